@@ -1,0 +1,87 @@
+"""The errors that femubench raises on purpose; everything else is a bug."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class FemubenchError(Exception):
+    """Base of all errors that a user can act upon."""
+
+
+class InputError(FemubenchError):
+    """Tell in one line what is wrong in an input, where, and what was expected.
+
+    Arguments:
+        what: the fault, e.g. ``"negative density -2700.0"``.
+        file: the file that holds it.
+        line: its line there, from 1.
+        key: the dotted key or the column, e.g. ``model.members[2].ends``.
+        expected: what would have been right, e.g. ``"a number > 0"``.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        *,
+        file: Path | str | None = None,
+        line: int | None = None,
+        key: str | None = None,
+        expected: str | None = None,
+    ) -> None:
+        self.what, self.file, self.line, self.key, self.expected = what, file, line, key, expected
+        where = "" if file is None else str(file)
+        where += "" if line is None else f":{line}"
+        parts = [part for part in (where, key, what) if part]
+        text = ": ".join(parts) + ("" if expected is None else f" (expected {expected})")
+        super().__init__(" ".join(text.split()))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _input_error, (self.what, self.file, self.line, self.key, self.expected)
+
+
+def _input_error(
+    what: str,
+    file: Path | str | None,
+    line: int | None,
+    key: str | None,
+    expected: str | None,
+) -> InputError:
+    return InputError(what, file=file, line=line, key=key, expected=expected)
+
+
+class ModelError(FemubenchError):
+    """A model that cannot be built or solved, e.g. a degree of freedom without any stiffness."""
+
+
+class PluginError(FemubenchError):
+    """A plugin that cannot be loaded or breaks its contract; names plugin and hook."""
+
+
+class NotApplicable(FemubenchError):  # noqa: N818 - a verdict of the contract, not a fault
+    """A strategy needs what the case does not have; the reason says what."""
+
+
+class StrategyFailure(FemubenchError):  # noqa: N818 - names the status `failed`
+    """A strategy cannot give a model; the reason carries the measured figure."""
+
+
+class SelfCheckFailed(StrategyFailure):
+    """A strategy's own promise is not met by its result.
+
+    Arguments:
+        promise: what was promised, e.g. ``"used modes reproduced"``.
+        measured: the residual that was found.
+        allowed: the largest residual that would have been accepted.
+    """
+
+    def __init__(self, promise: str, measured: float, allowed: float) -> None:
+        self.promise, self.measured, self.allowed = promise, measured, allowed
+        super().__init__(f"{promise}: measured {measured:.3g}, allowed {allowed:.3g}")
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return SelfCheckFailed, (self.promise, self.measured, self.allowed)
+
+
+class Diverged(StrategyFailure):
+    """An iteration that left every sensible range; the reason says at which step."""

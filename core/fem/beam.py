@@ -1,0 +1,221 @@
+"""Matrices of straight prismatic beam elements, a whole batch at a time, in local axes.
+
+The twelve local dofs are x y z rx ry rz of end 1, then of end 2; local x runs along the element and
+dw/dx = -ry, dv/dx = +rz. Everything is plain arithmetic on arrays, so complex numbers go through:
+that is how the derivatives are taken.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from femubench.core.typing import FloatArray, IntArray
+
+_AXIAL = np.array([0, 6])
+_TWIST = np.array([3, 9])
+# (v, rz) pairs with dv/dx = rz; (w, ry) pairs need the sign of the slope turned.
+_BEND_XY = np.array([1, 5, 7, 11])
+_BEND_XZ = np.array([2, 4, 8, 10])
+_SLOPE_SIGN = np.array([1.0, -1.0, 1.0, -1.0])
+
+
+@dataclass(frozen=True)
+class BeamProperties:
+    """Rigidities and inertias of a batch of elements, one entry an element.
+
+    Arguments:
+        length: distance of the two nodes in m.
+        EA, EIy, EIz, GJ: axial, bending (about y, about z) and torsional rigidity.
+        flex_y, flex_z: shear flexibility 1/(kappa G A) in 1/N; 0 for Euler-Bernoulli.
+        rhoA: mass per length in kg/m.
+        rhoJp: torsional inertia per length in kg m.
+        rhoIy, rhoIz: rotary inertia per length in kg m; 0 for Euler-Bernoulli.
+        rigid_1, rigid_2: rigid lengths at the ends in the stiffness matrix in m, of either sign.
+        rigid_mass_1, rigid_mass_2: rigid massless lengths in the mass matrix in m.
+    """
+
+    length: FloatArray
+    EA: FloatArray
+    EIy: FloatArray
+    EIz: FloatArray
+    GJ: FloatArray
+    flex_y: FloatArray
+    flex_z: FloatArray
+    rhoA: FloatArray
+    rhoJp: FloatArray
+    rhoIy: FloatArray
+    rhoIz: FloatArray
+    rigid_1: FloatArray
+    rigid_2: FloatArray
+    rigid_mass_1: FloatArray
+    rigid_mass_2: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.length)
+
+    def take(self, index: IntArray) -> BeamProperties:
+        """Return the entries of some elements."""
+        return BeamProperties(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+
+    def scaled(self, name: str, factor: FloatArray) -> BeamProperties:
+        """Return a batch in which one property is multiplied, one factor an element."""
+        return replace(self, **{name: getattr(self, name) * factor})
+
+
+def bending_stiffness(EI: Any, flexibility: Any, L: Any) -> Any:
+    """Return (n, 4, 4) for (w, slope) at both ends (Przemieniecki 1968, (5.116)).
+
+    Arguments:
+        EI: bending rigidity in N m2, (n,).
+        flexibility: 1/(kappa G A) in 1/N, (n,).
+        L: flexible length in m, (n,).
+    """
+    phi = 12.0 * EI * flexibility / L**2
+    c = EI / (L**3 * (1.0 + phi))
+    a, b = 6.0 * L, 4.0 + phi
+    d = 2.0 - phi
+    one = np.ones_like(c)
+    rows = [
+        [12 * one, a, -12 * one, a],
+        [a, b * L**2, -a, d * L**2],
+        [-12 * one, -a, 12 * one, -a],
+        [a, d * L**2, -a, b * L**2],
+    ]
+    return np.moveaxis(np.array(rows) * c, -1, 0)
+
+
+def bending_mass(rhoA: Any, rhoI: Any, phi: Any, L: Any) -> Any:
+    """Return (n, 4, 4) for (w, slope) at both ends (Friedman & Kosmatka 1993, (30)-(31)).
+
+    Arguments:
+        rhoA: mass per length in kg/m, (n,).
+        rhoI: rotary inertia per length in kg m, (n,).
+        phi: ratio of shear to bending flexibility 12 EI / (kappa G A L^2), (n,).
+        L: length that carries mass in m, (n,).
+    """
+    c = rhoA * L / (210.0 * (1.0 + phi) ** 2)
+    t1 = 70 * phi**2 + 147 * phi + 78
+    t2 = (35 * phi**2 + 77 * phi + 44) * L / 4
+    t3 = 35 * phi**2 + 63 * phi + 27
+    t4 = (35 * phi**2 + 63 * phi + 26) * L / 4
+    t5 = (7 * phi**2 + 14 * phi + 8) * L**2 / 4
+    t6 = (7 * phi**2 + 14 * phi + 6) * L**2 / 4
+    translation = [[t1, t2, t3, -t4], [t2, t5, t4, -t6], [t3, t4, t1, -t2], [-t4, -t6, -t2, t5]]
+    r = rhoI / (30.0 * (1.0 + phi) ** 2 * L)
+    r1 = 36.0 * np.ones_like(r)
+    r2 = (15 * phi - 3) * L
+    r3 = (10 * phi**2 + 5 * phi + 4) * L**2
+    r4 = (5 * phi**2 - 5 * phi - 1) * L**2
+    rotation = [[r1, -r2, -r1, -r2], [-r2, r3, r2, r4], [-r1, r2, r1, r2], [-r2, r4, r2, r3]]
+    return np.moveaxis(np.array(translation) * c + np.array(rotation) * r, -1, 0)
+
+
+def _place(target: Any, index: IntArray, block: Any, sign: FloatArray | None = None) -> None:
+    if sign is not None:
+        block = block * np.outer(sign, sign)
+    target[:, index[:, None], index[None, :]] += block
+
+
+def _flexible(p: BeamProperties) -> Any:
+    return p.length - p.rigid_1 - p.rigid_2
+
+
+def _add_rigid_ends(matrix: Any, first: Any, second: Any) -> Any:
+    """Return T' k T: the ends of the flexible part move rigidly with the nodes."""
+    if not (np.any(first) or np.any(second)):
+        return matrix
+    transform = _rigid_transform(first, second)
+    return np.swapaxes(transform, 1, 2) @ matrix @ transform
+
+
+def _rigid_transform(first: Any, second: Any) -> Any:
+    transform = np.zeros((len(first), 12, 12), dtype=np.result_type(first, second))
+    transform[:, range(12), range(12)] = 1.0
+    transform[:, 1, 5], transform[:, 2, 4] = first, -first
+    transform[:, 7, 11], transform[:, 8, 10] = -second, second
+    return transform
+
+
+def stiffness_matrices(p: BeamProperties) -> Any:
+    """Return the local stiffness matrices in N, N m, (n, 12, 12).
+
+    Rigid ends follow Horton et al. (1999), equation (5): T' k(L - a) T, axial EA/(L - a).
+    """
+    L = _flexible(p)
+    dtype = np.result_type(*(getattr(p, f.name) for f in fields(p)))
+    k = np.zeros((len(p), 12, 12), dtype=dtype)
+    bar = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    _place(k, _AXIAL, bar * (p.EA / L)[:, None, None])
+    _place(k, _TWIST, bar * (p.GJ / L)[:, None, None])
+    _place(k, _BEND_XY, bending_stiffness(p.EIz, p.flex_y, L))
+    _place(k, _BEND_XZ, bending_stiffness(p.EIy, p.flex_z, L), _SLOPE_SIGN)
+    return _add_rigid_ends(k, p.rigid_1, p.rigid_2)
+
+
+def mass_matrices(p: BeamProperties) -> Any:
+    """Return the consistent local mass matrices in kg, kg m, kg m2, (n, 12, 12)."""
+    L = p.length - p.rigid_mass_1 - p.rigid_mass_2
+    dtype = np.result_type(*(getattr(p, f.name) for f in fields(p)))
+    m = np.zeros((len(p), 12, 12), dtype=dtype)
+    bar = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
+    _place(m, _AXIAL, bar * (p.rhoA * L)[:, None, None])
+    _place(m, _TWIST, bar * (p.rhoJp * L)[:, None, None])
+    phi_y, phi_z = 12 * p.EIz * p.flex_y / L**2, 12 * p.EIy * p.flex_z / L**2
+    _place(m, _BEND_XY, bending_mass(p.rhoA, p.rhoIz, phi_y, L))
+    _place(m, _BEND_XZ, bending_mass(p.rhoA, p.rhoIy, phi_z, L), _SLOPE_SIGN)
+    return _add_rigid_ends(m, p.rigid_mass_1, p.rigid_mass_2)
+
+
+def shape_functions(p: BeamProperties, element: int, xi: float) -> FloatArray:
+    """Return displacement and rotation inside an element, (6, 12), local axes.
+
+    Arguments:
+        element: index in the batch.
+        xi: position along the element, 0..1 from node to node.
+
+    Source: Friedman & Kosmatka (1993), (20)-(21); cubic Hermite functions without shear.
+    """
+    one = p.take(np.array([element]))
+    L = float(_flexible(one)[0])
+    first, second = float(one.rigid_1[0]), float(one.rigid_2[0])
+    x = (xi * float(one.length[0]) - first) / L
+    rows = np.zeros((6, 12))
+    clear = min(max(x, 0.0), 1.0)
+    rows[np.ix_([0], _AXIAL)] = rows[np.ix_([3], _TWIST)] = [1.0 - clear, clear]
+    phi_y = 12 * one.EIz[0] * one.flex_y[0] / L**2
+    phi_z = 12 * one.EIy[0] * one.flex_z[0] / L**2
+    rows[np.ix_([1, 5], _BEND_XY)] = _bending_functions(x, L, float(phi_y))
+    rows[np.ix_([2, 4], _BEND_XZ)] = (
+        _bending_functions(x, L, float(phi_z)) * _SLOPE_SIGN * np.array([[1.0], [-1.0]])
+    )
+    return np.asarray(rows @ _rigid_transform(np.array([first]), np.array([second]))[0])
+
+
+def _bending_functions(x: float, L: float, phi: float) -> FloatArray:
+    if x < 0.0 or x > 1.0:
+        return _rigid_part(x, L)
+    c = 1.0 / (1.0 + phi)
+    cubic = 2 * x**3 - 3 * x**2 - phi * x
+    w = [
+        c * (cubic + 1 + phi),
+        c * L * (x**3 - (2 + phi / 2) * x**2 + (1 + phi / 2) * x),
+        -c * cubic,
+        c * L * (x**3 - (1 - phi / 2) * x**2 - phi / 2 * x),
+    ]
+    slope = 6 * c / L * (x**2 - x)
+    theta = [
+        slope,
+        c * (3 * x**2 - (4 + phi) * x + 1 + phi),
+        -slope,
+        c * (3 * x**2 - (2 - phi) * x),
+    ]
+    return np.array([w, theta])
+
+
+def _rigid_part(x: float, L: float) -> FloatArray:
+    if x < 0.0:
+        return np.array([[1.0, x * L, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
+    return np.array([[0.0, 0.0, 1.0, (x - 1.0) * L], [0.0, 0.0, 0.0, 1.0]])

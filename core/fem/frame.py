@@ -1,0 +1,174 @@
+"""The description of a frame, as a case folder gives it: plain data, no mesh yet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from femubench.core.fem.sections import Section
+
+Plane = Literal["in-plane", "out-of-plane", "3d"]
+BeamTheory = Literal["euler-bernoulli", "timoshenko"]
+Vector = tuple[float, float, float]
+
+ACTIVE: Mapping[Plane, tuple[str, ...]] = {
+    "in-plane": ("x", "z", "ry"),
+    "out-of-plane": ("z", "rx", "ry"),
+    "3d": ("x", "y", "z", "rx", "ry", "rz"),
+}
+
+
+@dataclass(frozen=True)
+class Material:
+    """Isotropic linear material: E in Pa, Poisson's ratio, density in kg/m3."""
+
+    E: float
+    nu: float
+    rho: float
+
+    @property
+    def G(self) -> float:  # noqa: N802 - the field's symbol
+        """Return the shear modulus E / 2(1 + nu) in Pa."""
+        return self.E / (2.0 * (1.0 + self.nu))
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A named point where members meet; joints of one type are expected to behave alike."""
+
+    name: str
+    xyz: Vector
+    type: str = ""
+
+
+@dataclass(frozen=True)
+class Member:
+    """A straight prismatic member from ends[0] to ends[1], cut into equal elements.
+
+    Arguments:
+        up: a vector in the local x-z plane, 3d only; None takes global z, or global x for a
+            member along z.
+    """
+
+    name: str
+    ends: tuple[str, str]
+    elements: int
+    section: Section
+    material: Material
+    up: Vector | None = None
+
+
+@dataclass(frozen=True)
+class Place:
+    """A point of the structure: a joint (or node), or the station s in 0..1 of a member."""
+
+    joint: str | None = None
+    member: str | None = None
+    s: float | None = None
+
+    def __str__(self) -> str:
+        return self.joint if self.joint is not None else f"{self.member}@{self.s}"
+
+
+@dataclass(frozen=True)
+class PointMass:
+    """A mass in kg without own rotary inertia, on a rigid massless arm `offset` (global, m)."""
+
+    at: Place
+    mass: float
+    offset: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class GroundSpring:
+    """A spring to ground in one global direction, N/m or N m/rad; a sign changes nothing."""
+
+    at: Place
+    direction: str
+    stiffness: float
+
+
+@dataclass(frozen=True)
+class Support:
+    """Degrees of freedom that are held at a place."""
+
+    at: Place
+    fixed: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class JointSpring:
+    """A flexible connection between a joint and one member end.
+
+    The member starts behind an arm of the given length; joint and member end are tied there by
+    one spring a direction; directions that are not named are shared.
+
+    Arguments:
+        joint: the joint's name.
+        member: the member whose end is connected flexibly.
+        stiffness: from local directions of the member (x along it) to N/m or N m/rad.
+        arm: length in m, measured from the joint along the member.
+        arm_factor: None for a rigid massless arm, else a massless beam with the member's
+            rigidities times this factor (Horton et al. 1999, section 3.1).
+    """
+
+    joint: str
+    member: str
+    stiffness: Mapping[str, float]
+    arm: float = 0.0
+    arm_factor: float | None = None
+
+
+@dataclass(frozen=True)
+class RigidEnd:
+    """A member end whose first element is partly rigid (Ahmadian et al.; Horton et al. 1999, (5)).
+
+    Arguments:
+        stiffness_length: a, the rigid length in the stiffness matrix in m; may be negative.
+        mass_length: a0, the rigid massless length in the mass matrix in m.
+    """
+
+    joint: str
+    member: str
+    stiffness_length: float
+    mass_length: float = 0.0
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame of beams with everything that is attached to it.
+
+    Arguments:
+        rotary_inertia: whether rho I takes part; None follows the beam theory.
+    """
+
+    plane: Plane
+    beam: BeamTheory
+    joints: tuple[Joint, ...]
+    members: tuple[Member, ...]
+    masses: tuple[PointMass, ...] = ()
+    springs: tuple[GroundSpring, ...] = ()
+    supports: tuple[Support, ...] = ()
+    joint_springs: tuple[JointSpring, ...] = ()
+    rigid_ends: tuple[RigidEnd, ...] = ()
+    rotary_inertia: bool | None = None
+
+    @property
+    def with_rotary_inertia(self) -> bool:
+        """Tell whether rho I takes part in the mass matrix."""
+        return self.beam == "timoshenko" if self.rotary_inertia is None else self.rotary_inertia
+
+    def joint(self, name: str) -> Joint:
+        """Return the joint of that name; raises KeyError."""
+        return next(joint for joint in self.joints if joint.name == name)
+
+    def ends_at(self, joint: str) -> tuple[str, ...]:
+        """Return the names of the members that end at a joint."""
+        return tuple(member.name for member in self.members if joint in member.ends)
+
+    def with_attachments(
+        self, masses: tuple[PointMass, ...], springs: tuple[GroundSpring, ...]
+    ) -> Frame:
+        """Return the frame with further masses and springs to ground."""
+        return replace(self, masses=self.masses + masses, springs=self.springs + springs)

@@ -1,0 +1,195 @@
+"""From free dofs to the six displacements of every node: planes, supports, rigid arms, joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench.core.errors import ModelError
+from femubench.core.fem.beam import BeamProperties, shape_functions
+from femubench.core.fem.frame import ACTIVE, Frame, Place
+from femubench.core.fem.mesh import Connection, Mesh
+from femubench.core.measurement import DIRECTIONS
+from femubench.core.typing import FloatArray, IntArray, SparseArray
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """What moves with what.
+
+    Arguments:
+        transform: node displacements = transform @ free dofs, (6 n_nodes, n).
+        node: node of every free dof, (n,).
+        direction: its direction, (n,).
+        axes: its unit motion in (x, y, z, rx, ry, rz), (n, 6).
+    """
+
+    transform: SparseArray
+    node: IntArray
+    direction: tuple[str, ...]
+    axes: FloatArray
+
+
+def rigid_arm(offset: FloatArray) -> FloatArray:
+    """Return the (6, 6) motion of a point at `offset` (global, m) of a moving rigid body."""
+    x, y, z = offset
+    motion = np.eye(6)
+    motion[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+    return motion
+
+
+def node_at(frame: Frame, mesh: Mesh, place: Place) -> int | None:
+    """Return the mesh node at a joint or a station, None between nodes."""
+    if place.joint is not None:
+        names = [joint.name for joint in frame.joints]
+        if place.joint not in names:
+            raise ModelError(f"there is no joint {place.joint!r}")
+        return names.index(place.joint)
+    element, s = _element_at(frame, mesh, place)
+    for end in (0, 1):
+        if abs(mesh.stations[element, end] - s) < 1e-9:
+            node = int(mesh.ends[element, end])
+            return _joint_of(mesh, node)
+    return None
+
+
+def _joint_of(mesh: Mesh, node: int) -> int:
+    """Return the joint itself where a node hangs on it without an arm."""
+    for connection in mesh.connections:
+        if connection.node == node and not connection.arm.any():
+            return connection.base
+    return node
+
+
+def _element_at(frame: Frame, mesh: Mesh, place: Place) -> tuple[int, float]:
+    names = [member.name for member in frame.members]
+    if place.member not in names or place.s is None:
+        raise ModelError(f"there is no member {place.member!r}")
+    rows = np.flatnonzero(mesh.member == names.index(place.member))
+    low, high = mesh.stations[rows, 0], mesh.stations[rows, 1]
+    gap = np.maximum(low - place.s, place.s - high)
+    return int(rows[gap.argmin()]), place.s
+
+
+def point_rows(frame: Frame, mesh: Mesh, properties: BeamProperties, place: Place) -> SparseArray:
+    """Return displacement and rotation of a point from node displacements, (6, 6 n_nodes).
+
+    Between nodes the element's shape functions interpolate; on a rigid arm it moves as a body.
+    """
+    shape = (6, 6 * len(mesh.xyz))
+    node = node_at(frame, mesh, place)
+    if node is not None:
+        return sp.csr_array((np.ones(6), (np.arange(6), 6 * node + np.arange(6))), shape=shape)
+    element, s = _element_at(frame, mesh, place)
+    s0, s1 = mesh.stations[element]
+    axes = np.kron(np.eye(2), mesh.axes[element])
+    if s < s0 or s > s1:
+        end = 0 if s < s0 else 1
+        base = next(c.base for c in mesh.connections if c.node == mesh.ends[element, end])
+        ends = [frame.joint(name).xyz for name in frame.members[mesh.member[element]].ends]
+        point = np.array(ends[0]) * (1 - s) + np.array(ends[1]) * s
+        block, columns = rigid_arm(point - mesh.xyz[base]), 6 * base + np.arange(6)
+    else:
+        local = shape_functions(properties, element, float((s - s0) / (s1 - s0)))
+        block = axes.T @ local @ np.kron(np.eye(2), axes)
+        columns = (6 * mesh.ends[element][:, None] + np.arange(6)).ravel()
+    rows = np.repeat(np.arange(6), len(columns))
+    return sp.csr_array((block.ravel(), (rows, np.tile(columns, 6))), shape=shape)
+
+
+def spring_rows(mesh: Mesh, connection: Connection) -> SparseArray:
+    """Return the relative local displacements of a joint spring, (n_directions, 6 n_nodes)."""
+    six = np.kron(np.eye(2), connection.axes)
+    index = [DIRECTIONS.index(name) for name in connection.spring.stiffness]
+    block = np.hstack([six, -six @ rigid_arm(connection.arm)])[index]
+    columns = np.concatenate(
+        [6 * connection.node + np.arange(6), 6 * connection.base + np.arange(6)]
+    )
+    rows = np.repeat(np.arange(len(index)), 12)
+    shape = (len(index), 6 * len(mesh.xyz))
+    return sp.csr_array((block.ravel(), (rows, np.tile(columns, len(index)))), shape=shape)
+
+
+def build_kinematics(frame: Frame, mesh: Mesh) -> Kinematics:
+    """Return which node displacements are free and how the others follow from them."""
+    active = np.array([name in ACTIVE[frame.plane] for name in DIRECTIONS])
+    free = np.tile(active, (len(mesh.xyz), 1))
+    for support in frame.supports:
+        node = node_at(frame, mesh, support.at)
+        assert node is not None  # the mesh is split at supports
+        free[node, [DIRECTIONS.index(name) for name in support.fixed]] = False
+    hanging = {connection.node: connection for connection in mesh.connections}
+    own: list[tuple[int, FloatArray, tuple[str, ...]]] = []  # node, (6, k) basis, labels
+    for node in hanging:
+        free[node] = False
+        own.append((node, *_own_motion(hanging[node], active)))
+    return _assemble_transform(mesh, free, own, hanging, active)
+
+
+def _own_motion(connection: Connection, active: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
+    """Return the motions that a hanging node has of its own, as columns, with their labels.
+
+    A block (translation, rotation) that is wholly free keeps the global axes; a partly free one
+    moves along the member's axes.
+    """
+    columns, labels = [], []
+    for block in (range(3), range(3, 6)):
+        names = [DIRECTIONS[i] for i in block if active[i]]
+        sprung = [name for name in names if name in connection.spring.stiffness]
+        whole = len(sprung) == len(names)
+        for name in sprung:
+            i = DIRECTIONS.index(name)
+            column = np.zeros(6)
+            if whole:
+                column[i] = 1.0
+            else:
+                column[list(block)] = connection.axes[i % 3]
+            columns.append(column)
+            labels.append(name)
+    return np.array(columns).reshape(-1, 6).T, tuple(labels)
+
+
+def _assemble_transform(
+    mesh: Mesh,
+    free: FloatArray,
+    own: list[tuple[int, FloatArray, tuple[str, ...]]],
+    hanging: dict[int, Connection],
+    active: FloatArray,
+) -> Kinematics:
+    size = 6 * len(mesh.xyz)
+    flat = np.flatnonzero(free.ravel())
+    node = [*(flat // 6), *(n for n, basis, _ in own for _ in range(basis.shape[1]))]
+    direction = [*(DIRECTIONS[i % 6] for i in flat), *(d for _, _, labels in own for d in labels)]
+    count = len(node)
+    rows, cols, data = [flat], [np.arange(len(flat))], [np.ones(len(flat))]
+    position = len(flat)
+    for n, basis, _ in own:
+        i, j = np.nonzero(basis)
+        rows.append(6 * n + i)
+        cols.append(position + j)
+        data.append(basis[i, j])
+        position += basis.shape[1]
+    triplet = (np.concatenate(data), (np.concatenate(rows), np.concatenate(cols)))
+    transform = sp.csr_array(triplet, shape=(size, count))
+    # A hanging node may hang on the tip of an arm that is itself free, never on a hanging node.
+    for n, basis, _ in own:
+        shared = np.eye(6) - basis @ basis.T
+        shared[~active] = 0.0
+        base = hanging[n].base
+        follow = shared @ rigid_arm(hanging[n].arm)
+        pick = sp.csr_array(
+            (follow.ravel(), (np.repeat(6 * n + np.arange(6), 6), np.tile(np.arange(6), 6))),
+            shape=(size, 6),
+        )
+        transform = transform + pick @ transform[6 * base : 6 * base + 6]
+    transform.eliminate_zeros()
+    axes = np.vstack([np.eye(6)[flat % 6], *(basis.T for _, basis, _ in own)])
+    order = np.lexsort((np.array([DIRECTIONS.index(d) for d in direction]), np.array(node)))
+    return Kinematics(
+        transform=transform[:, order].tocsr(),
+        node=np.array(node, dtype=np.int64)[order],
+        direction=tuple(direction[i] for i in order),
+        axes=axes[order],
+    )

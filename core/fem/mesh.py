@@ -1,0 +1,209 @@
+"""Meshing of a frame: nodes, elements, and where the attachments split a member."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from femubench.core.errors import ModelError
+from femubench.core.fem.frame import Frame, JointSpring, Member, Place, RigidEnd
+from femubench.core.typing import FloatArray, IntArray
+
+ON_MEMBER = 1e-6  # m, how far from the axis a sensor may lie
+_SAME_STATION = 1e-9
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A joint spring as it is meshed: `node` hangs on `base` behind a rigid arm (global, m)."""
+
+    spring: JointSpring
+    base: int
+    node: int
+    arm: FloatArray
+    axes: FloatArray
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Nodes and elements of a frame.
+
+    Arguments:
+        xyz: node positions in m, (n_nodes, 3); joints come first, in the frame's order.
+        ends: node numbers, (n_elements, 2).
+        axes: rows are the local x, y, z axes in global components, (n_elements, 3, 3).
+        member: index of the member of every element, (n_elements,).
+        number: element k of its member, from 1; pieces of a split element share it.
+        stations: where an element starts and ends on its member, 0..1, (n_elements, 2).
+        rigid: rigid lengths in the stiffness matrix in m, (n_elements, 2).
+        rigid_mass: rigid lengths in the mass matrix in m, (n_elements, 2).
+        arm_factor: nan for an ordinary element, else the massless arm's rigidity factor.
+        connections: the joint springs.
+    """
+
+    xyz: FloatArray
+    ends: IntArray
+    axes: FloatArray
+    member: IntArray
+    number: IntArray
+    stations: FloatArray
+    rigid: FloatArray
+    rigid_mass: FloatArray
+    arm_factor: FloatArray
+    connections: tuple[Connection, ...]
+
+
+def member_axes(frame: Frame, member: Member) -> tuple[FloatArray, float]:
+    """Return the local axes (rows) and the length of a member.
+
+    Raises:
+        ModelError: when the member has no length, leaves the plane, or `up` lies along it.
+    """
+    start, stop = (np.array(frame.joint(name).xyz) for name in member.ends)
+    length = float(np.linalg.norm(stop - start))
+    if length < ON_MEMBER:
+        raise ModelError(f"member {member.name!r} has length zero")
+    x = (stop - start) / length
+    if frame.plane == "out-of-plane":
+        return np.array([x, np.cross([0.0, 0.0, 1.0], x), [0.0, 0.0, 1.0]]), length
+    if frame.plane == "in-plane":
+        return np.array([x, [0.0, 1.0, 0.0], np.cross(x, [0.0, 1.0, 0.0])]), length
+    vertical = bool(np.hypot(x[0], x[1]) < 1e-9)
+    default = (1.0, 0.0, 0.0) if vertical else (0.0, 0.0, 1.0)
+    y = np.cross(np.array(member.up if member.up is not None else default), x)
+    if np.linalg.norm(y) < 1e-9:
+        raise ModelError(f"member {member.name!r}: `up` lies along the member")
+    y /= np.linalg.norm(y)
+    return np.array([x, y, np.cross(x, y)]), length
+
+
+class _Builder:
+    """Collects nodes and elements member by member."""
+
+    def __init__(self, frame: Frame) -> None:
+        self.frame = frame
+        self.joint_index = {joint.name: i for i, joint in enumerate(frame.joints)}
+        self.xyz: list[FloatArray] = [np.array(joint.xyz, dtype=float) for joint in frame.joints]
+        self.rows: list[tuple[int, int, int, int, float, float, float]] = []
+        self.rigid: dict[tuple[int, int], RigidEnd] = {}
+        self.axes: list[FloatArray] = []
+        self.connections: list[Connection] = []
+        self.springs = {(s.member, s.joint): s for s in frame.joint_springs}
+        self.rigid_ends = {(r.member, r.joint): r for r in frame.rigid_ends}
+        self.splits: dict[str, list[float]] = {}
+        for attachment in (*frame.masses, *frame.springs, *frame.supports):
+            if attachment.at.member is not None and attachment.at.s is not None:
+                self.splits.setdefault(attachment.at.member, []).append(attachment.at.s)
+
+    def node(self, xyz: FloatArray) -> int:
+        self.xyz.append(xyz)
+        return len(self.xyz) - 1
+
+    def connect(self, m: int, end: int, axes: FloatArray, length: float) -> tuple[int, float]:
+        """Return the node at which the member starts and the length of the arm before it."""
+        member = self.frame.members[m]
+        base = self.joint_index[member.ends[end]]
+        spring = self.springs.get((member.name, member.ends[end]))
+        if spring is None:
+            return base, 0.0
+        arm = axes[0] * spring.arm * (1.0 if end == 0 else -1.0)
+        face = self.xyz[base] + arm
+        if spring.arm_factor is not None and spring.arm > 0.0:
+            tip = self.node(face)
+            number = 1 if end == 0 else member.elements
+            station = spring.arm / length
+            ends = (base, tip) if end == 0 else (tip, base)
+            stations = (0.0, station) if end == 0 else (1.0 - station, 1.0)
+            self.rows.append((*ends, m, number, *stations, spring.arm_factor))
+            base, arm = tip, np.zeros(3)
+        node = self.node(face)
+        self.connections.append(Connection(spring, base, node, arm, axes))
+        return node, spring.arm
+
+    def member(self, m: int) -> None:
+        member = self.frame.members[m]
+        axes, length = member_axes(self.frame, member)
+        self.axes.append(axes)
+        first, arm_1 = self.connect(m, 0, axes, length)
+        last, arm_2 = self.connect(m, 1, axes, length)
+        grid = _stations(member, self.splits.get(member.name, []))
+        low, high = arm_1 / length, 1.0 - arm_2 / length
+        inner = grid[(grid > _SAME_STATION) & (grid < 1.0 - _SAME_STATION)]
+        if high <= low or (len(inner) and (inner[0] <= low or inner[-1] >= high)):
+            raise ModelError(
+                f"member {member.name!r}: the arm of a joint spring reaches past its end element"
+            )
+        start = self.xyz[self.joint_index[member.ends[0]]]
+        nodes = [first, *(self.node(start + axes[0] * length * s) for s in inner), last]
+        bounds = np.concatenate([[low], inner, [high]])
+        for (a, b), (s0, s1) in zip(pairwise(nodes), pairwise(bounds), strict=True):
+            number = min(int((s0 + s1) / 2 * member.elements) + 1, member.elements)
+            self.rows.append((a, b, m, number, s0, s1, np.nan))
+        for end, row in ((0, len(self.rows) - len(nodes) + 1), (1, len(self.rows) - 1)):
+            rigid = self.rigid_ends.get((member.name, member.ends[end]))
+            if rigid is not None:
+                self.rigid[row, end] = rigid
+
+    def mesh(self) -> Mesh:
+        for m in range(len(self.frame.members)):
+            self.member(m)
+        table = np.array(self.rows, dtype=float).reshape(-1, 7)
+        member = table[:, 2].astype(np.int64)
+        rigid, rigid_mass = np.zeros((len(table), 2)), np.zeros((len(table), 2))
+        for (row, end), spec in self.rigid.items():
+            rigid[row, end], rigid_mass[row, end] = spec.stiffness_length, spec.mass_length
+        return Mesh(
+            xyz=np.array(self.xyz).reshape(-1, 3),
+            ends=table[:, :2].astype(np.int64),
+            axes=np.array(self.axes).reshape(-1, 3, 3)[member],
+            member=member,
+            number=table[:, 3].astype(np.int64),
+            stations=table[:, 4:6],
+            rigid=rigid,
+            rigid_mass=rigid_mass,
+            arm_factor=table[:, 6],
+            connections=tuple(self.connections),
+        )
+
+
+def _stations(member: Member, splits: list[float]) -> FloatArray:
+    grid = np.linspace(0.0, 1.0, member.elements + 1)
+    new = [s for s in splits if np.min(np.abs(grid - s)) > _SAME_STATION]
+    merged = np.unique(np.concatenate([grid, new]))
+    keep = np.concatenate([[True], np.diff(merged) > _SAME_STATION])
+    return np.asarray(merged[keep])
+
+
+def build_mesh(frame: Frame) -> Mesh:
+    """Return the mesh of a frame; an attachment between nodes splits the element there.
+
+    Raises:
+        ModelError: for a member without length, or an arm longer than its element.
+    """
+    return _Builder(frame).mesh()
+
+
+def locate(frame: Frame, xyz: FloatArray) -> Place:
+    """Return the joint or the station of a member at a point.
+
+    Raises:
+        ModelError: when the point lies further than 1e-6 m from every member.
+    """
+    corners = np.array([joint.xyz for joint in frame.joints])
+    distance = np.linalg.norm(corners - xyz, axis=1)
+    if distance.min() <= ON_MEMBER:
+        return Place(joint=frame.joints[int(distance.argmin())].name)
+    index = {joint.name: i for i, joint in enumerate(frame.joints)}
+    ends = np.array([[index[name] for name in member.ends] for member in frame.members])
+    start, along = corners[ends[:, 0]], corners[ends[:, 1]] - corners[ends[:, 0]]
+    s = np.einsum("ij,ij->i", xyz - start, along) / np.einsum("ij,ij->i", along, along)
+    foot = start + np.clip(s, 0.0, 1.0)[:, None] * along
+    gap = np.linalg.norm(xyz - foot, axis=1)
+    best = int(gap.argmin())
+    if gap[best] > ON_MEMBER:
+        raise ModelError(
+            f"point ({', '.join(f'{v:g}' for v in xyz)}) lies {gap[best]:.3g} m off the structure"
+        )
+    return Place(member=frame.members[best].name, s=float(np.clip(s[best], 0.0, 1.0)))

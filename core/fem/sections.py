@@ -1,0 +1,166 @@
+"""Cross sections: area, second moments, torsion and polar constants, Cowper's shear coefficient."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+ShearCoefficients = Callable[[float], tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Section:
+    """Constants of a cross section in its local axes (y across, z up).
+
+    Arguments:
+        A: area in m2.
+        Iy: integral of z^2 over the area in m4 (bending in the local x-z plane).
+        Iz: integral of y^2 over the area in m4.
+        J: St Venant torsion constant in m4.
+        Jp: polar second moment in m4 (torsional inertia).
+        kappa: from Poisson's ratio to the shear coefficients for shear along y and along z;
+            None where the section was given without one.
+        width: size along y in m; None where the section was given as numbers.
+        height: size along z in m; None likewise.
+        shape: the name of the shape; empty for numbers.
+    """
+
+    A: float
+    Iy: float
+    Iz: float
+    J: float
+    Jp: float
+    kappa: ShearCoefficients | None = None
+    width: float | None = None
+    height: float | None = None
+    shape: str = ""
+
+
+def constant_kappa(value: float) -> ShearCoefficients:
+    """Return a shear coefficient that is the same along both axes and for every material."""
+    return partial(_constant, value)
+
+
+def _constant(value: float, nu: float) -> tuple[float, float]:
+    return value, value
+
+
+def bredt(b: float, h: float, wall: float) -> float:
+    """Return the torsion constant of a thin closed rectangle in m4 (Bredt 1896).
+
+    Arguments:
+        b, h: centre-line width and height in m.
+        wall: wall thickness in m.
+    """
+    return 2.0 * wall * (b * h) ** 2 / (b + h)
+
+
+def saint_venant_rectangle(a: float, b: float) -> float:
+    """Return the torsion constant of a solid rectangle in m4 (Timoshenko & Goodier, art. 109)."""
+    long, short = max(a, b), min(a, b)
+    n = np.arange(1, 40, 2)
+    series = np.sum(np.tanh(n * np.pi * long / (2.0 * short)) / n**5.0)
+    return float(long * short**3 * (1.0 / 3.0 - 64.0 / np.pi**5 * short / long * series))
+
+
+def _cowper_box(b: float, h: float, nu: float) -> float:
+    """Return kappa of a thin box of uniform wall for shear along h (Cowper 1966, table 1)."""
+    n = b / h
+    m = n
+    flange = (12 + 72 * m + 150 * m**2 + 90 * m**3) + nu * (11 + 66 * m + 135 * m**2 + 90 * m**3)
+    web = 10 * n**2 * ((3 + nu) * m + 3 * m**2)
+    return 10 * (1 + nu) * (1 + 3 * m) ** 2 / (flange + web)
+
+
+def _box_kappa(b: float, h: float, nu: float) -> tuple[float, float]:
+    return _cowper_box(h, b, nu), _cowper_box(b, h, nu)
+
+
+def _rectangle_kappa(nu: float) -> tuple[float, float]:
+    kappa = 10 * (1 + nu) / (12 + 11 * nu)
+    return kappa, kappa
+
+
+def _circle_kappa(ratio: float, nu: float) -> tuple[float, float]:
+    """Return kappa of a hollow circle, ratio = inner over outer radius (Cowper 1966, table 1)."""
+    square = (1 + ratio**2) ** 2
+    kappa = 6 * (1 + nu) * square / ((7 + 6 * nu) * square + (20 + 12 * nu) * ratio**2)
+    return kappa, kappa
+
+
+def rectangular_tube(width: float, height: float, wall: float) -> Section:
+    """Return a tube with sharp corners; sizes are outer sizes in m."""
+    inner_w, inner_h = width - 2 * wall, height - 2 * wall
+    iy = (width * height**3 - inner_w * inner_h**3) / 12
+    iz = (height * width**3 - inner_h * inner_w**3) / 12
+    b, h = width - wall, height - wall
+    return Section(
+        A=width * height - inner_w * inner_h,
+        Iy=iy,
+        Iz=iz,
+        J=bredt(b, h, wall),
+        Jp=iy + iz,
+        kappa=partial(_box_kappa, b, h),
+        width=width,
+        height=height,
+        shape="rectangular-tube",
+    )
+
+
+def solid_rectangle(width: float, height: float) -> Section:
+    """Return a solid rectangle; sizes in m."""
+    iy, iz = width * height**3 / 12, height * width**3 / 12
+    return Section(
+        A=width * height,
+        Iy=iy,
+        Iz=iz,
+        J=saint_venant_rectangle(width, height),
+        Jp=iy + iz,
+        kappa=_rectangle_kappa,
+        width=width,
+        height=height,
+        shape="solid-rectangle",
+    )
+
+
+def round_tube(diameter: float, wall: float) -> Section:
+    """Return a circular tube; `wall` of half the diameter makes it solid; sizes in m."""
+    outer, inner = diameter / 2, diameter / 2 - wall
+    second = np.pi / 4 * (outer**4 - inner**4)
+    return Section(
+        A=float(np.pi * (outer**2 - inner**2)),
+        Iy=float(second),
+        Iz=float(second),
+        J=float(2 * second),
+        Jp=float(2 * second),
+        kappa=partial(_circle_kappa, inner / outer),
+        width=diameter,
+        height=diameter,
+        shape="round-tube",
+    )
+
+
+def _square_tube(width: float, wall: float) -> Section:
+    return rectangular_tube(width, width, wall)
+
+
+def _solid_square(width: float) -> Section:
+    return solid_rectangle(width, width)
+
+
+def _solid_circle(diameter: float) -> Section:
+    return round_tube(diameter, diameter / 2)
+
+
+# Name in case.toml -> (constructor, its keys); walls come last so that they can be checked.
+SHAPES: Mapping[str, tuple[Callable[..., Section], tuple[str, ...]]] = {
+    "square-tube": (_square_tube, ("width", "wall")),
+    "rectangular-tube": (rectangular_tube, ("width", "height", "wall")),
+    "round-tube": (round_tube, ("diameter", "wall")),
+    "solid-square": (_solid_square, ("width",)),
+    "solid-rectangle": (solid_rectangle, ("width", "height")),
+    "solid-circle": (_solid_circle, ("diameter",)),
+}

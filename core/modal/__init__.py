@@ -1,0 +1,1 @@
+"""Modal analysis: eigenpairs, rigid-body modes, correlation, pairing, expansion, sensitivities."""

@@ -1,0 +1,204 @@
+"""Natural frequencies and mode shapes of any model, negative eigenvalues included."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from femubench.core.errors import ModelError
+from femubench.core.modal.rigid import rigid_modes_of, rigid_share
+from femubench.core.modal.sparse_eigen import lowest_eigenpairs
+from femubench.core.model import Model
+from femubench.core.typing import BoolArray, FloatArray
+
+DENSE_LIMIT = 500
+_RIGID_SHARE = 0.9
+_ROUNDOFF = 32.0 * np.finfo(float).eps
+_ZERO = 1e-6  # of the first elastic eigenvalue
+
+
+class _Counter:
+    """Counts eigenvalue solutions, so that nobody has to report their own."""
+
+    count = 0
+
+
+@contextmanager
+def counted_evaluations() -> Iterator[type[_Counter]]:
+    """Count the eigenvalue solutions made inside the block (read `.count` at its end)."""
+    _Counter.count = 0
+    yield _Counter
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Eigenpairs in ascending order.
+
+    Arguments:
+        eigenvalues: omega^2 in rad^2/s^2 with their sign, (m,).
+        shapes: mass-normalised, (n, m).
+        rigid: whether a mode lies in the space of rigid-body motions, (m,).
+    """
+
+    eigenvalues: FloatArray
+    shapes: FloatArray
+    rigid: BoolArray
+
+    def __len__(self) -> int:
+        return len(self.eigenvalues)
+
+    @property
+    def natural_frequencies(self) -> FloatArray:
+        """Return Hz; a negative number stands for an imaginary frequency, (m,)."""
+        root = np.sqrt(np.abs(self.eigenvalues)) / (2.0 * np.pi)
+        return np.asarray(np.copysign(root, self.eigenvalues))
+
+    def take(self, index: object) -> Modes:
+        """Return some of the modes."""
+        return Modes(self.eigenvalues[index], self.shapes[:, index], self.rigid[index])  # type: ignore[index]
+
+    @property
+    def elastic(self) -> Modes:
+        """Return the modes that are not rigid-body motions."""
+        return self.take(~self.rigid)
+
+
+def _dense(matrix: object, change: object) -> FloatArray:
+    dense = np.asarray(matrix.toarray())  # type: ignore[attr-defined]
+    return dense if change is None else dense + change.toarray()  # type: ignore[attr-defined]
+
+
+def dense_matrices(model: Model) -> tuple[FloatArray, FloatArray]:
+    """Return mass and stiffness as dense arrays, for small models only."""
+    return _dense(model.mass, model.mass_change), _dense(model.stiffness, model.stiffness_change)
+
+
+def natural_shift(mass: FloatArray, stiffness: FloatArray) -> float:
+    """Return a positive eigenvalue scale from the diagonals in rad^2/s^2."""
+    m, k = np.diagonal(mass), np.diagonal(stiffness)
+    carrying = (m > 0.0) & (k > 0.0)
+    if not carrying.any():
+        raise ModelError("no degree of freedom has both mass and stiffness")
+    return float(1e-6 * np.median(k[carrying] / m[carrying]))
+
+
+def solve_dense(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return all finite eigenpairs, ascending, shapes mass-normalised.
+
+    The reciprocal problem M x = mu (K + s M) x is solved, mu = 1/(lambda + s): low eigenvalues
+    come out with full relative accuracy, massless dofs have mu = 0 and are thereby condensed
+    exactly, and their motion is part of the shapes. Where K + s M is not positive definite
+    (an indefinite K), massless dofs are condensed first and the problem is solved as it stands.
+
+    Raises:
+        ModelError: when a massless motion has no stiffness, or the mass is indefinite.
+    """
+    shift = natural_shift(mass, stiffness)
+    for factor in (1.0, 1e3, 1e6):
+        try:
+            lower = la.cholesky(stiffness + factor * shift * mass, lower=True)
+        except la.LinAlgError:
+            continue
+        return _reciprocal(mass, lower, factor * shift)
+    return _direct(mass, stiffness)
+
+
+def _reciprocal(mass: FloatArray, lower: FloatArray, s: float) -> tuple[FloatArray, FloatArray]:
+    half = la.solve_triangular(lower, mass, lower=True)
+    inner = la.solve_triangular(lower, half.T, lower=True)
+    mu, vectors = la.eigh(0.5 * (inner + inner.T))
+    if mu[0] < -1e-9 * mu[-1]:
+        raise ModelError("the mass matrix is not positive semidefinite")
+    finite = mu > 1e-13 * mu[-1]
+    mu, vectors = mu[finite][::-1], vectors[:, finite][:, ::-1]
+    shapes = la.solve_triangular(lower.T, vectors, lower=False) / np.sqrt(mu)
+    return 1.0 / mu - s, shapes
+
+
+def _direct(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
+    reduced_k, reduced_m, expand = condense_massless(mass, stiffness)
+    try:
+        eigenvalues, shapes = la.eigh(reduced_k, reduced_m)
+    except la.LinAlgError as error:
+        raise ModelError("the mass matrix is not positive definite") from error
+    return eigenvalues, expand @ shapes
+
+
+def condense_massless(
+    mass: FloatArray, stiffness: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return stiffness and mass on the space that carries mass, and the expansion from it.
+
+    Massless motions follow statically, which is exact (Guyan 1965 with M_ss = 0): the expansion
+    is (n, n_massive), K and M are expansion' K expansion and so on.
+
+    Raises:
+        ModelError: when a massless motion has no stiffness.
+    """
+    values, vectors = la.eigh(_scaled(mass))
+    scale = _scaling(mass)[:, None]
+    empty = values < 1e-13 * values[-1]
+    if not empty.any():
+        return stiffness, mass, np.eye(len(mass))
+    null, carrying = scale * vectors[:, empty], scale * vectors[:, ~empty]
+    inner = null.T @ stiffness @ null
+    if np.linalg.matrix_rank(inner, hermitian=True) < len(inner):
+        raise ModelError("a degree of freedom has neither mass nor stiffness")
+    expand = carrying - null @ la.solve(inner, null.T @ stiffness @ carrying, assume_a="sym")
+    return expand.T @ stiffness @ expand, carrying.T @ mass @ carrying, expand
+
+
+def _scaling(mass: FloatArray) -> FloatArray:
+    diagonal = np.diagonal(mass)
+    return np.where(diagonal > 0.0, 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)), 1.0)
+
+
+def _scaled(mass: FloatArray) -> FloatArray:
+    scale = _scaling(mass)
+    return np.asarray(mass * np.outer(scale, scale))
+
+
+def solve_modes(model: Model, count: int | None = None) -> Modes:
+    """Return the lowest modes of a model, rigid-body modes recognised by projection.
+
+    Arguments:
+        model: any model; up to 500 dofs it is solved densely and completely.
+        count: number of modes wanted, rigid ones included; None for all (small models), or 20
+            of a large one, which has its negative eigenvalues besides.
+
+    Raises:
+        ModelError: when the eigenvalue problem has no solution, e.g. a mechanism without mass.
+    """
+    _Counter.count += 1
+    if model.size <= DENSE_LIMIT:
+        mass, stiffness = dense_matrices(model)
+        if not (np.isfinite(mass).all() and np.isfinite(stiffness).all()):
+            raise ModelError("a matrix has entries that are not finite")
+        eigenvalues, shapes = solve_dense(mass, stiffness)
+    else:
+        eigenvalues, shapes = lowest_eigenpairs(model, 20 if count is None else count)
+    if model.size <= DENSE_LIMIT:
+        eigenvalues, shapes = eigenvalues[:count], shapes[:, :count]
+    share = rigid_share(model, shapes, rigid_modes_of(model))
+    return Modes(_without_roundoff(model, eigenvalues, shapes), shapes, share > _RIGID_SHARE)
+
+
+def _without_roundoff(model: Model, eigenvalues: FloatArray, shapes: FloatArray) -> FloatArray:
+    """Return the eigenvalues with those that cannot be told from zero set to zero.
+
+    phi' K phi sums terms of the size of |phi|' |K| |phi|, so that is what its rounding error
+    scales with; on fine meshes it exceeds any fixed share of the first elastic eigenvalue.
+    """
+    small = np.abs(shapes)
+    bound = np.einsum("ij,ij->j", small, np.abs(model.stiffness) @ small)
+    return np.where(np.abs(eigenvalues) <= _ROUNDOFF * bound, 0.0, eigenvalues)
+
+
+def zero_tolerance(modes: Modes) -> float:
+    """Return the eigenvalue below which a mode counts as one of zero frequency."""
+    elastic = modes.eigenvalues[~modes.rigid & (modes.eigenvalues > 0.0)]
+    return float(_ZERO * elastic[0]) if len(elastic) else 0.0
