@@ -9,10 +9,10 @@ from typing import Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from femubench.core.errors import NotApplicable
+from femubench.core.errors import ModelError, NotApplicable
 from femubench.core.fem.frame import Frame, GroundSpring, PointMass
 from femubench.core.fem.structure import Structure
-from femubench.core.measurement import DIRECTIONS, Sensors
+from femubench.core.measurement import Sensors
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 
@@ -137,12 +137,14 @@ class Model:
     def stiffness_times(self, vectors: FloatArray) -> FloatArray:
         """Return K @ vectors with the low-rank change, (n, m)."""
         product: FloatArray = self.stiffness @ vectors
-        return product if self.stiffness_change is None else product + self.stiffness_change @ vectors
+        change = self.stiffness_change
+        return product if change is None else product + change @ vectors
 
     def mass_times(self, vectors: FloatArray) -> FloatArray:
         """Return M @ vectors with the low-rank change, (n, m)."""
         product: FloatArray = self.mass @ vectors
-        return product if self.mass_change is None else product + self.mass_change @ vectors
+        change = self.mass_change
+        return product if change is None else product + change @ vectors
 
     def attach(self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]) -> Model:
         """Return the model with further masses and springs to ground.
@@ -159,7 +161,7 @@ class Model:
         frame = self.structure.frame.with_attachments(tuple(masses), tuple(springs))
         new = Model.of(self.structure.rebuilt(frame))
         old_mass, old_stiffness = self.structure.matrices()
-        keep = _common_dofs(self.dofs, new.dofs)
+        keep = _common_dofs(self.structure, new.frame_structure)
         return replace(
             new,
             mass=new.mass + _spread(self.mass - old_mass, keep, new.size),
@@ -169,22 +171,21 @@ class Model:
         )
 
 
-def _keys(dofs: Dofs) -> list[tuple[int, ...]]:
-    """Return position, direction and rank among coincident nodes of every dof."""
-    seen: dict[tuple[int, ...], int] = {}
-    keys = []
-    places = np.round(dofs.xyz / 1e-9).astype(np.int64)
-    for xyz, direction in zip(places, dofs.direction, strict=True):
-        key = (*(int(v) for v in xyz), DIRECTIONS.index(direction))
-        seen[key] = seen.get(key, -1) + 1
-        keys.append((*key, seen[key]))
-    return keys
+def _keys(structure: Structure) -> list[tuple[object, ...]]:
+    """Return a name of every dof that stays the same when other elements are split."""
+    nodes = structure.mesh.node_keys(len(structure.frame.joints))
+    kinematics = structure.kinematics
+    pairs = zip(kinematics.node, kinematics.direction, strict=True)
+    return [(*nodes[node], direction) for node, direction in pairs]
 
 
-def _common_dofs(old: Dofs, new: Dofs) -> IntArray:
+def _common_dofs(old: Structure, new: Structure) -> IntArray:
     """Return the position of every old dof among the new ones, (n_old,)."""
     index = {key: i for i, key in enumerate(_keys(new))}
-    return np.array([index[key] for key in _keys(old)], dtype=np.int64)
+    try:
+        return np.array([index[key] for key in _keys(old)], dtype=np.int64)
+    except KeyError as error:
+        raise ModelError("two attachments lie too close to each other on a member") from error
 
 
 def _spread(change: SparseArray, keep: IntArray, size: int) -> SparseArray:

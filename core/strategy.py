@@ -39,7 +39,9 @@ class UpdateResult:
     """What a strategy hands back.
 
     Arguments:
-        model: the updated model, on the dofs of the one that was given.
+        model: the updated model: on the dofs of the one that was given, or `Model.of` a frame that
+            was rebuilt, e.g. with flexible joints, whose dofs are its own. Either way it answers
+            `observe` and `attach`.
         parameter_count: number of unknowns that were free to change.
         parameters: the ones that have a name, with values before and after.
         history: one mapping an iteration, e.g. ``{"residual": 0.1}``.

@@ -12,3 +12,5 @@ IntArray: TypeAlias = NDArray[np.int64]
 BoolArray: TypeAlias = NDArray[np.bool_]
 # scipy ships no type information; a sparse array is whatever answers to `@`.
 SparseArray: TypeAlias = Any
+# Element batches are real, or complex when a derivative is taken through them.
+AnyArray: TypeAlias = NDArray[Any]

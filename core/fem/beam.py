@@ -8,11 +8,10 @@ that is how the derivatives are taken.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Any
 
 import numpy as np
 
-from femubench.core.typing import FloatArray, IntArray
+from femubench.core.typing import AnyArray, FloatArray, IntArray
 
 _AXIAL = np.array([0, 6])
 _TWIST = np.array([3, 9])
@@ -35,6 +34,8 @@ class BeamProperties:
         rhoIy, rhoIz: rotary inertia per length in kg m; 0 for Euler-Bernoulli.
         rigid_1, rigid_2: rigid lengths at the ends in the stiffness matrix in m, of either sign.
         rigid_mass_1, rigid_mass_2: rigid massless lengths in the mass matrix in m.
+        shear_shape: how far the mass matrix and the interpolation know of the shear: 0 keeps
+            cubic Hermite functions, 1 takes those of the Timoshenko element.
     """
 
     length: FloatArray
@@ -52,6 +53,7 @@ class BeamProperties:
     rigid_2: FloatArray
     rigid_mass_1: FloatArray
     rigid_mass_2: FloatArray
+    shear_shape: FloatArray
 
     def __len__(self) -> int:
         return len(self.length)
@@ -65,7 +67,7 @@ class BeamProperties:
         return replace(self, **{name: getattr(self, name) * factor})
 
 
-def bending_stiffness(EI: Any, flexibility: Any, L: Any) -> Any:
+def bending_stiffness(EI: AnyArray, flexibility: AnyArray, L: AnyArray) -> AnyArray:
     """Return (n, 4, 4) for (w, slope) at both ends (Przemieniecki 1968, (5.116)).
 
     Arguments:
@@ -87,7 +89,7 @@ def bending_stiffness(EI: Any, flexibility: Any, L: Any) -> Any:
     return np.moveaxis(np.array(rows) * c, -1, 0)
 
 
-def bending_mass(rhoA: Any, rhoI: Any, phi: Any, L: Any) -> Any:
+def bending_mass(rhoA: AnyArray, rhoI: AnyArray, phi: AnyArray, L: AnyArray) -> AnyArray:
     """Return (n, 4, 4) for (w, slope) at both ends (Friedman & Kosmatka 1993, (30)-(31)).
 
     Arguments:
@@ -113,17 +115,19 @@ def bending_mass(rhoA: Any, rhoI: Any, phi: Any, L: Any) -> Any:
     return np.moveaxis(np.array(translation) * c + np.array(rotation) * r, -1, 0)
 
 
-def _place(target: Any, index: IntArray, block: Any, sign: FloatArray | None = None) -> None:
+def _place(
+    target: AnyArray, index: IntArray, block: AnyArray, sign: FloatArray | None = None
+) -> None:
     if sign is not None:
         block = block * np.outer(sign, sign)
     target[:, index[:, None], index[None, :]] += block
 
 
-def _flexible(p: BeamProperties) -> Any:
+def _flexible(p: BeamProperties) -> AnyArray:
     return p.length - p.rigid_1 - p.rigid_2
 
 
-def _add_rigid_ends(matrix: Any, first: Any, second: Any) -> Any:
+def _add_rigid_ends(matrix: AnyArray, first: AnyArray, second: AnyArray) -> AnyArray:
     """Return T' k T: the ends of the flexible part move rigidly with the nodes."""
     if not (np.any(first) or np.any(second)):
         return matrix
@@ -131,7 +135,7 @@ def _add_rigid_ends(matrix: Any, first: Any, second: Any) -> Any:
     return np.swapaxes(transform, 1, 2) @ matrix @ transform
 
 
-def _rigid_transform(first: Any, second: Any) -> Any:
+def _rigid_transform(first: AnyArray, second: AnyArray) -> AnyArray:
     transform = np.zeros((len(first), 12, 12), dtype=np.result_type(first, second))
     transform[:, range(12), range(12)] = 1.0
     transform[:, 1, 5], transform[:, 2, 4] = first, -first
@@ -139,7 +143,7 @@ def _rigid_transform(first: Any, second: Any) -> Any:
     return transform
 
 
-def stiffness_matrices(p: BeamProperties) -> Any:
+def stiffness_matrices(p: BeamProperties) -> AnyArray:
     """Return the local stiffness matrices in N, N m, (n, 12, 12).
 
     Rigid ends follow Horton et al. (1999), equation (5): T' k(L - a) T, axial EA/(L - a).
@@ -155,15 +159,21 @@ def stiffness_matrices(p: BeamProperties) -> Any:
     return _add_rigid_ends(k, p.rigid_1, p.rigid_2)
 
 
-def mass_matrices(p: BeamProperties) -> Any:
-    """Return the consistent local mass matrices in kg, kg m, kg m2, (n, 12, 12)."""
+def mass_matrices(p: BeamProperties) -> AnyArray:
+    """Return the consistent local mass matrices in kg, kg m, kg m2, (n, 12, 12).
+
+    Cubic in bending, linear in axial motion and twist. With cubic functions the rotary inertia
+    belongs to the slope of the axis (Rayleigh); with those of the Timoshenko element it belongs
+    to the rotation of the section, as Timoshenko's theory has it.
+    """
     L = p.length - p.rigid_mass_1 - p.rigid_mass_2
     dtype = np.result_type(*(getattr(p, f.name) for f in fields(p)))
     m = np.zeros((len(p), 12, 12), dtype=dtype)
     bar = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
     _place(m, _AXIAL, bar * (p.rhoA * L)[:, None, None])
     _place(m, _TWIST, bar * (p.rhoJp * L)[:, None, None])
-    phi_y, phi_z = 12 * p.EIz * p.flex_y / L**2, 12 * p.EIy * p.flex_z / L**2
+    phi_y = p.shear_shape * 12 * p.EIz * p.flex_y / L**2
+    phi_z = p.shear_shape * 12 * p.EIy * p.flex_z / L**2
     _place(m, _BEND_XY, bending_mass(p.rhoA, p.rhoIz, phi_y, L))
     _place(m, _BEND_XZ, bending_mass(p.rhoA, p.rhoIy, phi_z, L), _SLOPE_SIGN)
     return _add_rigid_ends(m, p.rigid_mass_1, p.rigid_mass_2)
@@ -176,7 +186,8 @@ def shape_functions(p: BeamProperties, element: int, xi: float) -> FloatArray:
         element: index in the batch.
         xi: position along the element, 0..1 from node to node.
 
-    Source: Friedman & Kosmatka (1993), (20)-(21); cubic Hermite functions without shear.
+    Source: cubic Hermite functions; Friedman & Kosmatka (1993), (20)-(21), where `shear_shape`
+    is 1.
     """
     one = p.take(np.array([element]))
     L = float(_flexible(one)[0])
@@ -184,13 +195,12 @@ def shape_functions(p: BeamProperties, element: int, xi: float) -> FloatArray:
     x = (xi * float(one.length[0]) - first) / L
     rows = np.zeros((6, 12))
     clear = min(max(x, 0.0), 1.0)
-    rows[np.ix_([0], _AXIAL)] = rows[np.ix_([3], _TWIST)] = [1.0 - clear, clear]
-    phi_y = 12 * one.EIz[0] * one.flex_y[0] / L**2
-    phi_z = 12 * one.EIy[0] * one.flex_z[0] / L**2
-    rows[np.ix_([1, 5], _BEND_XY)] = _bending_functions(x, L, float(phi_y))
-    rows[np.ix_([2, 4], _BEND_XZ)] = (
-        _bending_functions(x, L, float(phi_z)) * _SLOPE_SIGN * np.array([[1.0], [-1.0]])
-    )
+    rows[0, _AXIAL] = rows[3, _TWIST] = [1.0 - clear, clear]
+    phi_y = one.shear_shape[0] * 12 * one.EIz[0] * one.flex_y[0] / L**2
+    phi_z = one.shear_shape[0] * 12 * one.EIy[0] * one.flex_z[0] / L**2
+    rows[1, _BEND_XY], rows[5, _BEND_XY] = _bending_functions(x, L, float(phi_y))
+    deflection, slope = _bending_functions(x, L, float(phi_z))
+    rows[2, _BEND_XZ], rows[4, _BEND_XZ] = deflection * _SLOPE_SIGN, -slope * _SLOPE_SIGN
     return np.asarray(rows @ _rigid_transform(np.array([first]), np.array([second]))[0])
 
 

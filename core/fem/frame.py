@@ -10,6 +10,7 @@ from femubench.core.fem.sections import Section
 
 Plane = Literal["in-plane", "out-of-plane", "3d"]
 BeamTheory = Literal["euler-bernoulli", "timoshenko"]
+BendingMass = Literal["cubic", "shear-consistent"]
 Vector = tuple[float, float, float]
 
 ACTIVE: Mapping[Plane, tuple[str, ...]] = {
@@ -141,6 +142,8 @@ class Frame:
 
     Arguments:
         rotary_inertia: whether rho I takes part; None follows the beam theory.
+        bending_mass: ``cubic`` takes Hermite's functions in every theory; ``shear-consistent``
+            takes those of the Timoshenko element (Friedman & Kosmatka 1993).
     """
 
     plane: Plane
@@ -153,6 +156,7 @@ class Frame:
     joint_springs: tuple[JointSpring, ...] = ()
     rigid_ends: tuple[RigidEnd, ...] = ()
     rotary_inertia: bool | None = None
+    bending_mass: BendingMass = "cubic"
 
     @property
     def with_rotary_inertia(self) -> bool:

@@ -10,9 +10,9 @@ import scipy.sparse as sp
 from femubench.core.errors import ModelError
 from femubench.core.fem.beam import BeamProperties, shape_functions
 from femubench.core.fem.frame import ACTIVE, Frame, Place
-from femubench.core.fem.mesh import Connection, Mesh
+from femubench.core.fem.mesh import ON_MEMBER, SAME_STATION, Connection, Mesh, member_axes
 from femubench.core.measurement import DIRECTIONS
-from femubench.core.typing import FloatArray, IntArray, SparseArray
+from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 
 @dataclass(frozen=True)
@@ -40,33 +40,38 @@ def rigid_arm(offset: FloatArray) -> FloatArray:
     return motion
 
 
-def node_at(frame: Frame, mesh: Mesh, place: Place) -> int | None:
-    """Return the mesh node at a joint or a station, None between nodes."""
+def node_at(frame: Frame, mesh: Mesh, place: Place, tolerance: float = SAME_STATION) -> int | None:
+    """Return the mesh node at a joint or a station, None between nodes.
+
+    Arguments:
+        tolerance: how far from the node's station the place may be.
+    """
     if place.joint is not None:
-        names = [joint.name for joint in frame.joints]
-        if place.joint not in names:
-            raise ModelError(f"there is no joint {place.joint!r}")
-        return names.index(place.joint)
+        return _joint_index(frame, place.joint)
     element, s = _element_at(frame, mesh, place)
+    ends = frame.members[mesh.member[element]].ends
+    for station, joint in zip((0.0, 1.0), ends, strict=True):
+        if abs(station - s) < tolerance:
+            return _joint_index(frame, joint)
     for end in (0, 1):
-        if abs(mesh.stations[element, end] - s) < 1e-9:
-            node = int(mesh.ends[element, end])
-            return _joint_of(mesh, node)
+        if abs(mesh.stations[element, end] - s) < tolerance:
+            return int(mesh.ends[element, end])
     return None
 
 
-def _joint_of(mesh: Mesh, node: int) -> int:
-    """Return the joint itself where a node hangs on it without an arm."""
-    for connection in mesh.connections:
-        if connection.node == node and not connection.arm.any():
-            return connection.base
-    return node
+def _joint_index(frame: Frame, name: str) -> int:
+    names = [joint.name for joint in frame.joints]
+    if name not in names:
+        raise ModelError(f"there is no joint {name!r}")
+    return names.index(name)
 
 
 def _element_at(frame: Frame, mesh: Mesh, place: Place) -> tuple[int, float]:
     names = [member.name for member in frame.members]
     if place.member not in names or place.s is None:
         raise ModelError(f"there is no member {place.member!r}")
+    if not -SAME_STATION <= place.s <= 1.0 + SAME_STATION:
+        raise ModelError(f"station {place.s:g} of member {place.member!r} is not within 0..1")
     rows = np.flatnonzero(mesh.member == names.index(place.member))
     low, high = mesh.stations[rows, 0], mesh.stations[rows, 1]
     gap = np.maximum(low - place.s, place.s - high)
@@ -116,11 +121,12 @@ def build_kinematics(frame: Frame, mesh: Mesh) -> Kinematics:
     """Return which node displacements are free and how the others follow from them."""
     active = np.array([name in ACTIVE[frame.plane] for name in DIRECTIONS])
     free = np.tile(active, (len(mesh.xyz), 1))
-    for support in frame.supports:
-        node = node_at(frame, mesh, support.at)
-        assert node is not None  # the mesh is split at supports
-        free[node, [DIRECTIONS.index(name) for name in support.fixed]] = False
     hanging = {connection.node: connection for connection in mesh.connections}
+    for support in frame.supports:
+        node = _support_node(frame, mesh, support.at)
+        if node is None or node in hanging:
+            raise ModelError(f"the support at {support.at} lies on the arm of a joint spring")
+        free[node, [DIRECTIONS.index(name) for name in support.fixed]] = False
     own: list[tuple[int, FloatArray, tuple[str, ...]]] = []  # node, (6, k) basis, labels
     for node in hanging:
         free[node] = False
@@ -128,7 +134,15 @@ def build_kinematics(frame: Frame, mesh: Mesh) -> Kinematics:
     return _assemble_transform(mesh, free, own, hanging, active)
 
 
-def _own_motion(connection: Connection, active: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
+def _support_node(frame: Frame, mesh: Mesh, place: Place) -> int | None:
+    """Return the node that a support holds; the mesh is split there."""
+    member = next((member for member in frame.members if member.name == place.member), None)
+    if member is None:
+        return node_at(frame, mesh, place)
+    return node_at(frame, mesh, place, ON_MEMBER / member_axes(frame, member)[1])
+
+
+def _own_motion(connection: Connection, active: BoolArray) -> tuple[FloatArray, tuple[str, ...]]:
     """Return the motions that a hanging node has of its own, as columns, with their labels.
 
     A block (translation, rotation) that is wholly free keeps the global axes; a partly free one
@@ -153,10 +167,10 @@ def _own_motion(connection: Connection, active: FloatArray) -> tuple[FloatArray,
 
 def _assemble_transform(
     mesh: Mesh,
-    free: FloatArray,
+    free: BoolArray,
     own: list[tuple[int, FloatArray, tuple[str, ...]]],
     hanging: dict[int, Connection],
-    active: FloatArray,
+    active: BoolArray,
 ) -> Kinematics:
     size = 6 * len(mesh.xyz)
     flat = np.flatnonzero(free.ravel())

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+import bisect
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.frame import Frame, JointSpring, Member, Place, RigidEnd
+from femubench.core.fem.frame import (
+    Frame,
+    JointSpring,
+    Member,
+    Place,
+    RigidEnd,
+)
 from femubench.core.typing import FloatArray, IntArray
 
 ON_MEMBER = 1e-6  # m, how far from the axis a sensor may lie
-_SAME_STATION = 1e-9
+SAME_STATION = 1e-9
+# An attachment nearer than this share of an element to a node splits nothing: the piece would be so
+# stiff that rounding drowns everything else, and the shape functions miss its local flexibility by
+# no more than the cube of this share.
+_SHORTEST_PIECE = 2e-3
 
 
 @dataclass(frozen=True)
@@ -54,6 +66,22 @@ class Mesh:
     arm_factor: FloatArray
     connections: tuple[Connection, ...]
 
+    def node_keys(self, joints: int) -> list[tuple[int, int, bool]]:
+        """Return a name of every node that stays the same when other elements are split.
+
+        Member (-1 for a joint), joint or station in 1e-9, and whether it is the tip of an arm.
+
+        Arguments:
+            joints: number of joints, which are the first nodes.
+        """
+        keys = [(-1, node, False) for node in range(len(self.xyz))]
+        rows = zip(self.member, np.isfinite(self.arm_factor), self.ends, self.stations, strict=True)
+        for member, arm, ends, stations in rows:
+            for node, s in zip(ends, stations, strict=True):
+                if node >= joints:
+                    keys[node] = (int(member), round(float(s) / SAME_STATION), bool(arm))
+        return keys
+
 
 def member_axes(frame: Frame, member: Member) -> tuple[FloatArray, float]:
     """Return the local axes (rows) and the length of a member.
@@ -65,6 +93,9 @@ def member_axes(frame: Frame, member: Member) -> tuple[FloatArray, float]:
     length = float(np.linalg.norm(stop - start))
     if length < ON_MEMBER:
         raise ModelError(f"member {member.name!r} has length zero")
+    normal = {"out-of-plane": 2, "in-plane": 1}.get(frame.plane)
+    if normal is not None and abs(stop[normal] - start[normal]) > ON_MEMBER:
+        raise ModelError(f"member {member.name!r} leaves the plane of the frame")
     x = (stop - start) / length
     if frame.plane == "out-of-plane":
         return np.array([x, np.cross([0.0, 0.0, 1.0], x), [0.0, 0.0, 1.0]]), length
@@ -92,10 +123,9 @@ class _Builder:
         self.connections: list[Connection] = []
         self.springs = {(s.member, s.joint): s for s in frame.joint_springs}
         self.rigid_ends = {(r.member, r.joint): r for r in frame.rigid_ends}
-        self.splits: dict[str, list[float]] = {}
-        for attachment in (*frame.masses, *frame.springs, *frame.supports):
-            if attachment.at.member is not None and attachment.at.s is not None:
-                self.splits.setdefault(attachment.at.member, []).append(attachment.at.s)
+        self.held = _places([item.at for item in frame.supports])
+        places = [item.at for item in frame.masses] + [item.at for item in frame.springs]
+        self.splits = _places(places)
 
     def node(self, xyz: FloatArray) -> int:
         self.xyz.append(xyz)
@@ -128,13 +158,15 @@ class _Builder:
         self.axes.append(axes)
         first, arm_1 = self.connect(m, 0, axes, length)
         last, arm_2 = self.connect(m, 1, axes, length)
-        grid = _stations(member, self.splits.get(member.name, []))
         low, high = arm_1 / length, 1.0 - arm_2 / length
-        inner = grid[(grid > _SAME_STATION) & (grid < 1.0 - _SAME_STATION)]
-        if high <= low or (len(inner) and (inner[0] <= low or inner[-1] >= high)):
+        regular = np.linspace(0.0, 1.0, member.elements + 1)[1:-1]
+        if high <= low or (len(regular) and (regular[0] <= low or regular[-1] >= high)):
             raise ModelError(
                 f"member {member.name!r}: the arm of a joint spring reaches past its end element"
             )
+        held, splits = self.held.get(member.name, []), self.splits.get(member.name, [])
+        grid = _stations([low, *regular, high], held, ON_MEMBER / length)
+        inner = _stations(grid, splits, _SHORTEST_PIECE / member.elements)[1:-1]
         start = self.xyz[self.joint_index[member.ends[0]]]
         nodes = [first, *(self.node(start + axes[0] * length * s) for s in inner), last]
         bounds = np.concatenate([[low], inner, [high]])
@@ -168,20 +200,41 @@ class _Builder:
         )
 
 
-def _stations(member: Member, splits: list[float]) -> FloatArray:
-    grid = np.linspace(0.0, 1.0, member.elements + 1)
-    new = [s for s in splits if np.min(np.abs(grid - s)) > _SAME_STATION]
-    merged = np.unique(np.concatenate([grid, new]))
-    keep = np.concatenate([[True], np.diff(merged) > _SAME_STATION])
-    return np.asarray(merged[keep])
+def _places(places: Sequence[Place]) -> dict[str, list[float]]:
+    """Return the stations of places between joints by member."""
+    stations: dict[str, list[float]] = {}
+    for place in places:
+        if place.member is not None and place.s is not None:
+            stations.setdefault(place.member, []).append(place.s)
+    return stations
+
+
+def _check_ends(frame: Frame) -> None:
+    ends = {(member.name, name) for member in frame.members for name in member.ends}
+    wanted: tuple[JointSpring | RigidEnd, ...] = (*frame.joint_springs, *frame.rigid_ends)
+    for spec in wanted:
+        if (spec.member, spec.joint) not in ends:
+            raise ModelError(f"there is no member end {spec.member}@{spec.joint}")
+
+
+def _stations(grid: Sequence[float] | FloatArray, new: list[float], apart: float) -> FloatArray:
+    """Return the grid with those new stations inside it that keep a distance to all others."""
+    stations = list(grid)
+    for s in new:
+        inside = stations[0] < s < stations[-1]
+        if inside and min(abs(s - other) for other in stations) > apart:
+            bisect.insort(stations, s)
+    return np.array(stations)
 
 
 def build_mesh(frame: Frame) -> Mesh:
     """Return the mesh of a frame; an attachment between nodes splits the element there.
 
     Raises:
-        ModelError: for a member without length, or an arm longer than its element.
+        ModelError: for a member without length, an arm longer than its element, or a joint spring
+            or rigid end at no member end.
     """
+    _check_ends(frame)
     return _Builder(frame).mesh()
 
 

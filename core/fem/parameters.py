@@ -21,7 +21,7 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     "EA": ("EA",),
     "EI": ("EIy", "EIz"),
     "GJ": ("GJ",),
-    "E": ("EA", "EIy", "EIz", "GJ"),
+    "E": ("EA", "EIy", "EIz", "GJ", "flex_y", "flex_z"),
     "rhoA": ("rhoA",),
     "rhoJp": ("rhoJp",),
     "density": ("rhoA", "rhoJp", "rhoIy", "rhoIz"),
@@ -31,6 +31,8 @@ QUANTITIES: dict[str, tuple[str, ...]] = {
     "spring": (),
 }
 _SET = ("rigid", "spring")
+# Young's modulus is in GA too, which the elements know by its inverse.
+_DIVIDED = {"E": ("flex_y", "flex_z")}
 _STEP = 1e-30
 
 
@@ -80,6 +82,11 @@ def _targets(structure: Structure, parameter: Parameter) -> list[tuple[str, IntA
     return [(name, index) for name in QUANTITIES[parameter.quantity]]
 
 
+def _exponent(parameter: Parameter, name: str) -> float:
+    """Return the power of a factor with which a property grows."""
+    return -1.0 if name in _DIVIDED.get(parameter.quantity, ()) else 1.0
+
+
 def _lookup(labels: Sequence[str], parameter: Parameter) -> IntArray:
     wanted = set(parameter.places)
     missing = wanted.difference(labels)
@@ -110,7 +117,7 @@ def apply_values(
             if name == "spring":
                 springs[index] = value
             elif parameter.is_factor:
-                arrays[name][index] *= value
+                arrays[name][index] *= value ** _exponent(parameter, name)
             else:
                 arrays[name][index] = value
     return BeamProperties(**arrays), springs
@@ -193,9 +200,12 @@ def derivatives(structure: Structure, parameters: Sequence[Parameter]) -> Deriva
     entries: dict[str, list[tuple[IntArray, FloatArray, int]]] = {}
     for p, parameter in enumerate(parameters):
         for name, index in _targets(structure, parameter):
-            factor = name != "spring" and parameter.is_factor
-            slope = getattr(structure.properties, name)[index] if factor else np.ones(len(index))
-            entries.setdefault(name, []).append((index, slope, p))
+            slope = np.ones(len(index))
+            if parameter.is_factor:
+                present = getattr(structure.properties, name)[index]
+                slope = _exponent(parameter, name) * present
+            if slope.any():
+                entries.setdefault(name, []).append((index, slope, p))
     count, size = len(parameters), len(structure.properties)
 
     def weights(name: str, rows: int) -> SparseArray:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -40,10 +40,9 @@ def _nominal_properties(frame: Frame, mesh: Mesh) -> BeamProperties:
         ky, kz = s.kappa(m.nu) if s.kappa is not None else (1.0, 1.0)
         flex = shear / (m.G * s.A)
         inertia = rotary * m.rho
-        rows.append(
-            (m.E * s.A, m.E * s.Iy, m.E * s.Iz, m.G * s.J, flex / ky, flex / kz)
-            + (m.rho * s.A, m.rho * s.Jp, inertia * s.Iy, inertia * s.Iz)
-        )
+        rigidities = (m.E * s.A, m.E * s.Iy, m.E * s.Iz, m.G * s.J, flex / ky, flex / kz)
+        inertias = (m.rho * s.A, m.rho * s.Jp, inertia * s.Iy, inertia * s.Iz)
+        rows.append((*rigidities, *inertias))
     table = np.array(rows)[mesh.member]
     arm = np.isfinite(mesh.arm_factor)
     factor = np.where(arm, mesh.arm_factor, 1.0)[:, None]
@@ -51,10 +50,10 @@ def _nominal_properties(frame: Frame, mesh: Mesh) -> BeamProperties:
     table[:, 4:6] /= factor
     table[arm, 6:] = 0.0
     length = np.linalg.norm(mesh.xyz[mesh.ends[:, 1]] - mesh.xyz[mesh.ends[:, 0]], axis=1)
-    rigid = [mesh.rigid[:, 0], mesh.rigid[:, 1], mesh.rigid_mass[:, 0], mesh.rigid_mass[:, 1]]
-    if np.any(length - mesh.rigid.sum(axis=1) <= 0.0):
-        raise ModelError("a rigid end is longer than its element")
-    return BeamProperties(length, *table.T, *(np.array(column) for column in rigid))
+    shape = np.full(len(length), 1.0 if frame.bending_mass == "shear-consistent" else 0.0)
+    columns = (length, *table.T, *mesh.rigid.T, *mesh.rigid_mass.T, shape)
+    names = [f.name for f in fields(BeamProperties)]
+    return BeamProperties(**dict(zip(names, (np.array(c) for c in columns), strict=True)))
 
 
 @dataclass(frozen=True)
@@ -78,6 +77,12 @@ class Structure:
     changes: tuple[tuple[Parameter, float], ...] = ()
     plan: AssemblyPlan | None = field(default=None, repr=False)
 
+    def __post_init__(self) -> None:
+        p = self.properties
+        for rigid in (p.rigid_1 + p.rigid_2, p.rigid_mass_1 + p.rigid_mass_2):
+            if np.any(rigid >= p.length):
+                raise ModelError("a rigid end is longer than its element")
+
     @classmethod
     def build(cls, frame: Frame) -> Structure:
         """Mesh a frame.
@@ -89,7 +94,11 @@ class Structure:
         springs = [k for c in mesh.connections for k in c.spring.stiffness.values()]
         kinematics = build_kinematics(frame, mesh)
         base = cls(
-            frame, mesh, kinematics, _nominal_properties(frame, mesh), np.array(springs, dtype=float)
+            frame,
+            mesh,
+            kinematics,
+            _nominal_properties(frame, mesh),
+            np.array(springs, dtype=float),
         )
         return replace(base, plan=plan_assembly(base.gather, 12))
 
@@ -204,11 +213,32 @@ class Structure:
             rows = arm @ point @ transform
             mass = mass + item.mass * (rows.T @ rows)
         for spring in springs:
-            point = point_rows(self.frame, self.mesh, self.properties, spring.at)
-            row = DIRECTIONS.index(spring.direction.lstrip("+-"))
-            rows = point[row : row + 1] @ transform
+            rows = self._ground_row(spring)
             stiffness = stiffness + spring.stiffness * (rows.T @ rows)
         return sp.csc_array(mass), sp.csc_array(stiffness)
+
+    def _ground_row(self, spring: GroundSpring) -> SparseArray:
+        """Return the elongation of a spring to ground from free dofs, sparse (1, n)."""
+        point = point_rows(self.frame, self.mesh, self.properties, spring.at)
+        row = DIRECTIONS.index(spring.direction.lstrip("+-"))
+        return point[row : row + 1] @ self.kinematics.transform
+
+    def held(self, motion: Callable[[FloatArray, FloatArray], FloatArray]) -> FloatArray:
+        """Return what supports and springs to ground see of motions of the whole, (m, r).
+
+        A motion is free where its column is zero. Exact on any mesh, unlike a strain energy
+        from the stiffness matrix, which loses a soft suspension in its rounding errors.
+
+        Arguments:
+            motion: displacements from positions (k, 3) and axes (k, 6), as columns (k, r).
+        """
+        transform, xyz = self.kinematics.transform, self.mesh.xyz
+        own = motion(xyz[self.kinematics.node], self.kinematics.axes)
+        active = np.flatnonzero(np.tile(self.active_local[:6], len(xyz)))
+        all_nodes = motion(xyz[active // 6], np.eye(6)[active % 6])
+        rows = [self._ground_row(spring) for spring in self.frame.springs if spring.stiffness]
+        pulled = [np.asarray(row @ own) for row in rows]
+        return np.vstack([transform[active] @ own - all_nodes, *pulled])
 
     def matrices(self) -> tuple[SparseArray, SparseArray]:
         """Return mass and stiffness on the free dofs, sparse, (n, n) each."""

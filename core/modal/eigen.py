@@ -12,8 +12,8 @@ import scipy.linalg as la
 from femubench.core.errors import ModelError
 from femubench.core.modal.rigid import rigid_modes_of, rigid_share
 from femubench.core.modal.sparse_eigen import lowest_eigenpairs
-from femubench.core.model import Model
-from femubench.core.typing import BoolArray, FloatArray
+from femubench.core.model import LowRank, Model
+from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 DENSE_LIMIT = 500
 _RIGID_SHARE = 0.9
@@ -21,17 +21,25 @@ _ROUNDOFF = 32.0 * np.finfo(float).eps
 _ZERO = 1e-6  # of the first elastic eigenvalue
 
 
-class _Counter:
-    """Counts eigenvalue solutions, so that nobody has to report their own."""
+@dataclass(eq=False)
+class Evaluations:
+    """How many eigenvalue solutions were made; nobody has to report their own."""
 
-    count = 0
+    count: int = 0
+
+
+_counting: list[Evaluations] = []
 
 
 @contextmanager
-def counted_evaluations() -> Iterator[type[_Counter]]:
-    """Count the eigenvalue solutions made inside the block (read `.count` at its end)."""
-    _Counter.count = 0
-    yield _Counter
+def counted_evaluations() -> Iterator[Evaluations]:
+    """Count the eigenvalue solutions made inside the block, blocks inside it included."""
+    counter = Evaluations()
+    _counting.append(counter)
+    try:
+        yield counter
+    finally:
+        _counting.remove(counter)
 
 
 @dataclass(frozen=True)
@@ -57,9 +65,9 @@ class Modes:
         root = np.sqrt(np.abs(self.eigenvalues)) / (2.0 * np.pi)
         return np.asarray(np.copysign(root, self.eigenvalues))
 
-    def take(self, index: object) -> Modes:
+    def take(self, index: IntArray | BoolArray) -> Modes:
         """Return some of the modes."""
-        return Modes(self.eigenvalues[index], self.shapes[:, index], self.rigid[index])  # type: ignore[index]
+        return Modes(self.eigenvalues[index], self.shapes[:, index], self.rigid[index])
 
     @property
     def elastic(self) -> Modes:
@@ -67,9 +75,9 @@ class Modes:
         return self.take(~self.rigid)
 
 
-def _dense(matrix: object, change: object) -> FloatArray:
-    dense = np.asarray(matrix.toarray())  # type: ignore[attr-defined]
-    return dense if change is None else dense + change.toarray()  # type: ignore[attr-defined]
+def _dense(matrix: SparseArray, change: LowRank | None) -> FloatArray:
+    dense = np.asarray(matrix.toarray())
+    return dense if change is None else dense + change.toarray()
 
 
 def dense_matrices(model: Model) -> tuple[FloatArray, FloatArray]:
@@ -103,7 +111,10 @@ def solve_dense(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, Fl
             lower = la.cholesky(stiffness + factor * shift * mass, lower=True)
         except la.LinAlgError:
             continue
-        return _reciprocal(mass, lower, factor * shift)
+        eigenvalues, shapes = _reciprocal(mass, lower, factor * shift)
+        # An eigenvalue that happens to lie at minus the shift would swamp all others.
+        if eigenvalues[0] > -0.99 * factor * shift:
+            return eigenvalues, shapes
     return _direct(mass, stiffness)
 
 
@@ -139,17 +150,34 @@ def condense_massless(
     Raises:
         ModelError: when a massless motion has no stiffness.
     """
-    values, vectors = la.eigh(_scaled(mass))
-    scale = _scaling(mass)[:, None]
-    empty = values < 1e-13 * values[-1]
-    if not empty.any():
+    null, carrying = _split(mass)
+    if null.shape[1] == 0:
         return stiffness, mass, np.eye(len(mass))
-    null, carrying = scale * vectors[:, empty], scale * vectors[:, ~empty]
     inner = null.T @ stiffness @ null
-    if np.linalg.matrix_rank(inner, hermitian=True) < len(inner):
+    size = np.sqrt(np.abs(np.diagonal(inner)))
+    scaled = inner / np.outer(size, size) if size.all() else np.zeros_like(inner)
+    if np.linalg.matrix_rank(scaled, hermitian=True) < len(inner):
         raise ModelError("a degree of freedom has neither mass nor stiffness")
     expand = carrying - null @ la.solve(inner, null.T @ stiffness @ carrying, assume_a="sym")
     return expand.T @ stiffness @ expand, carrying.T @ mass @ carrying, expand
+
+
+def _split(mass: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return bases of the motions without and with mass, (n, p) and (n, n - p).
+
+    Dofs without any mass are taken as they are: an eigenvector of the mass would bring in traces
+    of others, whose stiffness hides that the dof has none.
+    """
+    bare = ~mass.any(axis=0)
+    unit = np.eye(len(mass))
+    rest = unit[:, ~bare]
+    loaded = mass[np.ix_(~bare, ~bare)]
+    values, vectors = la.eigh(_scaled(loaded))
+    if values[0] < -1e-9 * values[-1]:
+        raise ModelError("the mass matrix is not positive semidefinite")
+    empty = values < 1e-13 * values[-1]
+    basis = rest @ (_scaling(loaded)[:, None] * vectors)
+    return np.hstack([unit[:, bare], basis[:, empty]]), basis[:, ~empty]
 
 
 def _scaling(mass: FloatArray) -> FloatArray:
@@ -173,7 +201,8 @@ def solve_modes(model: Model, count: int | None = None) -> Modes:
     Raises:
         ModelError: when the eigenvalue problem has no solution, e.g. a mechanism without mass.
     """
-    _Counter.count += 1
+    for counter in _counting:
+        counter.count += 1
     if model.size <= DENSE_LIMIT:
         mass, stiffness = dense_matrices(model)
         if not (np.isfinite(mass).all() and np.isfinite(stiffness).all()):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import scipy.linalg as la
 
@@ -10,6 +12,7 @@ from femubench.core.model import Dofs, Model
 from femubench.core.typing import FloatArray
 
 _ZERO_ENERGY = 1e-12
+_HELD = 1e-9  # of a motion whose largest translation is 1
 
 
 def rigid_body_vectors(dofs: Dofs) -> FloatArray:
@@ -17,48 +20,68 @@ def rigid_body_vectors(dofs: Dofs) -> FloatArray:
 
     Three translations and three rotations about the centroid, those that move nothing left out.
     """
-    centred = dofs.xyz - dofs.xyz.mean(axis=0)
-    size = max(float(np.abs(centred).max()), 1e-12)
-    x, y, z = (centred / size).T
-    zero, one = np.zeros_like(x), np.ones_like(x)
-    motions = {
-        "x": (one, zero, zero, zero, z, -y),
-        "y": (zero, one, zero, -z, zero, x),
-        "z": (zero, zero, one, y, -x, zero),
-        "rx": (zero, zero, zero, one / size, zero, zero),
-        "ry": (zero, zero, zero, zero, one / size, zero),
-        "rz": (zero, zero, zero, zero, zero, one / size),
-    }
-    table = np.array([motions[name] for name in DIRECTIONS])  # direction, motion, dof
-    if dofs.axes is None:
-        index = np.array([DIRECTIONS.index(name) for name in dofs.direction])
-        vectors = table[index, :, np.arange(len(dofs))]
-    else:
-        vectors = np.einsum("nd,dmn->nm", dofs.axes, table)
+    vectors = _motions(dofs)(dofs.xyz, _axes(dofs))
     moving = np.abs(vectors).max(axis=0) > 0.0
     return np.asarray(vectors[:, moving])
+
+
+def _axes(dofs: Dofs) -> FloatArray:
+    if dofs.axes is not None:
+        return dofs.axes
+    return np.eye(6)[[DIRECTIONS.index(name) for name in dofs.direction]]
+
+
+def _motions(dofs: Dofs) -> Callable[[FloatArray, FloatArray], FloatArray]:
+    """Return the six motions of a body about the centroid, from positions and axes of dofs."""
+    centre = dofs.xyz.mean(axis=0)
+    size = max(float(np.abs(dofs.xyz - centre).max()), 1e-12)
+
+    def motion(xyz: FloatArray, axes: FloatArray) -> FloatArray:
+        x, y, z = ((xyz - centre) / size).T
+        zero, one = np.zeros_like(x), np.ones_like(x)
+        table = np.array(
+            [
+                (one, zero, zero, zero, z, -y),
+                (zero, one, zero, -z, zero, x),
+                (zero, zero, one, y, -x, zero),
+                (zero, zero, zero, one / size, zero, zero),
+                (zero, zero, zero, zero, one / size, zero),
+                (zero, zero, zero, zero, zero, one / size),
+            ]
+        )  # direction, motion, dof
+        return np.asarray(np.einsum("nd,dmn->nm", axes, table))
+
+    return motion
 
 
 def rigid_modes_of(model: Model) -> FloatArray:
     """Return the rigid-body motions that the model leaves free, mass-orthonormal, (n, r).
 
-    A motion is free where it costs no strain energy: supports and springs to ground take some
-    away. Low-rank changes are left out of the judgement, since it is the structure that is
-    asked, not what an update made of it.
+    Of a frame it is the supports and springs to ground that decide, whatever an update made of
+    the matrices; of a model from files, the strain energy.
     """
-    vectors = rigid_body_vectors(model.dofs)
-    structure = model.structure
-    mass, stiffness = (model.mass, model.stiffness) if structure is None else structure.matrices()
-    vectors = _orthonormal(vectors, vectors.T @ (mass @ vectors))
+    motion, structure = _motions(model.dofs), model.structure
+    vectors = motion(model.dofs.xyz, _axes(model.dofs))
+    moving = np.abs(vectors).max(axis=0) > 0.0
+    if structure is None:
+        candidates = _without_energy(model, vectors[:, moving])
+    else:
+        _, singular, turn = la.svd(np.linalg.qr(structure.held(motion)[:, moving], mode="r"))
+        rank = int(np.sum(singular > _HELD))
+        candidates = vectors[:, moving] @ turn[rank:].T
+    return _orthonormal(candidates, candidates.T @ (model.mass @ candidates))
+
+
+def _without_energy(model: Model, vectors: FloatArray) -> FloatArray:
+    """Return the combinations of motions that cost no strain energy but rounding."""
+    vectors = _orthonormal(vectors, vectors.T @ (model.mass @ vectors))
     if vectors.shape[1] == 0:
         return vectors
-    force = stiffness @ vectors
-    scale = np.abs(stiffness).sum(axis=0) @ np.square(vectors)
-    energy = vectors.T @ force / np.sqrt(np.outer(scale, scale))
+    scale = np.abs(model.stiffness).sum(axis=0) @ np.square(vectors)
+    energy = vectors.T @ (model.stiffness @ vectors) / np.sqrt(np.outer(scale, scale))
     values, turn = la.eigh(0.5 * (energy + energy.T))
     free = turn[:, np.abs(values) < _ZERO_ENERGY] / np.sqrt(scale)[:, None]
-    candidates = vectors @ free
-    return _orthonormal(candidates, candidates.T @ (mass @ candidates))
+    return np.asarray(vectors @ free)
 
 
 def _orthonormal(vectors: FloatArray, gram: FloatArray) -> FloatArray:

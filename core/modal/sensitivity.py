@@ -8,16 +8,17 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from femubench.core.errors import ModelError
 from femubench.core.fem.parameters import Derivatives, Parameter, derivatives
 from femubench.core.modal.eigen import Modes
 from femubench.core.model import Model
-from femubench.core.typing import FloatArray
+from femubench.core.typing import FloatArray, IntArray
 
 _REPEATED = 1e-8
 
 
 def eigenvalue_sensitivities(
-    model: Model, modes: Modes, parameters: Sequence[Parameter]
+    model: Model, modes: Modes, parameters: Sequence[Parameter], change: Derivatives | None = None
 ) -> FloatArray:
     """Return d lambda_j / d p in rad^2/s^2 a unit of the parameter, (m, n_parameters).
 
@@ -25,34 +26,52 @@ def eigenvalue_sensitivities(
         model: a frame model.
         modes: some of its modes, mass-normalised.
         parameters: factors are taken about 1, everything else about its present value.
+        change: the derivatives of the matrices, where they are at hand.
 
     Source: Fox & Kapoor (1968); Horton et al. (1999), equation (2).
     """
-    change = derivatives(model.frame_structure, parameters)
+    change = derivatives(model.frame_structure, parameters) if change is None else change
     stiffness, mass = change.quadratic(modes.shapes, modes.shapes)
     return np.asarray(stiffness - modes.eigenvalues[:, None] * mass)
 
 
 def shape_sensitivities(
-    model: Model, modes: Modes, index: int, parameters: Sequence[Parameter]
+    model: Model,
+    modes: Modes,
+    index: int,
+    parameters: Sequence[Parameter],
+    change: Derivatives | None = None,
 ) -> FloatArray:
     """Return d phi / d p of one mode, (n, n_parameters).
 
-    Where `modes` holds the full spectrum the modal sum is exact; else Nelson's method solves one
-    sparse bordered system.
+    Where `modes` holds the full spectrum (small models without massless dofs) the modal sum is
+    exact; else Nelson's method solves one sparse bordered system, which is as exact. Within a
+    repeated eigenvalue shapes have no derivative of their own: what turns inside its space is
+    left out.
 
     Arguments:
         model: a frame model.
-        modes: its modes, mass-normalised.
+        modes: its modes, mass-normalised; modes that share the eigenvalue must be among them.
         index: which of them.
         parameters: as in `eigenvalue_sensitivities`.
+        change: the derivatives of the matrices, where they are at hand.
+
+    Raises:
+        ModelError: when the bordered system is singular.
 
     Source: Fox & Kapoor (1968), full modal sum; Nelson (1976).
     """
-    change = derivatives(model.frame_structure, parameters)
+    change = derivatives(model.frame_structure, parameters) if change is None else change
     if len(modes) == model.size:
         return _modal_sum(modes, index, change)
     return _nelson(model, modes, index, change)
+
+
+def _same_eigenvalue(modes: Modes, index: int) -> IntArray:
+    """Return the modes whose eigenvalue cannot be told from the given one, itself included."""
+    gap = np.abs(modes.eigenvalues - modes.eigenvalues[index])
+    scale = max(abs(float(modes.eigenvalues[index])), 1.0)
+    return np.flatnonzero(gap <= _REPEATED * scale)
 
 
 def _modal_sum(modes: Modes, index: int, change: Derivatives) -> FloatArray:
@@ -60,34 +79,37 @@ def _modal_sum(modes: Modes, index: int, change: Derivatives) -> FloatArray:
     shape = shapes[:, index]
     force = change.products(shape, float(eigenvalue))
     gap = eigenvalue - modes.eigenvalues
-    scale = max(abs(float(eigenvalue)), float(np.abs(modes.eigenvalues).min()), 1.0)
-    apart = np.abs(gap) > _REPEATED * scale
-    factor = np.where(apart, 1.0 / np.where(apart, gap, 1.0), 0.0)
-    share = factor[:, None] * (shapes.T @ force)
+    gap[_same_eigenvalue(modes, index)] = np.inf
+    share = (shapes.T @ force) / gap[:, None]
     share[index] = -0.5 * _mass_part(shape, change)
     return np.asarray(shapes @ share)
 
 
 def _mass_part(shape: FloatArray, change: Derivatives) -> FloatArray:
     """Return phi' dM/dp phi, (n_parameters,)."""
-    return change.quadratic(shape[:, None], shape[:, None])[1][0]
+    _, mass = change.quadratic(shape[:, None], shape[:, None])
+    return np.asarray(mass[0])
 
 
 def _nelson(model: Model, modes: Modes, index: int, change: Derivatives) -> FloatArray:
     shape, eigenvalue = modes.shapes[:, index], float(modes.eigenvalues[index])
-    weighted = model.mass_times(shape[:, None])[:, 0]
+    cluster = modes.shapes[:, _same_eigenvalue(modes, index)]
+    weighted = model.mass_times(cluster)
     force = change.products(shape, eigenvalue)
-    stiffness, mass = change.quadratic(shape[:, None], shape[:, None])
-    right = np.outer(weighted, stiffness[0] - eigenvalue * mass[0]) - force
+    right = weighted @ (cluster.T @ force) - force
     # The border replaces Nelson's deleted row: it keeps the matrix symmetric and regular.
-    size = np.abs(model.stiffness.diagonal()).mean() / np.linalg.norm(weighted)
-    border = sp.csc_array((weighted * size)[:, None])
+    size = np.abs(model.stiffness.diagonal()).mean() / np.linalg.norm(weighted, axis=0)
+    border = sp.csc_array(weighted * size)
     dynamic = sp.block_array(
         [[model.stiffness - eigenvalue * model.mass, border], [border.T, None]], format="csc"
     )
-    solved = splu(sp.csc_matrix(dynamic)).solve(np.vstack([right, np.zeros((1, change.count))]))
-    particular = np.asarray(solved[:-1])
-    return np.asarray(particular - 0.5 * np.outer(shape, mass[0]))
+    zero = np.zeros((cluster.shape[1], change.count))
+    try:
+        solved = splu(sp.csc_matrix(dynamic)).solve(np.vstack([right, zero]))
+    except RuntimeError as error:
+        raise ModelError(f"mode {index + 1}: shape sensitivities have no solution") from error
+    particular = np.asarray(solved[: model.size])
+    return np.asarray(particular - 0.5 * np.outer(shape, _mass_part(shape, change)))
 
 
 def frequency_sensitivities(

@@ -13,9 +13,9 @@ from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 from femubench.core.errors import ModelError
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.model import LowRank, Model
-from femubench.core.typing import FloatArray, SparseArray
+from femubench.core.typing import FloatArray
 
-_RIGID_RESIDUAL = 1e-8
+_RIGID_RESIDUAL = 1e-12
 _MODE_RESIDUAL = 1e-6
 
 
@@ -168,7 +168,8 @@ def lowest_eigenpairs(model: Model, count: int) -> tuple[FloatArray, FloatArray]
     else:
         raise ModelError(f"{missed} eigenvalues below {eigenvalues[-1]:.6g} were not found")
     _check(model, eigenvalues, shapes)
-    values = np.concatenate([np.einsum("ij,ij->j", rigid, model.stiffness_times(rigid)), eigenvalues])
+    energy = np.einsum("ij,ij->j", rigid, model.stiffness_times(rigid))
+    values = np.concatenate([energy, eigenvalues])
     order = np.argsort(values, kind="stable")
     keep = order[: count + int(np.sum(eigenvalues < -1e-3 * abs(shifted.shift)))]
     return values[keep], np.hstack([rigid, shapes])[:, keep]

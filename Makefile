@@ -1,0 +1,57 @@
+# Every target makes the virtual environment it needs. PYTHON, VENV and ARGS can be set:
+#   make run ARGS="frame -s baruch"      make test ARGS="tests/test_cli.py"
+
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV ?= .venv
+ARGS ?=
+
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+# Folders too: their time changes when a file is added or removed.
+SOURCES := pyproject.toml $(shell find core plugins reports scenarios -not -path '*/__pycache__*')
+
+.PHONY: run test bench sweep format clean
+.DELETE_ON_ERROR:
+
+run: $(VENV)/.installed
+	@# 1 tells that some strategy failed on some case, which is a finding and no fault of make.
+	$(BIN)/bench run $(ARGS) || test $$? -eq 1
+
+test: $(VENV)/.installed-test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy -p femubench
+	$(BIN)/pytest $(ARGS)
+
+bench: $(VENV)/.installed-test
+	$(BIN)/pytest benchmarks -o addopts="--import-mode=importlib -ra" --benchmark-only $(ARGS)
+
+sweep: $(VENV)/.installed-test
+	$(BIN)/pytest -m sweep $(ARGS)
+
+format: $(VENV)/.installed-test
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .benchmarks .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "Python 3.11 or later is needed; set PYTHON"; exit 1; }
+	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \
+		echo "Python's venv is missing; on Debian: apt install python3-venv"; exit 1; }
+
+# pip builds inside the source folder: a file that was deleted would live on in build/.
+$(VENV)/.installed: $(SOURCES) | $(BIN)/python
+	rm -rf build *.egg-info
+	$(PIP) install --quiet .
+	rm -rf build *.egg-info
+	touch $@
+
+$(VENV)/.installed-test: $(SOURCES) | $(BIN)/python
+	rm -rf build *.egg-info
+	$(PIP) install --quiet '.[test]'
+	rm -rf build *.egg-info
+	touch $@ $(VENV)/.installed

@@ -1,0 +1,1 @@
+"""Case folders: their schema, how they are read, and what comes of them."""

@@ -1,0 +1,64 @@
+"""A case: a nominal model, what was measured on the structure, and its known changes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from femubench.core.fem.frame import GroundSpring, PointMass
+from femubench.core.measurement import Measurement
+from femubench.core.model import Model
+
+
+@dataclass(frozen=True)
+class Modification:
+    """A known change of the structure with its own measurement, all of it held out."""
+
+    name: str
+    masses: tuple[PointMass, ...]
+    springs: tuple[GroundSpring, ...]
+    measurement: Measurement
+
+
+@dataclass(frozen=True)
+class Case:
+    """Everything that a case folder says.
+
+    Arguments:
+        name: the case's name, as in ``bench run NAME``.
+        title: one line for tables.
+        source: where the numbers come from.
+        folder: the folder that was read.
+        model: the nominal model.
+        measurement: all measured modes, used, held out and neither.
+        used: labels of the modes that a strategy is given.
+        held_out: labels of the modes that only the score sees.
+        modifications: known changes with their modes.
+        band: every mode between these frequencies in Hz was found; None where not stated.
+        digest: hash of the content of all files of the case.
+    """
+
+    name: str
+    title: str
+    source: str
+    folder: Path
+    model: Model
+    measurement: Measurement
+    used: tuple[int, ...]
+    held_out: tuple[int, ...]
+    modifications: tuple[Modification, ...] = ()
+    band: tuple[float, float] | None = None
+    digest: str = ""
+
+    def used_measurement(self, seed: int = 0) -> Measurement:
+        """Return what a strategy may know: the used modes, noise added for a seed other than 0.
+
+        Seed 0 is the data as recorded; every other seed is one draw at the stated deviations.
+        """
+        used = self.measurement.select(self.used)
+        if seed == 0:
+            return used
+        words = [seed, *self.name.encode()]
+        return used.with_noise(np.random.default_rng(np.random.SeedSequence(words)))

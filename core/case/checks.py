@@ -1,0 +1,152 @@
+"""What the keys of a frame must be to each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from femubench.core.case.faults import Fault, KeyPath
+from femubench.core.case.schema import FrameSpec, JointSpringSpec, RigidEndSpec
+from femubench.core.fem.frame import ACTIVE, Plane
+from femubench.core.fem.mesh import ON_MEMBER
+from femubench.core.typing import FloatArray
+
+_MOST_ELEMENTS = 100_000
+_NORMAL: dict[Plane, str] = {"in-plane": "y", "out-of-plane": "z"}
+
+
+def check_frame(model: FrameSpec) -> None:
+    """Check names, geometry and connections; raises Fault with a path below `model`."""
+    check_unique((("joints", i, "name"), joint.name) for i, joint in enumerate(model.joints))
+    check_unique((("members", i, "name"), member.name) for i, member in enumerate(model.members))
+    _check_joints(model)
+    _check_members(model)
+    _check_connected(model)
+    for key, items in (("joint_springs", model.joint_springs), ("rigid_ends", model.rigid_ends)):
+        _check_ends(model, key, items)
+    _check_joint_springs(model)
+    for i, support in enumerate(model.supports):
+        _check_directions(support.fixed, model.plane, ("supports", i, "fixed"))
+
+
+def check_unique(names: Iterable[tuple[KeyPath, str]]) -> None:
+    """Check that no name comes twice."""
+    seen = set()
+    for path, name in names:
+        if name in seen:
+            raise Fault(path, f"{name!r} is listed twice", "a name of its own")
+        seen.add(name)
+
+
+def _check_directions(directions: Sequence[str], plane: Plane, path: KeyPath) -> None:
+    allowed = ACTIVE[plane]
+    for direction in directions:
+        if direction not in allowed:
+            expected = f"{', '.join(allowed)}, the directions of plane {plane!r}"
+            raise Fault(path, f"direction {direction!r} is not there", expected)
+    if len(set(directions)) < len(directions):
+        raise Fault(path, "a direction is listed twice", "each direction once")
+
+
+def _check_joints(model: FrameSpec) -> None:
+    normal = _NORMAL.get(model.plane)
+    xyz = np.array([joint.xyz for joint in model.joints])
+    if normal is not None:
+        column = xyz[:, "xyz".index(normal)]
+        off = np.flatnonzero(np.abs(column - column[0]) > ON_MEMBER)
+        if len(off):
+            i = int(off[0])
+            what = f"joint {model.joints[i].name!r} lies off the plane, {normal} = {column[i]:g}"
+            raise Fault(("joints", i, "xyz"), what, f"{normal} = {column[0]:g} as at the first")
+    pair = _nearest_pair(xyz)
+    if pair is not None:
+        first, second = (model.joints[k].name for k in pair)
+        what = f"joint {second!r} lies at the same point as {first!r}"
+        raise Fault(("joints", pair[1], "xyz"), what, "a point of its own")
+
+
+def _nearest_pair(xyz: FloatArray) -> tuple[int, int] | None:
+    """Return two joints that share a point."""
+    cells: dict[tuple[int, ...], int] = {}
+    for i, point in enumerate(xyz):
+        cell = tuple(int(v) for v in np.round(point / ON_MEMBER))
+        if cell in cells:
+            return cells[cell], i
+        cells[cell] = i
+    return None
+
+
+def _check_members(model: FrameSpec) -> None:
+    places = {joint.name: np.array(joint.xyz) for joint in model.joints}
+    elements = 0
+    for i, member in enumerate(model.members):
+        for j, end in enumerate(member.ends):
+            if end not in places:
+                what = f"member {member.name!r} ends at a joint {end!r} that is not there"
+                raise Fault(("members", i, "ends", j), what, "the name of a joint")
+        if member.ends[0] == member.ends[1]:
+            what = f"member {member.name!r} has length zero"
+            raise Fault(("members", i, "ends"), what, "two different joints")
+        for key, table in (("section", model.sections), ("material", model.materials)):
+            name = getattr(member, key)
+            if name not in table:
+                known = ", ".join(table) or f"a table [model.{key}s.NAME]"
+                raise Fault(("members", i, key), f"there is no {key} {name!r}", known)
+        if member.up is not None:
+            _check_up(model, i, places[member.ends[1]] - places[member.ends[0]])
+        elements += member.elements
+        if elements > _MOST_ELEMENTS:
+            what = f"more than {_MOST_ELEMENTS} elements"
+            raise Fault(("members", i, "elements"), what, "fewer elements")
+
+
+def _check_up(model: FrameSpec, i: int, along: FloatArray) -> None:
+    path = ("members", i, "up")
+    if model.plane != "3d":
+        raise Fault(path, f"not a key of plane {model.plane!r}", "no `up`, it belongs to 3d")
+    up = np.array(model.members[i].up)
+    across = np.linalg.norm(np.cross(up, along / np.linalg.norm(along)))
+    if across < 1e-9 or across < 1e-6 * np.linalg.norm(up):
+        raise Fault(path, "lies along the member", "a vector in the local x-z plane")
+
+
+def _check_connected(model: FrameSpec) -> None:
+    group = {joint.name: {joint.name} for joint in model.joints}
+    for member in model.members:
+        first, second = (group[end] for end in member.ends)
+        if first is not second:
+            small, large = sorted((first, second), key=len)
+            large |= small
+            for name in small:
+                group[name] = large
+    whole = group[model.joints[0].name]
+    for i, joint in enumerate(model.joints):
+        if joint.name not in whole:
+            what = f"joint {joint.name!r} is not connected to {model.joints[0].name!r}"
+            raise Fault(("joints", i), what, "members that connect all joints")
+
+
+def _check_ends(
+    model: FrameSpec, key: str, items: Sequence[JointSpringSpec | RigidEndSpec]
+) -> None:
+    ends = {member.name: member.ends for member in model.members}
+    seen = set()
+    for i, item in enumerate(items):
+        if item.member not in ends:
+            raise Fault((key, i, "member"), f"there is no member {item.member!r}", "a member")
+        if item.joint not in ends[item.member]:
+            what = f"member {item.member!r} does not end at {item.joint!r}"
+            raise Fault((key, i, "joint"), what, f"one of {', '.join(ends[item.member])}")
+        if (item.joint, item.member) in seen:
+            what = f"the end of {item.member!r} at {item.joint!r} is listed twice"
+            raise Fault((key, i), what, "every member end once")
+        seen.add((item.joint, item.member))
+
+
+def _check_joint_springs(model: FrameSpec) -> None:
+    for i, spring in enumerate(model.joint_springs):
+        path = ("joint_springs", i)
+        _check_directions(tuple(spring.stiffness), model.plane, (*path, "stiffness"))
+        if spring.arm_factor is not None and spring.arm == 0.0:
+            raise Fault((*path, "arm_factor"), "there is no arm", "arm > 0 beside arm_factor")

@@ -1,0 +1,142 @@
+"""Models that come as matrices: Matrix Market files, their degrees of freedom, groups."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import scipy.io
+import scipy.sparse as sp
+
+from femubench.core.case.checks import check_unique
+from femubench.core.case.faults import Fault, Misfit, at_key
+from femubench.core.case.files import CaseFiles
+from femubench.core.case.nodes import MatrixGeometry, read_dofs
+from femubench.core.case.schema import GroupSpec, MatricesSpec
+from femubench.core.errors import InputError
+from femubench.core.model import Model
+from femubench.core.plugin.roles import Reader
+from femubench.core.typing import SparseArray
+
+_MOST_DENSE = 20_000
+_ASYMMETRY = 1e-8  # of the largest entry
+_MATRIX_MARKET = (".mtx", ".mtx.gz", ".mtx.bz2")
+
+
+def read_matrix(file: Path, size: int, readers: Sequence[Reader]) -> SparseArray:
+    """Return a symmetric matrix of a file.
+
+    Arguments:
+        file: Matrix Market, or whatever one of the readers knows by its suffix.
+        size: the number of rows that it must have.
+        readers: reader plugins.
+
+    Raises:
+        InputError: when it is not real, square, of that size, finite and symmetric.
+    """
+    if file.name.lower().endswith(_MATRIX_MARKET):
+        matrix = _matrix_market(file, size)
+    else:
+        reader = reader_of(file, readers)
+        if reader is None:
+            known = [*_MATRIX_MARKET[:2], *(s for r in readers for s in r.suffixes)]
+            raise InputError("unknown kind of file", file=file, expected=", ".join(known))
+        matrix = sp.csc_array(reader.read_matrix(file))
+    if matrix.shape != (size, size):
+        what = f"the matrix has {matrix.shape[0]} rows and {matrix.shape[1]} columns"
+        raise InputError(what, file=file, expected=f"{size} of both as in the dofs file")
+    if matrix.dtype.kind not in "fiu" or not np.isfinite(matrix.data).all():
+        raise InputError("an entry is not a finite number", file=file, expected="real numbers")
+    matrix = sp.csc_array(matrix, dtype=float)
+    largest = np.abs(matrix.data).max(initial=0.0)
+    if np.abs((matrix - matrix.T).data).max(initial=0.0) > _ASYMMETRY * largest:
+        raise InputError("the matrix is not symmetric", file=file, expected="A = A'")
+    if largest == 0.0 or matrix.diagonal().min() < 0.0:
+        what = "the matrix is zero" if largest == 0.0 else "a diagonal entry is negative"
+        raise InputError(what, file=file, expected="a positive semidefinite matrix")
+    return sp.csc_array(0.5 * (matrix + matrix.T))
+
+
+def reader_of(file: Path, readers: Sequence[Reader]) -> Reader | None:
+    """Return the first reader that knows the suffix of a file."""
+    name = file.name.lower()
+    return next((r for r in readers if any(name.endswith(s) for s in r.suffixes)), None)
+
+
+def _matrix_market(file: Path, size: int) -> SparseArray:
+    expected = "a Matrix Market file, coordinate or array, real, symmetric or general"
+    try:
+        rows, columns, _, form, field, symmetry = scipy.io.mminfo(file)
+        if field not in ("real", "integer") or symmetry not in ("general", "symmetric"):
+            raise InputError(f"a matrix that is {field} {symmetry}", file=file, expected=expected)
+        if (rows, columns) != (size, size) or (form == "array" and size > _MOST_DENSE):
+            what = f"the matrix has {rows} rows and {columns} columns"
+            raise InputError(what, file=file, expected=f"{size} of both as in the dofs file")
+        return sp.csc_array(scipy.io.mmread(file, spmatrix=False))
+    except (ValueError, OverflowError, OSError, EOFError, IndexError, TypeError) as error:
+        raise InputError(f"cannot be read: {error}", file=file, expected=expected) from None
+
+
+def matrix_model(spec: MatricesSpec, files: CaseFiles, readers: Sequence[Reader]) -> Model:
+    """Return the model of a case of kind ``matrices``.
+
+    Raises:
+        Fault: with a path below `model`.
+        InputError: for what is wrong in one of the files.
+    """
+    paths = {}
+    for key in ("dofs", "mass", "stiffness"):
+        with at_key(key):
+            paths[key] = files.path(getattr(spec, key))
+    geometry = read_dofs(paths["dofs"])
+    size = len(geometry.dofs)
+    mass, stiffness = (read_matrix(paths[key], size, readers) for key in ("mass", "stiffness"))
+    check_unique((("groups", i, "name"), group.name) for i, group in enumerate(spec.groups))
+    groups: dict[str, SparseArray] = {}
+    for i, group in enumerate(spec.groups):
+        with at_key("groups", i):
+            groups[group.name] = _group(group, geometry, stiffness, files, readers)
+    return Model(mass, stiffness, geometry.dofs, geometry, groups=groups)
+
+
+def _group(
+    spec: GroupSpec,
+    geometry: MatrixGeometry,
+    stiffness: SparseArray,
+    files: CaseFiles,
+    readers: Sequence[Reader],
+) -> SparseArray:
+    """Return the part of the stiffness that a group names."""
+    if (spec.stiffness is None) == (spec.dofs is None):
+        raise Fault((), "a group with both or neither", "either stiffness or dofs")
+    size = len(geometry.dofs)
+    if spec.stiffness is not None:
+        with at_key("stiffness"):
+            path = files.path(spec.stiffness)
+        return read_matrix(path, size, readers)
+    inside = np.zeros(size)
+    for i, entry in enumerate(spec.dofs or ()):
+        with at_key("dofs", i):
+            inside[_rows(entry, geometry, geometry.rows)] = 1.0
+    pick = sp.diags_array(inside)
+    part = sp.csc_array(pick @ stiffness @ pick)
+    part.eliminate_zeros()
+    return part
+
+
+def _rows(
+    entry: int | str, geometry: MatrixGeometry, rows: Mapping[tuple[str, str], int]
+) -> list[int]:
+    if isinstance(entry, int):
+        row = entry - geometry.first_row
+        if not 0 <= row < len(geometry.dofs):
+            raise Misfit("there is no such row", "a row number of the dofs file")
+        return [row]
+    node, _, direction = entry.rpartition(":")
+    if (node, direction) in rows:
+        return [rows[node, direction]]
+    found = [row for (name, _), row in rows.items() if name == entry]
+    if not found:
+        raise Misfit(f"there is no dof {entry[:60]!r}", 'a row number, "node" or "node:direction"')
+    return found

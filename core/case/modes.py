@@ -1,0 +1,181 @@
+"""Read measured modes: the table modes.csv, and what reader plugins hand over."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from femubench.core.case.faults import Misfit, WrongDirection
+from femubench.core.case.frames import Site
+from femubench.core.case.schema import SMALLEST
+from femubench.core.case.tables import RESERVED, Complex, Row, Table, read_table
+from femubench.core.errors import InputError
+from femubench.core.measurement import DIRECTIONS, Measurement, Sensors
+from femubench.core.modal.complex_modes import real_modes
+from femubench.core.typing import FloatArray
+
+FREQUENCY_STD = 0.005  # of the frequency, where the table gives none
+NO_SENSORS = Sensors((), np.zeros((0, 3)), ())
+
+
+def read_modes(file: Path, sensors: Sensors, shape_std: float) -> Measurement:
+    """Return the modes of a CSV file.
+
+    Arguments:
+        file: mode,frequency,frequency_std,damping and a column a sensor, optionally LABEL_std.
+        sensors: whose labels the columns bear; a sensor without a column was not measured.
+        shape_std: deviation of a shape, of its largest component, where the table gives none.
+
+    Raises:
+        InputError: for an unknown column, a mode listed twice, a number that cannot be.
+    """
+    table = read_table(file)
+    labels = sensors.labels
+    known = {*RESERVED, *labels, *(f"{label}_std" for label in labels)}
+    table.check_columns(("mode", "frequency"), known)
+    if not table.rows:
+        raise InputError("no modes", file=file, expected="a row for every mode")
+    numbers: dict[int, None] = {}
+    for row in table.rows:
+        number = row.whole("mode")
+        if number in numbers or number < 1:
+            what = f"mode {number} is listed twice" if number else "mode 0"
+            raise row.error("mode", what, "a whole number >= 1 of its own")
+        numbers[number] = None
+    frequencies, frequency_std, damping = _frequencies(table)
+    shapes, std = _shapes(table, labels)
+    return Measurement(
+        sensors=sensors,
+        numbers=tuple(numbers),
+        frequencies=frequencies,
+        frequency_std=frequency_std,
+        damping=damping,
+        shapes=shapes,
+        shape_std=with_default_std(shapes, std, shape_std),
+    )
+
+
+def _frequencies(table: Table) -> tuple[FloatArray, FloatArray, FloatArray]:
+    columns: list[tuple[float, float, float]] = []
+    for row in table.rows:
+        frequency = row.number("frequency", "a number > 0 in Hz", _positive)
+        if frequency is None:
+            raise row.error("frequency", "empty cell", "a number > 0 in Hz")
+        std = row.number("frequency_std", "a number > 0 in Hz, or nothing", _positive)
+        damping = row.number("damping", "a ratio >= 0 and < 1, or nothing", _ratio)
+        std = FREQUENCY_STD * frequency if std is None else std
+        columns.append((frequency, std, np.nan if damping is None else damping))
+    frequencies, stds, ratios = np.array(columns).T
+    return frequencies, stds, ratios
+
+
+def _positive(value: float) -> bool:
+    return value >= SMALLEST
+
+
+def _ratio(value: float) -> bool:
+    return 0.0 <= value < 1.0
+
+
+def _shapes(table: Table, labels: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
+    """Return real shapes and the deviations that are given, nan elsewhere, (n_sensors, m)."""
+    size = (len(labels), len(table.rows))
+    shapes, std = np.full(size, np.nan, dtype=complex), np.full(size, np.nan)
+    complex_modes = np.zeros(len(table.rows), dtype=bool)
+    for m, row in enumerate(table.rows):
+        for s, label in enumerate(labels):
+            value = row.value(label)
+            if isinstance(value, Complex):
+                shapes[s, m] = complex(*value)
+                complex_modes[m] = True
+            elif value is not None:
+                shapes[s, m] = value
+            if f"{label}_std" not in labels:
+                deviation = row.number(f"{label}_std", "a number > 0, or nothing", _positive)
+                std[s, m] = np.nan if deviation is None else deviation
+        _check_shape(row, shapes[:, m])
+    real = np.where(complex_modes, real_modes(shapes), shapes.real)
+    return real, std
+
+
+def _check_shape(row: Row, shape: FloatArray) -> None:
+    measured = np.abs(shape[np.isfinite(shape)])
+    if len(measured) and measured.max() < SMALLEST:
+        raise row.error("mode", "the shape is zero at every sensor", "a shape, or empty cells")
+
+
+def with_default_std(shapes: FloatArray, std: FloatArray, share: float) -> FloatArray:
+    """Return deviations with a share of each mode's largest component where there is none.
+
+    Arguments:
+        shapes, std: (n_sensors, m), nan where missing; a mode without any shape keeps nan.
+        share: the deviation relative to the largest measured component of the mode.
+    """
+    largest = np.max(np.abs(np.nan_to_num(shapes)), axis=0, initial=0.0)
+    default = share * np.where(largest > 0.0, largest, np.nan)
+    return np.where(np.isnan(std), default[None, :], std)
+
+
+def fitted_sensors(read: Measurement, file: Path, site: Site) -> Sensors:
+    """Return the sensors of a file that a plugin has read, those that fit the structure.
+
+    Files of three components a point list directions that a planar model does not have, and
+    points whose place is in another file; such sensors are left out, one that lies off the
+    structure is an error.
+
+    Raises:
+        InputError: when a sensor lies off the structure, or none is left.
+    """
+    sensors = read.sensors
+    keep = []
+    for i, (label, direction) in enumerate(zip(sensors.labels, sensors.directions, strict=True)):
+        x, y, z = (float(v) for v in sensors.xyz[i])
+        if direction.lstrip("+-") not in DIRECTIONS or not np.isfinite([x, y, z]).all():
+            continue
+        try:
+            site.check_sensor((x, y, z), direction)
+        except WrongDirection:
+            continue
+        except Misfit as misfit:
+            what = f"sensor {label!r}: {misfit.what}"
+            raise InputError(what, file=file, expected=misfit.expected) from None
+        keep.append(i)
+    if not keep:
+        expected = "nodes with coordinates, in a direction that the model has"
+        raise InputError("no sensor fits the structure", file=file, expected=expected)
+    labels, directions = sensors.labels, sensors.directions
+    return Sensors(
+        tuple(labels[i] for i in keep), sensors.xyz[keep], tuple(directions[i] for i in keep)
+    )
+
+
+def fitted_modes(read: Measurement, file: Path, sensors: Sensors, share: float) -> Measurement:
+    """Return the modes of a file that a plugin has read, on the sensors of the case.
+
+    Raises:
+        InputError: when the file holds no modes, or none of its sensors is one of the case.
+    """
+    if not len(read):
+        raise InputError("no modes", file=file, expected="frequencies and mode shapes")
+    rows = {label: i for i, label in enumerate(read.sensors.labels)}
+    shapes = np.full((len(sensors), len(read)), np.nan)
+    found = [(s, rows[label]) for s, label in enumerate(sensors.labels) if label in rows]
+    if not found and len(sensors) and len(rows):
+        expected = f"labels as in the file, e.g. {read.sensors.labels[0]!r}"
+        raise InputError("no shape belongs to a sensor of the case", file=file, expected=expected)
+    for s, row in found:
+        shapes[s] = read.shapes[row]
+    std = with_default_std(shapes, np.full(shapes.shape, np.nan), share)
+    return replace(read, sensors=sensors, shapes=shapes, shape_std=std)
+
+
+def measured_only(sensors: Sensors, shapes: FloatArray) -> Sensors:
+    """Return the sensors at which some mode has a shape."""
+    keep = np.flatnonzero(np.isfinite(shapes).any(axis=1))
+    return Sensors(
+        tuple(sensors.labels[i] for i in keep),
+        sensors.xyz[keep],
+        tuple(sensors.directions[i] for i in keep),
+    )

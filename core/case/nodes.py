@@ -1,0 +1,192 @@
+"""The nodes and degrees of freedom of a model that comes as matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench.core.case.faults import Misfit, WrongDirection
+from femubench.core.case.tables import read_table
+from femubench.core.errors import InputError, ModelError
+from femubench.core.fem.frame import GroundSpring, Place, PointMass, Vector
+from femubench.core.fem.kinematics import rigid_arm
+from femubench.core.fem.mesh import ON_MEMBER
+from femubench.core.measurement import DIRECTIONS, Sensors
+from femubench.core.model import Dofs
+from femubench.core.typing import FloatArray, SparseArray
+
+_MOST_DOFS = 1_000_000
+
+
+@dataclass(frozen=True)
+class MatrixGeometry:
+    """Where the rows of the matrices sit: nodes by name, their places and directions.
+
+    Arguments:
+        names: the nodes, in the order in which the dofs file first names them.
+        dofs: the rows; `dofs.node` counts the names.
+        first_row: the number that the dofs file gives to the first row, 0 or 1.
+    """
+
+    names: tuple[str, ...]
+    dofs: Dofs
+    first_row: int = 1
+
+    @cached_property
+    def rows(self) -> dict[tuple[str, str], int]:
+        """Return from (node, direction) to the row."""
+        pairs = zip(self.dofs.node, self.dofs.direction, strict=True)
+        return {(self.names[node], direction): i for i, (node, direction) in enumerate(pairs)}
+
+    @cached_property
+    def places(self) -> dict[str, FloatArray]:
+        """Return where the nodes are in m."""
+        first = np.unique(self.dofs.node, return_index=True)[1]
+        return dict(zip(self.names, self.dofs.xyz[first], strict=True))
+
+    @cached_property
+    def _points(self) -> FloatArray:
+        return np.array(list(self.places.values()))
+
+    def node(self, place: Place) -> str:
+        """Return the node of a place; raises Misfit."""
+        if place.joint is None or place.joint not in self.places:
+            raise Misfit(f"there is no node {str(place)!r}", "the name of a node of the dofs file")
+        return place.joint
+
+    def point(self, place: Place) -> Vector:
+        """Return where a node lies in m; raises Misfit."""
+        node = self.node(place)
+        x, y, z = (float(v) for v in self.places[node])
+        shared = [name for name, _ in self.near((x, y, z)) if name != node]
+        if shared:
+            raise Misfit(f"node {node!r} shares its place with {shared[0]!r}", "a place of its own")
+        return x, y, z
+
+    def check_direction(self, place: Place, direction: str) -> None:
+        """Check that a node has a dof in a direction; raises Misfit."""
+        node = self.node(place)
+        if (node, direction.lstrip("+-")) not in self.rows:
+            there = ", ".join(name for other, name in self.rows if other == node)
+            raise WrongDirection(f"node {node!r} has no direction {direction!r}", there)
+
+    def check_sensor(self, xyz: Vector, direction: str) -> None:
+        """Check that a node with that direction lies at a point; raises Misfit."""
+        self.row_at(np.array(xyz), direction.lstrip("+-"))
+
+    def near(self, xyz: Vector | FloatArray) -> list[tuple[str, float]]:
+        """Return the nodes within 1e-6 m of a point with their distances."""
+        gaps = np.linalg.norm(self._points - np.array(xyz), axis=1)
+        return [(self.names[i], float(gaps[i])) for i in np.flatnonzero(gaps <= ON_MEMBER)]
+
+    def row_at(self, xyz: FloatArray, direction: str) -> int:
+        """Return the row that a sensor reads; raises Misfit."""
+        names = [name for name, _ in self.near(xyz)]
+        where = f"({', '.join(f'{v:g}' for v in xyz)})"
+        if not names:
+            raise Misfit(f"there is no node at {where}", "the place of a node, within 1e-6 m")
+        rows = [self.rows[name, direction] for name in names if (name, direction) in self.rows]
+        if not rows:
+            there = sorted({d for name, d in self.rows if name in names}, key=DIRECTIONS.index)
+            raise WrongDirection(f"direction {direction!r} is no dof at {where}", ", ".join(there))
+        if len(rows) > 1:
+            what = f"nodes {' and '.join(map(repr, names))} share the place {where}"
+            raise Misfit(what, "a sensor at a place of one node")
+        return rows[0]
+
+    def observe(self, sensors: Sensors) -> SparseArray:
+        """Return sensor readings from dofs, sparse (n_sensors, n)."""
+        directions = [direction.lstrip("+-") for direction in sensors.directions]
+        try:
+            pairs = zip(sensors.xyz, directions, strict=True)
+            columns = [self.row_at(xyz, direction) for xyz, direction in pairs]
+        except Misfit as misfit:
+            raise ModelError(misfit.what) from None
+        signs = sensors.axes.sum(axis=1)
+        shape = (len(sensors), len(self.dofs))
+        return sp.csr_array((signs, (np.arange(len(sensors)), columns)), shape=shape)
+
+    def attached(
+        self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]
+    ) -> tuple[SparseArray, SparseArray]:
+        """Return the mass and stiffness that attachments add, sparse (n, n) each.
+
+        Raises:
+            ModelError: when a node has no such dof, or an arm needs a rotation that is not there.
+        """
+        n = len(self.dofs)
+        mass, stiffness = sp.csc_array((n, n)), sp.csc_array((n, n))
+        try:
+            for item in masses:
+                rows = self._moved(self.node(item.at), np.array(item.offset))
+                mass = mass + item.mass * (rows.T @ rows)
+            for spring in springs:
+                self.check_direction(spring.at, spring.direction)
+                row = self.rows[self.node(spring.at), spring.direction.lstrip("+-")]
+                one = sp.csc_array(([spring.stiffness], ([row], [row])), shape=(n, n))
+                stiffness = stiffness + one
+        except Misfit as misfit:
+            raise ModelError(misfit.what) from None
+        return sp.csc_array(mass), sp.csc_array(stiffness)
+
+    def _moved(self, node: str, offset: FloatArray) -> SparseArray:
+        """Return the displacements of a mass on a rigid arm from the dofs, sparse (3, n)."""
+        arm = rigid_arm(offset)[:3]
+        own = [self.rows.get((node, name)) for name in DIRECTIONS]
+        if all(row is None for row in own[:3]):
+            raise ModelError(f"node {node!r} has no translation that a mass could take part in")
+        entries: list[tuple[int, int, float]] = []
+        for i in range(3):
+            for j in np.flatnonzero(arm[i]):
+                row = own[j]
+                if row is not None:
+                    entries.append((i, row, float(arm[i, j])))
+                elif j >= 3 and own[i] is not None:
+                    what = f"node {node!r} has no rotation {DIRECTIONS[j]} for the arm of a mass"
+                    raise ModelError(what)
+        i_rows, columns, values = zip(*entries, strict=True)
+        return sp.csr_array((values, (i_rows, columns)), shape=(3, len(self.dofs)))
+
+
+def read_dofs(file: Path) -> MatrixGeometry:
+    """Return the dofs of a CSV file row,node,direction,x,y,z; rows count from 0 or from 1.
+
+    Raises:
+        InputError: for a row listed twice or left out, a dof listed twice, a node at two places.
+    """
+    table = read_table(file)
+    table.check_columns(("row", "node", "direction", "x", "y", "z"))
+    if not table.rows or len(table.rows) > _MOST_DOFS:
+        raise InputError(f"{len(table.rows)} rows", file=file, expected="a row for every dof")
+    numbers = [row.whole("row") for row in table.rows]
+    first, count = min(numbers), len(numbers)
+    seen: set[int] = set()
+    names: dict[str, int] = {}
+    places: dict[str, Vector] = {}
+    listed: dict[tuple[str, str], int] = {}
+    for number, row in zip(numbers, table.rows, strict=True):
+        if number in seen or first > 1 or number - first >= count:
+            expected = f"the numbers 1 to {count} (or 0 to {count - 1}), each once"
+            raise row.error("row", f"row {number}", expected)
+        seen.add(number)
+        node, direction, xyz = row.text("node"), row.direction().lstrip("-"), row.vector()
+        if row.cells["direction"] != direction:
+            raise row.error("direction", row.cells["direction"], ", ".join(DIRECTIONS))
+        if (node, direction) in listed:
+            raise row.error("node", f"node {node!r} has {direction} twice", "every dof once")
+        if places.setdefault(node, xyz) != xyz:
+            raise row.error("x", f"node {node!r} lies at two places", f"{places[node]}")
+        names.setdefault(node, len(names))
+        listed[node, direction] = number - first
+    order = sorted(listed, key=lambda key: listed[key])
+    dofs = Dofs(
+        node=np.array([names[node] for node, _ in order], dtype=np.int64),
+        direction=tuple(direction for _, direction in order),
+        xyz=np.array([places[node] for node, _ in order], dtype=float),
+    )
+    return MatrixGeometry(tuple(names), dofs, first)

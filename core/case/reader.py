@@ -1,0 +1,229 @@
+"""Read a case folder: whatever is wrong in it comes out as one line with file, line and key."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from pydantic import ValidationError
+
+from femubench.core.case.case import Case, Modification
+from femubench.core.case.checks import check_unique
+from femubench.core.case.faults import Fault, KeyPath, at_key, dotted, first_fault
+from femubench.core.case.files import CaseFiles, read_text
+from femubench.core.case.frames import FrameSite, Site, frame_of, ground_springs, point_masses
+from femubench.core.case.matrices import matrix_model, reader_of
+from femubench.core.case.modes import (
+    NO_SENSORS,
+    fitted_modes,
+    fitted_sensors,
+    measured_only,
+    read_modes,
+)
+from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.case.schema import CaseSpec, FrameSpec, ModificationSpec, parse_spec
+from femubench.core.case.tables import read_sensors
+from femubench.core.case.toml_lines import key_lines, line_of
+from femubench.core.errors import InputError, ModelError
+from femubench.core.measurement import Measurement, Sensors
+from femubench.core.model import Model
+from femubench.core.plugin.roles import Reader
+
+_TABLES = (".csv", ".txt")
+_AT_LINE = re.compile(r"\s*\(at line (\d+), column \d+\)")
+
+
+def read_case(folder: Path, name: str | None = None, readers: Sequence[Reader] = ()) -> Case:
+    """Read a case folder.
+
+    Arguments:
+        folder: a folder with a `case.toml`.
+        name: the name to give to the case; None takes its own.
+        readers: reader plugins for files other than CSV and Matrix Market.
+
+    Raises:
+        InputError: for anything wrong in the folder.
+    """
+    files = CaseFiles(Path(folder))
+    text = read_text(files.case_file)
+    try:
+        return _Building(files, _parsed(text, files.case_file), tuple(readers)).case(name)
+    except Fault as fault:
+        line = line_of(key_lines(text), fault.path)
+        raise InputError(
+            fault.what,
+            file=files.case_file,
+            line=line,
+            key=dotted(fault.path) or None,
+            expected=fault.expected,
+        ) from None
+
+
+def _parsed(text: str, file: Path) -> CaseSpec:
+    try:
+        return parse_spec(tomllib.loads(text))
+    except ValidationError as error:
+        raise first_fault(error, CaseSpec) from None
+    except RecursionError:
+        raise InputError("nested too deeply", file=file, expected="a flat table") from None
+    except tomllib.TOMLDecodeError as error:
+        found = _AT_LINE.search(str(error))
+        line = int(found.group(1)) if found else None
+        what = _AT_LINE.sub("", str(error))
+        raise InputError(what, file=file, line=line, expected="valid TOML") from None
+    except ValueError:  # Python's own, at whole numbers of more than 4300 digits
+        raise InputError("a number is too long", file=file, expected="valid TOML") from None
+
+
+@dataclass
+class _Building:
+    """A case while it is put together."""
+
+    files: CaseFiles
+    spec: CaseSpec
+    readers: tuple[Reader, ...]
+    readings: dict[Path, Measurement] = field(default_factory=dict)
+
+    def case(self, name: str | None) -> Case:
+        """Return the case; raises Fault or InputError."""
+        model = self.model()
+        site: Site = (
+            model.geometry
+            if isinstance(model.geometry, MatrixGeometry)
+            else FrameSite(model.frame_structure.frame)
+        )
+        measurement = self.measurement(site)
+        info = self.spec.case
+        return Case(
+            name=info.name if name is None else name,
+            title=info.title or info.name,
+            source=info.source,
+            folder=self.files.folder,
+            model=model,
+            measurement=measurement,
+            used=self.spec.measurement.used,
+            held_out=self.spec.measurement.held_out,
+            modifications=self.modifications(model, site, measurement.sensors),
+            band=self.spec.measurement.band,
+            digest=self.files.digest(),
+        )
+
+    def model(self) -> Model:
+        spec = self.spec.model
+        with at_key("model"), np.errstate(all="ignore"):
+            if not isinstance(spec, FrameSpec):
+                return matrix_model(spec, self.files, self.readers)
+            try:
+                model = Model.of(frame_of(spec))
+                finite = all(np.isfinite(m.data).all() for m in (model.mass, model.stiffness))
+            except ModelError as error:
+                key, expected = _key_of(str(error), spec)
+                raise Fault(key, str(error), expected) from None
+            except ArithmeticError:
+                finite = False
+            if not finite:
+                expected = "sizes and constants of a real structure"
+                raise Fault((), "the matrices are not finite", expected)
+            if model.size == 0:
+                raise Fault(("supports",), "nothing can move", "a direction that is free")
+            return model
+
+    def reading(self, key: KeyPath, name: str) -> tuple[Path, Measurement | None]:
+        """Return the path of a file, and what a reader plugin reads in it, None for a table."""
+        with at_key(*key):
+            path = self.files.path(name)
+        if path.suffix.lower() in _TABLES:
+            return path, None
+        reader = reader_of(path, self.readers)
+        if reader is None:
+            known = [".csv", *(suffix for r in self.readers for suffix in r.suffixes)]
+            raise Fault(key, f"unknown kind of file {name!r}", ", ".join(known))
+        if path not in self.readings:
+            self.readings[path] = reader.read_modes(path)
+        return path, self.readings[path]
+
+    def measurement(self, site: Site) -> Measurement:
+        spec = self.spec.measurement
+        if spec.band is not None and spec.band[0] >= spec.band[1]:
+            raise Fault(("measurement", "band"), "the band is empty", "[low, high], low < high")
+        sensors, from_plugin = self.sensors(site)
+        measurement = self.modes(("measurement", "modes"), spec.modes, sensors)
+        if from_plugin:
+            measured = measured_only(sensors, measurement.shapes)
+            measurement = self.modes(("measurement", "modes"), spec.modes, measured)
+        self.check_labels(measurement)
+        if spec.mass is None:
+            return measurement
+        return replace(measurement, total_mass=(spec.mass.value, spec.mass.std))
+
+    def sensors(self, site: Site) -> tuple[Sensors, bool]:
+        """Return the sensors, and whether a reader plugin gave them."""
+        spec = self.spec.measurement
+        if spec.sensors is None:
+            path, read = self.reading(("measurement", "modes"), spec.modes)
+            if read is None or not len(read.sensors):
+                return NO_SENSORS, False
+        else:
+            path, read = self.reading(("measurement", "sensors"), spec.sensors)
+            if read is None:
+                return read_sensors(path, site), False
+        return fitted_sensors(read, path, site), True
+
+    def modes(self, key: KeyPath, name: str, sensors: Sensors) -> Measurement:
+        share = self.spec.measurement.shape_std
+        path, read = self.reading(key, name)
+        if read is None:
+            return read_modes(path, sensors, share)
+        return fitted_modes(read, path, sensors, share)
+
+    def check_labels(self, measurement: Measurement) -> None:
+        spec = self.spec.measurement
+        seen: set[int] = set()
+        for key, numbers in (("used", spec.used), ("held_out", spec.held_out)):
+            for i, number in enumerate(numbers):
+                path = ("measurement", key, i)
+                if number in seen:
+                    raise Fault(path, f"mode {number} is listed twice", "every mode once")
+                if number not in measurement.numbers:
+                    there = ", ".join(map(str, measurement.numbers[:20]))
+                    what = f"mode {number} has no data in {spec.modes}"
+                    raise Fault(path, what, f"one of {there}")
+                seen.add(number)
+
+    def modifications(self, model: Model, site: Site, sensors: Sensors) -> tuple[Modification, ...]:
+        specs = self.spec.modification
+        check_unique((("modification", i, "name"), spec.name) for i, spec in enumerate(specs))
+        return tuple(
+            self.modification(i, spec, model, site, sensors) for i, spec in enumerate(specs)
+        )
+
+    def modification(
+        self, i: int, spec: ModificationSpec, model: Model, site: Site, sensors: Sensors
+    ) -> Modification:
+        with at_key("modification", i):
+            masses = point_masses(spec.masses, site)
+            springs = ground_springs(spec.springs, site)
+            if not masses and not springs:
+                raise Fault((), "nothing is changed", "masses or springs")
+            try:
+                model.attach(masses, springs)
+            except ModelError as error:
+                raise Fault((), str(error), "a change that the model can take") from None
+        measurement = self.modes(("modification", i, "modes"), spec.modes, sensors)
+        return Modification(spec.name, masses, springs, measurement)
+
+
+def _key_of(message: str, model: FrameSpec) -> tuple[KeyPath, str]:
+    """Return the key, below `model`, that an error of the mesher most likely means."""
+    for key, word in (("joint_springs", "joint spring"), ("rigid_ends", "rigid end")):
+        items = getattr(model, key)
+        if word in message and items:
+            named = [i for i, item in enumerate(items) if repr(item.member) in message]
+            one = named[:1] or list(range(len(items)))
+            return ((key, one[0]) if len(one) == 1 else (key,)), "a shorter one"
+    named = [i for i, member in enumerate(model.members) if repr(member.name) in message]
+    return (("members", named[0]) if named else ()), "a frame that can be meshed"

@@ -1,0 +1,238 @@
+"""Read the CSV files of a case: cells, sensors, dofs."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from femubench.core.case.faults import Misfit, WrongDirection
+from femubench.core.case.files import read_text
+from femubench.core.case.frames import Site
+from femubench.core.case.schema import LARGEST
+from femubench.core.errors import InputError
+from femubench.core.fem.frame import Place, Vector
+from femubench.core.measurement import DIRECTIONS, Sensors
+
+_MOST_ROWS, _MOST_COLUMNS = 1_000_000, 50_000
+_REAL = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_NUMBER = re.compile(_REAL, re.ASCII)
+_COMPLEX = re.compile(rf"\(?(?:({_REAL})(?=[+-]))?({_REAL})[ijIJ]\)?", re.ASCII)
+_WHOLE = re.compile(r"\+?\d{1,9}", re.ASCII)
+RESERVED = ("mode", "frequency", "frequency_std", "damping")
+
+
+class Complex(NamedTuple):
+    """A cell that was written as a complex number, which `complex` alone does not tell."""
+
+    real: float
+    imag: float
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row of a table; cells are found by column and told with file and line when wrong."""
+
+    file: Path
+    line: int
+    cells: dict[str, str]
+
+    def error(self, column: str, what: str, expected: str) -> InputError:
+        """Return the error that names this cell."""
+        return InputError(what, file=self.file, line=self.line, key=column, expected=expected)
+
+    def text(self, column: str, expected: str = "a name") -> str:
+        """Return a cell that must not be empty."""
+        cell = self.cells[column]
+        if not cell or not cell.isprintable():
+            raise self.error(column, "empty cell" if not cell else "not a text", expected)
+        return cell
+
+    def whole(self, column: str) -> int:
+        """Return a whole number, at least 0."""
+        cell = self.cells[column]
+        if not _WHOLE.fullmatch(cell):
+            raise self.error(column, _refused(cell), "a whole number")
+        return int(cell)
+
+    def value(self, column: str) -> float | Complex | None:
+        """Return a real or complex number, None for an empty cell or a missing column."""
+        cell = self.cells.get(column, "")
+        if not cell:
+            return None
+        compact = "".join(cell.split())
+        match = _COMPLEX.fullmatch(compact)
+        if match is not None:
+            parts = [float(part or 0.0) for part in match.groups()]
+        elif _NUMBER.fullmatch(compact):
+            parts = [float(compact), 0.0]
+        else:
+            raise self.error(column, f"{_shown(cell)} is not a finite number", "a number")
+        if not all(math.isfinite(part) and abs(part) <= LARGEST for part in parts):
+            raise self.error(column, f"{_shown(cell)} is too large", "a finite number")
+        return Complex(*parts) if match is not None else parts[0]
+
+    def number(
+        self,
+        column: str,
+        expected: str = "a number",
+        allowed: Callable[[float], bool] | None = None,
+    ) -> float | None:
+        """Return a real number, None for an empty cell or a missing column."""
+        value = self.value(column)
+        if value is None:
+            return None
+        if isinstance(value, Complex) or (allowed is not None and not allowed(value)):
+            raise self.error(column, _refused(self.cells[column]), expected)
+        return value
+
+    def vector(self) -> Vector:
+        """Return the columns x, y, z."""
+        values = []
+        for column in ("x", "y", "z"):
+            value = self.number(column)
+            if value is None:
+                raise self.error(column, "empty cell", "a number in m")
+            values.append(value)
+        return values[0], values[1], values[2]
+
+    def direction(self) -> str:
+        """Return the column direction, in the spelling of `DIRECTIONS` with an optional minus."""
+        cell = self.cells["direction"]
+        if cell.lstrip("+-") not in DIRECTIONS or len(cell) - len(cell.lstrip("+-")) > 1:
+            expected = f"one of {', '.join(DIRECTIONS)}, with an optional sign"
+            raise self.error("direction", _refused(cell), expected)
+        return cell.removeprefix("+")
+
+
+def _refused(cell: str) -> str:
+    return f"{_shown(cell)} is not allowed" if cell else "empty cell"
+
+
+def _shown(cell: str) -> str:
+    return repr(cell if len(cell) <= 40 else cell[:37] + "...")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A CSV file: its column names and its rows."""
+
+    file: Path
+    columns: tuple[str, ...]
+    rows: tuple[Row, ...]
+
+    def check_columns(self, required: tuple[str, ...], known: Collection[str] = ()) -> None:
+        """Check that the required columns are there and no others but the known ones."""
+        for column in required:
+            if column not in self.columns:
+                found = f"it among {', '.join(self.columns)}"[:200]
+                raise InputError(
+                    "missing column", file=self.file, line=1, key=column, expected=found
+                )
+        for column in self.columns:
+            if column not in required and column not in known:
+                raise InputError(
+                    "unknown column",
+                    file=self.file,
+                    line=1,
+                    key=column,
+                    expected=", ".join([*required, *sorted(set(known).difference(required))])[:200],
+                )
+
+
+def read_table(file: Path) -> Table:
+    """Return the content of a CSV file whose first row names the columns.
+
+    Raises:
+        InputError: for a ragged row, a column without name or named twice, a broken quotation.
+    """
+    reader = csv.reader(StringIO(read_text(file)), skipinitialspace=True)
+    rows: list[Row] = []
+    columns: tuple[str, ...] = ()
+    try:
+        for cells in reader:
+            cells = [cell.strip() for cell in cells]
+            if any("\n" in cell for cell in cells):
+                raise csv.Error("a quotation is not closed")
+            if not any(cells):
+                continue
+            if not columns:
+                columns = _header(file, reader.line_num, cells)
+                continue
+            if len(cells) != len(columns):
+                what = f"{len(cells)} cells"
+                expected = f"{len(columns)} as in the first row"
+                raise InputError(what, file=file, line=reader.line_num, expected=expected)
+            rows.append(Row(file, reader.line_num, dict(zip(columns, cells, strict=True))))
+            if len(rows) > _MOST_ROWS:
+                raise InputError("too many rows", file=file, expected=f"at most {_MOST_ROWS}")
+    except csv.Error as error:
+        what = f"not a table: {error}"
+        expected = "cells separated by commas"
+        raise InputError(what, file=file, line=reader.line_num, expected=expected) from None
+    if not columns:
+        raise InputError("empty file", file=file, expected="a row of column names")
+    return Table(file, columns, tuple(rows))
+
+
+def _header(file: Path, line: int, cells: list[str]) -> tuple[str, ...]:
+    for i, cell in enumerate(cells):
+        if not cell or not cell.isprintable():
+            what = f"column {i + 1} has no name"
+            raise InputError(what, file=file, line=line, expected="a name for every column")
+        if cell in cells[:i]:
+            what = "column is listed twice"
+            raise InputError(what, file=file, line=line, key=cell, expected="every column once")
+    if len(cells) > _MOST_COLUMNS:
+        raise InputError("too many columns", file=file, expected=f"at most {_MOST_COLUMNS}")
+    return tuple(cells)
+
+
+def read_sensors(file: Path, site: Site) -> Sensors:
+    """Return the sensors of a CSV file: label,x,y,z,direction or label,at,direction.
+
+    Raises:
+        InputError: for a duplicate label, a sensor off the structure, an impossible direction.
+    """
+    table = read_table(file)
+    by_place = "at" in table.columns
+    place = ("at",) if by_place else ("x", "y", "z")
+    table.check_columns(("label", *place, "direction"))
+    labels: dict[str, None] = {}
+    points, directions = [], []
+    for row in table.rows:
+        label = row.text("label")
+        if label in labels or label in RESERVED:
+            what = f"{label!r} is listed twice" if label in labels else f"{label!r} is reserved"
+            raise row.error("label", what, "a label of its own")
+        direction = row.direction()
+        try:
+            xyz = site.point(parse_place(row.text("at"))) if by_place else row.vector()
+            site.check_sensor(xyz, direction)
+        except Misfit as misfit:
+            what = f"sensor {label!r}: {misfit.what}"
+            faulty = "direction" if isinstance(misfit, WrongDirection) else place[0]
+            raise row.error(faulty, what, misfit.expected) from None
+        labels[label] = None
+        points.append(xyz)
+        directions.append(direction)
+    if not labels:
+        raise InputError("no sensors", file=file, expected="a row for every sensor")
+    return Sensors(tuple(labels), np.array(points, dtype=float), tuple(directions))
+
+
+def parse_place(text: str) -> Place:
+    """Return the place that a cell names; raises Misfit."""
+    member, found, station = text.rpartition("@")
+    if not found:
+        return Place(joint=text)
+    if not _NUMBER.fullmatch(station) or not 0.0 <= float(station) <= 1.0:
+        raise Misfit(f"{station[:20]!r} is not a station", "member@s with s in 0..1")
+    return Place(member=member, s=float(station))

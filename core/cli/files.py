@@ -1,0 +1,58 @@
+"""Files that the commands write: checked before the work starts, replaced in one step after it."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+from femubench.core.errors import InputError
+
+
+def check_writable(path: Path) -> None:
+    """Make sure that a file can be written before hours are spent on its content.
+
+    Raises:
+        InputError: when it is a folder, or its folder is missing or may not be written to.
+    """
+    if path.is_dir():
+        raise InputError("is a folder", file=path, expected="the name of a file")
+    if not path.parent.is_dir():
+        raise InputError("folder does not exist", file=path.parent, expected="an existing folder")
+    if not os.access(path.parent, os.W_OK | os.X_OK):
+        raise InputError("folder cannot be written to", file=path.parent)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder with its parents.
+
+    Raises:
+        InputError: when that fails or the folder may not be written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as fault:
+        raise InputError(f"cannot make the folder: {fault.strerror}", file=folder) from fault
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError("folder cannot be written to", file=folder)
+
+
+def write_atomically(path: Path, text: str) -> None:
+    """Write a text with a final newline; a reader sees the old file or the new, never a part."""
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    part = Path(name)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="") as stream:
+            stream.write(text.rstrip("\n") + "\n")
+        # mkstemp gives 0600; a report is as public as any file that the user makes.
+        part.chmod(0o666 & ~_umask())
+        part.replace(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

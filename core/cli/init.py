@@ -1,0 +1,18 @@
+"""The verb ``bench init``: write a case folder to start from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+def init(folder: Path) -> None:
+    """Write a commented example case into FOLDER, which must be new or empty."""
+    from femubench.core.case.example import write_example
+
+    for path in write_example(folder):
+        click.echo(f"wrote {path}")
+    click.echo(f"Now change it to your structure, and run: bench run {folder}")

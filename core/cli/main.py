@@ -1,0 +1,116 @@
+"""The command ``bench``: finds the verb, imports it alone, and turns errors into exit codes.
+
+Exit codes: 0 done, 1 some run failed, 2 wrong input, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+import traceback
+from collections.abc import Callable
+from difflib import get_close_matches
+from importlib import import_module
+from typing import Any, NoReturn
+
+import click
+
+import femubench
+from femubench.core.errors import FemubenchError, InputError, PluginError
+
+DONE, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+# verb: the module that holds a click command of the same name, and its help in one line. The line
+# stands here so that `bench --help` imports none of them.
+VERBS = {
+    "run": ("femubench.core.cli.run", "Run strategies on cases and rank them."),
+    "report": ("femubench.core.cli.report", "Write a report on a stored run."),
+    "init": (
+        "femubench.core.cli.init",
+        "Write a commented example case into FOLDER, which must be new or empty.",
+    ),
+    "scenarios": ("femubench.core.cli.scenarios", "List the built-in scenarios, or show one."),
+    "plugins": ("femubench.core.cli.plugins", "List the plugins and what is wrong with them."),
+}
+
+
+class Bench(click.Group):
+    """A group of lazily imported verbs with the exit codes of `bench`."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs in the order in which one meets them."""
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import one verb."""
+        if cmd_name not in VERBS:
+            return None
+        command = getattr(import_module(VERBS[cmd_name][0]), cmd_name)
+        assert isinstance(command, click.Command)
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the verb; name the nearest ones where it is unknown."""
+        if args and args[0] not in VERBS and not args[0].startswith("-"):
+            near = get_close_matches(args[0], VERBS, n=2)
+            hint = f" Did you mean {' or '.join(near)}?" if near else ""
+            ctx.fail(f"No such command {args[0]!r}.{hint}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of verbs without importing them."""
+        with formatter.section("Commands"):
+            formatter.write_dl([(verb, line) for verb, (_, line) in VERBS.items()])
+
+    def invoke(self, ctx: click.Context) -> Any:  # noqa: ANN401 - as click has it
+        """Run a verb; print one line for an error that the user can act upon."""
+        try:
+            return super().invoke(ctx)
+        except (FemubenchError, OSError) as fault:
+            if isinstance(fault, OSError) and fault.errno == errno.EPIPE:
+                raise
+            if ctx.params["traceback"]:
+                click.echo("".join(traceback.format_exception(fault)), err=True, nl=False)
+            click.echo(f"bench: {' '.join(str(fault).split())}", err=True)
+            wrong_input = isinstance(fault, (InputError, PluginError))
+            ctx.exit(WRONG_INPUT if wrong_input else FAILED)
+
+    def main(self, *args: Any, **kwargs: Any) -> NoReturn:  # noqa: ANN401 - as click has it
+        """Run `bench` and leave with its exit code."""
+        sys.exit(_exit_code(lambda: super(Bench, self).main(*args, **kwargs), kwargs))
+
+
+def _exit_code(call: Callable[[], Any], kwargs: dict[str, Any]) -> int:
+    """Return the exit code of a call of click's main."""
+    kwargs["standalone_mode"] = False
+    try:
+        code = call()
+    except click.ClickException as fault:
+        fault.show()
+        return WRONG_INPUT
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("bench: interrupted", err=True)
+        return INTERRUPTED
+    except OSError as fault:
+        if fault.errno != errno.EPIPE:
+            raise
+        # The reader of a pipe has gone; what is still buffered must not raise once more at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+    return code if isinstance(code, int) else DONE
+
+
+@click.group(cls=Bench, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(femubench.__version__, prog_name="femubench")
+@click.option(
+    "--traceback", is_flag=True, help="Show where an error or a broken plugin comes from."
+)
+def bench(traceback: bool) -> None:
+    """Rank finite element model updating strategies on measured structures."""
+
+
+if __name__ == "__main__":
+    bench()

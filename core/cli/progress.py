@@ -1,0 +1,43 @@
+"""A progress bar on stderr, only where someone watches."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from femubench.core.harness.results import JobResult
+
+Progress = Callable[[JobResult, int, int], None]
+
+
+@contextmanager
+def progress_bar(*, quiet: bool = False) -> Iterator[Progress | None]:
+    """Give the function that `run_jobs` calls after each job; None where stderr is no terminal."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress as Bar,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=24),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("left"),
+    )
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("jobs", total=None)
+
+        def advance(result: JobResult, done: int, total: int) -> None:
+            label = f"{result.case} {result.strategy}"[:36]
+            bar.update(task, completed=done, total=total, description=f"{label:36}")
+
+        yield advance

@@ -1,0 +1,54 @@
+"""What ``run`` and ``report`` share: reporters by name or by suffix, and the exit code of a run."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from femubench.core.cli.registry import unknown
+from femubench.core.errors import InputError, PluginError
+from femubench.core.harness.results import Run
+from femubench.core.plugin.loader import Plugins
+from femubench.core.plugin.roles import Reporter
+
+# A strategy that a case has no room for is no failure.
+FINE = frozenset({"ok", "not-applicable"})
+
+
+def exit_code(run: Run) -> int:
+    """Return 1 when some result is a failure, else 0."""
+    return int(any(result.status not in FINE for result in run.results))
+
+
+def reporter(plugins: Plugins, name: str) -> Reporter:
+    """Return the reporter of that name.
+
+    Raises:
+        PluginError: when there is none, which for a built-in name means a broken installation.
+    """
+    if name not in plugins.reporters:
+        raise PluginError(unknown("report format", name, plugins.reporters))
+    return plugins.reporters[name]
+
+
+def reporter_for(plugins: Plugins, path: Path) -> Reporter:
+    """Return the reporter that writes files of a path's suffix.
+
+    Raises:
+        InputError: when none does.
+    """
+    # Of two formats with one suffix the first, of two suffixes that fit the longer.
+    suffixes = {found.suffix: found for found in reversed(plugins.reporters.values())}
+    for suffix, found in sorted(suffixes.items(), key=lambda item: -len(item[0])):
+        if path.name.endswith(suffix):
+            return found
+    raise InputError(
+        f"no report format has the suffix {path.suffix!r}",
+        file=path,
+        expected=f"one of {', '.join(sorted(suffixes))}",
+    )
+
+
+def run_name(run: Run) -> str:
+    """Return the run's id as it may stand in a file name."""
+    return re.sub(r"[^A-Za-z0-9._-]+", "-", str(run.meta.get("run", "run"))).strip(".-") or "run"

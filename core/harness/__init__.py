@@ -1,0 +1,1 @@
+"""The harness: jobs, isolation, store, scoring, statistics."""

@@ -1,0 +1,107 @@
+"""What comes out of a run: one result a job, in plain data that goes to JSON and back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+Status = Literal["ok", "failed", "timeout", "crashed", "diverged", "not-applicable"]
+STATUSES: tuple[Status, ...] = ("ok", "failed", "timeout", "crashed", "diverged", "not-applicable")
+BLOCKS = ("used", "higher", "modified")
+
+
+@dataclass(frozen=True)
+class PairedMode:
+    """One measured mode and the model's mode that was paired with it by shape.
+
+    Arguments:
+        number: label of the measured mode.
+        measured_hz: its frequency.
+        predicted_hz: the model's; None where no mode of the model matches. A negative number
+            stands for an imaginary frequency.
+        mac: of the two shapes, 0..1; None where nothing was paired or no shape was measured.
+        modification: name of the design change; None for the structure as tested.
+    """
+
+    number: int
+    measured_hz: float
+    predicted_hz: float | None
+    mac: float | None
+    modification: str | None = None
+
+
+@dataclass(frozen=True)
+class Block:
+    """The error of one set of modes: used, higher or modified.
+
+    Arguments:
+        rms_percent: root mean square of the relative frequency errors; a measured mode without
+            partner counts 100 %.
+        mean_mac: mean over the modes that have a measured shape; None where none has one.
+        modes: the pairs.
+    """
+
+    rms_percent: float
+    mean_mac: float | None
+    modes: tuple[PairedMode, ...]
+
+
+@dataclass(frozen=True)
+class JobResult:
+    """The outcome of one (case, strategy, seed).
+
+    Arguments:
+        case, strategy, seed: the job.
+        status: how it ended; anything but ``ok`` has a reason.
+        reason: one line, with the measured figure where a self-check failed.
+        seconds: wall time of the strategy alone.
+        blocks: errors by block name; empty unless the status is ``ok``.
+        rigid_body_modes: modes of zero frequency that are rigid-body motions.
+        rigid_body_modes_expected: those of the nominal model.
+        negative_eigenvalues: of the updated model.
+        parameter_count: unknowns that were free.
+        evaluations: eigenvalue solutions that the strategy made.
+        score: geometric mean over the blocks of (rms + 0.05 %) / (rms of `unchanged` + 0.05 %).
+        rank: within case and seed; 1 is best.
+        parameters, history, diagnostics: as the strategy gave them, in plain data.
+        traceback: of an exception, for whoever asks for it.
+    """
+
+    case: str
+    strategy: str
+    seed: int
+    status: Status
+    reason: str = ""
+    seconds: float = 0.0
+    blocks: Mapping[str, Block] = field(default_factory=dict)
+    rigid_body_modes: int | None = None
+    rigid_body_modes_expected: int | None = None
+    negative_eigenvalues: int | None = None
+    parameter_count: int | None = None
+    evaluations: int | None = None
+    score: float | None = None
+    rank: int | None = None
+    parameters: tuple[Mapping[str, Any], ...] = ()
+    history: tuple[Mapping[str, float], ...] = ()
+    diagnostics: Mapping[str, float] = field(default_factory=dict)
+    traceback: str = ""
+
+    @property
+    def unphysical(self) -> bool:
+        """Tell whether rigid-body modes were lost or eigenvalues are negative."""
+        lost = (self.rigid_body_modes or 0) < (self.rigid_body_modes_expected or 0)
+        return self.status == "ok" and (lost or bool(self.negative_eigenvalues))
+
+
+@dataclass(frozen=True)
+class Run:
+    """All results of one `bench run`.
+
+    Arguments:
+        meta: run id, seed, versions, machine, git commit, start time; plain data.
+        results: one entry a job.
+    """
+
+    meta: Mapping[str, Any]
+    results: tuple[JobResult, ...]

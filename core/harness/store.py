@@ -1,0 +1,218 @@
+"""The store of results: one file of JSON lines to which every job adds one line at once."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from femubench.core.errors import InputError
+from femubench.core.harness.ranking import rank_results
+from femubench.core.harness.results import JobResult, Run
+from femubench.core.harness.serial import finite, result_from_json, result_to_json
+
+SCHEMA = 1
+FILE_NAME = "results.jsonl"
+_KINDS = ("run", "result", "end")
+
+
+@dataclass(frozen=True)
+class _Line:
+    number: int
+    record: dict[str, Any]
+
+
+class Store:
+    """Results of many runs in one folder.
+
+    Several processes may write at the same time. Every record is a line with ``record`` (run,
+    result or end), ``schema`` and ``run``; results carry ``result``, the other two ``meta``.
+
+    Arguments:
+        folder: created with the first record.
+    """
+
+    def __init__(self, folder: Path | str) -> None:
+        self.folder = Path(folder)
+
+    @property
+    def path(self) -> Path:
+        """Return the file that holds the records."""
+        return self.folder / FILE_NAME
+
+    def begin(self, meta: Mapping[str, Any]) -> None:
+        """Record the start of a run; `meta` has its id under ``run``."""
+        self._write({"record": "run", "run": meta["run"], "meta": dict(meta)})
+
+    def append(self, run_id: str, result: JobResult) -> None:
+        """Record the result of one job; after a crash it is there whole or not at all."""
+        self._write({"record": "result", "run": run_id, "result": result_to_json(result)})
+
+    def end(self, run_id: str, meta: Mapping[str, Any]) -> None:
+        """Record the end of a run with what is known only then."""
+        self._write({"record": "end", "run": run_id, "meta": dict(meta)})
+
+    def runs(self) -> tuple[str, ...]:
+        """Return the ids of all runs, oldest first; none where nothing was stored.
+
+        Raises:
+            InputError: for a line that is no record.
+        """
+        if not self.path.exists():
+            return ()
+        lines, _ = self._lines()
+        return tuple(line.record["run"] for line in lines if line.record["record"] == "run")
+
+    def load(self, run_id: str | None = None) -> Run:
+        """Return a run with scores and ranks.
+
+        A last line that was cut short (a crash while writing) is left out and told about in
+        ``meta["notes"]``; a run that never ended has ``meta["finished"]`` None.
+
+        Arguments:
+            run_id: or the beginning of one; None for the latest.
+
+        Raises:
+            InputError: where there is no such run, or a line is no record.
+        """
+        if not self.path.exists():
+            raise InputError("no results", file=self.path, expected="a run stored by `bench run`")
+        lines, notes = self._lines()
+        wanted = self._find(lines, run_id)
+        meta: dict[str, Any] = {"finished": None}
+        results: dict[tuple[str, str, int], JobResult] = {}
+        for line in lines:
+            if line.record["run"] != wanted:
+                continue
+            if line.record["record"] == "result":
+                found = result_from_json(
+                    line.record.get("result"), file=self.path, line=line.number, key="result"
+                )
+                results[found.case, found.strategy, found.seed] = found
+            else:
+                meta.update(self._meta(line))
+        reference = meta.get("reference") or None
+        return Run({**meta, "notes": notes}, rank_results(results.values(), reference))
+
+    def _find(self, lines: list[_Line], run_id: str | None) -> str:
+        known = [line.record["run"] for line in lines if line.record["record"] == "run"]
+        if run_id in known:
+            return str(run_id)
+        matching = [name for name in known if run_id is None or name.startswith(run_id)]
+        if not matching:
+            what = "no run" if run_id is None else f"no run {run_id!r}"
+            latest = (
+                f"one of the {len(known)} stored, e.g. {known[-1]}" if known else "a stored run"
+            )
+            raise InputError(what, file=self.path, expected=latest)
+        if run_id is not None and len(set(matching)) > 1:
+            raise InputError(
+                f"{len(set(matching))} runs begin with {run_id!r}",
+                file=self.path,
+                expected=f"more letters, e.g. {matching[0]}",
+            )
+        return str(matching[-1])
+
+    def _meta(self, line: _Line) -> dict[str, Any]:
+        meta = line.record.get("meta")
+        if not isinstance(meta, dict):
+            raise InputError(
+                "no meta data", file=self.path, line=line.number, key="meta", expected="a table"
+            )
+        return meta
+
+    def _lines(self) -> tuple[list[_Line], list[str]]:
+        """Return all records and what has to be told about the file."""
+        *whole, tail = self.path.read_bytes().split(b"\n")
+        found = [
+            _Line(number, self._record(text, number))
+            for number, text in enumerate(whole, start=1)
+            if text.strip()
+        ]
+        if not tail.strip():
+            return found, []
+        number = len(whole) + 1
+        if _is_json(tail):
+            return [*found, _Line(number, self._record(tail, number))], []
+        return found, [f"{self.path}:{number}: the last line is cut short and was left out"]
+
+    def _record(self, text: bytes, number: int) -> dict[str, Any]:
+        try:
+            record = json.loads(text)
+        except ValueError as error:
+            raise InputError(
+                f"not JSON: {error}", file=self.path, line=number, expected="one record a line"
+            ) from error
+        if not isinstance(record, dict) or record.get("record") not in _KINDS:
+            raise InputError(
+                "not a record",
+                file=self.path,
+                line=number,
+                key="record",
+                expected=f"one of {', '.join(_KINDS)}",
+            )
+        if record.get("schema") != SCHEMA:
+            raise InputError(
+                f"schema {record.get('schema')!r}",
+                file=self.path,
+                line=number,
+                key="schema",
+                expected=f"{SCHEMA}, as this version writes",
+            )
+        if not isinstance(record.get("run"), str):
+            raise InputError("no run id", file=self.path, line=number, key="run", expected="a text")
+        return record
+
+    def _write(self, record: dict[str, Any]) -> None:
+        text = json.dumps(finite({"schema": SCHEMA, **record}), allow_nan=False)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with _locked(self.path) as descriptor:
+            size = _mend(descriptor)
+            line = text.encode() + b"\n"
+            if os.write(descriptor, line) != len(line):
+                os.ftruncate(descriptor, size)
+                raise OSError(f"{self.path}: the record could not be written in full")
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[int]:
+    descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield descriptor
+    finally:
+        os.close(descriptor)
+
+
+def _mend(descriptor: int) -> int:
+    """Let the file end with a whole line and return its size.
+
+    What an interrupted write left behind is cut off: with a record after it, it would be a
+    broken line in the middle of the file, which nobody could tell from damage.
+    """
+    size = os.fstat(descriptor).st_size
+    if size == 0 or os.pread(descriptor, 1, size - 1) == b"\n":
+        return size
+    start, tail = size, b""
+    while start > 0 and b"\n" not in tail:
+        step = min(start, 65536)
+        start -= step
+        tail = os.pread(descriptor, step, start) + tail
+    last = tail[tail.rfind(b"\n") + 1 :]
+    if _is_json(last):
+        os.write(descriptor, b"\n")
+        return size + 1
+    os.ftruncate(descriptor, size - len(last))
+    return size - len(last)
+
+
+def _is_json(text: bytes) -> bool:
+    try:
+        return isinstance(json.loads(text), dict)
+    except ValueError:
+        return False

@@ -1,0 +1,130 @@
+"""Which mode of a model belongs to which measured mode: by shape and frequency, never by index."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from femubench.core.modal.correlation import mac
+from femubench.core.typing import BoolArray, FloatArray, IntArray
+
+# Two shapes with a MAC below one half have more in what differs than in what they share; any
+# third shape can then be as near to either.
+LEAST_MAC = 0.5
+# Shapes at one sensor always have a MAC of 1, at two sensors half of all random pairs exceed 0.5:
+# below three common sensors a shape says nothing, and the frequency alone decides.
+LEAST_SENSORS = 3
+# A nominal model that is more than a factor of two off has no claim to describe the mode.
+WINDOW = 2.0
+# Frequency alone is weaker evidence: a wider window would pair a mode that the model lacks
+# with the next one up, and that one with its next, in a chain.
+WINDOW_WITHOUT_SHAPE = 1.4
+# One MAC point is worth four points of ln(f_p / f_m): shapes decide, and frequencies decide
+# between shapes that the sensors can hardly tell apart.
+FREQUENCY_WEIGHT = 0.25
+# Any gain by shape outweighs all gains by frequency alone.
+_WITHOUT_SHAPE = 1e-4
+_TINY = 1e-9  # an admissible pair, however poor, is better than none
+
+
+@dataclass(frozen=True)
+class Pairing:
+    """The partners of measured modes.
+
+    Arguments:
+        index: column of the predicted mode, -1 where there is none, (m,).
+        mac: of the pair; nan where there is none or the shapes could not be compared, (m,).
+    """
+
+    index: IntArray
+    mac: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+
+def pair_modes(
+    measured_frequencies: FloatArray,
+    measured_shapes: FloatArray,
+    predicted_frequencies: FloatArray,
+    predicted_shapes: FloatArray,
+    *,
+    least_mac: float = LEAST_MAC,
+    window: float = WINDOW,
+    window_without_shape: float = WINDOW_WITHOUT_SHAPE,
+) -> Pairing:
+    """Return the partner of every measured mode, by one linear assignment over all of them.
+
+    A mode with a shape at three sensors or more pairs by (1 - MAC) + 0.25 |ln(f_p / f_m)|, where
+    MAC >= 0.5 and the frequencies lie within a factor of two. A mode with fewer sensors, or with
+    a frequency alone, pairs by |ln(f_p / f_m)| within a factor of 1.4, and only among what modes
+    with shapes leave. An imaginary frequency (negative here) pairs by shape alone, as if at the
+    edge of the window.
+
+    Arguments:
+        measured_frequencies: Hz, (m,).
+        measured_shapes: (n_sensors, m), real or complex; nan where missing.
+        predicted_frequencies: Hz, negative for imaginary ones, (p,).
+        predicted_shapes: at the same sensors, (n_sensors, p).
+        least_mac: smallest MAC of a pair.
+        window: largest ratio of the two frequencies.
+        window_without_shape: the same where shapes cannot be compared.
+    """
+    measured = np.asarray(measured_frequencies, dtype=float)
+    predicted = np.asarray(predicted_frequencies, dtype=float)
+    m, p = len(measured), len(predicted)
+    if m == 0 or p == 0:
+        return Pairing(np.full(m, -1, dtype=np.int64), np.full(m, np.nan))
+    distance = _distance(measured, predicted)
+    likeness = mac(measured_shapes, predicted_shapes)
+    by_shape = _comparable(measured_shapes, predicted_shapes)
+    gain = np.where(
+        by_shape,
+        _gain_by_shape(likeness, distance, predicted < 0.0, least_mac, window),
+        _gain_by_frequency(distance, window_without_shape),
+    )
+    # One column of gain 0 a measured mode: to stay alone is always possible.
+    rows, columns = linear_sum_assignment(np.hstack([gain, np.zeros((m, m))]), maximize=True)
+    index = np.full(m, -1, dtype=np.int64)
+    taken = columns < p
+    index[rows[taken]] = columns[taken]
+    score = likeness[np.arange(m), index]
+    known = (index >= 0) & by_shape[np.arange(m), index]
+    return Pairing(index, np.where(known, score, np.nan))
+
+
+def _distance(measured: FloatArray, predicted: FloatArray) -> FloatArray:
+    """Return |ln(f_p / f_m)|, infinite where either is not positive, (m, p)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.abs(np.log(predicted)[None, :] - np.log(measured)[:, None])
+    return np.where(np.isfinite(ratio), ratio, np.inf)
+
+
+def _comparable(measured: FloatArray, predicted: FloatArray) -> BoolArray:
+    """Tell which pairs share enough sensors for their MAC to mean something, (m, p)."""
+    common = np.isfinite(measured).T.astype(int) @ np.isfinite(predicted).astype(int)
+    return np.asarray(common >= LEAST_SENSORS)
+
+
+def _gain_by_shape(
+    likeness: FloatArray,
+    distance: FloatArray,
+    imaginary: BoolArray,
+    least_mac: float,
+    window: float,
+) -> FloatArray:
+    edge = float(np.log(window))
+    apart = np.where(imaginary[None, :], edge, distance)
+    admissible = (likeness >= least_mac) & (apart <= edge)
+    cost = 1.0 - likeness + FREQUENCY_WEIGHT * np.where(admissible, apart, 0.0)
+    worst = 1.0 - least_mac + FREQUENCY_WEIGHT * edge
+    return np.where(admissible, worst - cost + _TINY, -1.0)
+
+
+def _gain_by_frequency(distance: FloatArray, window: float) -> FloatArray:
+    edge = float(np.log(window))
+    admissible = distance <= edge
+    gain = _WITHOUT_SHAPE * (edge - np.where(admissible, distance, edge))
+    return np.where(admissible, gain + _TINY, -1.0)

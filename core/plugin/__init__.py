@@ -1,0 +1,1 @@
+"""Plugins: hook specifications, the loader, and the roles that plugins fill."""

@@ -1,0 +1,90 @@
+"""The roles that plugins fill besides strategies: scenarios, readers, reporters, effects."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+
+if TYPE_CHECKING:
+    from femubench.core.harness.results import Run
+    from femubench.core.measurement import Measurement
+    from femubench.core.model import Model
+    from femubench.core.typing import SparseArray
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A named set of case folders that are run together.
+
+    Arguments:
+        name: the word after ``bench run``.
+        title: one line for lists.
+        cases: from the case's name (the scenario's own, or ``scenario/part``) to its folder.
+    """
+
+    name: str
+    title: str
+    cases: Mapping[str, Path]
+
+
+@runtime_checkable
+class Reader(Protocol):
+    """Reads a file format that the case format does not know by itself.
+
+    Attributes:
+        name: for messages, e.g. ``"universal file"``.
+        suffixes: lower-case file suffixes with the dot.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+
+    def read_matrix(self, path: Path) -> SparseArray:
+        """Return a square sparse matrix; raises InputError where the file holds none."""
+        ...
+
+    def read_modes(self, path: Path) -> Measurement:
+        """Return sensors and modes; raises InputError where the file holds none."""
+        ...
+
+
+@runtime_checkable
+class Reporter(Protocol):
+    """Turns stored results into a text.
+
+    Attributes:
+        name: the word after ``bench report --format``.
+        suffix: of the file that is written, with the dot.
+    """
+
+    name: str
+    suffix: str
+
+    def render(self, run: Run) -> str:
+        """Return the report; must not run anything."""
+        ...
+
+
+@runtime_checkable
+class Effect(Protocol):
+    """A physical cause that a model can lack.
+
+    Attributes:
+        name: a slug such as ``"joint-rotation"``.
+    """
+
+    name: str
+
+    def places(self, model: Model) -> Sequence[str]:
+        """Return where the effect may sit in this model."""
+        ...
+
+    def parameters(self, model: Model, place: str) -> Sequence[Any]:
+        """Return its parameters there, with unit, prior and bounds."""
+        ...
+
+    def extend(self, model: Model, place: str, values: Sequence[float]) -> Model:
+        """Return the model with the effect in it."""
+        ...

@@ -1,0 +1,170 @@
+"""What a plugin hands over must fill its role; a message says which argument does not."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from femubench.core.errors import PluginError
+from femubench.core.plugin.roles import Effect, Reader, Reporter, Scenario
+from femubench.core.strategy import CAPABILITIES, Strategy
+
+# Names become words on the command line and parts of file names.
+_WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
+
+
+def check_strategy(offered: object) -> Strategy:
+    """Return an instance of a strategy class or the instance itself.
+
+    Raises:
+        PluginError: when it is no Strategy, has no name or citation, or needs the unknown.
+    """
+    strategy = _instance(offered)
+    if not isinstance(strategy, Strategy):
+        raise PluginError(f"{_label(offered)} is no subclass of femubench.Strategy")
+    _check_name(strategy, offered)
+    if not _is_text(getattr(strategy, "citation", None)):
+        raise PluginError(f"{_label(offered)}: citation is missing (author, year, title, equation)")
+    needs: object = strategy.needs
+    if not isinstance(needs, frozenset | set | tuple | list):
+        raise PluginError(f"{_label(offered)}: needs is {needs!r}, not a set of capabilities")
+    for need in needs:
+        if need not in CAPABILITIES:
+            raise PluginError(
+                f"{_label(offered)}: needs {need!r}, which is none of "
+                f"{', '.join(CAPABILITIES)}{did_you_mean(str(need), CAPABILITIES)}"
+            )
+    return strategy
+
+
+def check_scenario(offered: object) -> Scenario:
+    """Return a scenario whose cases carry its name.
+
+    Raises:
+        PluginError: when it is no Scenario or its cases are misnamed.
+    """
+    if not isinstance(offered, Scenario):
+        raise PluginError(f"{_label(offered)} is no femubench.Scenario")
+    _check_name(offered, offered)
+    if not isinstance(offered.cases, Mapping) or not offered.cases:
+        raise PluginError(f"scenario {offered.name!r}: cases is not a mapping of names to folders")
+    for name, folder in offered.cases.items():
+        prefix, slash, part = str(name).partition("/")
+        if prefix != offered.name or (slash and not _WORD.fullmatch(part)):
+            raise PluginError(
+                f"scenario {offered.name!r}: case {name!r} is neither "
+                f"'{offered.name}' nor '{offered.name}/PART'"
+            )
+        if not isinstance(folder, Path):
+            raise PluginError(f"scenario {offered.name!r}: folder of {name!r} is no pathlib.Path")
+    return offered
+
+
+def check_reader(offered: object) -> Reader:
+    """Return a reader with lower-case suffixes.
+
+    Raises:
+        PluginError: when it lacks a method, a name or a suffix.
+    """
+    reader = _instance(offered)
+    _check_members(reader, offered, "Reader", ("read_matrix", "read_modes"))
+    if not _is_text(getattr(reader, "name", None)):
+        raise PluginError(f"{_label(offered)}: name is missing")
+    suffixes = getattr(reader, "suffixes", None)
+    if not isinstance(suffixes, (tuple, list)) or not suffixes:
+        raise PluginError(
+            f"{_label(offered)}: suffixes is {suffixes!r}, not a tuple like ('.unv',)"
+        )
+    for suffix in suffixes:
+        if not isinstance(suffix, str) or suffix[:1] != "." or suffix != suffix.lower():
+            raise PluginError(f"{_label(offered)}: suffix {suffix!r} is not like '.unv'")
+    assert isinstance(reader, Reader)
+    return reader
+
+
+def check_reporter(offered: object) -> Reporter:
+    """Return a reporter with a file suffix.
+
+    Raises:
+        PluginError: when it lacks its method, a name or a suffix.
+    """
+    reporter = _instance(offered)
+    _check_members(reporter, offered, "Reporter", ("render",))
+    _check_name(reporter, offered)
+    suffix = getattr(reporter, "suffix", None)
+    if not isinstance(suffix, str) or not re.fullmatch(r"\.[A-Za-z0-9.]+", suffix):
+        raise PluginError(f"{_label(offered)}: suffix {suffix!r} is not like '.md'")
+    assert isinstance(reporter, Reporter)
+    return reporter
+
+
+def check_effect(offered: object) -> Effect:
+    """Return an effect.
+
+    Raises:
+        PluginError: when it lacks a method or a name.
+    """
+    effect = _instance(offered)
+    _check_members(effect, offered, "Effect", ("places", "parameters", "extend"))
+    _check_name(effect, offered)
+    assert isinstance(effect, Effect)
+    return effect
+
+
+CHECKS: Mapping[str, Callable[[object], Any]] = {
+    "strategies": check_strategy,
+    "scenarios": check_scenario,
+    "effects": check_effect,
+    "readers": check_reader,
+    "reporters": check_reporter,
+}
+
+
+def did_you_mean(word: str, known: Any) -> str:  # noqa: ANN401 - any iterable of names
+    """Return ``; did you mean 'x'?`` for a near match, else nothing."""
+    near = get_close_matches(word, list(known), n=3, cutoff=0.6)
+    return f"; did you mean {' or '.join(repr(name) for name in near)}?" if near else ""
+
+
+def _instance(offered: object) -> object:
+    """Return what was offered, made without arguments when it is a class."""
+    if not inspect.isclass(offered):
+        return offered
+    if inspect.isabstract(offered):
+        missing = ", ".join(sorted(getattr(offered, "__abstractmethods__", ())))
+        raise PluginError(f"{_label(offered)} does not override {missing}()")
+    try:
+        return offered()
+    except TypeError as fault:
+        raise PluginError(f"{_label(offered)} cannot be made without arguments: {fault}") from fault
+
+
+def _check_name(filled: object, offered: object) -> None:
+    name = getattr(filled, "name", None)
+    if not _is_text(name):
+        raise PluginError(f"{_label(offered)}: name is missing")
+    if not _WORD.fullmatch(str(name)):
+        raise PluginError(f"{_label(offered)}: name {name!r} is not one word of letters, digits, -")
+
+
+def _check_members(filled: object, offered: object, role: str, methods: tuple[str, ...]) -> None:
+    for method in methods:
+        if not callable(getattr(filled, method, None)):
+            raise PluginError(f"{_label(offered)} is no femubench.{role}: {method}() is missing")
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str) and bool(value.strip())
+
+
+def _label(offered: object) -> str:
+    """Return a short name of an object for messages."""
+    if inspect.isclass(offered):
+        return f"class {offered.__qualname__}"
+    if isinstance(offered, (str, int, float, bytes, type(None))):
+        return repr(offered)
+    return f"a {type(offered).__qualname__}"

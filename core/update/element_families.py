@@ -1,0 +1,270 @@
+"""Families of element stiffness matrices in which an updated element is looked for."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from femubench.core.errors import NotApplicable
+from femubench.core.fem.beam import BeamProperties, stiffness_matrices
+from femubench.core.fem.structure import Structure
+from femubench.core.typing import BoolArray, FloatArray, IntArray
+from femubench.core.update.element_symmetry import (
+    Symmetry,
+    active_strain_modes,
+    end_swap_signs,
+    free_terms,
+    operations_of,
+)
+
+_TRANSLATION_XZ, _SLOPE_XZ = [2, 8], [4, 10]
+_TRANSLATION_XY, _SLOPE_XY = [1, 7], [5, 11]
+_TWIST, _AXIAL = [3, 9], [0, 6]
+
+
+@dataclass(frozen=True)
+class ElementFamily:
+    """Element stiffness matrices k_e = k_e0 + sum_a x[column_ea] pattern_ea.
+
+    The unknowns x are relative changes (p - p0)/ref, zero for the nominal model.
+
+    Arguments:
+        structure: the meshed frame.
+        elements: the elements that may change, (n_e,).
+        patterns: change of a local stiffness matrix for a unit change, (n_e, n_a, 12, 12).
+        columns: the unknown that scales each pattern, -1 for none, (n_e, n_a).
+        names: one a unknown.
+        before, units: nominal values of the parameters and their unit, one an unknown; an unknown
+            x stands for the value before + x scale.
+        scale: unit change of every parameter, (n_unknowns,).
+        cores: part of each pattern in the element's relative core, whose nominal value is the unit
+            matrix, (n_e, n_a, q, q); None for a family without such a promise. The element is
+            positive semidefinite where its core is.
+    """
+
+    structure: Structure
+    elements: IntArray
+    patterns: FloatArray
+    columns: IntArray
+    names: tuple[str, ...]
+    before: FloatArray
+    scale: FloatArray
+    units: tuple[str, ...]
+    cores: FloatArray | None = None
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def values(self, x: FloatArray) -> FloatArray:
+        """Return the parameters that belong to the relative changes x, (n_unknowns,)."""
+        return self.before + self.scale * x
+
+    def spread(self, x: FloatArray) -> FloatArray:
+        """Return the unknowns of every element and pattern, zero where there is none."""
+        return np.asarray(np.append(x, 0.0)[self.columns])
+
+    def change(self, x: FloatArray) -> FloatArray:
+        """Return the change of all local stiffness matrices, (n_elements, 12, 12)."""
+        change = np.zeros((len(self.structure.properties), 12, 12))
+        change[self.elements] = np.einsum("ea,eaij->eij", self.spread(x), self.patterns)
+        return change
+
+    def relative_cores(self, x: FloatArray) -> FloatArray:
+        """Return the relative core of every element, the unit matrix nominally, (n_e, q, q)."""
+        assert self.cores is not None
+        change = np.einsum("ea,eaij->eij", self.spread(x), self.cores)
+        return np.asarray(np.eye(self.cores.shape[-1]) + change)
+
+
+def _changeable(structure: Structure) -> tuple[IntArray, FloatArray, list[str]]:
+    """Return the elements that carry mass, their stiffness and distinct labels."""
+    carries = (structure.properties.rhoA > 0.0) & np.array([bool(s) for s in structure.labels])
+    elements = np.flatnonzero(carries)
+    if len(elements) == 0:
+        raise NotApplicable("no element of the model carries mass")
+    stiffness = stiffness_matrices(structure.properties.take(elements))
+    seen: Counter[str] = Counter()
+    labels = []
+    for e in elements:
+        label = structure.labels[e]
+        labels.append(label if not seen[label] else f"{label}#{seen[label] + 1}")
+        seen[label] += 1
+    return elements, np.asarray(stiffness), labels
+
+
+def _block(rows: list[int], columns: list[int]) -> FloatArray:
+    mask = np.zeros((12, 12))
+    mask[np.ix_(rows, columns)] = mask[np.ix_(columns, rows)] = 1.0
+    return mask
+
+
+def _masked(
+    structure: Structure, masks: Mapping[str, FloatArray]
+) -> tuple[IntArray, FloatArray, IntArray, list[tuple[str, int]], list[str]]:
+    """Return elements, parts of their stiffness, unknowns, (key, row) of each and labels."""
+    elements, stiffness, labels = _changeable(structure)
+    active = structure.active_local
+    seen = {key: mask * np.outer(active, active) for key, mask in masks.items()}
+    keys = [key for key, mask in seen.items() if mask.any()]
+    patterns = stiffness[:, None] * np.array([seen[key] for key in keys])
+    present = np.abs(patterns).max(axis=(2, 3)) > 0.0
+    columns = np.where(present, np.cumsum(present.ravel()).reshape(present.shape) - 1, -1)
+    listed = [(keys[a], int(e)) for e, a in zip(*np.nonzero(present), strict=True)]
+    return elements, patterns, columns, listed, labels
+
+
+def physical_family(structure: Structure) -> ElementFamily:
+    """Return one factor on every rigidity of every element: EI and GJ, or EI and EA, or all four.
+
+    The matrices that integration gave are kept: with a Timoshenko beam the shear rigidity goes
+    with EI, so that the ratio of shear to bending flexibility stays.
+
+    Source: Ahmadian, Gladwell & Ismail (1997), section 4.2.
+    """
+    spatial = structure.frame.plane == "3d"
+    xz, xy = _TRANSLATION_XZ + _SLOPE_XZ, _TRANSLATION_XY + _SLOPE_XY
+    masks = {
+        "EIy" if spatial else "EI": _block(xz, xz),
+        "GJ": _block(_TWIST, _TWIST),
+        "EA": _block(_AXIAL, _AXIAL),
+    }
+    if spatial:
+        masks["EIz"] = _block(xy, xy)
+    elements, patterns, columns, listed, labels = _masked(structure, masks)
+    p = structure.properties
+    rigidity = {"EI": p.EIy, "EIy": p.EIy, "EIz": p.EIz, "GJ": p.GJ, "EA": p.EA}
+    before = np.array([rigidity[key][elements[e]] for key, e in listed])
+    count = patterns.shape[1]
+    units = np.eye(count)[:, :, None] * np.eye(count)[:, None, :]
+    return ElementFamily(
+        structure, elements, patterns, columns,
+        tuple(f"{key} {labels[e]}" for key, e in listed),
+        before, before, tuple("N" if key == "EA" else "N m2" for key, _ in listed),
+        np.broadcast_to(units, (len(elements), *units.shape)),
+    )  # fmt: skip
+
+
+def nobari_family(structure: Structure) -> ElementFamily:
+    """Return one factor each on the terms w-w, w-slope and slope-slope of bending, and on the rod.
+
+    Source: Nobari, Robb & Ewins (1993); Ahmadian, Gladwell & Ismail (1997), equation (20), whose
+    third matrix is [2, 1; 1, 2] on the slopes.
+    """
+    spatial = structure.frame.plane == "3d"
+    masks: dict[str, FloatArray] = {}
+    planes = [("y" if spatial else "", _TRANSLATION_XZ, _SLOPE_XZ)]
+    if spatial:
+        planes.append(("z", _TRANSLATION_XY, _SLOPE_XY))
+    for about, translation, slope in planes:
+        masks[f"k1{about}"] = _block(translation, translation)
+        masks[f"k2{about}"] = _block(translation, slope)
+        masks[f"k3{about}"] = _block(slope, slope)
+    masks["k4t" if spatial else "k4"] = _block(_TWIST, _TWIST)
+    masks["k4a" if spatial else "k4 "] = _block(_AXIAL, _AXIAL)
+    elements, patterns, columns, listed, labels = _masked(structure, masks)
+    one = np.ones(len(listed))
+    names = tuple(f"{key.strip()} {labels[e]}" for key, e in listed)
+    return ElementFamily(
+        structure, elements, patterns, columns, names, one, one, ("",) * len(listed)
+    )
+
+
+def strain_vectors(properties: BeamProperties) -> FloatArray:
+    """Return the strain modes of every element in forces per strain, (n_e, 12, 6).
+
+    The order is that of `element_symmetry.strain_modes`; a rigid end lengthens the lever of the
+    shear force, so that the columns stay free of rigid-body motion.
+    """
+    p = properties
+    clear = p.length - p.rigid_1 - p.rigid_2
+    first, last = clear + 2.0 * p.rigid_1, clear + 2.0 * p.rigid_2
+    a, b = np.sqrt(0.5), np.sqrt(0.1)
+    modes = np.zeros((len(p), 12, 6))
+    for bend, shear, (w1, w2), (r1, r2), turn in (
+        (0, 1, _TRANSLATION_XZ, _SLOPE_XZ, -1.0),
+        (4, 5, _TRANSLATION_XY, _SLOPE_XY, 1.0),
+    ):
+        modes[:, r1, bend], modes[:, r2, bend] = turn * a * clear, -turn * a * clear
+        modes[:, w1, shear], modes[:, w2, shear] = 2.0 * b, -2.0 * b
+        modes[:, r1, shear], modes[:, r2, shear] = turn * b * first, turn * b * last
+    modes[:, _TWIST, 2] = np.stack([a * clear, -a * clear], axis=1)
+    modes[:, _AXIAL, 3] = [a, -a]
+    return modes
+
+
+def scaled_strain_vectors(structure: Structure, elements: IntArray) -> FloatArray:
+    """Return V with k_e0 = V V' on the dofs that the plane lets move, (n_e, 12, q)."""
+    properties = structure.properties.take(elements)
+    vectors = strain_vectors(properties)[:, :, active_strain_modes(structure.active_local)]
+    inverse = np.linalg.pinv(vectors)
+    core = inverse @ stiffness_matrices(properties) @ np.swapaxes(inverse, 1, 2)
+    diagonal = np.einsum("eqq->eq", core)
+    return np.asarray(vectors * np.sqrt(np.maximum(diagonal, 0.0))[:, None, :])
+
+
+def _joint_of(structure: Structure) -> tuple[list[str], list[int]]:
+    """Return the joint type that every element touches and the end by which it does."""
+    kinds, ends = [""] * len(structure.properties), [0] * len(structure.properties)
+    for kind, names in structure.joint_ends.items():
+        for name in names:
+            element, end = structure.element_ends[name]
+            kinds[element], ends[element] = kind, end
+    return kinds, ends
+
+
+def _core_patterns(
+    structure: Structure, terms: list[tuple[int, int]], turned: BoolArray
+) -> FloatArray:
+    """Return the core of each term, turned end for end where told, (n_e, n_a, q, q)."""
+    flip = end_swap_signs(structure.frame.plane, structure.active_local)
+    cores = np.zeros((len(terms), len(flip), len(flip)))
+    for a, (i, j) in enumerate(terms):
+        cores[a, i, j] = cores[a, j, i] = 1.0
+    return np.where(turned[:, None, None, None], np.outer(flip, flip) * cores, cores)
+
+
+def generic_family(
+    structure: Structure,
+    *,
+    plain: Symmetry = "half-turn",
+    joint: Symmetry = "none",
+    tied: bool = False,
+) -> ElementFamily:
+    """Return elements with the nominal strain modes and a free symmetric core for them.
+
+    A parameter k_ij is relative: the core term divided by the nominal sqrt(k_ii k_jj).
+
+    Arguments:
+        plain: symmetry of elements that touch no joint.
+        joint: symmetry of elements that touch a joint.
+        tied: whether all elements at joints of one type, and all plain ones, share one relative
+            core; that of an element is turned end for end where its second end is at the joint.
+
+    Source: Ahmadian, Gladwell & Ismail (1997), section 4.3.
+    """
+    elements, _, labels = _changeable(structure)
+    kinds, ends = _joint_of(structure)
+    plane, active = structure.frame.plane, structure.active_local
+    terms = free_terms([], active)
+    turned = np.array([tied and ends[e] == 1 for e in elements])
+    cores = _core_patterns(structure, terms, turned)
+    vectors = scaled_strain_vectors(structure, elements)[:, None]
+    patterns = vectors @ cores @ np.swapaxes(vectors, 2, 3)
+    allowed = {s: set(free_terms(operations_of(s, plane), active)) for s in (plain, joint)}
+    unknowns: dict[tuple[int, int, str | int], tuple[int, str]] = {}
+    columns = np.full(patterns.shape[:2], -1)
+    for row, e in enumerate(elements):
+        where = (kinds[e] or "plain") if tied else labels[row]
+        for a, (i, j) in enumerate(terms):
+            if (i, j) in allowed[joint if kinds[e] else plain] and patterns[row, a].any():
+                new = (len(unknowns), f"k{i + 1}{j + 1} {where}")
+                columns[row, a] = unknowns.setdefault((i, j, kinds[e] if tied else row), new)[0]
+    before = np.array([1.0 if i == j else 0.0 for i, j, _ in unknowns])
+    names = tuple(name for _, name in unknowns.values())
+    return ElementFamily(
+        structure, elements, patterns, columns, names,
+        before, np.ones(len(names)), ("",) * len(names), cores,
+    )  # fmt: skip

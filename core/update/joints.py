@@ -1,0 +1,260 @@
+"""Joints of any frame as the update methods of the H-frame see them: roles, springs, rigid ends."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from femubench.core.errors import NotApplicable
+from femubench.core.fem.frame import Frame, JointSpring, Member, RigidEnd
+from femubench.core.fem.mesh import member_axes
+from femubench.core.fem.sections import Section
+from femubench.core.fem.structure import Structure
+from femubench.core.typing import FloatArray
+
+_COLLINEAR = np.cos(np.radians(175.0))
+# An arm takes this much of the element behind it at most; a rigid length likewise.
+_LARGEST_SHARE = 0.9
+
+SPRING_DIRECTIONS: Mapping[str, tuple[str, ...]] = {
+    "in-plane": ("x", "z", "ry"),
+    "out-of-plane": ("z", "rx", "ry"),
+    "3d": ("x", "y", "z", "rx", "ry", "rz"),
+}
+
+
+@dataclass(frozen=True)
+class JointGroup:
+    """Member ends that are alike: the same joint type, the same role.
+
+    Arguments:
+        type: the joint type; the joint's name where it has none; ``all`` for every joint.
+        role: ``through`` for two collinear ends that pass a third one, ``branch`` for what meets
+            them there, ``end`` where no member passes (L joints, splices, corners).
+        ends: ``member@joint``.
+    """
+
+    type: str
+    role: str
+    ends: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Return e.g. ``T branch``; ``L`` where there is one role only."""
+        return self.type if self.role == "end" else f"{self.type} {self.role}"
+
+
+def _outward(frame: Frame, member: Member, joint: str) -> FloatArray:
+    axis = member_axes(frame, member)[0][0]
+    return np.asarray(axis if member.ends[0] == joint else -axis)
+
+
+def _members_at(frame: Frame, joint: str) -> list[Member]:
+    return [member for member in frame.members if joint in member.ends]
+
+
+def _roles(frame: Frame, joint: str) -> dict[str, str]:
+    """Return the role of every member at a joint.
+
+    The first collinear pair in the frame's order passes through; what else meets there branches
+    off.
+    """
+    members = _members_at(frame, joint)
+    if len(members) > 2:
+        for first, second in combinations(members, 2):
+            if _outward(frame, first, joint) @ _outward(frame, second, joint) < _COLLINEAR:
+                through = (first.name, second.name)
+                return {m.name: "through" if m.name in through else "branch" for m in members}
+    return {member.name: "end" for member in members}
+
+
+def joint_groups(frame: Frame, *, merged: bool = False) -> tuple[JointGroup, ...]:
+    """Return the member ends at joints, by joint type and role.
+
+    Arguments:
+        frame: any frame; an end without a second member is no joint.
+        merged: take all joints for one type.
+    """
+    found: dict[tuple[str, str], list[str]] = {}
+    for joint in frame.joints:
+        roles = _roles(frame, joint.name)
+        if len(roles) > 1:
+            kind = "all" if merged else (joint.type or joint.name)
+            for member, role in roles.items():
+                found.setdefault((kind, role), []).append(f"{member}@{joint.name}")
+    return tuple(JointGroup(kind, role, tuple(ends)) for (kind, role), ends in found.items())
+
+
+def groups_within(frame: Frame, count: int, *, passing: bool = True) -> tuple[JointGroup, ...]:
+    """Return the joint groups, at most so many: all joints as one type where types are too many.
+
+    Arguments:
+        frame: any frame.
+        count: how many groups there may be.
+        passing: whether the groups of passing ends count.
+
+    Raises:
+        NotApplicable: when the frame has no joint.
+    """
+    groups = joint_groups(frame)
+    if not groups:
+        raise NotApplicable("no two members meet in a joint")
+    for merged in (False, True):
+        groups = joint_groups(frame, merged=merged)
+        if sum(passing or group.role != "through" for group in groups) <= count:
+            return groups
+    return (JointGroup("all", "end", tuple(end for group in groups for end in group.ends)),)
+
+
+def all_elements(structure: Structure) -> tuple[str, ...]:
+    """Return the label of every element that is no arm of a joint."""
+    return tuple(dict.fromkeys(label for label in structure.labels if label))
+
+
+def elements_at(structure: Structure, group: JointGroup) -> tuple[str, ...]:
+    """Return the labels of the elements that touch joints at the ends of a group."""
+    return tuple(
+        dict.fromkeys(structure.labels[structure.element_ends[end][0]] for end in group.ends)
+    )
+
+
+def flexible_ends(frame: Frame, group: JointGroup) -> tuple[str, ...]:
+    """Return the ends of a group that take a spring: all but one a joint where none passes.
+
+    At a joint of two members, a spring at one end or at the other is the same; with more, the
+    first member stays tied to the joint so that the joint keeps its inertia.
+    """
+    taken = {f"{spring.member}@{spring.joint}" for spring in frame.joint_springs}
+    ends = group.ends
+    if group.role == "through":
+        return ()
+    if group.role == "end":
+        first: set[str] = set()
+        for joint in {end.rpartition("@")[2] for end in ends}:
+            first.add(f"{_members_at(frame, joint)[0].name}@{joint}")
+        ends = tuple(end for end in ends if end not in first)
+    return tuple(end for end in ends if end not in taken)
+
+
+def section_depth(section: Section) -> tuple[float, float]:
+    """Return the sizes along local y and z in m.
+
+    A section that was given as numbers has those of the thin square tube with its area and its
+    second moments: centre-line width sqrt(6 I / A), wall A / (4 width).
+    """
+    if section.width is not None and section.height is not None:
+        return section.width, section.height
+    sizes = []
+    for second_moment in (section.Iz, section.Iy):
+        middle = float(np.sqrt(6.0 * second_moment / section.A))
+        sizes.append(middle + section.A / (4.0 * middle))
+    return sizes[0], sizes[1]
+
+
+def half_depth(frame: Frame, end: str) -> float:
+    """Return half the depth of the member that crosses a member end, along that member, in m.
+
+    Of several, the one that stands squarest on it counts; a member that only continues it has no
+    depth to offer.
+    """
+    name, _, joint = end.rpartition("@")
+    members = _members_at(frame, joint)
+    own = next(member for member in members if member.name == name)
+    direction = _outward(frame, own, joint)
+    others = [member for member in members if member.name != name]
+    crossing = min(others, key=lambda m: abs(float(_outward(frame, m, joint) @ direction)))
+    axes = member_axes(frame, crossing)[0]
+    across = np.abs(axes @ direction)
+    if across[0] > -_COLLINEAR:
+        return 0.0
+    width, height = section_depth(crossing.section)
+    return 0.5 * (width if across[1] > across[2] else height)
+
+
+def _element_length(structure: Structure, end: str) -> float:
+    return float(structure.properties.length[structure.element_ends[end][0]])
+
+
+def available_length(structure: Structure, end: str) -> float:
+    """Return the longest arm or rigid length that the element at a member end can take in m."""
+    element = structure.element_ends[end][0]
+    both = sum(index == element for index, _ in structure.element_ends.values())
+    return _LARGEST_SHARE * _element_length(structure, end) / both
+
+
+def spring_estimates(frame: Frame, ends: tuple[str, ...]) -> dict[str, float]:
+    """Return initial joint stiffnesses in local directions, N/m and N m/rad.
+
+    Twice EA/L, 12 EI/L^3, 4 EI/L and GJ/L of the element behind the spring, averaged over the
+    ends.
+
+    Source: Horton et al. (1999), section 7; GJ/L by analogy.
+    """
+    members = {member.name: member for member in frame.members}
+    rows = []
+    for end in ends:
+        member = members[end.rpartition("@")[0]]
+        s, m = member.section, member.material
+        length = member_axes(frame, member)[1] / member.elements
+        rows.append(
+            {
+                "x": 2.0 * m.E * s.A / length,
+                "y": 24.0 * m.E * s.Iz / length**3,
+                "z": 24.0 * m.E * s.Iy / length**3,
+                "rx": 2.0 * m.G * s.J / length,
+                "ry": 8.0 * m.E * s.Iy / length,
+                "rz": 8.0 * m.E * s.Iz / length,
+            }
+        )
+    names = SPRING_DIRECTIONS[frame.plane]
+    return {name: float(np.mean([row[name] for row in rows])) for name in names}
+
+
+def with_joint_springs(
+    structure: Structure,
+    stiffness: Mapping[str, Mapping[str, float]],
+    *,
+    arm: float | None = None,
+    arm_factor: float | None = 5.0,
+) -> Structure:
+    """Return the frame with a flexible connection at member ends, figure 1 of the source.
+
+    Arguments:
+        structure: the frame as it is.
+        stiffness: from ``member@joint`` to local directions to N/m or N m/rad.
+        arm: length of the massless arm in m; None for half the depth of the crossing member,
+            shortened where the end element is too short for it.
+        arm_factor: the arm's rigidities in those of the member; None for a rigid arm.
+
+    Source: Horton et al. (1999), section 3.1.
+    """
+    springs = []
+    for end, values in stiffness.items():
+        member, _, joint = end.rpartition("@")
+        wanted = half_depth(structure.frame, end) if arm is None else arm
+        length = min(wanted, available_length(structure, end)) if arm is None else wanted
+        factor = arm_factor if length > 0.0 else None
+        springs.append(JointSpring(joint, member, values, length, factor))
+    frame = structure.frame
+    return structure.rebuilt(replace(frame, joint_springs=frame.joint_springs + tuple(springs)))
+
+
+def with_rigid_ends(structure: Structure, lengths: Mapping[str, tuple[float, float]]) -> Structure:
+    """Return the frame with partly rigid elements at member ends, figure 2 of the source.
+
+    Arguments:
+        structure: the frame as it is.
+        lengths: from ``member@joint`` to the rigid lengths a in the stiffness and a0 in the mass
+            matrix, in m.
+
+    Source: Horton et al. (1999), section 3.2, equation (5).
+    """
+    rigid = []
+    for end, (a, a0) in lengths.items():
+        member, _, joint = end.rpartition("@")
+        rigid.append(RigidEnd(joint, member, a, a0))
+    frame = structure.frame
+    return structure.rebuilt(replace(frame, rigid_ends=frame.rigid_ends + tuple(rigid)))

@@ -1,0 +1,80 @@
+"""Quasi-measured modes: measured frequencies with shapes expanded to all dofs of a model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from femubench.core.errors import StrategyFailure
+from femubench.core.measurement import Measurement
+from femubench.core.modal.eigen import Modes, solve_modes
+from femubench.core.modal.expansion import expand_by_rotation, measured_rows
+from femubench.core.modal.pairing import pair_modes
+from femubench.core.model import Model
+from femubench.core.typing import FloatArray, IntArray
+
+ITERATIONS = 5  # Ahmadian, Gladwell & Ismail (1997), section 4
+
+
+@dataclass(frozen=True)
+class QuasiModes:
+    """Measured modes as a full model sees them.
+
+    Arguments:
+        shapes: mass-orthonormal with the model's mass, (n, m).
+        eigenvalues: measured, in rad^2/s^2, (m,).
+        rigid: free rigid-body modes of the model, mass-orthonormal, (n, r).
+        modes: the model's own modes from which the shapes were made.
+        partners: which of them belong to the measured ones, (m,).
+    """
+
+    shapes: FloatArray
+    eigenvalues: FloatArray
+    rigid: FloatArray
+    modes: Modes
+    partners: IntArray
+
+
+def paired_modes(model: Model, measurement: Measurement) -> tuple[Modes, IntArray]:
+    """Return enough modes of a model and the index of every measured mode's partner.
+
+    Raises:
+        StrategyFailure: when a measured mode has no partner in the model.
+    """
+    modes = solve_modes(model, None if model.size <= 500 else 2 * len(measurement) + 12)
+    candidates = np.flatnonzero(~modes.rigid)
+    at_sensors = model.observe(measurement.sensors) @ modes.shapes[:, candidates]
+    pairing = pair_modes(
+        measurement.frequencies,
+        measurement.shapes,
+        modes.natural_frequencies[candidates],
+        at_sensors,
+    )
+    lost = [n for n, p in zip(measurement.numbers, pairing.index, strict=True) if p < 0]
+    if lost:
+        raise StrategyFailure(f"no mode of the model matches measured mode {lost[0]}")
+    return modes, candidates[pairing.index]
+
+
+def quasi_measured_modes(model: Model, measurement: Measurement) -> QuasiModes:
+    """Return the used modes expanded by rotating the model's own shapes.
+
+    Arguments:
+        model: the current estimate; its mass is the one the shapes are orthonormal with.
+        measurement: the used modes.
+
+    Raises:
+        StrategyFailure: when a measured mode has no partner in the model.
+        NotApplicable: when there are fewer complete sensors than modes.
+
+    Source: Ahmadian, Gladwell & Ismail (1997), equations (16)-(17).
+    """
+    rows = measured_rows(measurement.shapes)
+    modes, partners = paired_modes(model, measurement)
+    full = modes.shapes[:, partners]
+    at_sensors = (model.observe(measurement.sensors) @ full)[rows]
+    shapes, _ = expand_by_rotation(measurement.shapes[rows], at_sensors, full)
+    return QuasiModes(
+        shapes, measurement.eigenvalues, modes.shapes[:, modes.rigid], modes, partners
+    )

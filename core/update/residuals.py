@@ -1,0 +1,235 @@
+"""Measured minus predicted modal data of a frame model, with sensitivities in scaled parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from femubench.core.errors import NotApplicable
+from femubench.core.fem.parameters import Derivatives, Parameter, derivatives
+from femubench.core.fem.structure import Structure
+from femubench.core.measurement import Measurement
+from femubench.core.modal.correlation import modal_scale_factor
+from femubench.core.modal.eigen import DENSE_LIMIT, Modes, solve_modes
+from femubench.core.modal.pairing import pair_modes
+from femubench.core.modal.sensitivity import eigenvalue_sensitivities, shape_sensitivities
+from femubench.core.model import Model
+from femubench.core.typing import BoolArray, FloatArray, IntArray
+
+Residual = Literal["eigenvalue", "relative-eigenvalue", "frequency"]
+# Two vectors with a cosine above this to the same third one cannot be orthogonal to each other.
+_SAME_MODE = 0.75
+
+
+@dataclass(frozen=True)
+class Data:
+    """What is fitted, and how it is weighted.
+
+    Arguments:
+        measurement: the used modes.
+        residual: the modal quantity of a mode: absolute eigenvalues (2 pi f)^2, as Horton et al.
+            use, eigenvalues relative to the measured ones, or frequencies in Hz.
+        statistical: weight every datum by its inverse standard deviation; else by 1.
+        shapes: take mode shapes at the sensors as data too (statistical weighting only).
+        weigh: take the measured total mass as a datum, where there is one.
+    """
+
+    measurement: Measurement
+    residual: Residual = "eigenvalue"
+    statistical: bool = False
+    shapes: bool = False
+    weigh: bool = False
+
+    @cached_property
+    def target(self) -> FloatArray:
+        """Return the measured modal quantities z_m, (m,)."""
+        return self.quantity(self.measurement.eigenvalues)
+
+    def quantity(self, eigenvalues: FloatArray) -> FloatArray:
+        """Return z of eigenvalues in rad^2/s^2, one a measured mode, (m,)."""
+        if self.residual == "eigenvalue":
+            return eigenvalues
+        if self.residual == "relative-eigenvalue":
+            return np.asarray(eigenvalues / self.measurement.eigenvalues)
+        root = np.sqrt(np.abs(eigenvalues)) / (2.0 * np.pi)
+        return np.asarray(np.copysign(root, eigenvalues))
+
+    def slope(self, eigenvalues: FloatArray) -> FloatArray:
+        """Return dz / d eigenvalue, (m,)."""
+        if self.residual == "eigenvalue":
+            return np.ones(len(eigenvalues))
+        if self.residual == "relative-eigenvalue":
+            return np.asarray(1.0 / self.measurement.eigenvalues)
+        return np.asarray(1.0 / (4.0 * np.pi * np.sqrt(np.abs(eigenvalues))))
+
+    @cached_property
+    def weight(self) -> FloatArray:
+        """Return the square roots of the weights of the modal quantities, (m,).
+
+        Raises:
+            NotApplicable: when a statistical weight has no standard deviation to rest on.
+        """
+        if not self.statistical:
+            return np.ones(len(self.measurement))
+        std = self.measurement.frequency_std
+        if not (np.isfinite(std) & (std > 0.0)).all():
+            raise NotApplicable("a measured frequency has no standard deviation")
+        measured = self.measurement.eigenvalues
+        return np.asarray(1.0 / (self.slope(measured) * 4.0 * np.pi * np.sqrt(measured) * std))
+
+    @cached_property
+    def shape_weight(self) -> FloatArray:
+        """Return 1/sigma of every shape component, 0 where there is none, (n_sensors, m)."""
+        shapes, std = self.measurement.shapes, self.measurement.shape_std
+        known = np.isfinite(shapes) & np.isfinite(std) & (std > 0.0)
+        return np.where(known, 1.0 / np.where(known, std, 1.0), 0.0)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A model's answer to the data: one eigenvalue solution, sensitivities on demand.
+
+    Arguments:
+        data: what it is compared with.
+        structure: the frame with its present parameter values.
+        model: its matrices.
+        modes: its modes.
+        partner: which of them belongs to every measured mode; -1 where none does, (m,).
+    """
+
+    data: Data
+    structure: Structure
+    model: Model
+    modes: Modes
+    partner: IntArray
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """Return weighted measured minus predicted data, nan without a partner, (n_rows,)."""
+        data, lost = self.data, self.partner < 0
+        eigenvalues = self.modes.eigenvalues[self.partner]
+        rows = data.weight * (data.target - data.quantity(eigenvalues))
+        parts = [np.where(lost, np.nan, rows)]
+        if data.shapes:
+            misfit = data.shape_weight * (np.nan_to_num(data.measurement.shapes) - self._scaled)
+            parts.append(np.where(lost, np.nan, misfit).T.ravel())
+        if data.weigh and data.measurement.total_mass is not None:
+            mass, std = data.measurement.total_mass
+            parts.append(np.array([(mass - total_mass(self.structure)) / std]))
+        return np.concatenate(parts)
+
+    @cached_property
+    def _at_sensors(self) -> FloatArray:
+        observed = self.model.observe(self.data.measurement.sensors) @ self.modes.shapes
+        return np.asarray(observed[:, self.partner])
+
+    @cached_property
+    def _factor(self) -> FloatArray:
+        shapes, weight = self.data.measurement.shapes, self.data.shape_weight
+        return np.asarray(modal_scale_factor(shapes, self._at_sensors, np.square(weight)))
+
+    @property
+    def _scaled(self) -> FloatArray:
+        return np.asarray(self._at_sensors * self._factor)
+
+    def jacobian(self, parameters: Sequence[Parameter]) -> FloatArray:
+        """Return d (weighted prediction) / d parameter, 0 without partner, (n_rows, p)."""
+        data = self.data
+        change = derivatives(self.structure, parameters)
+        paired = self.modes.take(self.partner)
+        slope = eigenvalue_sensitivities(self.model, paired, parameters, change)
+        scale = data.weight * data.slope(paired.eigenvalues) * (self.partner >= 0)
+        parts = [np.where(scale[:, None] > 0.0, slope * scale[:, None], 0.0)]
+        if data.shapes:
+            parts.append(self._shape_rows(parameters, change))
+        if data.weigh and data.measurement.total_mass is not None:
+            grow = [_mass_slope(self.structure, parameter) for parameter in parameters]
+            parts.append(np.array([grow]) / data.measurement.total_mass[1])
+        return np.vstack(parts)
+
+    def _shape_rows(self, parameters: Sequence[Parameter], change: Derivatives) -> FloatArray:
+        """Return the sensitivities of s phi with the modal scale factor's own, (n_s m, p)."""
+        data = self.data
+        observe = self.model.observe(data.measurement.sensors)
+        rows = np.zeros((len(self.partner), observe.shape[0], len(parameters)))
+        for j, index in enumerate(self.partner):
+            weight, seen = data.shape_weight[:, j], self._at_sensors[:, j]
+            if index < 0 or not weight.any():
+                continue
+            turn = observe @ shape_sensitivities(self.model, self.modes, index, parameters, change)
+            square = np.square(weight)
+            rest = np.nan_to_num(data.measurement.shapes[:, j]) - 2.0 * self._factor[j] * seen
+            factor_slope = (square * rest) @ turn / (square @ np.square(seen))
+            slope = self._factor[j] * turn + np.outer(seen, factor_slope)
+            rows[j] = weight[:, None] * slope
+        return rows.reshape(-1, len(parameters))
+
+
+def total_mass(structure: Structure) -> float:
+    """Return the mass of members and attached masses in kg."""
+    p = structure.properties
+    beams = p.rhoA @ (p.length - p.rigid_mass_1 - p.rigid_mass_2)
+    return float(beams + sum(item.mass for item in structure.frame.masses))
+
+
+def _mass_slope(structure: Structure, parameter: Parameter) -> float:
+    """Return d total mass / d factor about the present value in kg."""
+    if parameter.quantity not in ("rhoA", "density"):
+        return 0.0
+    p = structure.properties
+    mass = p.rhoA * (p.length - p.rigid_mass_1 - p.rigid_mass_2)
+    wanted = set(parameter.places)
+    return float(sum(m for m, label in zip(mass, structure.labels, strict=True) if label in wanted))
+
+
+def predict(data: Data, structure: Structure, previous: Prediction | None = None) -> Prediction:
+    """Return the prediction of a frame, its modes paired with the measured ones.
+
+    Pairs are formed by shape and frequency; a measured mode that finds no partner that way keeps
+    the mode that continues its previous partner.
+
+    Arguments:
+        data: what is measured.
+        structure: the frame with its present values.
+        previous: the prediction at the iteration before, on the same dofs.
+
+    Raises:
+        ModelError: when the eigenvalue problem has no solution.
+    """
+    model = Model.of(structure)
+    count = None if model.size <= DENSE_LIMIT else 2 * len(data.measurement) + 12
+    modes = solve_modes(model, count)
+    elastic = np.flatnonzero(~modes.rigid)
+    pairing = pair_modes(
+        data.measurement.frequencies,
+        data.measurement.shapes,
+        modes.natural_frequencies[elastic],
+        model.observe(data.measurement.sensors) @ modes.shapes[:, elastic],
+    )
+    partner = np.where(pairing.index >= 0, elastic[pairing.index], -1)
+    if previous is not None:
+        partner = _followed(partner, model, modes, previous)
+    return Prediction(data, structure, model, modes, partner)
+
+
+def _followed(partner: IntArray, model: Model, modes: Modes, previous: Prediction) -> IntArray:
+    """Return the partners with lost ones continued from the previous iteration."""
+    result = partner.copy()
+    for row in np.flatnonzero((partner < 0) & (previous.partner >= 0)):
+        before = model.mass_times(previous.modes.shapes[:, previous.partner[row]][:, None])[:, 0]
+        likeness = np.abs(before @ modes.shapes)
+        likeness[modes.rigid] = 0.0
+        likeness[result[result >= 0]] = 0.0
+        best = int(likeness.argmax())
+        if likeness[best] > _SAME_MODE:
+            result[row] = best
+    return result
+
+
+def common_rows(first: Prediction, second: Prediction) -> BoolArray:
+    """Tell which data both predictions have a partner for, (n_rows,)."""
+    return np.isfinite(first.residual) & np.isfinite(second.residual)

@@ -1,0 +1,223 @@
+"""The iterative sensitivity method: damped Gauss-Newton steps in scaled parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from femubench.core.errors import Diverged, ModelError, NotApplicable, StrategyFailure
+from femubench.core.fem.structure import Structure
+from femubench.core.measurement import Measurement
+from femubench.core.strategy import ParameterEstimate, UpdateResult
+from femubench.core.typing import BoolArray, FloatArray
+from femubench.core.update.residuals import Data, Prediction, common_rows, predict
+from femubench.core.update.unknowns import Scaling, Unknown, UpdateOptions
+
+_SMALLEST_STEP = 1e-9
+_NO_GAIN = 1e-6
+_PATIENCE = 3
+
+
+@dataclass(frozen=True)
+class _Point:
+    q: FloatArray
+    prediction: Prediction
+
+    def cost(self, rows: BoolArray, precision: FloatArray) -> float:
+        """Return r'Wr over some data plus the prior's share."""
+        residual = self.prediction.residual[rows]
+        return float(residual @ residual + precision @ np.square(self.q))
+
+
+class _Iteration:
+    """State of one update."""
+
+    def __init__(
+        self, structure: Structure, unknowns: Sequence[Unknown], data: Data, options: UpdateOptions
+    ) -> None:
+        self.structure, self.unknowns, self.data, self.options = structure, unknowns, data, options
+        self.scaling = Scaling(unknowns)
+        self.parameters = [u.parameter for u in unknowns]
+        self.history: list[Mapping[str, float]] = []
+        self.beta = 0.0
+        self.converged = False
+
+    def at(self, q: FloatArray, previous: Prediction | None = None) -> _Point:
+        values = self.scaling.values(q)
+        structure = self.structure.with_values(self.parameters, values)
+        return _Point(q, predict(self.data, structure, previous))
+
+    def system(self, point: _Point) -> tuple[FloatArray, FloatArray]:
+        """Return scaled sensitivities s and residual of the data that have a partner."""
+        scale = self.scaling.slope(point.q)
+        known = np.isfinite(point.prediction.residual)
+        sensitivities = point.prediction.jacobian(self.parameters) * scale
+        return sensitivities[known], point.prediction.residual[known]
+
+    def step(self, point: _Point) -> FloatArray:
+        """Return dtheta / |theta| = (s's + beta I + P)^-1 (s'r - P q), limits respected."""
+        s, residual = self.system(point)
+        free = np.ones(len(point.q), dtype=bool)
+        scaling, precision = self.scaling, self.scaling.precision
+        step = np.zeros(len(point.q))
+        while free.any():
+            rows = [s, np.sqrt(self.beta) * np.eye(len(step)), np.diag(np.sqrt(precision))]
+            right = [residual, np.zeros(len(step)), -np.sqrt(precision) * point.q]
+            matrix = np.vstack(rows)[:, free]
+            step[:] = 0.0
+            step[free] = np.linalg.lstsq(matrix, np.concatenate(right), rcond=None)[0]
+            stuck = free & (point.q <= scaling.lower) & (step < 0.0)
+            stuck |= free & (point.q >= scaling.upper) & (step > 0.0)
+            if not stuck.any():
+                break
+            free &= ~stuck
+        longest = float(np.abs(step).max(initial=0.0))
+        return step * min(1.0, self.options.max_step / longest) if longest > 0.0 else step
+
+    def gain(self, before: _Point, after: _Point) -> float:
+        """Return the share of the cost that a step took away."""
+        rows, precision = common_rows(before.prediction, after.prediction), self.scaling.precision
+        cost = before.cost(rows, precision)
+        return 1.0 - after.cost(rows, precision) / cost if cost > 0.0 else 0.0
+
+    def promise(self, point: _Point, step: FloatArray) -> float:
+        """Return the share of the cost that a step would take away were the model linear."""
+        s, residual = self.system(point)
+        after = residual - s @ step
+        rest = self.scaling.precision @ np.square(point.q + step)
+        cost = point.cost(np.isfinite(point.prediction.residual), self.scaling.precision)
+        return float(1.0 - (after @ after + rest) / cost) if cost > 0.0 else 0.0
+
+    def advance(self, point: _Point, step: FloatArray) -> _Point | None:
+        """Return the next point, the step halved until the cost does not grow; None for none."""
+        precision = self.scaling.precision
+        for halving in range(self.options.halvings + 1):
+            q = np.clip(point.q + step / 2**halving, self.scaling.lower, self.scaling.upper)
+            if np.abs(q - point.q).max() < _SMALLEST_STEP:
+                return None
+            try:
+                trial = self.at(q, point.prediction)
+            except ModelError:
+                continue
+            rows = common_rows(point.prediction, trial.prediction)
+            if rows.any() and trial.cost(rows, precision) <= point.cost(rows, precision):
+                return trial
+        return None
+
+    def run(self) -> _Point:
+        point = self.at(np.zeros(len(self.unknowns)))
+        if not (point.prediction.partner >= 0).any():
+            raise StrategyFailure("no mode of the model matches any measured mode")
+        data = self.data
+        self.beta = self.options.damping * float(np.square(data.weight * data.target).sum())
+        self.record(0, point, 0.0)
+        slow = 0
+        for iteration in range(1, self.options.max_iterations + 1):
+            step = self.step(point)
+            following = self.advance(point, step)
+            if following is None:
+                self.converged = self.promise(point, step) < _NO_GAIN
+                break
+            moved = float(np.abs(following.q - point.q).max())
+            slow = slow + 1 if self.gain(point, following) < self.options.cost_tolerance else 0
+            point = following
+            self.record(iteration, point, moved)
+            if moved < self.options.tolerance or slow == _PATIENCE:
+                self.converged = True
+                break
+        self.check(point)
+        return point
+
+    def record(self, iteration: int, point: _Point, step: float) -> None:
+        rows = np.isfinite(point.prediction.residual)
+        entry = {
+            "iteration": float(iteration),
+            "cost": point.cost(rows, self.scaling.precision),
+            "step": step,
+        }
+        values = self.scaling.values(point.q)
+        names = (u.parameter.name for u in self.unknowns)
+        entry.update((name, float(v)) for name, v in zip(names, values, strict=True))
+        self.history.append(entry)
+
+    def check(self, point: _Point) -> None:
+        """Raise Diverged where a parameter ended at the limit of its sense."""
+        at_limit = (point.q <= self.scaling.lower) | (point.q >= self.scaling.upper)
+        for unknown, out in zip(self.unknowns, at_limit, strict=True):
+            if unknown.fatal and out:
+                raise Diverged(
+                    f"{unknown.parameter.name} left its range {unknown.lower:g}..{unknown.upper:g}"
+                    f" at iteration {len(self.history) - 1}"
+                )
+
+    def deviations(self, point: _Point) -> FloatArray | None:
+        """Return the posterior standard deviations of the values; None without statistics."""
+        if not self.data.statistical:
+            return None
+        s, _ = self.system(point)
+        information = s.T @ s + np.diag(self.scaling.precision)
+        values = self.scaling.values(point.q)
+        try:
+            covariance = np.linalg.inv(information)
+        except np.linalg.LinAlgError:
+            return np.full(len(values), np.inf)
+        grow = np.where(self.scaling.signed, np.abs(self.scaling.start), values)
+        return np.asarray(np.sqrt(np.diagonal(covariance)) * grow)
+
+
+def sensitivity_update(
+    structure: Structure,
+    unknowns: Sequence[Unknown],
+    measurement: Measurement,
+    options: UpdateOptions | None = None,
+) -> UpdateResult:
+    """Return a frame model whose parameters fit the measured modes.
+
+    Every iteration pairs by shape and makes one eigenvalue solution; a step after which the cost
+    is larger is halved, at one solution each.
+
+    Arguments:
+        structure: the nominal frame; factors multiply its present properties.
+        unknowns: the parameters, with ranges and priors.
+        measurement: the used modes.
+        options: residual, weighting, damping, ends.
+
+    Raises:
+        NotApplicable: when there is no parameter to change.
+        StrategyFailure: when no measured mode has a partner at the start.
+        Diverged: when a parameter leaves the range in which it makes sense.
+
+    Source: Horton, Gurgenci, Veidt & Friswell (1999), equations (1)-(4).
+    """
+    if not unknowns:
+        raise NotApplicable("there is no parameter to update")
+    options = UpdateOptions() if options is None else options
+    statistical = options.weighting == "statistical"
+    data = Data(measurement, options.residual, statistical, options.shapes, statistical)
+    iteration = _Iteration(structure, unknowns, data, options)
+    point = iteration.run()
+    values = iteration.scaling.values(point.q)
+    deviations = iteration.deviations(point)
+    estimates = tuple(
+        ParameterEstimate(
+            name=unknown.parameter.name,
+            before=float(unknown.start),
+            after=float(value),
+            unit=unknown.parameter.unit,
+            std=None if deviations is None else float(deviations[i]),
+        )
+        for i, (unknown, value) in enumerate(zip(unknowns, values, strict=True))
+    )
+    return UpdateResult(
+        model=point.prediction.model,
+        parameter_count=len(unknowns),
+        parameters=estimates,
+        history=tuple(iteration.history),
+        diagnostics={
+            "iterations": float(len(iteration.history) - 1),
+            "converged": float(iteration.converged),
+            "paired_modes": float((point.prediction.partner >= 0).sum()),
+        },
+    )

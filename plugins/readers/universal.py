@@ -1,0 +1,278 @@
+"""Read nodes and mode shapes of universal files (SDRC I-DEAS), through pyuff."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from femubench import InputError, Measurement, Sensors, real_modes
+
+_DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+_COORDINATES, _UNITS, _SYSTEMS, _SHAPES = (15, 2411), 164, (18, 2420), (55, 2414)
+_WANTED = (*_COORDINATES, _UNITS, *_SYSTEMS, *_SHAPES)
+_NORMAL_MODE, _COMPLEX_MODES = 2, (3, 7)
+_MOTIONS = (0, 1, 8, 11, 12)  # unknown, general, displacement, velocity, acceleration
+_FREQUENCY_STD, _SHAPE_STD = 0.005, 0.015
+_GLOBAL = (0, 1)  # numbers that writers use for the global axes without defining them
+
+Dataset = Mapping[str, Any]
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class _Mode:
+    """One mode of a file: complex shapes from (node, direction)."""
+
+    number: int
+    frequency: float
+    damping: float
+    shape: Mapping[tuple[int, str], complex]
+
+
+class UniversalReader:
+    """Reads datasets 15, 2411 (nodes), 55, 2414 (modes), 164 (units), 18, 2420 (axes)."""
+
+    name: str = "universal file"
+    suffixes: tuple[str, ...] = (".uff", ".unv", ".uf")
+
+    def read_matrix(self, path: Path) -> NoReturn:
+        """Refuse: matrices of universal files are not read."""
+        raise InputError("no matrix is read from a universal file", file=path, expected=".mtx")
+
+    def read_modes(self, path: Path) -> Measurement:
+        """Return sensors ``node:direction`` and modes.
+
+        A component that is zero in every mode counts as not measured. Without modes every node
+        is a sensor in x, y and z; nodes without coordinates get nan.
+
+        Raises:
+            InputError: when the file is broken, holds neither nodes nor modes, or uses local axes.
+        """
+        datasets, other = _datasets(path)
+        nodes = _nodes(path, datasets)
+        modes = _modes(path, datasets)
+        if not nodes and not modes:
+            expected = "datasets 15 or 2411 with nodes, 55 or 2414 with modes"
+            what = "neither nodes nor modes"
+            if 58 in other:
+                what += "; frequency responses (dataset 58) must be turned into modes first"
+            raise InputError(what, file=path, expected=expected)
+        return _measurement(path, nodes, modes)
+
+
+def _datasets(path: Path) -> tuple[list[Dataset], set[int]]:
+    """Return the datasets that are of use, and the numbers of the others."""
+    import pyuff
+
+    wanted: list[Dataset] = []
+    other: set[int] = set()
+    try:
+        file = pyuff.UFF(str(path))
+        types = [int(number) for number in file.get_set_types()]
+    except Exception as error:  # pyuff raises nothing more special
+        raise InputError(f"cannot be read: {error}", file=path) from None
+    for i, number in enumerate(types):
+        if number not in _WANTED:
+            other.add(number)
+            continue
+        try:
+            wanted.append(file.read_sets(i))
+        except Exception as error:
+            key = f"dataset {number} (block {i + 1})"
+            raise InputError(f"cannot be read: {error}", file=path, key=key) from None
+    return wanted, other
+
+
+def _of(datasets: Sequence[Dataset], *numbers: int) -> Iterator[Dataset]:
+    return (dataset for dataset in datasets if dataset["type"] in numbers)
+
+
+def _length_factor(path: Path, datasets: Sequence[Dataset]) -> float:
+    """Return what lengths must be divided by to be in m (dataset 164)."""
+    factors = {float(dataset["length"]) for dataset in _of(datasets, _UNITS)} or {1.0}
+    if len(factors) > 1 or not all(math.isfinite(f) and f > 0.0 for f in factors):
+        raise InputError("unclear units", file=path, key="dataset 164", expected="one length > 0")
+    return factors.pop()
+
+
+def _global_systems(datasets: Sequence[Dataset]) -> dict[int, bool]:
+    """Return from the number of a coordinate system to whether it is the global one."""
+    systems = dict.fromkeys(_GLOBAL, True)
+    for dataset in _of(datasets, 2420):
+        triples = zip(
+            dataset["CS_sys_labels"], dataset["CS_types"], dataset["CS_matrices"], strict=True
+        )
+        for label, kind, matrix in triples:
+            identity = np.allclose(matrix, np.eye(4)[:, :3] * [[1], [1], [1], [0]])
+            systems[int(label)] = kind == 0 and bool(identity)
+    for dataset in _of(datasets, 18):
+        for i, label in enumerate(dataset["cs_num"]):
+            along = dataset["x_point"][i] - dataset["ref_o"][i]
+            plane = dataset["xz_point"][i] - dataset["ref_o"][i]
+            same = bool(
+                dataset["cs_type"][i] == 0
+                and dataset["ref_cs_num"][i] == 0
+                and np.allclose(dataset["ref_o"][i], 0.0)
+                and along[0] > 0.0
+                and np.allclose(along[1:], 0.0)
+                and np.isclose(plane[1], 0.0)
+                and plane[2] > 0.0
+            )
+            systems[int(label)] = same
+    return systems
+
+
+def _nodes(path: Path, datasets: Sequence[Dataset]) -> dict[int, Point]:
+    """Return the coordinates of the nodes in m."""
+    factor, systems = _length_factor(path, datasets), _global_systems(datasets)
+    nodes: dict[int, Point] = {}
+    for dataset in _of(datasets, *_COORDINATES):
+        key = f"dataset {dataset['type']}"
+        names = ("node_nums", "def_cs", "disp_cs", "x", "y", "z")
+        columns = [np.asarray(dataset[name], dtype=float) for name in names]
+        if len({len(column) for column in columns}) > 1 or not np.isfinite(columns).all():
+            raise InputError("truncated or not finite", file=path, key=key, expected="nodes")
+        for number, defined, displaced, *xyz in zip(*columns, strict=True):
+            for system in (int(defined), int(displaced)):
+                if not systems.get(system, False):
+                    what = f"node {int(number)} uses the local coordinate system {system}"
+                    expected = "nodes and shapes in global axes"
+                    raise InputError(what, file=path, key=key, expected=expected)
+            x, y, z = (float(v) / factor for v in xyz)
+            if nodes.setdefault(int(number), (x, y, z)) != (x, y, z):
+                what = f"node {int(number)} lies at two places"
+                raise InputError(what, file=path, key=key, expected="one place")
+    return nodes
+
+
+def _modes(path: Path, datasets: Sequence[Dataset]) -> list[_Mode]:
+    """Return the elastic modes; dataset 2414 counts where there is no dataset 55."""
+    factor = _length_factor(path, datasets)
+    modes = [mode for d in _of(datasets, 55) for mode in _mode_55(path, d, factor)]
+    modes = modes or [mode for d in _of(datasets, 2414) for mode in _mode_2414(path, d, factor)]
+    if any(mode.number < 1 for mode in modes):
+        modes = [
+            _Mode(i + 1, mode.frequency, mode.damping, mode.shape) for i, mode in enumerate(modes)
+        ]
+    numbers = [mode.number for mode in modes]
+    for number in numbers:
+        if numbers.count(number) > 1:
+            what = f"mode {number} is listed twice"
+            raise InputError(what, file=path, key="mode number", expected="every mode once")
+    return [mode for mode in modes if mode.frequency > 0.0]
+
+
+def _mode_55(path: Path, dataset: Dataset, factor: float) -> Iterator[_Mode]:
+    analysis = dataset["analysis_type"]
+    if analysis not in (_NORMAL_MODE, *_COMPLEX_MODES):
+        return
+    if dataset["spec_data_type"] not in _MOTIONS or dataset["n_data_per_node"] not in (3, 6):
+        return
+    if analysis == _NORMAL_MODE:
+        frequency = float(dataset["freq"])
+        damping = _ratio(dataset["modal_damp_vis"], dataset["modal_damp_his"])
+    else:
+        frequency, damping = _from_eigenvalue(complex(dataset["eig"]))
+    columns = [dataset[f"r{i + 1}"] for i in range(6) if f"r{i + 1}" in dataset]
+    lengths = {len(column) for column in (dataset["node_nums"], *columns)}
+    if len(lengths) > 1:
+        raise InputError("truncated shape", file=path, key="dataset 55", expected="all nodes")
+    rows = np.array(columns, dtype=complex).T
+    number = int(dataset["mode_n"])
+    yield _mode(path, "dataset 55", number, frequency, damping, dataset["node_nums"], rows, factor)
+
+
+def _mode_2414(path: Path, dataset: Dataset, factor: float) -> Iterator[_Mode]:
+    analysis, count = dataset["analysis_type"], {2: 3, 3: 6}.get(dataset["data_characteristic"])
+    at_nodes = dataset["dataset_location"] == 1
+    if analysis not in (_NORMAL_MODE, *_COMPLEX_MODES) or count is None or not at_nodes:
+        return
+    if dataset["result_type"] not in _MOTIONS:
+        return
+    if analysis == _NORMAL_MODE:
+        frequency = float(dataset["record12_field2"])
+        damping = _ratio(dataset["record12_field5"], dataset["record12_field6"])
+    else:
+        eigenvalue = complex(dataset["record13_field1"], dataset["record13_field2"])
+        frequency, damping = _from_eigenvalue(eigenvalue)
+    width = 2 * count if dataset["data_type"] in (5, 6) else count
+    if any(len(values) != width for values in dataset["data_at_node"]):
+        expected = f"{width} values a node"
+        raise InputError("truncated shape", file=path, key="dataset 2414", expected=expected)
+    values = np.array(dataset["data_at_node"], dtype=float).reshape(-1, width)
+    rows = values[:, ::2] + 1j * values[:, 1::2] if width > count else values.astype(complex)
+    number = int(dataset["record10_field6"])
+    nodes = dataset["node_nums"]
+    yield _mode(path, "dataset 2414", number, frequency, damping, nodes, rows, factor)
+
+
+def _mode(
+    path: Path,
+    key: str,
+    number: int,
+    frequency: float,
+    damping: float,
+    nodes: Sequence[int],
+    rows: NDArray[np.complex128],
+    factor: float,
+) -> _Mode:
+    if not (math.isfinite(frequency) and frequency >= 0.0 and np.isfinite(rows).all()):
+        what = f"mode {number} has numbers that cannot be"
+        raise InputError(what, file=path, key=key, expected="a frequency >= 0, finite shapes")
+    if damping < 0.0 or damping >= 1.0:
+        what = f"mode {number} has the damping {damping:g}"
+        raise InputError(what, file=path, key=key, expected="a ratio >= 0 and < 1")
+    rows = rows.copy()
+    rows[:, :3] /= factor
+    shape = {
+        (int(node), direction): complex(value)
+        for node, row in zip(nodes, rows, strict=True)
+        for direction, value in zip(_DIRECTIONS, row, strict=False)
+    }
+    return _Mode(number, frequency, damping, shape)
+
+
+def _ratio(viscous: float, hysteretic: float) -> float:
+    """Return the damping ratio; files write zero where nothing was measured."""
+    return float(viscous) or 0.5 * float(hysteretic) or math.nan
+
+
+def _from_eigenvalue(eigenvalue: complex) -> tuple[float, float]:
+    size = abs(eigenvalue)
+    return size / (2.0 * math.pi), -eigenvalue.real / size if size > 0.0 else math.nan
+
+
+def _measurement(path: Path, nodes: Mapping[int, Point], modes: Sequence[_Mode]) -> Measurement:
+    if modes:
+        listed = dict.fromkeys(place for mode in modes for place in mode.shape)
+        places = [p for p in listed if any(mode.shape.get(p, 0.0) != 0.0 for mode in modes)]
+    else:
+        places = [(node, direction) for node in nodes for direction in _DIRECTIONS[:3]]
+    nowhere = (math.nan, math.nan, math.nan)
+    sensors = Sensors(
+        labels=tuple(f"{node}:{direction}" for node, direction in places),
+        xyz=np.array([nodes.get(node, nowhere) for node, _ in places]).reshape(-1, 3),
+        directions=tuple(direction for _, direction in places),
+    )
+    empty = complex(math.nan, 0.0)
+    table = [[mode.shape.get(place, empty) for mode in modes] for place in places]
+    complex_shapes = np.array(table, dtype=complex).reshape(len(places), len(modes))
+    # The complex scale of a mode is arbitrary: residues and velocities come out imaginary.
+    shapes = real_modes(complex_shapes, align_phase=True)
+    frequencies = np.array([mode.frequency for mode in modes])
+    largest = np.abs(np.nan_to_num(shapes)).max(axis=0, initial=0.0)
+    return Measurement(
+        sensors=sensors,
+        numbers=tuple(mode.number for mode in modes),
+        frequencies=frequencies,
+        frequency_std=_FREQUENCY_STD * frequencies,
+        damping=np.array([mode.damping for mode in modes]),
+        shapes=shapes,
+        shape_std=np.broadcast_to(_SHAPE_STD * largest, shapes.shape).copy(),
+    )

@@ -1,0 +1,87 @@
+"""The most probable parameters, with their uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from femubench import (
+    Measurement,
+    Model,
+    Parameter,
+    Strategy,
+    Structure,
+    Unknown,
+    UpdateOptions,
+    UpdateResult,
+    all_elements,
+    global_stiffness,
+    joint_groups,
+    joint_stiffness,
+    sensitivity_update,
+)
+
+_OPTIONS = UpdateOptions(residual="frequency", weighting="statistical", damping=0.0)
+
+
+@dataclass(frozen=True)
+class Bayesian(Strategy):
+    """Weigh measured modes against prior knowledge by their covariances.
+
+    Parameters are the stiffness of all members; out of plane and in 3-D their torsional rigidity;
+    one factor for the elements at joints of every type and role; and the density where the
+    structure was weighed (without that only the ratio of stiffness to density shows). All have
+    log-normal priors about the nominal value, so there may be more of them than data. The result
+    is the maximum of the posterior density, its covariance the inverse of s'Ws + P.
+
+    Arguments:
+        stiffness_std: prior standard deviation of ln(E or EI).
+        torsion_std: of ln(GJ).
+        joint_std: of the logarithm of a joint factor.
+        density_std: of ln(density).
+        options: of the iteration; `shapes` takes the shapes at the sensors as data too.
+
+    Source: Horton et al. (1999), equation (4) with W_ee and W_theta the inverse covariances;
+    Friswell & Mottershead (1995), Finite Element Model Updating in Structural Dynamics, ch. 8.
+    """
+
+    name: ClassVar[str] = "bayesian"
+    citation: ClassVar[str] = (
+        "Friswell & Mottershead (1995), Finite Element Model Updating in Structural Dynamics, "
+        "chapter 8; Horton et al. (1999), equation (4) with the covariances of data and parameters"
+    )
+    needs: ClassVar[frozenset[str]] = frozenset({"geometry"})
+
+    stiffness_std: float = 0.1
+    torsion_std: float = 0.3
+    joint_std: float = 0.5
+    density_std: float = 0.1
+    options: UpdateOptions = _OPTIONS
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        """Return the most probable model, parameters with standard deviations."""
+        structure = model.frame_structure
+        unknowns = self.unknowns(structure, weighed=measurement.total_mass is not None)
+        return sensitivity_update(structure, unknowns, measurement, self.options)
+
+    def unknowns(self, structure: Structure, *, weighed: bool) -> list[Unknown]:
+        """Return the parameters with their priors.
+
+        Arguments:
+            structure: the nominal frame.
+            weighed: whether the total mass was measured.
+        """
+        everywhere = all_elements(structure)
+        unknowns = [global_stiffness(structure, prior_std=self.stiffness_std)]
+        if structure.frame.plane != "in-plane":
+            torsion = Parameter("GJ all members", "GJ", everywhere)
+            unknowns.append(Unknown(torsion, prior_std=self.torsion_std))
+        if weighed:
+            density = Parameter("density all members", "density", everywhere)
+            unknowns.append(Unknown(density, prior_std=self.density_std))
+        groups = joint_groups(structure.frame)
+        return unknowns + [joint_stiffness(structure, g, prior_std=self.joint_std) for g in groups]

@@ -1,0 +1,99 @@
+"""Partly rigid elements at joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from femubench import (
+    JointGroup,
+    Measurement,
+    Model,
+    Parameter,
+    Strategy,
+    Structure,
+    Unknown,
+    UpdateOptions,
+    UpdateResult,
+    available_length,
+    carried_by,
+    global_stiffness,
+    groups_within,
+    half_depth,
+    sensitivity_update,
+    with_rigid_ends,
+)
+
+_ALMOST_NOTHING = 3.12e-6  # m, the initial offset of the passing member in table 4(e)
+_LONGEST_EXTENSION = 3.0  # negative lengths, in those available
+
+
+@dataclass(frozen=True)
+class Offset(Strategy):
+    """Make the elements at joints partly rigid and update the rigid lengths with EI.
+
+    Every joint type has one length for its branches, initially half the depth of the member that
+    passes, and one for the member that passes, initially nothing; where none passes, one for all
+    ends. The mass of branches inside the passing member is left out once and for all. Lengths may
+    become negative, which stands for a joint softer than the beam; they move by multiples of their
+    initial size, so that one which starts at nothing stays there, as in the paper. No more
+    parameters than measured frequencies are free: branches first, then EI, then what passes.
+
+    Arguments:
+        length: initial rigid length of branches and ends in m; None for half the depth.
+        options: of the iteration.
+
+    Source: Horton et al. (1999), sections 3.2 and 8, table 4(e); Ahmadian, Mottershead & Friswell
+    for the partly rigid element.
+    """
+
+    name: ClassVar[str] = "offset"
+    citation: ClassVar[str] = (
+        "Horton, Gurgenci, Veidt & Friswell (1999), Finite element model updating of the welded "
+        "joints in a tubular H-frame, equation (5), section 8, table 4(e)"
+    )
+    needs: ClassVar[frozenset[str]] = frozenset({"geometry", "joints"})
+
+    length: float | None = None
+    options: UpdateOptions = field(default_factory=UpdateOptions)
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        """Return the model with partly rigid elements at its joints."""
+        structure = model.frame_structure
+        count = len(measurement)
+        groups = groups_within(structure.frame, count, passing=False)
+        lengths: dict[str, tuple[float, float]] = {}
+        unknowns: dict[str, list[Unknown]] = {"branch": [], "end": [], "through": []}
+        for group in groups:
+            start, in_mass = self._initial(structure, group)
+            lengths.update(dict.fromkeys(group.ends, (start, in_mass)))
+            unknowns[group.role].append(_length(structure, group, start))
+        levels = [
+            unknowns["branch"] + unknowns["end"],
+            [global_stiffness(structure)],
+            unknowns["through"],
+        ]
+        free = carried_by(levels, count)
+        return sensitivity_update(
+            with_rigid_ends(structure, lengths), free, measurement, self.options
+        )
+
+    def _initial(self, structure: Structure, group: JointGroup) -> tuple[float, float]:
+        """Return the rigid lengths in the stiffness and in the mass matrix in m."""
+        if group.role == "through":
+            return _ALMOST_NOTHING, 0.0
+        half = [half_depth(structure.frame, end) for end in group.ends]
+        wanted = float(np.mean(half)) if self.length is None else self.length
+        room = min(available_length(structure, end) for end in group.ends)
+        start = min(max(wanted, _ALMOST_NOTHING), room / 2.0)
+        return start, start if group.role == "branch" else 0.0
+
+
+def _length(structure: Structure, group: JointGroup, start: float) -> Unknown:
+    room = min(available_length(structure, end) for end in group.ends)
+    parameter = Parameter(f"a {group.name}", "rigid", group.ends, "m")
+    return Unknown(parameter, start, -_LONGEST_EXTENSION * room, room, signed=True)

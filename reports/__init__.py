@@ -1,0 +1,21 @@
+"""Reports on stored results: screen, Markdown, CSV, JSON; nothing here runs anything."""
+
+from __future__ import annotations
+
+from femubench import Reporter, hookimpl
+from femubench.reports.csvs import CsvReporter, ModesCsvReporter
+from femubench.reports.jsons import JsonReporter
+from femubench.reports.markdown import MarkdownReporter
+from femubench.reports.terminal import TerminalReporter
+
+
+@hookimpl
+def femubench_reporters() -> list[Reporter]:
+    """Return the built-in reporters."""
+    return [
+        TerminalReporter(),
+        MarkdownReporter(),
+        CsvReporter(),
+        ModesCsvReporter(),
+        JsonReporter(),
+    ]

@@ -1,0 +1,45 @@
+"""One line a job, or one line a measured mode, as comma-separated values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from femubench import Run, modes_frame, results_frame
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+# A spreadsheet takes a cell that starts like this for a formula and runs it.
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+
+
+class CsvReporter:
+    """One line a job."""
+
+    name = "csv"
+    suffix = ".csv"
+
+    def render(self, run: Run) -> str:
+        """Return the results as CSV."""
+        return _csv(results_frame(run))
+
+
+class ModesCsvReporter:
+    """One line a measured mode of every job."""
+
+    name = "modes-csv"
+    suffix = ".modes.csv"
+
+    def render(self, run: Run) -> str:
+        """Return the paired modes as CSV."""
+        return _csv(modes_frame(run))
+
+
+def _csv(frame: pd.DataFrame) -> str:
+    text: str = frame.map(_harmless).to_csv(index=False, lineterminator="\n")
+    return text.rstrip("\n")
+
+
+def _harmless(cell: object) -> object:
+    """Return a cell that no spreadsheet takes for a formula; numbers stay as they are."""
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(_FORMULA) else cell

@@ -1,0 +1,211 @@
+"""The full report: header, leaderboard, failures, frequencies, design changes."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
+
+from femubench import JobResult, PairedMode, Run, leaderboard
+from femubench.reports.cells import NOTHING, fixed, hertz, interval, plain, whole
+from femubench.reports.summary import (
+    Trouble,
+    cases_of,
+    change_errors,
+    changes_of,
+    first_seed,
+    header,
+    strategies_of,
+    troubles,
+)
+
+_SPECIAL = re.compile(r"([\\`*_\[\]|~])")
+_ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
+_FOOTNOTES = (
+    "**skill**: geometric mean over blocks and cases of (rms + 0.05 %) / (rms of the unchanged "
+    "model + 0.05 %); 1 is no better than the unchanged model, less is better. A job that failed, "
+    "crashed or timed out counts 10, one that is not applicable 1.",
+    "**used, higher, modified**: rms relative frequency error in percent over the modes that the "
+    "strategy was given, those above that it was not given, and those of the structure with a "
+    "known design change; median over the cases. A measured mode without partner counts 100 %.",
+    "**rigid lost, negative**: rigid-body modes that the updated models lost and negative "
+    "eigenvalues that they have, in all jobs. Either makes a strategy *unphysical*: it ranks below "
+    "all physical ones.",
+    "**parameters, evaluations, seconds**: unknowns that were free, eigenvalue solutions, wall "
+    "time; median over the cases.",
+)
+
+
+class MarkdownReporter:
+    """A report to keep, in GitHub's Markdown."""
+
+    name = "markdown"
+    suffix = ".md"
+
+    def render(self, run: Run) -> str:
+        """Return the report."""
+        sections = [
+            f"# Updating strategies compared: run {escape(run.meta.get('run', ''))}",
+            table(["", ""], ([title, escape(text)] for title, text in header(run)), "ll"),
+            "## Leaderboard",
+            _leaderboard(run),
+            *_FOOTNOTES,
+            *_coverage(run),
+            *chain.from_iterable(_case(run, case) for case in cases_of(run)),
+            *chain.from_iterable(_changes(run, *item) for item in changes_of(run).items()),
+            *_citations(run.meta.get("citations") or {}),
+        ]
+        return "\n\n".join(sections)
+
+
+def escape(text: object) -> str:
+    """Return text that Markdown shows as it is, on one line."""
+    safe = "".join(_ENTITIES.get(letter, letter) for letter in plain(text))
+    return _SPECIAL.sub(r"\\\1", safe)
+
+
+def table(headers: Sequence[str], rows: Iterable[Sequence[str]], align: str) -> str:
+    """Return a table of cells that are escaped already; `align` has an l or r a column."""
+    rules = {"l": ":---", "r": "---:"}
+    lines = [headers, [rules[side] for side in align], *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _leaderboard(run: Run) -> str:
+    board = leaderboard(run)
+    headers = [
+        *("rank", "strategy", "skill", "used %", "higher %", "modified %"),
+        *("rigid lost", "negative", "parameters", "evaluations", "seconds"),
+    ]
+    several = bool(board["skill_low"].notna().any())
+    if several:
+        headers.insert(3, "95 % interval")
+    rows = []
+    for row in board.to_dict("records"):
+        cells = [
+            whole(row["rank"]),
+            escape(row["strategy"]) + (" (unphysical)" if row["unphysical"] else ""),
+            fixed(row["skill"], 3, 6),
+            *(fixed(row[f"{block}_percent"], 2, 7) for block in ("used", "higher", "modified")),
+            *(whole(row[key]) for key in ("rigid_modes_lost", "negative_eigenvalues")),
+            *(whole(row[key]) for key in ("parameters", "evaluations")),
+            fixed(row["seconds"], 3, 7),
+        ]
+        if several:
+            cells.insert(3, interval(row["skill_low"], row["skill_high"]))
+        rows.append(cells)
+    return table(headers, rows, "rl" + "r" * (len(headers) - 2))
+
+
+def _coverage(run: Run) -> Iterator[str]:
+    """Return how many jobs each strategy finished, then the failures and what did not apply."""
+    yield "## Coverage"
+    rows = []
+    for name in strategies_of(run):
+        found = [result.status for result in run.results if result.strategy == name]
+        counts = (found.count("ok"), found.count("not-applicable"))
+        rows.append([escape(name), *map(str, (*counts, len(found) - sum(counts), len(found)))])
+    yield table(["strategy", "ok", "not applicable", "failed", "jobs"], rows, "lrrrr")
+    for title, items in (
+        ("### Failures", troubles(run.results)),
+        ("### Not applicable", troubles(run.results, fine=True)),
+    ):
+        yield title
+        yield _troubles(items) if items else "None."
+
+
+def _troubles(items: Iterable[Trouble]) -> str:
+    rows = (
+        [
+            escape(item.case),
+            escape(item.strategy),
+            " ".join(map(str, item.seeds)),
+            item.status,
+            escape(item.reason),
+        ]
+        for item in items
+    )
+    return table(["case", "strategy", "seeds", "status", "reason"], rows, "lllll")
+
+
+def _case(run: Run, case: str) -> Iterator[str]:
+    """Return the frequencies of one case, a strategy a row, as the papers tabulate them."""
+    seed = first_seed(run)
+    found = [r for r in run.results if r.case == case and r.seed == seed]
+    shown = [result for result in found if result.blocks]
+    yield f"## Case {escape(case)}"
+    about = (run.meta.get("cases") or {}).get(case) or {}
+    if about.get("title"):
+        yield f"{escape(about['title'])}."
+    if not shown:
+        yield "No strategy gave a model."
+        return
+    columns = {key: mode for result in shown for key, mode in _tested(result).items()}
+    yield f"Frequencies in Hz, in brackets the error in percent; seed {seed}."
+    headers = ["strategy", *(f"{block} {number}" for block, number in columns)]
+    measured = (hertz(mode.measured_hz) for mode in columns.values())
+    rows = [["*measured*", *measured, NOTHING, NOTHING]]
+    for result in sorted(shown, key=lambda result: result.rank or 0):
+        modes = _tested(result)
+        rows.append(
+            [
+                escape(result.strategy) + (" (unphysical)" if result.unphysical else ""),
+                *(_predicted(modes[key]) if key in modes else NOTHING for key in columns),
+                _mac(modes.values()),
+                fixed(result.score, 3, 6),
+            ]
+        )
+    yield table([*headers, "mean MAC", "score"], rows, "l" + "r" * (len(columns) + 2))
+
+
+def _tested(result: JobResult) -> dict[tuple[str, int], PairedMode]:
+    """Return the modes of the structure as tested by block and number."""
+    return {
+        (block, mode.number): mode
+        for block in ("used", "higher")
+        if block in result.blocks
+        for mode in result.blocks[block].modes
+    }
+
+
+def _predicted(mode: PairedMode) -> str:
+    if mode.predicted_hz is None:
+        return f"{NOTHING} (no partner)"
+    error = 100.0 * (mode.predicted_hz / mode.measured_hz - 1.0)
+    return hertz(mode.predicted_hz) + (f" ({error:+.2f})" if mode.predicted_hz > 0.0 else "")
+
+
+def _mac(modes: Iterable[PairedMode]) -> str:
+    values = [mode.mac for mode in modes if mode.mac is not None]
+    return f"{sum(values) / len(values):.3f}" if values else NOTHING
+
+
+def _changes(run: Run, scenario: str, columns: Sequence[tuple[str, str]]) -> Iterator[str]:
+    """Return the errors after each design change of a scenario, a strategy a row."""
+    seed = first_seed(run)
+    yield f"## Design changes of {escape(scenario)}"
+    yield f"Rms frequency error in percent of the modes after each change; seed {seed}."
+    yield "\n".join(
+        f"{number}. {escape(case)}: {escape(name)}"
+        for number, (case, name) in enumerate(columns, start=1)
+    )
+    rows = []
+    for strategy in strategies_of(run):
+        errors = {
+            (result.case, name): error
+            for result in run.results
+            if result.strategy == strategy and result.seed == seed
+            for name, error in change_errors(result).items()
+        }
+        if errors:
+            values = [errors.get(column, math.nan) for column in columns]
+            rows.append([escape(strategy), *(fixed(value, 2, 7) for value in values)])
+    headers = ["strategy", *(str(number) for number in range(1, len(columns) + 1))]
+    yield table(headers, rows, "l" + "r" * len(columns))
+
+
+def _citations(citations: Mapping[str, str]) -> Iterator[str]:
+    if citations:
+        yield "## Strategies"
+        yield "\n".join(f"- {escape(name)}: {escape(text)}" for name, text in citations.items())

@@ -1,0 +1,114 @@
+"""What the reports say about a run besides the leaderboard: failures, design changes, header."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from femubench import JobResult, PairedMode, Run, frequency_error
+from femubench.reports.cells import plain
+
+FINE = ("ok", "not-applicable")
+
+
+@dataclass(frozen=True)
+class Trouble:
+    """Jobs of one strategy on one case that ended alike; the reason is that of the first."""
+
+    case: str
+    strategy: str
+    status: str
+    seeds: tuple[int, ...]
+    reason: str
+
+
+def troubles(results: Iterable[JobResult], *, fine: bool = False) -> list[Trouble]:
+    """Return the jobs without a model, seeds taken together.
+
+    Arguments:
+        fine: return those that are not applicable instead of the failures.
+    """
+    groups: dict[tuple[str, str, str], list[JobResult]] = {}
+    for result in results:
+        if result.status != "ok" and (result.status in FINE) == fine:
+            groups.setdefault((result.case, result.strategy, result.status), []).append(result)
+    return [
+        Trouble(*key, tuple(job.seed for job in jobs), plain(jobs[0].reason))
+        for key, jobs in groups.items()
+    ]
+
+
+def first_seed(run: Run) -> int:
+    """Return the lowest seed of a run, the one whose frequencies are shown."""
+    return min((result.seed for result in run.results), default=0)
+
+
+def cases_of(run: Run) -> list[str]:
+    """Return the cases in the order in which they were run."""
+    return list(dict.fromkeys([*run.meta.get("cases", ()), *(r.case for r in run.results)]))
+
+
+def strategies_of(run: Run) -> list[str]:
+    """Return the strategies in the order in which they were run."""
+    named = run.meta.get("strategies", ())
+    return list(dict.fromkeys([*named, *(result.strategy for result in run.results)]))
+
+
+def changes_of(run: Run) -> dict[str, list[tuple[str, str]]]:
+    """Return (case, modification) of all design changes by scenario."""
+    found: dict[str, list[tuple[str, str]]] = {}
+    for result in run.results:
+        scenario = result.case.partition("/")[0]
+        for name in _modified(result):
+            column = (result.case, name)
+            if column not in found.setdefault(scenario, []):
+                found[scenario].append(column)
+    return {scenario: columns for scenario, columns in found.items() if columns}
+
+
+def change_errors(result: JobResult) -> dict[str, float]:
+    """Return the rms relative frequency error in percent by modification."""
+    return {name: rms_percent(modes) for name, modes in _modified(result).items()}
+
+
+def rms_percent(modes: Iterable[PairedMode]) -> float:
+    """Return the rms relative frequency error in percent; nan without modes."""
+    squares = [frequency_error(mode) ** 2 for mode in modes]
+    return 100.0 * math.sqrt(sum(squares) / len(squares)) if squares else math.nan
+
+
+def _modified(result: JobResult) -> dict[str, list[PairedMode]]:
+    groups: dict[str, list[PairedMode]] = {}
+    block = result.blocks.get("modified")
+    for mode in block.modes if block is not None else ():
+        groups.setdefault(mode.modification or "", []).append(mode)
+    return groups
+
+
+def header(run: Run) -> Iterator[tuple[str, str]]:
+    """Return what a reader needs to repeat a run: seeds, versions, machine."""
+    meta = run.meta
+    titles = {
+        "run": "run",
+        "started": "started",
+        "seed": "seed",
+        "seeds": "seeds",
+        "jobs": "workers",
+        "timeout": "timeout in s",
+        "versions": "versions",
+        "machine": "machine",
+        "git_commit": "git commit",
+    }
+    for key, title in titles.items():
+        if meta.get(key) not in (None, "", []):
+            yield title, _spoken(meta[key])
+
+
+def _spoken(value: Any) -> str:  # noqa: ANN401 - plain data of any kind
+    if isinstance(value, Mapping):
+        return ", ".join(f"{plain(key)} {plain(entry)}" for key, entry in value.items())
+    if isinstance(value, (list, tuple)):
+        return " ".join(plain(entry) for entry in value)
+    return plain(value)

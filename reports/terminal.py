@@ -1,0 +1,133 @@
+"""The leaderboard and the failures, 80 columns wide."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from femubench import Run, leaderboard
+from femubench.reports.cells import fixed, interval, plain, shortened, whole
+from femubench.reports.summary import Trouble, troubles
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+WIDTH = 80
+_NAME_WIDTH = 16
+_MOST_FAILURES = 20
+_MOST_WIDTHS = (20, _NAME_WIDTH, 13)
+_HEADERS = (
+    *("#", "strategy", "skill", "used\n%", "high.\n%", "mod.\n%"),
+    *("rigid\nlost", "neg.\neig.", "par.", "eval.", "s"),
+)
+_ALIGN = ("right", "left", *("right" for _ in _HEADERS[2:]))
+
+
+class TerminalReporter:
+    """Plain text for the screen."""
+
+    name = "terminal"
+    suffix = ".txt"
+
+    def render(self, run: Run) -> str:
+        """Return the ranking, the failures and what the columns mean."""
+        board = leaderboard(run)
+        parts = [ranking(board)]
+        if board["skill_low"].notna().any():
+            parts.append(intervals(board))
+        parts.append("\n".join(_legend(board)))
+        failed = troubles(run.results)
+        if failed:
+            parts.append(failures(failed))
+        spared = sum(result.status == "not-applicable" for result in run.results)
+        if spared:
+            parts.append(
+                textwrap.fill(
+                    f"Not applicable: {spared} of {len(run.results)} jobs, where the case lacks "
+                    "what the strategy needs; the model counts as unchanged (skill 1).",
+                    WIDTH,
+                )
+            )
+        return "\n\n".join(parts)
+
+
+def ranking(board: pd.DataFrame) -> str:
+    """Return the leaderboard as a text of 80 columns at most."""
+    return _table([_row(row) for row in board.to_dict("records")], _HEADERS, _ALIGN)
+
+
+def intervals(board: pd.DataFrame) -> str:
+    """Return median and 95 % interval of the skill over the seeds."""
+    rows = [
+        [
+            shortened(plain(row["strategy"]), _NAME_WIDTH),
+            fixed(row["skill"], 3),
+            interval(row["skill_low"], row["skill_high"]),
+        ]
+        for row in board.to_dict("records")
+    ]
+    return _table(rows, ("strategy", "median skill", "95 % interval"), ("left", "right", "left"))
+
+
+def failures(failed: list[Trouble]) -> str:
+    """Return a table of the failures with their reasons, the first ones where there are many."""
+    from tabulate import tabulate
+
+    rows = [
+        (
+            plain(item.case),
+            plain(item.strategy),
+            item.status + (f" x{len(item.seeds)}" if len(item.seeds) > 1 else ""),
+            item.reason,
+        )
+        for item in failed[:_MOST_FAILURES]
+    ]
+    headers = ("case", "strategy", "status", "reason")
+    # tabulate pads a header by two; columns are two apart.
+    columns = zip(*([f"{header}  " for header in headers], *rows), strict=True)
+    needed = [max(map(len, column)) for column in columns][:3]
+    widths = [min(width, most) for width, most in zip(needed, _MOST_WIDTHS, strict=True)]
+    text: str = tabulate(
+        rows,
+        headers=headers,
+        tablefmt="simple",
+        disable_numparse=True,
+        maxcolwidths=[*widths, WIDTH - sum(widths) - 6],
+    )
+    more = len(failed) - _MOST_FAILURES
+    return text + (f"\n... and {more} more in the report" if more > 0 else "")
+
+
+def _row(row: dict[Any, Any]) -> list[str]:
+    return [
+        ("!" if row["unphysical"] else "") + whole(row["rank"]),
+        shortened(plain(row["strategy"]), _NAME_WIDTH),
+        fixed(row["skill"], 3),
+        *(fixed(row[f"{block}_percent"], 2, 4) for block in ("used", "higher", "modified")),
+        whole(row["rigid_modes_lost"], 5),
+        whole(row["negative_eigenvalues"], 4),
+        whole(row["parameters"], 5),
+        whole(row["evaluations"], 5),
+        fixed(row["seconds"], 2, 4),
+    ]
+
+
+def _table(rows: list[list[str]], headers: tuple[str, ...], align: tuple[str, ...]) -> str:
+    """Return a table no wider than its cells; tabulate pads headers, so they go in as rows."""
+    from tabulate import tabulate
+
+    height = max(header.count("\n") for header in headers) + 1
+    split = [[""] * (height - 1 - header.count("\n")) + header.split("\n") for header in headers]
+    heads = [list(line) for line in zip(*split, strict=True)]
+    rule = ["-" * max(map(len, column)) for column in zip(*heads, *rows, strict=True)]
+    lines = [*heads, rule, *rows]
+    text: str = tabulate(lines, tablefmt="plain", disable_numparse=True, colalign=align)
+    return "\n".join(line.rstrip() for line in text.splitlines())
+
+
+def _legend(board: pd.DataFrame) -> Iterator[str]:
+    yield "skill: error against the unchanged model, 1 = no better, less is better"
+    yield "used, high., mod.: rms frequency error, median over the cases"
+    if board["unphysical"].any():
+        yield "!: unphysical (rigid modes lost or negative eigenvalues), below all others"

@@ -1,0 +1,510 @@
+"""The command line: what it prints, writes and returns."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner, Result
+
+import femubench
+from femubench.core.cli import progress
+from femubench.core.cli.durations import seconds_of, spoken
+from femubench.core.cli.files import write_atomically
+from femubench.core.cli.main import VERBS, bench
+
+CASE = """\
+[case]
+name = "{name}"
+title = "A cantilever"
+source = "made up"
+
+[model]
+kind = "frame"
+plane = "in-plane"
+beam = "euler-bernoulli"
+
+[model.materials.steel]
+E = 210e9
+nu = 0.3
+rho = 7850.0
+
+[model.sections.bar]
+A = 1e-4
+Iy = 1e-9
+Iz = 1e-9
+J = 1e-9
+Jp = 2e-9
+kappa = 0.83
+
+[[model.joints]]
+name = "A"
+xyz = [0.0, 0.0, 0.0]
+
+[[model.joints]]
+name = "B"
+xyz = [1.0, 0.0, 0.0]
+
+[[model.members]]
+name = "bar"
+ends = ["A", "B"]
+elements = 4
+section = "bar"
+material = "steel"
+
+[[model.supports]]
+at = "A"
+fixed = ["x", "z", "ry"]
+
+[measurement]
+sensors = "sensors.csv"
+modes = "modes.csv"
+shape_std = 0.01
+used = [1]
+held_out = [2]
+"""
+SENSORS = "label,x,y,z,direction\nmid,0.5,0,0,z\ntip,1,0,0,z\n"
+MODES = "mode,frequency,frequency_std,mid,tip\n1,9.0,0.01,0.34,1\n2,57.0,0.05,-0.71,1\n"
+
+PLUGIN = """
+import time
+
+from femubench import Strategy, StrategyFailure, UpdateResult, hookimpl
+
+class Nothing(Strategy):
+    name = "test-nothing"
+    citation = "A. Author 2001, (1)"
+    def update(self, model, measurement, rng):
+        return UpdateResult(model)
+
+class Fails(Nothing):
+    name = "test-fails"
+    def update(self, model, measurement, rng):
+        raise StrategyFailure("residual 3e-2, allowed 1e-8")
+
+class Sleeps(Nothing):
+    name = "test-sleeps"
+    def update(self, model, measurement, rng):
+        time.sleep(600.0)
+
+class Picky(Nothing):
+    name = "test-picky"
+    needs = frozenset({"joints"})
+    def update(self, model, measurement, rng):
+        from femubench import NotApplicable
+        raise NotApplicable("no joint to be soft")
+
+@hookimpl
+def femubench_strategies():
+    return [Nothing, Fails, Sleeps, Picky]
+"""
+
+Invoke = Callable[..., Result]
+
+
+def put_distribution(folder: Path, name: str, source: str) -> None:
+    (folder / f"{name}.py").write_text(source, encoding="utf-8")
+    info = folder / f"{name}-1.0.dist-info"
+    info.mkdir()
+    metadata = f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n"
+    (info / "METADATA").write_text(metadata, encoding="utf-8")
+    (info / "entry_points.txt").write_text(f"[femubench]\n{name} = {name}\n", encoding="utf-8")
+
+
+def put_case(folder: Path, *, name: str = "rod", **files: str) -> Path:
+    folder.mkdir(parents=True)
+    content = {"case_toml": CASE.format(name=name), "sensors_csv": SENSORS, "modes_csv": MODES}
+    for file, text in {**content, **files}.items():
+        (folder / file.replace("_", ".")).write_text(text, encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Install a plugin with well-known strategies for this file."""
+    folder = tmp_path_factory.mktemp("site")
+    put_distribution(folder, "femubench_cli_tests", PLUGIN)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(folder)
+        yield folder
+    sys.modules.pop("femubench_cli_tests", None)
+
+
+@pytest.fixture
+def invoke(site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
+    """Call `bench` in this process, in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("FEMUBENCH_STORE", raising=False)
+    return lambda *words: CliRunner().invoke(bench, [str(word) for word in words])
+
+
+def python(code: str, *, path: Path | None = None) -> str:
+    """Return what a fresh interpreter prints."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    if path is not None:
+        environment["PYTHONPATH"] = f"{path}{os.pathsep}{environment['PYTHONPATH']}"
+    command = [sys.executable, "-c", textwrap.dedent(code)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    return done.stdout
+
+
+class TestHelp:
+    def test_help_is_lighter_than_numpy(self) -> None:
+        """No clock: a help that loads fewer modules than numpy, and no big one, is no slower."""
+        loaded = python(
+            """
+            import contextlib, io, sys
+            from femubench.core.cli.main import bench
+            with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
+                bench(["--help"])
+            print(" ".join(sys.modules))
+            """
+        ).split()
+        numpy = python("import sys, numpy; print(' '.join(sys.modules))").split()
+        heavy = ("numpy", "scipy", "pandas", "rich", "pluggy", "pydantic", "tabulate", "pebble")
+        assert "femubench.core.cli.main" in loaded
+        assert not {name.partition(".")[0] for name in loaded} & set(heavy)
+        assert not {module for module, _ in VERBS.values()} & set(loaded)
+        assert len(loaded) < len(numpy)
+
+    def test_one_line_a_verb(self, invoke: Invoke) -> None:
+        result = invoke("--help")
+        assert result.exit_code == 0
+        for verb, (_, line) in VERBS.items():
+            assert f"{verb} " in result.stdout
+            assert line in " ".join(result.stdout.split())
+
+    @pytest.mark.parametrize("verb", VERBS)
+    def test_verb_says_of_itself_what_the_list_says(self, verb: str) -> None:
+        command = bench.get_command(click.Context(bench), verb)
+        assert command is not None
+        assert command.name == verb
+        assert command.get_short_help_str(limit=200) == VERBS[verb][1]
+
+    def test_version(self, invoke: Invoke) -> None:
+        result = invoke("--version")
+        assert (result.exit_code, result.stdout.split()[-1]) == (0, femubench.__version__)
+
+    def test_every_option_is_documented(self) -> None:
+        text = (Path(__file__).parents[1] / "docs" / "commands.md").read_text(encoding="utf-8")
+        for verb in VERBS:
+            command = bench.get_command(click.Context(bench), verb)
+            assert command is not None
+            assert f"bench {verb}" in text
+            options = [p for p in command.params if isinstance(p, click.Option)]
+            for option in options:
+                assert any(f"`{name}" in text for name in option.opts), f"{verb} {option.opts}"
+
+
+class TestWrongInput:
+    """Exit code 2, one line, and nothing is written."""
+
+    @pytest.mark.parametrize(
+        ("words", "expected"),
+        [
+            (
+                ["case", "-s", "test-nothin"],
+                "no strategy 'test-nothin'; did you mean 'test-nothing'",
+            ),
+            (["frmae"], "no case 'frmae'; did you mean 'frame'"),
+            (["some/where"], "some/where: folder does not exist"),
+            (["empty"], "empty/case.toml: missing file"),
+            (["case", "--json", "no/such.json"], "no: folder does not exist"),
+            (["case", "--report", "report.docx"], "no report format has the suffix '.docx'"),
+            (["case", "--json", "x.json", "--report", "x.json"], "is to hold two outputs"),
+            (["case", "twin"], "the name 'rod' is also that of case"),
+            (["case", "bad"], "bad/sensors.csv:3"),
+        ],
+    )
+    def test_is_one_line(
+        self, invoke: Invoke, tmp_path: Path, words: list[str], expected: str
+    ) -> None:
+        put_case(tmp_path / "case")
+        put_case(tmp_path / "twin")
+        put_case(tmp_path / "bad", name="bad", sensors_csv=SENSORS.replace("tip,1", "tip,7"))
+        (tmp_path / "empty").mkdir()
+        before = sorted(tmp_path.rglob("*"))
+        result = invoke("run", *words)
+        assert result.exit_code == 2
+        assert result.stdout == ""
+        (line,) = result.stderr.splitlines()
+        assert line.startswith("bench: ")
+        assert expected in line
+        assert sorted(tmp_path.rglob("*")) == before
+
+    @pytest.mark.parametrize(
+        "words",
+        [
+            ["run", "--timeout", "soon"],
+            ["run", "--seeds", "0"],
+            ["run", "-j", "0"],
+            ["runn"],
+            ["--x"],
+        ],
+    )
+    def test_usage(self, invoke: Invoke, words: list[str]) -> None:
+        result = invoke(*words)
+        assert result.exit_code == 2
+        assert "Error: " in result.stderr
+
+    def test_nearest_verb(self, invoke: Invoke) -> None:
+        assert "Did you mean report?" in invoke("reprt").stderr
+
+    def test_folder_that_may_not_be_written_to(self, invoke: Invoke, tmp_path: Path) -> None:
+        put_case(tmp_path / "case")
+        (tmp_path / "file").write_text("")
+        result = invoke("run", "case", "-s", "test-nothing", "--store", "file/store")
+        assert result.exit_code == 2
+        assert "file/store: cannot make the folder" in result.stderr
+
+    def test_traceback_on_request(self, invoke: Invoke) -> None:
+        result = invoke("--traceback", "run", "nowhere/at-all")
+        assert result.exit_code == 2
+        assert "Traceback (most recent call last)" in result.stderr
+        assert result.stderr.splitlines()[-1].startswith("bench: nowhere/at-all: ")
+
+    def test_report_on_what_is_no_result(self, invoke: Invoke, tmp_path: Path) -> None:
+        (tmp_path / "no.json").write_text("{")
+        (tmp_path / "other.json").write_text('{"results": 3}')
+        for word, expected in (("no.json", "no.json: not JSON"), ("other.json", "other.json")):
+            result = invoke("report", word)
+            assert result.exit_code == 2
+            assert result.stderr.startswith(f"bench: {expected}")
+        assert "no results" in invoke("report").stderr
+
+
+@pytest.fixture(scope="module")
+def done(site: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
+    folder = tmp_path_factory.mktemp("run")
+    case = put_case(folder / "case")
+    words = [
+        "run",
+        case,
+        "--store",
+        folder / "store",
+        "--seeds",
+        2,
+        "--json",
+        folder / "r.json",
+    ]
+    words += ["--csv", folder / "r.csv", "-j", 2, "--timeout", "1m"]
+    for strategy in ("test-nothing", "test-fails", "test-picky"):
+        words += ["-s", strategy]
+    return folder, CliRunner().invoke(bench, [str(word) for word in words])
+
+
+class TestRun:
+    def test_failure_is_exit_1_and_no_traceback(self, done: tuple[Path, Result]) -> None:
+        _, result = done
+        assert result.exit_code == 1
+        assert result.stderr == ""
+
+    def test_header_tells_what_decides_on_the_outcome(self, done: tuple[Path, Result]) -> None:
+        header = " ".join(done[1].stdout.partition("\n\n")[0].split())
+        assert header == (
+            f"femubench {femubench.__version__}: 1 case, 3 strategies, seeds 0-1 (0: data as "
+            "recorded, else noise added), 6 jobs, 2 workers, timeout 1m"
+        )
+
+    def test_screen(self, done: tuple[Path, Result]) -> None:
+        lines = done[1].stdout.splitlines()
+        assert max(len(line) for line in lines if not line.startswith("markdown: ")) <= 80
+        found = [re.match(r" *(\d)  (test-\w+) +\d", line) for line in lines]
+        ranks = {match[2]: match[1] for match in found if match}
+        assert ranks == {"test-nothing": "1", "test-picky": "2", "test-fails": "3"}
+        assert "failed x2" in done[1].stdout
+        assert "residual 3e-2, allowed" in done[1].stdout
+
+    def test_files(self, done: tuple[Path, Result]) -> None:
+        folder, result = done
+        data = json.loads((folder / "r.json").read_text(encoding="utf-8"))
+        jobs = [(entry["strategy"], entry["seed"], entry["status"]) for entry in data["results"]]
+        assert sorted(jobs) == [
+            ("test-fails", 0, "failed"),
+            ("test-fails", 1, "failed"),
+            ("test-nothing", 0, "ok"),
+            ("test-nothing", 1, "ok"),
+            ("test-picky", 0, "not-applicable"),
+            ("test-picky", 1, "not-applicable"),
+        ]
+        assert (folder / "r.csv").read_text(encoding="utf-8").count("\n") == 7
+        report = folder / "store" / f"{data['meta']['run']}.md"
+        assert result.stdout.splitlines()[-1] == f"markdown: {report}"
+        assert report.read_text(encoding="utf-8").startswith("# ")
+        assert not list(folder.rglob(".*"))
+
+    def test_stored_run_in_any_format(self, done: tuple[Path, Result], invoke: Invoke) -> None:
+        folder, _ = done
+        data = json.loads((folder / "r.json").read_text(encoding="utf-8"))
+        run_id = data["meta"]["run"]
+        store = ("--store", folder / "store")
+        assert "test-nothing" in invoke("report", *store).stdout
+        stored = json.loads(invoke("report", run_id[:10], "-f", "json", *store).stdout)
+
+        def by_job(entry: dict[str, object]) -> tuple[str, str]:
+            return str(entry["strategy"]), str(entry["seed"])
+
+        assert sorted(stored["results"], key=by_job) == sorted(data["results"], key=by_job)
+        result = invoke("report", folder / "r.json", "-f", "csv", "-f", "markdown", "-o", "new/dir")
+        assert result.exit_code == 0
+        assert sorted(path.name for path in Path("new/dir").iterdir()) == [
+            f"{run_id}.csv",
+            f"{run_id}.md",
+        ]
+        csv_file = Path("new/dir", f"{run_id}.csv")
+        assert csv_file.read_bytes() == (folder / "r.csv").read_bytes()
+        wrong = invoke("report", "19990101", *store)
+        assert (wrong.exit_code, "no run '19990101'" in wrong.stderr) == (2, True)
+        assert "did you mean 'markdown'" in invoke("report", "-f", "markdwn", *store).stderr
+
+    def test_run_id_of_a_file_cannot_leave_the_folder(
+        self, done: tuple[Path, Result], invoke: Invoke, tmp_path: Path
+    ) -> None:
+        data = json.loads((done[0] / "r.json").read_text(encoding="utf-8"))
+        data["meta"]["run"] = "../../evil"
+        (tmp_path / "evil.json").write_text(json.dumps(data), encoding="utf-8")
+        result = invoke("report", "evil.json", "-f", "json", "-o", "deep/out")
+        assert result.exit_code == 0
+        assert [path.name for path in (tmp_path / "deep" / "out").iterdir()] == ["evil.json"]
+
+    def test_not_applicable_is_no_failure(
+        self, invoke: Invoke, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        put_case(tmp_path / "case")
+        monkeypatch.setenv("FEMUBENCH_STORE", "elsewhere")
+        words = ("-s", "test-nothing", "-s", "test-picky", "-j", 1, "--seed", 3, "--quiet")
+        result = invoke("run", "case/case.toml", *words, "--report", "mine.csv")
+        assert (result.exit_code, result.output) == (0, "")
+        assert (tmp_path / "mine.csv").read_text().splitlines()[1].startswith("rod,test-nothing,3")
+        assert [path.name for path in (tmp_path / "elsewhere").iterdir()] == ["results.jsonl"]
+
+    def test_ctrl_c(self, site: Path, tmp_path: Path) -> None:
+        """A real signal to a real process: exit code 130, no traceback, no worker left behind."""
+        put_case(tmp_path / "case")
+        code = "from femubench.core.cli.main import bench; bench()"
+        environment = {
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join([str(site), *(p for p in sys.path if p)]),
+        }
+        command = [sys.executable, "-c", code, "run", "case", "-s", "test-sleeps", "-j", "1"]
+        with subprocess.Popen(
+            command,
+            cwd=tmp_path,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as process:
+            started = tmp_path / "femubench-results" / "results.jsonl"
+            deadline = time.monotonic() + 60.0
+            while not started.exists() and time.monotonic() < deadline:
+                time.sleep(0.05)
+            time.sleep(0.5)
+            process.send_signal(signal.SIGINT)
+            # ends only when the workers, who hold the pipes too, are gone
+            _, error = process.communicate(timeout=60.0)
+        assert process.returncode == 130
+        assert error.strip() == "bench: interrupted"
+
+
+class TestPluginsAndScenarios:
+    def test_broken_plugin_is_one_line(
+        self, invoke: Invoke, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.syspath_prepend(tmp_path)
+        put_distribution(tmp_path, "cli_broken", "import a_module_that_nobody_has\n")
+        put_distribution(tmp_path, "cli_typo", PLUGIN.replace("_strategies()", "_strategis()"))
+        result = invoke("plugins", "list")
+        assert result.exit_code == 0
+        assert "strategies: test-nothing" in result.stdout
+        lines = result.stderr.splitlines()
+        first, second = [line for line in lines if "cli_" in line]
+        assert first.startswith("bench: plugin 'cli_broken' (cli_broken 1.0): ModuleNotFoundError")
+        assert "did you mean 'femubench_strategies'" in second
+        assert "--traceback" in lines[-1]
+        for words in (("plugins", "list", "--traceback"), ("--traceback", "scenarios", "list")):
+            shown = invoke(*words)
+            assert shown.exit_code == 0
+            assert 'cli_broken.py", line 1' in shown.stderr
+
+    def test_builtins_are_plugins_and_none_is_broken(self, invoke: Invoke) -> None:
+        result = invoke("plugins", "list")
+        assert result.stderr == ""
+        for kind in ("strategies: unchanged", "reporters: terminal", "scenarios: frame"):
+            assert kind in " ".join(result.stdout.split())
+
+    def test_scenarios_list_and_show(self, invoke: Invoke) -> None:
+        listed = invoke("scenarios", "list")
+        assert listed.exit_code == 0
+        assert "hframe " in listed.stdout
+        shown = invoke("scenarios", "show", "hframe").stdout
+        assert "modes 1 2 3 4 5 at 77.1" in shown
+        assert max(len(line) for line in shown.splitlines() if "/" not in line) <= 80
+        wrong = invoke("scenarios", "show", "hfrme")
+        assert (wrong.exit_code, "'hframe'" in wrong.stderr) == (2, True)
+
+    def test_show_takes_a_folder(self, invoke: Invoke, tmp_path: Path) -> None:
+        put_case(tmp_path / "case")
+        shown = invoke("scenarios", "show", "case").stdout
+        assert "12 degrees of freedom" in shown
+        assert "in-plane, 1 member, 2 joints" in shown
+        assert "mode 1 at 9 Hz" in shown
+
+
+def parsed(text: str) -> float:
+    return seconds_of(click.Context(bench), click.Option(["--timeout"]), text)
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [("90", 90.0), ("90s", 90.0), ("10m", 600.0), ("1h", 3600.0), ("1.5h", 5400.0), (".5", 0.5)],
+)
+def test_durations(text: str, seconds: float) -> None:
+    assert parsed(text) == seconds
+    assert parsed(spoken(seconds)) == seconds
+
+
+@pytest.mark.parametrize("text", ["", "0", "-1", "1d", "m", "1m30s", "inf", "nan", "٣", "1e3"])
+def test_no_durations(text: str) -> None:
+    with pytest.raises(click.BadParameter, match="no duration > 0"):
+        parsed(text)
+
+
+def test_progress_only_where_someone_watches(monkeypatch: pytest.MonkeyPatch) -> None:
+    from femubench import JobResult
+
+    with progress.progress_bar() as report:
+        assert report is None
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    with progress.progress_bar(quiet=True) as report:
+        assert report is None
+    with progress.progress_bar() as report:
+        assert report is not None
+        report(JobResult("[red]case", "strategy", 0, "ok"), 1, 2)
+
+
+def test_files_are_replaced_in_one_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "result.json"
+    write_atomically(path, "old")
+    plain = tmp_path / "plain"
+    plain.touch()
+    assert path.stat().st_mode == plain.stat().st_mode
+
+    def fail(self: Path, target: Path) -> None:
+        raise OSError("disk is full")
+
+    monkeypatch.setattr(Path, "replace", fail)
+    with pytest.raises(OSError, match="disk is full"):
+        write_atomically(path, "new")
+    assert path.read_text() == "old\n"
+    assert sorted(tmp_path.iterdir()) == [plain, path]

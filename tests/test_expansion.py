@@ -1,0 +1,186 @@
+"""Expansion of measured shapes: what comes back exactly, and what rotation is for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from femubench.core.errors import NotApplicable
+from femubench.core.measurement import Sensors
+from femubench.core.modal.eigen import solve_modes
+from femubench.core.modal.expansion import (
+    expand_by_dynamics,
+    expand_by_rotation,
+    expand_by_serep,
+    measured_rows,
+    procrustes_rotation,
+    same_length,
+)
+from femubench.core.model import Model
+from femubench.core.typing import FloatArray
+from scipy.stats import ortho_group
+
+
+def thirteen_points(model: Model) -> Sensors:
+    """Return z at the corners, the tees and the midpoints of all segments."""
+    frame = model.frame_structure.frame
+    points = [joint.xyz for joint in frame.joints]
+    for member in frame.members:
+        a, b = (np.array(frame.joint(name).xyz) for name in member.ends)
+        x, y, z = (0.5 * (a + b)).tolist()
+        points.append((x, y, z))
+    labels = tuple(f"s{i}" for i in range(len(points)))
+    return Sensors(labels, np.array(points), ("z",) * len(points))
+
+
+@pytest.fixture
+def nominal(ladder) -> Model:
+    return Model.of(ladder())
+
+
+@pytest.fixture
+def truth(asymmetric_ladder) -> Model:
+    return Model.of(asymmetric_ladder(accelerometer=False))
+
+
+def at_sensors(model: Model, count: int = 3) -> tuple[FloatArray, FloatArray]:
+    """Return elastic modes at the thirteen points and at all dofs."""
+    shapes = solve_modes(model).elastic.shapes[:, :count]
+    return np.asarray(model.observe(thirteen_points(model)) @ shapes), shapes
+
+
+def mixed(seed: int, analytical: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return analytical shapes turned by R', so that R turns them back."""
+    rotation = ortho_group.rvs(analytical.shape[1], random_state=seed)
+    return analytical @ rotation.T, rotation
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_rotation_recovers_an_exact_mix(seed):
+    analytical = np.random.default_rng(seed).standard_normal((13, 4))
+    measured, rotation = mixed(seed, analytical)
+    found = procrustes_rotation(measured, analytical)
+    np.testing.assert_allclose(found, rotation, atol=1e-12)
+    np.testing.assert_allclose(measured @ found, analytical, atol=1e-12)
+    # The paper prints R = V U', which turns the wrong way.
+    assert np.linalg.norm(measured @ found.T - analytical) > 0.1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_orthogonal_matrix_does_better(seed):
+    rng = np.random.default_rng(seed)
+    analytical, measured = rng.standard_normal((2, 13, 3))
+    best = procrustes_rotation(measured, analytical)
+    np.testing.assert_allclose(best.T @ best, np.eye(3), atol=1e-13)
+    least = np.linalg.norm(measured @ best - analytical)
+    for _ in range(50):
+        other = ortho_group.rvs(3, random_state=rng)
+        assert np.linalg.norm(measured @ other - analytical) >= least
+
+
+def test_expansion_by_rotation_returns_the_full_shapes_of_an_exact_mix(nominal):
+    sensors, full = at_sensors(nominal)
+    # Orthonormal at the sensors, so that a mix has the same column lengths.
+    basis, upper = np.linalg.qr(sensors)
+    whole = full @ np.linalg.inv(upper)
+    measured, rotation = mixed(1, basis)
+    shapes, found = expand_by_rotation(measured * [2.0, 0.1, 5.0], basis, whole)
+    aligned = same_length(measured, basis)
+    np.testing.assert_allclose(
+        nominal.observe(thirteen_points(nominal)) @ shapes, aligned, atol=1e-9
+    )
+    assert np.abs(np.abs(found) - np.abs(rotation)).max() < 1e-9
+
+
+def test_rotated_shapes_are_orthogonal_and_fit_better(nominal, truth):
+    sensors, full = at_sensors(nominal)
+    measured, _ = at_sensors(truth)
+    shapes, rotation = expand_by_rotation(measured, sensors, full)
+    assert np.abs(rotation - np.eye(3)).max() > 1e-3  # no symmetric luck
+    np.testing.assert_allclose(shapes.T @ nominal.mass @ shapes, np.eye(3), atol=1e-10)
+    aligned = same_length(measured, sensors)
+    before = np.linalg.norm(aligned - sensors)
+    after = np.linalg.norm(aligned @ rotation - sensors)
+    transposed = np.linalg.norm(aligned @ rotation.T - sensors)
+    assert after < before < transposed
+    expanded = nominal.observe(thirteen_points(nominal)) @ shapes
+    assert np.linalg.norm(expanded - aligned) == pytest.approx(after, rel=1e-9)
+
+
+def test_scale_and_sign_are_those_of_the_analytical_shapes(nominal):
+    sensors, _ = at_sensors(nominal)
+    np.testing.assert_allclose(
+        same_length(sensors * [-3.0, 0.2, -7e4], sensors), sensors, rtol=1e-12
+    )
+
+
+def test_serep_is_exact_in_the_span(nominal):
+    sensors, full = at_sensors(nominal, 5)
+    mix = np.random.default_rng(3).standard_normal((5, 3))
+    expanded = expand_by_serep(sensors @ mix, sensors, full)
+    np.testing.assert_allclose(expanded, full @ mix, rtol=0, atol=1e-10 * np.abs(full).max())
+
+
+def test_serep_is_the_least_squares_fit_outside_it(nominal, truth):
+    sensors, full = at_sensors(nominal, 3)
+    measured, _ = at_sensors(truth)
+    expanded = nominal.observe(thirteen_points(nominal)) @ expand_by_serep(measured, sensors, full)
+    residual = measured - expanded
+    assert np.linalg.norm(residual) > 1e-3 * np.linalg.norm(measured)
+    np.testing.assert_allclose(sensors.T @ residual, 0.0, atol=1e-10)
+
+
+def test_dynamic_expansion_is_exact_for_the_models_own_modes(truth):
+    modes = solve_modes(truth).elastic
+    rows = truth.observe(thirteen_points(truth))
+    expanded = expand_by_dynamics(
+        truth, rows, np.asarray(rows @ modes.shapes[:, :5]), modes.eigenvalues[:5]
+    )
+    np.testing.assert_allclose(
+        expanded, modes.shapes[:, :5], rtol=0, atol=1e-8 * np.abs(modes.shapes[:, :5]).max()
+    )
+
+
+def test_dynamic_expansion_meets_the_readings_with_the_least_force(nominal, truth):
+    measured, _ = at_sensors(truth)
+    eigenvalues = solve_modes(truth).elastic.eigenvalues[:3]
+    rows = nominal.observe(thirteen_points(nominal))
+    expanded = expand_by_dynamics(nominal, rows, measured, eigenvalues)
+    np.testing.assert_allclose(rows @ expanded, measured, atol=1e-10)
+    mass, stiffness = nominal.mass.toarray(), nominal.stiffness.toarray()
+    scale = 1.0 / np.sqrt(np.diagonal(stiffness))
+    free = np.flatnonzero(~rows.toarray().any(axis=0))
+    for j, eigenvalue in enumerate(eigenvalues):
+        dynamic = (stiffness - eigenvalue * mass) * scale[:, None]
+        gradient = dynamic[:, free].T @ (dynamic @ expanded[:, j])
+        size = np.abs(dynamic[:, free]).T @ (np.abs(dynamic) @ np.abs(expanded[:, j]))
+        assert np.abs(gradient).max() < 1e-9 * size.max()
+
+
+def test_sensors_with_a_gap_are_left_out():
+    shapes = np.ones((5, 2))
+    shapes[1, 1] = shapes[3, 0] = np.nan
+    np.testing.assert_array_equal(measured_rows(shapes), [True, False, True, False, True])
+    with pytest.raises(NotApplicable, match="at least 2 sensors"):
+        measured_rows(np.array([[1.0, np.nan], [np.nan, 2.0], [1.0, 1.0]]))
+
+
+def test_asymmetry_is_seen_in_every_shape(ladder, asymmetric_ladder):
+    """Tell that the asymmetric frame is no mirror image of itself, unlike the nominal one."""
+    mirror = [2, 1, 0, 5, 4, 3]  # A B C D E F turned end for end
+    for frame, symmetric in (
+        (ladder(accelerometer=False), True),
+        (asymmetric_ladder(accelerometer=False), False),
+    ):
+        model = Model.of(frame)
+        corners = thirteen_points(model)
+        first = replace(
+            corners, labels=corners.labels[:6], xyz=corners.xyz[:6], directions=("z",) * 6
+        )
+        shapes = model.observe(first) @ solve_modes(model).elastic.shapes[:, :5]
+        even = np.minimum(
+            np.abs(shapes - shapes[mirror]).max(axis=0), np.abs(shapes + shapes[mirror]).max(axis=0)
+        )
+        lopsided = even / np.abs(shapes).max(axis=0)
+        assert (lopsided < 1e-8).all() if symmetric else (lopsided > 1e-3).all()

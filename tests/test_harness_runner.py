@@ -1,0 +1,251 @@
+"""Runs in worker processes: every way a job can end, isolation, the store, interruption."""
+
+from __future__ import annotations
+
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_limits
+
+from femubench.core.errors import InputError
+from femubench.core.harness import runner
+from femubench.core.harness.results import JobResult
+from femubench.core.harness.runner import run_jobs
+from femubench.core.harness.scoring import leaderboard, score_model
+from femubench.core.harness.store import Store
+from femubench.core.measurement import Measurement
+from femubench.core.model import Model
+
+sys.path.insert(0, str(Path(__file__).parent / "toys"))
+from typing import Never
+
+import harness_toys as toys
+
+FOLDER, NAME = "/nowhere/zq104729104729", "zq271828182845"
+
+
+class Local(toys.Strategy):
+    """Lives where no worker finds it."""
+
+    name = "local"
+    citation = "none"
+
+    def __init__(self) -> None:
+        self.lock = lambda: None
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> toys.UpdateResult:
+        return toys.UpdateResult(model)
+
+
+@pytest.fixture(scope="module")
+def everything(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """One run with every kind of outcome."""
+    case = toys.tiny_case(NAME, folder=FOLDER)
+    plain = replace(toys.tiny_case("plain"), model=toys.matrices_only(case.model))
+    held_out = case.measurement.frequencies[3:]
+    hashes = frozenset(toys.hashed(f) for f in held_out)
+    strategies = [
+        toys.Unchanged(),
+        toys.Softer(),
+        toys.Grounded(),
+        toys.Failing(),
+        toys.Exiting(7),
+        toys.Exiting(0),
+        toys.Exiting(-9),
+        toys.Looping(),
+        toys.Locked(),
+        toys.Unpicklable(),
+        toys.Unreadable(),
+        toys.WrongSize(),
+        Local(),
+    ]
+    store, seen = Store(tmp_path_factory.mktemp("store")), []
+
+    def progress(result: JobResult, done: int, total: int) -> None:
+        seen.append((result.strategy, done, total))
+
+    options = {"jobs": 2, "store": store, "run_seed": 11}
+    run = run_jobs([case], strategies, timeout=1.0, progress=progress, **options)
+    calm = run_jobs([case, plain], [toys.Softer(), toys.Spy(hashes)], seeds=(0, 1), **options)
+    return {"case": case, "run": run, "calm": calm, "store": store, "seen": seen}
+
+
+@pytest.mark.parametrize(
+    ("strategy", "status", "reason"),
+    [
+        ("unchanged", "ok", ""),
+        ("softer", "ok", ""),
+        ("grounded", "ok", ""),
+        ("failing", "failed", "used modes reproduced: measured 0.25, allowed 1e-08"),
+        ("exiting-7", "crashed", "the worker process ended with exit code 7"),
+        ("exiting-0", "crashed", "the worker process ended with exit code 70"),
+        ("exiting--9", "crashed", "the worker process was ended by SIGKILL"),
+        ("looping", "timeout", "no result within 1 s"),
+        ("locked", "failed", "_LockedError"),
+        ("unpicklable", "failed", "the result cannot be sent back: TypeError: this geometry"),
+        ("unreadable", "failed", "the result cannot be read: RuntimeError: opened in the wrong"),
+        ("wrong-size", "failed", "stiffness has shape"),
+        ("local", "failed", "Local cannot be sent to a worker process: "),
+    ],
+)
+def test_every_way_a_job_can_end(
+    everything: dict[str, Any], strategy: str, status: str, reason: str
+) -> None:
+    result = next(item for item in everything["run"].results if item.strategy == strategy)
+    assert result.status == status
+    assert result.reason.startswith(reason)
+    assert (result.reason == "") == (status == "ok")
+    assert "\n" not in result.reason
+    assert bool(result.blocks) == (status == "ok")
+    assert result.score == 10.0 or status == "ok"
+
+
+def test_results_come_in_order_with_scores_and_ranks(everything: dict[str, Any]) -> None:
+    run = everything["run"]
+    assert [item.strategy for item in run.results] == run.meta["strategies"]
+    found = {item.strategy: item for item in run.results}
+    assert found["unchanged"].score == pytest.approx(1.0, abs=1e-12)
+    assert found["unchanged"].rigid_body_modes == 3
+    assert found["softer"].score < 0.5
+    assert (found["softer"].rank, found["unchanged"].rank) == (1, 2)
+    assert found["grounded"].unphysical
+    assert found["grounded"].rank == len(run.results)
+    assert found["softer"].evaluations == 1
+    assert found["looping"].seconds == 1.0
+    assert sorted(item.rank for item in run.results) == list(range(1, 14))
+
+
+def test_progress_counts_every_job_once(everything: dict[str, Any]) -> None:
+    seen = everything["seen"]
+    assert [done for _, done, _ in seen] == list(range(1, 14))
+    assert {total for _, _, total in seen} == {13}
+    assert {name for name, _, _ in seen} == set(everything["run"].meta["strategies"])
+
+
+def test_the_store_has_what_the_run_returned(everything: dict[str, Any]) -> None:
+    store, runs = everything["store"], (everything["run"], everything["calm"])
+    assert store.runs() == tuple(run.meta["run"] for run in runs)
+    for run in runs:
+        loaded = store.load(run.meta["run"])
+        by_job = {(item.case, item.strategy, item.seed): item for item in loaded.results}
+        assert len(by_job) == len(run.results)
+        for item in run.results:
+            assert by_job[item.case, item.strategy, item.seed] == item
+        assert loaded.meta["interrupted"] is False
+        assert loaded.meta["reference"] == run.meta["reference"]
+        assert loaded.meta["cases"][NAME]["digest"] == "0123"
+    table = leaderboard(store.load(runs[0].meta["run"]))
+    assert table.equals(leaderboard(runs[0]))
+
+
+def test_reference_errors_do_not_depend_on_who_runs(everything: dict[str, Any]) -> None:
+    case = everything["case"]
+    with threadpool_limits(1):  # roundoff depends on the number of threads
+        blocks = score_model(case, case.model)
+    expected = {name: block.rms_percent for name, block in blocks.items()}
+    assert everything["run"].meta["reference"] == {NAME: expected}
+    assert everything["calm"].meta["reference"][NAME] == expected
+
+
+def test_a_strategy_cannot_find_held_out_data(everything: dict[str, Any]) -> None:
+    spies = [item for item in everything["calm"].results if item.strategy == "spy"]
+    assert len(spies) == 4
+    for item in spies:
+        assert item.diagnostics["objects"] > 10_000  # it did look around
+        assert (item.diagnostics["numbers"], item.diagnostics["words"]) == (0.0, 0.0)
+
+
+def test_seeds_draw_noise_for_the_strategy_and_score_against_the_record(
+    everything: dict[str, Any],
+) -> None:
+    results = [
+        item
+        for item in everything["calm"].results
+        if (item.case, item.strategy) == (NAME, "softer")
+    ]
+    assert [item.seed for item in results] == [0, 1]
+    values = [item.parameters[0]["after"] for item in results]
+    assert values[0] != values[1]
+    assert values[1] == pytest.approx(values[0], rel=0.05)
+    measured = [[m.measured_hz for m in item.blocks["used"].modes] for item in results]
+    assert measured[0] == measured[1] == everything["case"].measurement.frequencies[:3].tolist()
+
+
+def test_what_a_case_lacks_is_not_applicable(everything: dict[str, Any]) -> None:
+    found = [item for item in everything["calm"].results if item.case == "plain"]
+    softer = [item for item in found if item.strategy == "softer"]
+    assert {item.status for item in softer} == {"not-applicable"}
+    assert {item.score for item in softer} == {1.0}
+    row = leaderboard(everything["calm"]).set_index("strategy").loc["softer"]
+    assert row[["ok", "not_applicable", "total"]].tolist() == [2, 2, 4]
+
+
+def test_the_same_run_gives_the_same_figures(everything: dict[str, Any]) -> None:
+    case = everything["case"]
+    again = run_jobs([case], [toys.Softer()], jobs=1)
+    first = next(item for item in everything["run"].results if item.strategy == "softer")
+    keep = ("blocks", "score", "diagnostics", "parameters")
+    assert all(getattr(again.results[0], name) == getattr(first, name) for name in keep)
+
+
+def test_an_interrupt_stops_the_workers_and_keeps_what_is_done(
+    everything: dict[str, Any], tmp_path: Path
+) -> None:
+    store, case = Store(tmp_path), everything["case"]
+
+    def interrupt(result: JobResult, done: int, total: int) -> Never:
+        raise KeyboardInterrupt
+
+    start = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt):
+        run_jobs(
+            [case],
+            [toys.Unchanged(), toys.Looping()],
+            jobs=2,
+            timeout=None,
+            store=store,
+            progress=interrupt,
+        )
+    assert time.perf_counter() - start < 20.0
+    run = store.load()
+    assert [item.strategy for item in run.results] == ["unchanged"]
+    assert run.meta["interrupted"] is True
+    table = leaderboard(run).set_index("strategy")
+    assert table.loc["looping", "skill"] == pytest.approx(10.0)
+
+
+def test_workers_that_cannot_start_end_the_run(
+    everything: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runner, "prepare", toys.cannot_start)
+    run = run_jobs([everything["case"]], [toys.Unchanged(), toys.Softer()], jobs=1)
+    assert {item.status for item in run.results} == {"crashed"}
+    assert {item.reason for item in run.results} == {"no worker process could start"}
+
+
+def test_wrong_input_is_told() -> None:
+    case = toys.tiny_case()
+    with pytest.raises(InputError, match="case 'corner' is there twice"):
+        run_jobs([case, case], [toys.Unchanged()])
+    with pytest.raises(InputError, match="strategy 'unchanged' is there twice"):
+        run_jobs([case], [toys.Unchanged(), toys.Unchanged()])
+    with pytest.raises(InputError, match="0 worker processes"):
+        run_jobs([case], [toys.Unchanged()], jobs=0)
+
+
+def test_a_model_that_cannot_be_solved_has_failed() -> None:
+    case = toys.tiny_case()
+    reference = runner.reference_of(case)
+    massless = replace(case.model, mass=case.model.mass * 0.0)
+    slot = runner._Slot(case, "s", 0, None)
+    result = runner._judged(slot, runner.JobOutcome("ok", model=massless), reference)
+    assert result.status == "failed"
+    assert result.reason
+    assert np.isclose(result.score, 10.0)

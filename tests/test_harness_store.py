@@ -1,0 +1,252 @@
+"""The store of results, data frames and JSON."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from femubench.core.errors import InputError
+from femubench.core.harness.frames import modes_frame, results_frame, run_from_json, run_to_json
+from femubench.core.harness.meta import git_commit, new_run_id, versions
+from femubench.core.harness.ranking import rank_results
+from femubench.core.harness.results import Block, JobResult, PairedMode, Run
+from femubench.core.harness.store import Store
+
+MODES = (
+    PairedMode(1, 100.0, 103.0, 0.99),
+    PairedMode(2, 200.0, None, None),
+    PairedMode(3, 300.0, -40.0, 0.7, "mass at C"),
+)
+GOOD = JobResult(
+    "corner",
+    "softer",
+    0,
+    "ok",
+    seconds=0.25,
+    blocks={"used": Block(3.0, 0.99, MODES[:2]), "modified": Block(100.0, None, MODES[2:])},
+    rigid_body_modes=2,
+    rigid_body_modes_expected=3,
+    negative_eigenvalues=0,
+    parameter_count=1,
+    evaluations=4,
+    parameters=({"name": "E", "before": 1.0, "after": 0.9, "unit": "", "std": None},),
+    history=({"residual": 0.5},),
+    diagnostics={"rank": 3.0},
+)
+BAD = JobResult("corner", "failing", 0, "failed", reason="residual 0.25", traceback="Traceback ...")
+META = {
+    "run": "20260101T000000Z-000000",
+    "seed": 0,
+    "seeds": [0],
+    "reference": {"corner": {"used": 6.0, "modified": 50.0}},
+}
+
+
+def stored(
+    folder: Path,
+    run_id: str = "20260101T000000Z-000000",
+    results: Sequence[JobResult] = (GOOD, BAD),
+) -> Store:
+    store = Store(folder)
+    store.begin({**META, "run": run_id})
+    for item in results:
+        store.append(run_id, item)
+    store.end(run_id, {"finished": "2026-01-01T00:00:09+00:00", "interrupted": False})
+    return store
+
+
+def test_what_goes_in_comes_out_with_scores_and_ranks(tmp_path: Path) -> None:
+    run = stored(tmp_path / "new" / "folder").load()
+    assert run.results == rank_results([GOOD, BAD], META["reference"])
+    assert {**META, "finished": "2026-01-01T00:00:09+00:00"}.items() <= run.meta.items()
+    assert run.meta["notes"] == []
+
+
+def test_the_latest_run_is_the_default_and_others_go_by_id(tmp_path: Path) -> None:
+    stored(tmp_path, "20260101T000000Z-aaaaaa")
+    store = stored(tmp_path, "20260102T000000Z-bbbbbb", [GOOD])
+    assert store.runs() == ("20260101T000000Z-aaaaaa", "20260102T000000Z-bbbbbb")
+    assert len(store.load().results) == 1
+    assert len(store.load("20260101T000000Z-aaaaaa").results) == 2
+    assert len(store.load("20260101").results) == 2
+    with pytest.raises(InputError, match="2 runs begin with '2026'"):
+        store.load("2026")
+    with pytest.raises(InputError, match="no run 'x'"):
+        store.load("x")
+
+
+def test_an_unfinished_run_is_loaded_as_far_as_it_went(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    store.begin(META)
+    store.append(META["run"], GOOD)
+    run = store.load()
+    assert run.meta["finished"] is None
+    assert [item.strategy for item in run.results] == ["softer"]
+
+
+def test_a_truncated_last_line_is_left_out_and_told(tmp_path: Path) -> None:
+    store = stored(tmp_path)
+    whole = store.path.read_bytes().splitlines(keepends=True)
+    store.path.write_bytes(b"".join(whole[:-2]) + whole[-2][:40])
+    run = store.load()
+    assert [item.strategy for item in run.results] == ["softer"]
+    assert run.meta["notes"] == [f"{store.path}:3: the last line is cut short and was left out"]
+    # The next record does not end up behind the torso.
+    store.append(META["run"], BAD)
+    assert [item.strategy for item in store.load().results] == ["softer", "failing"]
+    assert store.load().meta["notes"] == []
+
+
+def test_a_last_line_without_its_end_is_kept(tmp_path: Path) -> None:
+    store = stored(tmp_path, results=[GOOD])
+    store.path.write_bytes(store.path.read_bytes().rstrip(b"\n"))
+    assert store.load().meta["finished"] is not None
+    store.append(META["run"], BAD)
+    assert len(store.load().results) == 2
+
+
+def test_a_record_that_does_not_fit_on_the_disk_leaves_no_trace(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store = stored(tmp_path, results=[GOOD])
+    before = store.path.read_bytes()
+    real = os.write
+    monkeypatch.setattr(os, "write", lambda descriptor, data: real(descriptor, data[:10]))
+    with pytest.raises(OSError, match="could not be written in full"):
+        store.append(META["run"], BAD)
+    assert store.path.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("{not json}", r"results\.jsonl:2: not JSON"),
+        ('{"record": "song"}', r"results\.jsonl:2: record: not a record \(expected one of run"),
+        ('{"record": "run", "schema": 99, "run": "a"}', r":2: schema: schema 99 \(expected 1"),
+        ('{"record": "run", "schema": 1}', ":2: run: no run id"),
+    ],
+)
+def test_damage_is_told_with_its_line(tmp_path: Path, line: str, message: str) -> None:
+    store = stored(tmp_path)
+    lines = store.path.read_text().splitlines()
+    store.path.write_text("\n".join([lines[0], line, *lines[1:]]) + "\n")
+    with pytest.raises(InputError, match=message):
+        store.load()
+
+
+def test_a_wrong_field_is_told_with_its_key(tmp_path: Path) -> None:
+    store = stored(tmp_path)
+    text = store.path.read_text().replace('"measured_hz": 200.0', '"measured_hz": "high"')
+    store.path.write_text(text)
+    with pytest.raises(InputError, match=r":2: result\.used\.modes\[1\]\.measured_hz: "):
+        store.load()
+
+
+def test_an_empty_folder_has_no_runs(tmp_path: Path) -> None:
+    assert Store(tmp_path).runs() == ()
+    with pytest.raises(InputError, match="no results"):
+        Store(tmp_path).load()
+
+
+def test_many_writers_do_not_mix_their_lines(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    store.begin(META)
+    long = replace(BAD, traceback="x" * 20_000)
+    with ThreadPoolExecutor(8) as pool:
+        names = [f"s{i}" for i in range(64)]
+        list(
+            pool.map(
+                lambda n: Store(tmp_path).append(META["run"], replace(long, strategy=n)), names
+            )
+        )
+    assert {item.strategy for item in store.load().results} == set(names)
+
+
+def test_json_is_the_contract_and_comes_back() -> None:
+    run = Run(META, rank_results([GOOD, BAD], META["reference"]))
+    data = run_to_json(run)
+    text = json.dumps(data, allow_nan=False)
+    first, second = json.loads(text)["results"]
+    required = "case strategy seed status reason seconds used higher modified rigid_body_modes"
+    assert {*required.split(), "negative_eigenvalues", "score", "rank"} <= first.keys()
+    assert first["used"]["rms_percent"] == 3.0
+    assert first["used"]["modes"][1].items() >= {"measured_hz": 200.0, "predicted_hz": None}.items()
+    assert first["higher"] is None
+    assert first["unphysical"] is True
+    assert (second["status"], second["score"], second["used"]) == ("failed", 10.0, None)
+    assert run_from_json(json.loads(text)) == run
+
+
+def test_numbers_that_json_does_not_know_become_null() -> None:
+    odd = replace(BAD, diagnostics={"condition": np.inf}, history=({"residual": np.nan},))
+    data = run_to_json(Run({"limit": float("nan")}, (odd,)))
+    json.dumps(data, allow_nan=False)
+    assert data["meta"] == {"limit": None}
+    assert data["results"][0]["diagnostics"] == {"condition": None}
+    back = run_from_json(data).results[0]
+    assert np.isnan(back.history[0]["residual"])
+
+
+@pytest.mark.parametrize(
+    ("change", "key"),
+    [({"status": "fine"}, "status"), ({"seed": None}, "seed"), ({"score": "high"}, "score")],
+)
+def test_wrong_json_is_refused_with_its_place(change: dict[str, Any], key: str) -> None:
+    data = run_to_json(Run(META, (GOOD, BAD)))
+    data["results"][1].update(change)
+    with pytest.raises(InputError, match=rf"run\.json: results\[1\]\.{key}: "):
+        run_from_json(data, file="run.json")
+    with pytest.raises(InputError, match="meta"):
+        run_from_json({"results": []})
+
+
+def test_one_row_a_job() -> None:
+    frame = results_frame(Run(META, rank_results([GOOD, BAD], META["reference"])))
+    assert frame["strategy"].tolist() == ["softer", "failing"]
+    assert frame["used_percent"].tolist()[0] == 3.0
+    assert np.isnan(frame["used_percent"].tolist()[1])
+    assert frame["rank"].tolist() == [2, 1]  # an unphysical model ranks below a failure
+    assert frame["unphysical"].tolist() == [True, False]
+    assert len(results_frame(Run({}, ()))) == 0
+
+
+def test_one_row_a_mode() -> None:
+    frame = modes_frame(Run(META, (GOOD, BAD)))
+    assert frame["block"].tolist() == ["used", "used", "modified"]
+    assert frame["error_percent"].tolist()[0] == pytest.approx(3.0)
+    assert frame["error_percent"].isna().tolist() == [False, True, True]
+    assert frame["counted_percent"].tolist() == pytest.approx([3.0, 100.0, 100.0])
+    assert frame["modification"].tolist()[2] == "mass at C"
+    assert len(modes_frame(Run({}, ()))) == 0
+
+
+def test_run_ids_sort_by_time_and_differ() -> None:
+    early, late = (
+        datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC),
+        datetime(2026, 1, 2, 3, 4, 6, tzinfo=UTC),
+    )
+    assert re.fullmatch(r"20260102T030405Z-[0-9a-f]{6}", new_run_id(early))
+    assert new_run_id(early) < new_run_id(late)
+    assert len({new_run_id(early) for _ in range(20)}) == 20
+
+
+def test_versions_and_commit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert versions()["numpy"] == np.__version__
+    assert versions()["python"] == ".".join(map(str, sys.version_info[:3]))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(tmp_path.parent))
+    assert git_commit() is None
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert git_commit() is None
+    assert Path.cwd() == tmp_path

@@ -1,0 +1,92 @@
+"""What is written in pyproject.toml against the folders and what is installed."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import pytest
+
+import femubench
+from femubench.core.plugin.markers import PROJECT
+
+ROOT = Path(__file__).parents[1]
+PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+SETUPTOOLS = PYPROJECT["tool"]["setuptools"]
+
+
+def folder_of(package: str) -> Path:
+    """Return where the source of a package lies: the longest entry of package-dir that fits."""
+    folders = SETUPTOOLS["package-dir"]
+    prefix = max((p for p in folders if package == p or package.startswith(f"{p}.")), key=len)
+    return ROOT.joinpath(folders[prefix], *package[len(prefix) :].strip(".").split("."))
+
+
+def test_every_folder_with_python_files_is_a_listed_package() -> None:
+    """A package missing from the list is silently absent from the wheel."""
+    listed = {folder_of(package).resolve() for package in SETUPTOOLS["packages"]}
+    assert len(listed) == len(SETUPTOOLS["packages"])
+    rooms = ("core", "plugins", "reports", "scenarios")
+    found = {path.parent.resolve() for room in rooms for path in (ROOT / room).rglob("*.py")}
+    assert listed == found
+
+
+def test_every_package_has_an_init() -> None:
+    for package in SETUPTOOLS["packages"]:
+        assert (folder_of(package) / "__init__.py").is_file(), package
+
+
+def test_every_data_file_is_in_the_wheel() -> None:
+    """What is no Python file must match a glob of package-data, from the package's folder."""
+    taken: set[Path] = set()
+    for package, globs in SETUPTOOLS["package-data"].items():
+        for glob in globs:
+            matches = {path for path in folder_of(package).glob(glob) if path.is_file()}
+            assert matches, f"{package}: {glob} matches no file"
+            taken |= matches
+    rooms = ("core", "plugins", "reports", "scenarios")
+    data = {
+        path
+        for room in rooms
+        for path in (ROOT / room).rglob("*")
+        if path.is_file() and path.suffix not in (".py", ".pyc")
+    }
+    assert data <= taken
+
+
+def test_version_stands_in_one_place() -> None:
+    assert "version" in PYPROJECT["project"]["dynamic"]
+    assert SETUPTOOLS["dynamic"]["version"] == {"attr": "femubench.__version__"}
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert f"## {femubench.__version__}" in changelog
+
+
+@pytest.mark.parametrize("group", [PROJECT, "console_scripts"])
+def test_entry_points_are_installed_and_load(group: str) -> None:
+    project = PYPROJECT["project"]
+    listed = project["scripts"] if group == "console_scripts" else project["entry-points"][group]
+    installed = {
+        point.name: point
+        for point in entry_points(group=group)
+        if point.dist is not None and point.dist.name == PROJECT
+    }
+    assert {name: point.value for name, point in installed.items()} == listed
+    for point in installed.values():
+        assert point.load() is not None
+
+
+def test_facade_gives_every_name_that_it_lists() -> None:
+    names = [name for name in dir(femubench) if not name.startswith("_")]
+    assert {"Strategy", "Scenario", "UpdateResult", "hookimpl", "solve_modes"} <= set(names)
+    for name in names:
+        assert getattr(femubench, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'Stratgy'"):
+        femubench.Stratgy  # noqa: B018
+
+
+def test_index_of_the_docs_names_every_page() -> None:
+    docs = ROOT / "docs"
+    linked = set(re.findall(r"\]\(([\w-]+\.md)\)", (docs / "index.md").read_text(encoding="utf-8")))
+    assert linked | {"index.md"} == {page.name for page in docs.glob("*.md")}

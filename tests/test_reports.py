@@ -1,0 +1,327 @@
+"""Reports on results that were put together by hand: what is in them and what cannot break them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import re
+from dataclasses import replace
+
+import pytest
+
+from femubench import Block, JobResult, PairedMode, Reporter, Run
+from femubench.core.plugin.loader import load_plugins
+from femubench.core.plugin.validation import check_reporter
+from femubench.reports import femubench_reporters
+from femubench.reports.cells import fixed, hertz, plain, shortened, whole
+from femubench.reports.csvs import CsvReporter, ModesCsvReporter
+from femubench.reports.jsons import JsonReporter
+from femubench.reports.markdown import MarkdownReporter, escape
+from femubench.reports.summary import change_errors, rms_percent
+from femubench.reports.terminal import TerminalReporter
+
+NOMINAL = {"used": 10.0, "higher": 8.0, "modified": 5.0}
+
+
+def mode(
+    number: int, measured: float, predicted: float | None, change: str | None = None
+) -> PairedMode:
+    return PairedMode(number, measured, predicted, None if predicted is None else 0.9, change)
+
+
+def block(*modes: PairedMode) -> Block:
+    return Block(rms_percent(modes), 0.9, modes)
+
+
+def result(strategy: str, factor: float = 1.0, **changes: object) -> JobResult:
+    """Return a result whose frequencies are all off by a factor, 10 % at 1."""
+    error = 1.0 + 0.1 * factor
+    blocks = {
+        "used": block(mode(1, 100.0, 100.0 * error), mode(2, 200.0, 200.0 * error)),
+        "higher": block(mode(3, 300.0, 300.0 * error)),
+        "modified": block(
+            mode(1, 80.0, 80.0 * error, "mass at 6"),
+            mode(2, 160.0, None, "mass at 6"),
+            mode(1, 90.0, 90.0 * error, "spring at 6"),
+        ),
+    }
+    made = JobResult(
+        case="beam",
+        strategy=strategy,
+        seed=0,
+        status="ok",
+        seconds=1.25,
+        blocks=blocks,
+        rigid_body_modes=3,
+        rigid_body_modes_expected=3,
+        negative_eigenvalues=0,
+        parameter_count=4,
+        evaluations=17,
+    )
+    return replace(made, **changes)  # type: ignore[arg-type]
+
+
+def run_of(*results: JobResult, **meta: object) -> Run:
+    cases = dict.fromkeys(result.case for result in results)
+    full = {
+        "run": "20260101T000000Z-abcdef",
+        "seed": 0,
+        "seeds": sorted({result.seed for result in results}),
+        "strategies": list(dict.fromkeys(result.strategy for result in results)),
+        "versions": {"python": "3.11.0", "femubench": "0.1.0"},
+        "machine": {"platform": "Linux", "cpu_count": 2},
+        "cases": {case: {"title": f"The {case}", "digest": "0"} for case in cases},
+        "reference": dict.fromkeys(cases, NOMINAL),
+        "citations": {"good": "A. Author 2001, (1)"},
+    }
+    return Run({**full, **meta}, results)
+
+
+GOOD = result("good", 0.1)
+WORSE = result("worse", 1.5)
+IMAGINARY = result(
+    "imaginary",
+    0.05,
+    negative_eigenvalues=2,
+    rigid_body_modes=1,
+    blocks={"used": block(mode(1, 100.0, -102.46), mode(2, 200.0, 200.0))},
+)
+FAILED = JobResult("beam", "broken", 0, "failed", "stiffness: measured 3e-2, allowed 1e-8")
+SPARED = JobResult("beam", "picky", 0, "not-applicable", "the model has no joints")
+RUN = run_of(WORSE, GOOD, IMAGINARY, FAILED, SPARED)
+
+
+def cells(line: str) -> list[str]:
+    """Return the cells of a Markdown row, escaped bars left alone."""
+    return [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
+
+
+def tables(text: str) -> list[list[list[str]]]:
+    """Return all Markdown tables; every row of a table has as many cells as its header."""
+    found: list[list[list[str]]] = [[]]
+    for line in text.splitlines():
+        if line.startswith("|"):
+            found[-1].append(cells(line))
+        elif found[-1]:
+            found.append([])
+    found = [table for table in found if table]
+    for table in found:
+        assert {len(row) for row in table} == {len(table[0])}
+    return found
+
+
+def with_header(text: str, *start: str) -> list[list[str]]:
+    """Return the body of the table whose header starts with these cells."""
+    (table,) = [t for t in tables(text) if tuple(t[0][: len(start)]) == start]
+    return table[2:]
+
+
+def test_builtin_reporters_fill_the_role() -> None:
+    reporters = femubench_reporters()
+    names = [check_reporter(reporter).name for reporter in reporters]
+    assert names == ["terminal", "markdown", "csv", "modes-csv", "json"]
+    assert list(load_plugins().reporters)[: len(names)] == names
+
+
+@pytest.mark.parametrize("reporter", femubench_reporters(), ids=lambda reporter: reporter.name)
+def test_every_format_takes_an_empty_run(reporter: Reporter) -> None:
+    text = reporter.render(run_of(strategies=[]))
+    assert "nan" not in text
+
+
+class TestTerminal:
+    def test_table_is_ranked_and_shows_every_figure(self) -> None:
+        text = TerminalReporter().render(RUN)
+        rows = [line.split() for line in text.splitlines()[3:8]]
+        assert [row[1] for row in rows] == ["good", "picky", "worse", "broken", "imaginary"]
+        assert [row[0] for row in rows] == ["1", "2", "3", "4", "!5"]
+        # rms 1 % over used and higher; one of three modified modes has no partner
+        modified = 100.0 * math.sqrt((0.01**2 + 1.0 + 0.01**2) / 3.0)
+        assert rows[0][3:] == ["1.00", "1.00", f"{modified:.1f}", "0", "0", "4", "17", "1.25"]
+        assert rows[4][6:8] == ["2", "2"]
+        assert "unphysical" in text
+
+    def test_fits_80_columns_whatever_the_names_and_figures(self) -> None:
+        name = "a-strategy-with-a-very-long-name-that-nobody-would-type"
+        wild = result(
+            name,
+            3e4,
+            seconds=12345.678,
+            parameter_count=123456,
+            evaluations=1234567,
+            rigid_body_modes=0,
+            negative_eigenvalues=1234,
+        )
+        reason = "no convergence " * 20 + "x" * 200
+        failed = replace(FAILED, case="scenario-name/part-of-it-with-a-long-name", reason=reason)
+        many = [replace(result(f"s{i}"), seed=seed) for i in range(12) for seed in range(3)]
+        text = TerminalReporter().render(run_of(wild, failed, *many))
+        assert max(len(line) for line in text.splitlines()) <= 80
+        assert "a-strategy-with…" in text
+        assert "no convergence" in text
+
+    def test_several_seeds_show_an_interval_and_gather_failures(self) -> None:
+        results = [result("good", 0.1 + 0.1 * seed, seed=seed) for seed in range(5)]
+        failed = [replace(FAILED, seed=seed) for seed in range(5)]
+        text = TerminalReporter().render(run_of(*results, *failed))
+        assert "95 % interval" in text
+        assert re.search(r"good +\d\.\d{3} +\d\.\d{3} - \d\.\d{3}", text)
+        assert "failed x5" in text
+        assert text.count("measured 3e-2") == 1
+
+    def test_one_seed_shows_no_interval(self) -> None:
+        assert "interval" not in TerminalReporter().render(RUN)
+
+    def test_failures_are_told_and_counted(self) -> None:
+        text = TerminalReporter().render(RUN)
+        assert re.search(r"beam +broken +failed +stiffness: measured 3e-2,", text)
+        assert "Not applicable: 1 of 5 jobs" in text
+        many = [replace(FAILED, case=f"case{number}") for number in range(30)]
+        assert "... and 10 more in the report" in TerminalReporter().render(run_of(*many))
+
+    def test_control_characters_do_not_reach_the_terminal(self) -> None:
+        evil = replace(FAILED, reason="\x1b[2Jgone\nnext\x07", case="a\x9bcase", strategy="s\x1bx")
+        text = TerminalReporter().render(run_of(evil))
+        assert not re.search(r"[\x00-\x09\x0b-\x1f\x7f-\x9f]", text)
+        assert "[2Jgone next" in text
+
+
+class TestMarkdown:
+    TEXT = MarkdownReporter().render(RUN)
+
+    def test_says_how_to_repeat_the_run(self) -> None:
+        found = dict(with_header(self.TEXT, "", ""))
+        assert found["run"] == "20260101T000000Z-abcdef"
+        assert found["seed"] == "0"
+        assert found["versions"] == "python 3.11.0, femubench 0.1.0"
+        assert found["machine"] == r"platform Linux, cpu\_count 2"
+
+    def test_leaderboard(self) -> None:
+        rows = with_header(self.TEXT, "rank", "strategy", "skill")
+        assert [row[:2] for row in rows] == [
+            ["1", "good"],
+            ["2", "picky"],
+            ["3", "worse"],
+            ["4", "broken"],
+            ["5", "imaginary (unphysical)"],
+        ]
+        assert rows[3][2] == "10.000"
+
+    def test_coverage_and_reasons(self) -> None:
+        rows = {row[0]: row[1:] for row in with_header(self.TEXT, "strategy", "ok")}
+        assert rows["good"] == ["1", "0", "0", "1"]
+        assert rows["broken"] == ["0", "0", "1", "1"]
+        assert rows["picky"] == ["0", "1", "0", "1"]
+        reasons = [t for t in tables(self.TEXT) if t[0][-1] == "reason"]
+        assert [table[2][1] for table in reasons] == ["broken", "picky"]
+        assert reasons[0][2] == ["beam", "broken", "0", "failed", FAILED.reason]
+
+    def test_frequencies_as_in_the_papers(self) -> None:
+        assert "## Case beam\n\nThe beam." in self.TEXT
+        rows = with_header(self.TEXT, "strategy", "used 1", "used 2", "higher 3")
+        assert rows[0][:4] == ["*measured*", "100.0", "200.0", "300.0"]
+        found = {row[0]: row[1:] for row in rows[1:]}
+        assert found["good"][:3] == ["101.0 (+1.00)", "202.0 (+1.00)", "303.0 (+1.00)"]
+        assert found["worse"][0] == "115.0 (+15.00)"
+
+    def test_imaginary_and_missing_modes(self) -> None:
+        lost = result("lost", blocks={"used": block(mode(1, 100.0, None), mode(2, 200.0, -102.46))})
+        rows = with_header(MarkdownReporter().render(run_of(lost)), "strategy", "used 1")
+        assert rows[1][1:3] == ["– (no partner)", "102.5 i"]
+
+    def test_blocks_that_differ_between_strategies_keep_the_columns(self) -> None:
+        """`imaginary` has no higher block: its row must not shift."""
+        rows = {r[0]: r for r in with_header(self.TEXT, "strategy", "used 1")}
+        assert rows["imaginary (unphysical)"][3] == "–"
+        assert len(rows["imaginary (unphysical)"]) == len(rows["good"])
+
+    def test_design_changes(self) -> None:
+        rows = with_header(self.TEXT, "strategy", "1", "2")
+        assert "1. beam: mass at 6\n2. beam: spring at 6" in self.TEXT
+        found = {row[0]: [float(cell) for cell in row[1:]] for row in rows}
+        expected = 100.0 * math.sqrt((0.15**2 + 1.0) / 2.0)
+        assert found["worse"] == pytest.approx([expected, 15.0], abs=0.01)
+        assert list(found) == ["worse", "good"]
+
+    def test_design_changes_of_one_scenario_share_a_table(self) -> None:
+        parts = [result("good", 0.1, case=f"changes/{part}") for part in ("solid", "beam")]
+        rows = with_header(
+            MarkdownReporter().render(run_of(*parts)), "strategy", "1", "2", "3", "4"
+        )
+        assert rows == [["good", "70.71", "1.00", "70.71", "1.00"]]
+
+    def test_names_cannot_break_it(self) -> None:
+        evil = "a|b <script>*x*</script> [l](u) `c`\n| new"
+        failed = replace(FAILED, case=evil, strategy=evil, reason=evil)
+        other = result(evil, case=evil)
+        text = MarkdownReporter().render(run_of(failed, other, citations={evil: evil}))
+        assert tables(text)
+        assert "<script>" not in text
+        shown = r"a\|b &lt;script&gt;\*x\*&lt;/script&gt; \[l\](u) \`c\` \| new"
+        assert escape(evil) == shown
+        assert with_header(text, "case", "strategy", "seeds")[0][:2] == [shown, shown]
+
+
+class TestCsv:
+    def test_jobs(self) -> None:
+        rows = list(csv.DictReader(io.StringIO(CsvReporter().render(RUN))))
+        assert [row["strategy"] for row in rows] == [result.strategy for result in RUN.results]
+        assert float(rows[1]["used_percent"]) == pytest.approx(1.0)
+        assert rows[3]["reason"] == FAILED.reason
+
+    def test_modes(self) -> None:
+        rows = list(csv.DictReader(io.StringIO(ModesCsvReporter().render(RUN))))
+        assert len(rows) == 6 + 6 + 2
+        assert float(rows[0]["error_percent"]) == pytest.approx(15.0)
+        assert float(rows[12]["predicted_hz"]) == pytest.approx(-102.46)
+
+    @pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r"])
+    def test_no_cell_is_a_formula(self, start: str) -> None:
+        reason = f'{start}HYPERLINK(1),"x"'
+        text = CsvReporter().render(run_of(replace(FAILED, reason=reason, case=reason)))
+        (row,) = csv.DictReader(io.StringIO(text, newline=""))
+        assert row["reason"] == row["case"] == f"'{reason}"
+
+    def test_negative_numbers_stay_numbers(self) -> None:
+        """A minus sign makes a formula of a text, not of a frequency."""
+        assert ",-102.46," in ModesCsvReporter().render(RUN)
+
+
+class TestJson:
+    def test_contract(self) -> None:
+        data = json.loads(JsonReporter().render(RUN))
+        assert data["meta"]["run"] == RUN.meta["run"]
+        good = data["results"][1]
+        assert {"case", "strategy", "seed", "status", "reason", "seconds"} <= set(good)
+        assert good["used"]["modes"][0]["predicted_hz"] == pytest.approx(101.0)
+        assert {"measured_hz", "predicted_hz", "mac"} <= set(good["used"]["modes"][0])
+        assert data["results"][3]["used"] is None
+
+    def test_is_strict(self) -> None:
+        def refuse(word: str) -> None:
+            raise AssertionError(word)
+
+        odd = replace(GOOD, diagnostics={"residual": math.nan, "bound": math.inf})
+        text = JsonReporter().render(run_of(odd, timeout=math.inf))
+        data = json.loads(text, parse_constant=refuse)
+        assert data["results"][0]["diagnostics"] == {"residual": None, "bound": None}
+
+
+def test_cells() -> None:
+    assert [fixed(x) for x in (0.0, 1.234, 123.456, 12345.6)] == ["0.00", "1.23", "123.5", "12346"]
+    assert [fixed(x, 2, 4) for x in (99.999, 1234567.0, None, math.nan)] == ["100", "1e6", "–", "–"]
+    assert [whole(x) for x in (3.0, 2.5, None)] == ["3", "2.5", "–"]
+    assert [hertz(x) for x in (226.84, -102.46, None)] == ["226.8", "102.5 i", "–"]
+    assert plain("a\x1b[0m\n b") == "a [0m b"
+    assert [shortened(x, 5) for x in ("abcde", "abcdef")] == ["abcde", "abcd…"]
+
+
+def test_errors_by_design_change_match_the_definition() -> None:
+    errors = change_errors(WORSE)
+    assert list(errors) == ["mass at 6", "spring at 6"]
+    assert errors["spring at 6"] == pytest.approx(15.0)
+    imaginary = result("x", blocks={"modified": block(mode(1, 50.0, -3.0, "c"))})
+    assert change_errors(imaginary) == {"c": pytest.approx(100.0)}
+    assert math.isnan(rms_percent([]))

@@ -1,0 +1,101 @@
+"""The built-in scenarios: their data can be made again, and their models are the papers'."""
+
+from __future__ import annotations
+
+import shutil
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from femubench.core.case.reader import read_case
+from femubench.core.modal.eigen import solve_modes
+from femubench.scenarios import HERE, femubench_scenarios
+from femubench.scenarios.generate import FRAME_HZ, HFRAME_HZ, write_all
+
+CASES = {name: folder for s in femubench_scenarios() for name, folder in s.cases.items()}
+DATA = sorted(p.relative_to(HERE) for p in HERE.glob("**/*.csv") if p.parent.name != "twin")
+MODEL_HZ = {
+    "frame": (255.8, 277.5, 581.3, 911.3, 1049.4),
+    "hframe": (78.51, 147.31, 298.90, 408.03, 523.31, 957.34, 1013.35, 1310.70),
+}
+
+
+def test_every_scenario_has_a_case_and_a_readme() -> None:
+    for scenario in femubench_scenarios():
+        assert scenario.cases, scenario.name
+        assert (HERE / scenario.name / "README.md").is_file(), scenario.name
+
+
+@pytest.fixture(scope="module")
+def regenerated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("scenarios")
+    for folder in CASES.values():
+        (root / folder.relative_to(HERE)).mkdir(parents=True)
+    write_all(root)
+    return root
+
+
+@pytest.mark.parametrize("file", DATA, ids=str)
+def test_data_are_what_their_generator_writes(regenerated: Path, file: Path) -> None:
+    stored, made = pd.read_csv(HERE / file), pd.read_csv(regenerated / file)
+    assert list(stored.columns) == list(made.columns)
+    for column in stored.columns:
+        if stored[column].dtype.kind in "fi":
+            np.testing.assert_allclose(stored[column], made[column], rtol=2e-6, atol=2e-6)
+        else:
+            assert list(stored[column]) == list(made[column])
+
+
+def test_the_generator_writes_every_file(regenerated: Path) -> None:
+    made = {p.relative_to(regenerated) for p in regenerated.glob("**/*.csv")}
+    assert made == set(DATA)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_case_reads(name: str) -> None:
+    case = read_case(CASES[name], name)
+    assert case.name == name
+    assert not set(case.used) & set(case.held_out)
+    assert case.measurement.select(case.used).has_shapes
+    assert bool(solve_modes(case.model).rigid[:3].all())
+
+
+@pytest.mark.parametrize(("name", "tolerance"), [("frame", 1e-3), ("hframe", 5e-5)])
+def test_nominal_model_has_the_printed_frequencies(name: str, tolerance: float) -> None:
+    printed = np.array(MODEL_HZ[name])
+    found = solve_modes(read_case(CASES[name]).model).elastic.natural_frequencies
+    np.testing.assert_allclose(found[: len(printed)], printed, rtol=tolerance)
+
+
+def test_published_frequencies_are_the_measured_ones() -> None:
+    assert tuple(read_case(CASES["frame"]).measurement.frequencies) == FRAME_HZ
+    assert tuple(read_case(CASES["hframe"]).measurement.frequencies) == HFRAME_HZ
+
+
+def test_no_nominal_model_is_of_the_class_of_its_truth() -> None:
+    for folder in CASES.values():
+        model = tomllib.loads((folder / "case.toml").read_text())["model"]
+        assert model["beam"] == "euler-bernoulli"
+        assert "joint_springs" not in model
+        assert all(member["elements"] < 48 for member in model["members"])
+
+
+def test_a_copied_case_folder_runs_from_anywhere(tmp_path: Path) -> None:
+    copy = shutil.copytree(CASES["frame-solid"], tmp_path / "mine")
+    assert len(read_case(copy).modifications) == 1
+
+
+def test_the_twin_interpolation_agrees_with_a_left_out_station() -> None:
+    from femubench.scenarios import twin_data
+
+    table = pd.read_csv(twin_data.TWIN / "frame_twin_outofplane.csv")
+    first = table[table["mode"] == 3].reset_index(drop=True)
+    station = first.index[(first["x"] == 0.11020) & (first["y"] == 0.0)][0]
+    left_out = first.drop(index=station).reset_index(drop=True)
+    xyz = first.loc[station, ["x", "y", "z"]].to_numpy(dtype=float)
+    interpolated = twin_data._reading(left_out, xyz, "z")
+    peak = first["uz"].abs().max()
+    assert interpolated == pytest.approx(first.loc[station, "uz"], abs=5e-4 * peak)

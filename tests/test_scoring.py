@@ -1,0 +1,271 @@
+"""Blocks, rigid-body modes, scores, ranks and the leaderboard."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from femubench.core.case.case import Case
+from femubench.core.harness.ranking import score_of
+from femubench.core.harness.results import Block, JobResult, PairedMode, Run, Status
+from femubench.core.harness.scoring import (
+    Reference,
+    frequency_error,
+    judge,
+    leaderboard,
+    predict_block,
+    rank_results,
+    reference_of,
+    score_model,
+)
+from femubench.core.modal import eigen
+from femubench.core.modal.eigen import solve_modes
+from femubench.core.model import LowRank, Model
+
+sys.path.insert(0, str(Path(__file__).parent / "toys"))
+import harness_toys as toys
+
+
+@pytest.fixture(scope="module")
+def case() -> Case:
+    return toys.tiny_case()
+
+
+@pytest.fixture(scope="module")
+def reference(case: Case) -> Reference:
+    return reference_of(case)
+
+
+def shifted(model: Model, direction: str, stiffness: float) -> Model:
+    basis = np.zeros((model.size, 1))
+    basis[model.dofs.direction.index(direction)] = 1.0
+    return replace(model, stiffness_change=LowRank(basis, np.array([[stiffness]])))
+
+
+def test_blocks_hold_the_modes_that_were_asked_for(case: Case, reference: Reference) -> None:
+    blocks = score_model(case, case.model)
+    assert list(blocks) == ["used", "higher", "modified"]
+    assert [m.number for m in blocks["used"].modes] == [1, 2, 3]
+    assert [m.number for m in blocks["higher"].modes] == [4, 5]
+    assert {m.modification for m in blocks["modified"].modes} == {"mass at C"}
+    assert reference.rms_percent == {name: block.rms_percent for name, block in blocks.items()}
+    assert all(block.mean_mac > 0.9 for block in blocks.values())
+
+
+def test_rms_is_that_of_the_relative_frequency_errors(case: Case) -> None:
+    block = score_model(case, case.model)["used"]
+    elastic = solve_modes(case.model).elastic.natural_frequencies[:3]
+    errors = elastic / case.measurement.frequencies[:3] - 1.0
+    assert block.rms_percent == pytest.approx(100 * np.sqrt(np.mean(errors**2)), rel=1e-12)
+    assert 2.0 < block.rms_percent < 10.0  # E is 10 % too high
+
+
+def test_a_block_without_data_is_not_there(case: Case) -> None:
+    bare = replace(case, held_out=(), modifications=())
+    assert list(score_model(bare, case.model)) == ["used"]
+
+
+def test_the_truth_scores_almost_nothing(case: Case, reference: Reference) -> None:
+    masses = (toys.PointMass(toys.Place(joint="A"), 0.005),)
+    truth = Model.of(toys.frame(9, 70.0e9, masses))
+    judgement = judge(case, truth, reference)
+    assert all(block.rms_percent < 1e-6 for block in judgement.blocks.values())
+    assert all(block.mean_mac == pytest.approx(1.0) for block in judgement.blocks.values())
+    assert (judgement.rigid_body_modes, judgement.negative_eigenvalues) == (3, 0)
+
+
+def test_modes_are_never_paired_by_index(case: Case) -> None:
+    order = [4, 2, 0, 3, 1]
+    shuffled = replace(
+        case, measurement=case.measurement.select([case.measurement.numbers[i] for i in order])
+    )
+    assert score_model(shuffled, case.model) == score_model(case, case.model)
+
+
+def test_used_and_higher_modes_never_share_a_partner(case: Case) -> None:
+    twice = replace(
+        case.measurement,
+        frequencies=case.measurement.frequencies[[0, 1, 2, 2, 4]],
+        shapes=case.measurement.shapes[:, [0, 1, 2, 2, 4]],
+    )
+    blocks = score_model(replace(case, measurement=twice), case.model)
+    # Apart, each block gives its copy of mode 3 the best partner there is; together only one.
+    higher = predict_block(case.model, twice.select([4]), None)
+    assert higher[0].predicted_hz == blocks["used"].modes[2].predicted_hz
+    pairs = [*blocks["used"].modes, *blocks["higher"].modes]
+    partners = [pair.predicted_hz for pair in pairs if pair.predicted_hz is not None]
+    assert len(set(partners)) == len(partners)
+
+
+def test_a_mode_that_no_sensor_sees_has_no_shape_to_pair_by(case: Case) -> None:
+    # Sensors at the corner alone read x-bending and torsion at roundoff level for this direction.
+    at = toys.sensors()
+    blind = replace(case.measurement, sensors=replace(at, xyz=np.tile(at.xyz[:1], (len(at), 1))))
+    pairs = predict_block(case.model, blind, None)
+    assert all(pair.mac is None or 0.0 <= pair.mac <= 1.0 for pair in pairs)
+
+
+@pytest.mark.parametrize(
+    ("predicted", "error"), [(None, 1.0), (-99.0, 1.0), (0.0, 1.0), (97.0, 0.03), (150.0, 0.5)]
+)
+def test_what_a_pair_counts(predicted: float | None, error: float) -> None:
+    assert frequency_error(PairedMode(1, 100.0, predicted, None)) == pytest.approx(error)
+
+
+def test_rigid_body_modes_are_counted_against_the_nominal_model(
+    case: Case, reference: Reference
+) -> None:
+    assert reference.rigid.shape[1] == 3
+    nominal = judge(case, case.model, reference)
+    assert (nominal.rigid_body_modes, nominal.negative_eigenvalues) == (3, 0)
+    grounded = judge(case, shifted(case.model, "z", 1.0e6), reference)
+    assert (grounded.rigid_body_modes, grounded.negative_eigenvalues) == (2, 0)
+    buckled = judge(case, shifted(case.model, "z", -1.0e3), reference)
+    assert (buckled.rigid_body_modes, buckled.negative_eigenvalues) == (2, 1)
+
+
+def test_a_matrix_model_that_lost_its_rigid_body_modes_is_found_out(case: Case) -> None:
+    plain = replace(case, model=toys.matrices_only(case.model))
+    reference = reference_of(plain)
+    rigid = plain.model.mass @ reference.rigid
+    spoilt = plain.model.stiffness + 1e3 * rigid[:, :2] @ rigid[:, :2].T
+    changed = replace(plain.model, stiffness=type(plain.model.stiffness)(spoilt))
+    assert judge(plain, plain.model, reference).rigid_body_modes == 3
+    assert judge(plain, changed, reference).rigid_body_modes == 1
+
+
+def test_zero_modes_that_are_no_rigid_motions_do_not_count(
+    case: Case, reference: Reference
+) -> None:
+    # A hinge in the middle: two mechanisms more, mixed with the three rigid-body modes.
+    stiffness = case.model.stiffness.toarray()
+    modes = solve_modes(case.model).elastic
+    pushed = case.model.mass @ modes.shapes[:, :2]
+    stiffness -= pushed @ np.diag(modes.eigenvalues[:2]) @ pushed.T
+    loose = replace(case.model, stiffness=type(case.model.stiffness)(stiffness))
+    judgement = judge(case, loose, reference)
+    assert (judgement.rigid_body_modes, judgement.negative_eigenvalues) == (3, 0)
+
+
+def test_a_large_model_offers_as_many_modes_as_a_small_one(
+    case: Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fine = Model.of(toys.frame(40, 77.0e9))
+    dense = score_model(case, fine)
+    monkeypatch.setattr(eigen, "DENSE_LIMIT", 50)
+    monkeypatch.setattr("femubench.core.harness.scoring.DENSE_LIMIT", 50)
+    sparse = score_model(case, fine)
+    for name, block in dense.items():
+        assert sparse[name].rms_percent == pytest.approx(block.rms_percent, rel=1e-6)
+
+
+def result(
+    strategy: str,
+    *,
+    status: Status = "ok",
+    seed: int = 0,
+    case: str = "a",
+    rms: float = 1.0,
+    **more: Any,
+) -> JobResult:
+    blocks = {name: Block(rms, 0.9, ()) for name in ("used", "higher")} if status == "ok" else {}
+    return JobResult(case, strategy, seed, status, blocks=blocks, **more)
+
+
+REFERENCE = {"a": {"used": 4.0, "higher": 2.0}, "b": {"used": 1.0}}
+META = {"reference": REFERENCE, "seeds": [0], "seed": 5, "strategies": []}
+
+
+def test_score_is_the_geometric_mean_of_the_ratios() -> None:
+    expected = math.sqrt((1.05 / 4.05) * (1.05 / 2.05))
+    assert score_of(result("s"), REFERENCE["a"]) == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("status", "score"),
+    [("failed", 10), ("crashed", 10), ("timeout", 10), ("diverged", 10), ("not-applicable", 1)],
+)
+def test_score_of_a_job_without_model(status: str, score: float) -> None:
+    assert score_of(result("s", status=status), REFERENCE["a"]) == score
+
+
+def test_ranks_go_by_physics_then_score_then_name() -> None:
+    results = [
+        result("zeta", rms=2.0),
+        result("best", rms=0.1, rigid_body_modes=2, rigid_body_modes_expected=3),
+        result("negative", rms=0.2, negative_eigenvalues=1),
+        result("alpha", rms=2.0),
+        result("gone", status="crashed"),
+        result("zeta", rms=9.0, case="b"),
+    ]
+    ranked = rank_results(results, REFERENCE)
+    places = [(item.strategy, item.rank) for item in ranked]
+    assert places == [
+        ("zeta", 2),
+        ("best", 4),
+        ("negative", 5),
+        ("alpha", 1),
+        ("gone", 3),
+        ("zeta", 1),
+    ]
+    assert [item.score for item in rank_results(ranked)] == [item.score for item in ranked]
+
+
+def test_without_reference_the_result_of_unchanged_serves() -> None:
+    ranked = rank_results(
+        [result("unchanged", rms=2.0), result("good", rms=1.0), result("x", case="b")]
+    )
+    assert [item.score for item in ranked] == pytest.approx([1.0, 1.05 / 2.05, 10.0])
+
+
+def test_skill_weighs_every_block_of_every_case_alike() -> None:
+    results = [
+        result("s", rms=1.0),
+        replace(result("s", case="b"), blocks={"used": Block(3.0, None, ())}),
+    ]
+    row = leaderboard(Run(META, tuple(results))).iloc[0]
+    ratios = [1.05 / 4.05, 1.05 / 2.05, 3.05 / 1.05]
+    assert row["skill"] == pytest.approx(np.prod(ratios) ** (1 / 3), rel=1e-12)
+    assert row["used_percent"] == 2.0  # the median over the two cases
+    assert row["higher_percent"] == 1.0
+    assert np.isnan(row["modified_percent"])
+
+
+def test_a_missing_result_scores_ten_and_a_strategy_without_any_is_there() -> None:
+    run = Run({**META, "strategies": ["s", "never"]}, (result("s", rms=1.0),))
+    table = leaderboard(run).set_index("strategy")
+    expected = math.exp((math.log(1.05 / 4.05) + math.log(1.05 / 2.05) + math.log(10.0)) / 3)
+    assert table.loc["s", "skill"] == pytest.approx(expected, rel=1e-12)
+    assert table.loc["never", "skill"] == pytest.approx(10.0)
+    assert table.loc["s", ["ok", "total"]].tolist() == [1, 2]
+
+
+def test_the_unphysical_rank_below_all_others() -> None:
+    lost = result("lost", rms=0.1, rigid_body_modes=1, rigid_body_modes_expected=3)
+    fine = result("lost", rms=0.1, case="b", rigid_body_modes=3, rigid_body_modes_expected=3)
+    bad = [result("bad", status="failed"), result("bad", status="failed", case="b")]
+    table = leaderboard(Run(META, (lost, fine, *bad)))
+    assert table["strategy"].tolist() == ["bad", "lost"]
+    assert table["rank"].tolist() == [1, 2]
+    assert table["unphysical"].tolist() == [False, True]
+    assert table["rigid_modes_lost"].tolist() == [0, 2]
+
+
+def test_several_seeds_give_the_median_and_an_interval() -> None:
+    errors = [1.0, 3.0, 2.0, 5.0, 4.0]
+    results = [result("s", seed=k, rms=rms) for k, rms in enumerate(errors)]
+    meta = {**META, "reference": {"a": REFERENCE["a"]}, "seeds": list(range(5))}
+    row = leaderboard(Run(meta, tuple(results))).iloc[0]
+    expected = math.sqrt((3.05 / 4.05) * (3.05 / 2.05))
+    assert row["skill"] == pytest.approx(expected, rel=1e-12)
+    assert row["skill_low"] < row["skill"] < row["skill_high"]
+    again = leaderboard(Run(meta, tuple(reversed(results)))).iloc[0]
+    assert again.to_dict() == pytest.approx(row.to_dict(), nan_ok=True)
+    one = leaderboard(Run(META, (result("s"),))).iloc[0]
+    assert np.isnan(one["skill_low"])

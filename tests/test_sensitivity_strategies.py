@@ -1,0 +1,591 @@
+"""The sensitivity strategies: table 4 of Horton et al. (1999), other frames, statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from scipy import stats
+
+from femubench import (
+    Diverged,
+    Frame,
+    GroundSpring,
+    Joint,
+    JointSpring,
+    Measurement,
+    Member,
+    Model,
+    NotApplicable,
+    Parameter,
+    Place,
+    PointMass,
+    Sensors,
+    Strategy,
+    StrategyFailure,
+    Structure,
+    Support,
+    Unknown,
+    UpdateOptions,
+    UpdateResult,
+    carried_by,
+    global_stiffness,
+    groups_within,
+    half_depth,
+    joint_groups,
+    rectangular_tube,
+    sensitivity_update,
+    solve_modes,
+    with_joint_springs,
+)
+from femubench.core.fem.frame import ACTIVE
+from femubench.core.fem.sections import constant_kappa
+from femubench.core.modal.eigen import counted_evaluations
+from femubench.core.modal.sensitivity import eigenvalue_sensitivities
+from femubench.core.update.residuals import Data, predict
+from femubench.plugins.strategies.bayesian import Bayesian
+from femubench.plugins.strategies.global_ import Global
+from femubench.plugins.strategies.local import Local
+from femubench.plugins.strategies.offset import Offset
+from femubench.plugins.strategies.spring import Spring
+
+RNG = np.random.default_rng(0)
+HFRAME_HZ = np.array([77.13, 137.60, 300.90, 404.98, 482.23])
+LADDER_HZ = np.array([226.8, 275.2, 537.4])
+PAPER_SPRINGS = {"x": 3.30e9, "z": 4.48e9, "ry": 3.02e6}
+EVERY = (Global(), Local(), Spring(), Offset(), Bayesian())
+
+
+def sensors_on(frame: Frame) -> Sensors:
+    """Return sensors in all translations at joints and at two points of every member."""
+    at = {joint.name: np.array(joint.xyz) for joint in frame.joints}
+    points = list(at.values())
+    for member in frame.members:
+        start, stop = (at[name] for name in member.ends)
+        points += [start + s * (stop - start) for s in (0.25, 0.5)]
+    directions = [d for d in ACTIVE[frame.plane] if len(d) == 1]
+    labels = tuple(f"{i}{d}" for i in range(len(points)) for d in directions)
+    xyz = np.repeat(np.array(points), len(directions), axis=0)
+    return Sensors(labels, xyz, tuple(directions) * len(points))
+
+
+def measured(
+    truth: Frame | Model, count: int, frequencies: np.ndarray | None = None, std: float = 0.005
+) -> Measurement:
+    """Return modes of a truth at sensors; frequencies replaced by printed ones where given."""
+    model = Model.of(truth) if isinstance(truth, Frame) else truth
+    sensors = sensors_on(model.frame_structure.frame)
+    modes = solve_modes(model).elastic
+    shapes = model.observe(sensors) @ modes.shapes[:, :count]
+    hertz = modes.natural_frequencies[:count] if frequencies is None else frequencies
+    deviation = 0.015 * np.abs(shapes).max(axis=0) * np.ones_like(shapes)
+    numbers = tuple(range(1, count + 1))
+    return Measurement(
+        sensors, numbers, hertz, std * hertz, np.full(count, np.nan), shapes, deviation
+    )
+
+
+def with_shear(frame: Frame) -> Frame:
+    members = tuple(
+        replace(m, section=replace(m.section, kappa=constant_kappa(0.4355))) for m in frame.members
+    )
+    return replace(frame, beam="timoshenko", members=members)
+
+
+@pytest.fixture(scope="module")
+def hframe_case(hframe: Any) -> tuple[Model, Measurement]:
+    """The published frequencies; shapes of a finer frame with shear and rotary inertia."""
+    truth = with_shear(hframe(mesh=(32, 16, 32)))
+    return Model.of(hframe()), measured(truth, 5, HFRAME_HZ)
+
+
+def ratios(result: UpdateResult) -> dict[str, float]:
+    return {p.name: p.after / p.before for p in result.parameters}
+
+
+# Table 4 --------------------------------------------------------------------------------------
+
+
+def test_row_a_global(hframe_case: Any) -> None:
+    result = Global().update(*hframe_case, RNG)
+    assert ratios(result) == {"EI all members": pytest.approx(0.8942, abs=1e-4)}
+    np.testing.assert_allclose(
+        solve_modes(result.model).elastic.natural_frequencies[:5],
+        [74.26, 139.33, 282.84, 385.96, 495.16],
+        rtol=4e-4,
+    )
+
+
+def test_row_b_local(hframe_case: Any) -> None:
+    result = Local().update(*hframe_case, RNG)
+    assert ratios(result) == {
+        "EI at T branch": pytest.approx(0.4906, abs=1e-4),
+        "EI at T through": pytest.approx(1.0878, abs=1e-4),
+    }
+    # the paper stopped a little short of the optimum: .4928 and 1.0814
+    assert ratios(result)["EI at T branch"] == pytest.approx(0.4928, rel=0.01)
+    assert ratios(result)["EI at T through"] == pytest.approx(1.0814, rel=0.01)
+
+
+def test_row_d_spring_with_the_global_factor_frozen(hframe_case: Any) -> None:
+    strategy = Spring(arm=0.02, stiffness=PAPER_SPRINGS, free_stiffness=False)
+    result = strategy.update(*hframe_case, RNG)
+    after = {p.name: p.after for p in result.parameters}
+    assert after["k_ry T branch"] == pytest.approx(273725, rel=1e-3)
+    assert after["k_x T branch"] == pytest.approx(3.24e9, rel=0.01)
+    assert after["k_z T branch"] == pytest.approx(4.35e9, rel=0.015)
+    np.testing.assert_allclose(
+        solve_modes(result.model).elastic.natural_frequencies[:5],
+        [75.16, 135.41, 298.82, 402.89, 482.51],
+        rtol=4e-4,
+    )
+    nominal = [79.31, 151.45, 299.05, 411.55, 539.36]
+    first = with_joint_springs(
+        hframe_case[0].frame_structure,
+        {f"horizontal@{joint}": PAPER_SPRINGS for joint in ("T1", "T2")},
+        arm=0.02,
+    )
+    np.testing.assert_allclose(
+        solve_modes(Model.of(first)).elastic.natural_frequencies[:5], nominal, rtol=1e-4
+    )
+
+
+def test_row_d_spring_with_the_global_factor_free(hframe_case: Any) -> None:
+    result = Spring(arm=0.02, stiffness=PAPER_SPRINGS).update(*hframe_case, RNG)
+    assert result.parameter_count == 4
+    assert ratios(result)["EI all members"] == pytest.approx(1.0133, abs=1e-4)
+    assert ratios(result)["k_ry T branch"] == pytest.approx(259210 / 3.02e6, rel=1e-3)
+    # the rule of the paper on mesh C, with the arm from the section, comes near the same
+    by_rule = Spring().update(*hframe_case, RNG)
+    assert ratios(by_rule)["EI all members"] == pytest.approx(1.0133, abs=1e-3)
+    assert by_rule.parameters[0].after == pytest.approx(259210, rel=0.01)
+
+
+def test_row_e_offset(hframe_case: Any) -> None:
+    result = Offset(length=0.02).update(*hframe_case, RNG)
+    assert ratios(result)["a T branch"] == pytest.approx(-1.4248, abs=1e-3)
+    assert ratios(result)["EI all members"] == pytest.approx(1.0053, abs=1e-4)
+    assert ratios(result)["a T through"] == pytest.approx(1.0, abs=1e-3)
+    np.testing.assert_allclose(
+        solve_modes(result.model).elastic.natural_frequencies[:5],
+        [76.70, 138.77, 299.18, 405.73, 482.17],
+        rtol=1.5e-3,
+    )
+
+
+def test_row_c_scales_all_members_of_the_spring_model(hframe_case: Any) -> None:
+    heavy = UpdateOptions(damping=1.0, max_iterations=8)
+    strategy = Spring(arm=0.02, stiffness=PAPER_SPRINGS, variant="global", options=heavy)
+    found = ratios(strategy.update(*hframe_case, RNG))
+    assert set(found) == {"EI all members", "rhoA all members"}
+    assert found["EI all members"] == pytest.approx(0.930, rel=0.01)
+    assert found["EI all members"] / found["rhoA all members"] == pytest.approx(0.828, rel=0.03)
+
+
+def test_half_the_depth_of_a_section_given_as_numbers(hframe_case: Any) -> None:
+    frame = hframe_case[0].frame_structure.frame
+    assert half_depth(frame, "horizontal@T1") == pytest.approx(0.020, rel=0.02)
+
+
+# The iteration --------------------------------------------------------------------------------
+
+
+def test_an_iteration_is_one_eigenvalue_solution(hframe_case: Any) -> None:
+    with counted_evaluations() as counter:
+        result = Local().update(*hframe_case, RNG)
+    steps = [entry["iteration"] for entry in result.history]
+    assert steps == list(range(len(steps)))
+    assert counter.count == len(result.history)
+    costs = [entry["cost"] for entry in result.history]
+    assert costs == sorted(costs, reverse=True)
+    assert result.history[-1]["EI at T branch"] == result.parameters[0].after
+    assert result.diagnostics["converged"] == 1.0
+
+
+def test_the_first_step_is_equation_4(hframe_case: Any) -> None:
+    model, data = hframe_case
+    options = UpdateOptions(damping=0.05, max_iterations=1, max_step=10.0)
+    result = Local(options).update(model, data, RNG)
+    structure = model.frame_structure
+    parameters = [
+        Parameter("x", "EI", ("horizontal/1", "horizontal/16")),
+        Parameter("z", "EI", ("lower1/8", "lower2/8", "upper1/1", "upper2/1")),
+    ]
+    modes = solve_modes(model).elastic.take(slice(0, 5))
+    s = eigenvalue_sensitivities(model, modes, parameters)
+    measured_z, beta = data.eigenvalues, 0.05 * np.sum(data.eigenvalues**2)
+    step = np.linalg.solve(s.T @ s + beta * np.eye(2), s.T @ (measured_z - modes.eigenvalues))
+    assert structure.changes == ()
+    np.testing.assert_allclose([np.log(p.after) for p in result.parameters], step, rtol=1e-6)
+
+
+@pytest.mark.parametrize("damping", [0.0, 1e-9])
+def test_stiffness_stays_positive_where_damping_is_too_small(
+    hframe_case: Any, damping: float
+) -> None:
+    options = UpdateOptions(damping=damping)
+    strategy = Spring(arm=0.02, stiffness=PAPER_SPRINGS, options=options)
+    result = strategy.update(*hframe_case, RNG)
+    for entry in result.history:
+        assert all(entry[p.name] > 0.0 for p in result.parameters)
+    assert (solve_modes(result.model).eigenvalues >= 0.0).all()
+
+
+@pytest.mark.parametrize("residual", ["eigenvalue", "relative-eigenvalue", "frequency"])
+@pytest.mark.parametrize("strategy", [Local, Spring, Offset])
+def test_a_truth_within_the_class_is_recovered(
+    hframe: Any, strategy: type[Strategy], residual: str
+) -> None:
+    model = Model.of(hframe(mesh=(8, 4, 8)))
+    names, values = {
+        "Local": (("EI at T branch", "EI at T through"), (0.6, 1.2)),
+        "Spring": (("k_ry T branch", "EI all members"), (3e5, 1.02)),
+        "Offset": (("a T branch", "EI all members"), (-0.01, 0.97)),
+    }[strategy.__name__]
+    options = UpdateOptions(residual=residual, damping=1e-6, max_iterations=100)  # type: ignore[arg-type]
+    tool = strategy(options=options)  # type: ignore[call-arg]
+    start = tool.update(model, measured(model, 5), RNG)
+    # the class is what the strategy would build: set its parameters to a truth
+    structure = start.model.frame_structure
+    groups = {p.name: p for p, _ in structure.changes}
+    known = [groups[name] for name in names]
+    neutral = structure.with_values(
+        [*groups.values()], [_neutral(p, start) for p in groups.values()]
+    )
+    truth = Model.of(neutral.with_values(known, values))
+    result = tool.update(model, measured(truth, 6), RNG)
+    found = {p.name: p.after for p in result.parameters}
+    for name, value in zip(names, values, strict=True):
+        assert found[name] == pytest.approx(value, rel=2e-3)
+
+
+def _neutral(parameter: Parameter, start: UpdateResult) -> float:
+    """Return what takes a parameter back to where the strategy starts from."""
+    estimate = next(p for p in start.parameters if p.name == parameter.name)
+    return estimate.before / estimate.after if parameter.is_factor else estimate.before
+
+
+def test_a_mode_that_matches_nothing_is_left_out(hframe_case: Any) -> None:
+    model, data = hframe_case
+    shapes = data.shapes.copy()
+    shapes[:, 2] = np.random.default_rng(3).normal(size=len(shapes))
+    spoilt = Local().update(model, replace(data, shapes=shapes), RNG)
+    assert spoilt.diagnostics["paired_modes"] == 4.0
+    without = Local().update(model, data.select([1, 2, 4, 5]), RNG)
+    assert ratios(spoilt) == pytest.approx(ratios(without), rel=1e-3)
+
+
+def test_a_partner_that_is_lost_for_an_iteration_is_followed(hframe_case: Any) -> None:
+    model, data = hframe_case
+    shapes = data.shapes.copy()
+    shapes[:, 2] = np.random.default_rng(3).normal(size=len(shapes))
+    before = predict(Data(data), model.frame_structure)
+    alone = predict(Data(replace(data, shapes=shapes)), model.frame_structure)
+    followed = predict(Data(replace(data, shapes=shapes)), model.frame_structure, before)
+    assert alone.partner[2] == -1
+    assert np.isnan(alone.residual[2])
+    np.testing.assert_array_equal(followed.partner, before.partner)
+
+
+def test_no_mode_at_all_is_a_failure(hframe_case: Any) -> None:
+    model, data = hframe_case
+    noise = np.random.default_rng(4).normal(size=data.shapes.shape)
+    with pytest.raises(StrategyFailure, match="no mode"):
+        Global().update(model, replace(data, shapes=noise), RNG)
+
+
+def test_frequencies_alone_will_do(hframe_case: Any) -> None:
+    model, data = hframe_case
+    bare = replace(data, shapes=np.full(data.shapes.shape, np.nan))
+    with_shapes, without = (Local().update(model, d, RNG) for d in (data, bare))
+    assert ratios(without) == pytest.approx(ratios(with_shapes), rel=1e-6)
+
+
+def test_an_optimum_out_of_range_is_a_divergence(hframe_case: Any) -> None:
+    model, data = hframe_case
+    narrow = replace(global_stiffness(model.frame_structure), lower=0.95, upper=1.05)
+    with pytest.raises(Diverged, match=r"EI all members left its range 0\.95\.\.1\.05"):
+        sensitivity_update(model.frame_structure, [narrow], data)
+    soft = replace(narrow, fatal=False)
+    result = sensitivity_update(model.frame_structure, [soft], data)
+    assert result.parameters[0].after == pytest.approx(0.95)
+
+
+def test_no_more_parameters_than_frequencies(hframe_case: Any) -> None:
+    model, data = hframe_case
+    assert Spring().update(model, data.select([1, 2]), RNG).parameter_count == 2
+    assert Offset().update(model, data.select([1, 2]), RNG).parameter_count == 2
+    one = Local().update(model, data.select([1]), RNG)
+    assert [p.name for p in one.parameters] == ["EI at all"]
+
+    def some(name: str) -> Unknown:
+        return Unknown(Parameter(name, "EI", ()))
+
+    levels = [[some("a"), some("b")], [], [some("c"), some("d")], [some("e")]]
+    counts = {n: [u.parameter.name for u in carried_by(levels, n)] for n in (1, 2, 3, 4, 9)}
+    assert counts == {1: ["a"], 2: ["a", "b"], 3: ["a", "b"], 4: list("abcd"), 9: list("abcde")}
+
+
+# Other frames ---------------------------------------------------------------------------------
+
+
+def table_frame(elements: int, beam: str, softness: float = 0.0, **parts: Any) -> Frame:
+    """Return a 3-D box of eight tubes on four feet, a rail across; softer joints on request."""
+    tube = rectangular_tube(0.04, 0.04, 0.0025)
+    at = {
+        "A": (0.0, 0.0, 0.0),
+        "B": (1.0, 0.0, 0.0),
+        "C": (1.0, 0.8, 0.0),
+        "D": (0.0, 0.8, 0.0),
+        "E": (0.0, 0.0, 0.6),
+        "F": (1.0, 0.0, 0.6),
+        "G": (1.0, 0.8, 0.6),
+        "H": (0.0, 0.8, 0.6),
+        "M": (0.5, 0.0, 0.6),
+        "N": (0.5, 0.8, 0.6),
+    }
+    kinds = {**dict.fromkeys("ABCD", "foot"), **dict.fromkeys("EFGH", "corner")}
+    joints = tuple(Joint(name, xyz, kinds.get(name, "T")) for name, xyz in at.items())
+    pairs = ("AE", "BF", "CG", "DH", "EM", "MF", "FG", "GN", "NH", "HE", "MN")
+    material = parts.pop("material")
+    members = tuple(Member(p, (p[0], p[1]), elements, tube, material) for p in pairs)
+    springs = tuple(
+        JointSpring(joint, member, {"ry": 3e4, "rz": 3e4})
+        for joint, member in (("F", "BF"), ("M", "MN"), ("N", "MN"))
+        if softness
+    )
+    return Frame("3d", beam, joints, members, joint_springs=springs, **parts)  # type: ignore[arg-type]
+
+
+def other_cases(ladder: Any, asymmetric: Any) -> Iterator[tuple[str, Frame, Measurement]]:
+    finer = ladder("timoshenko", polar=False, elements=8, E=71e9)
+    yield "ladder", ladder(), measured(finer, 3, LADDER_HZ)
+    supports = (Support(Place(joint="A"), ("z", "rx", "ry")), Support(Place(joint="D"), ("z",)))
+    held = replace(ladder(), supports=supports)
+    yield "supported", held, measured(replace(finer, supports=supports), 4)
+    truth = asymmetric(3.0, beam="timoshenko", polar=False, elements=8, E=71e9)
+    yield "asymmetric", ladder(stretch=1.04), measured(truth, 5)
+    aluminium = ladder().members[0].material
+    space = table_frame(4, "timoshenko", 1.0, material=replace(aluminium, E=66e9))
+    yield "3d", table_frame(2, "euler-bernoulli", material=aluminium), measured(space, 5)
+
+
+@pytest.fixture(scope="module")
+def cases(ladder: Any, asymmetric_ladder: Any) -> dict[str, tuple[Model, Measurement]]:
+    return {
+        name: (Model.of(nominal), data)
+        for name, nominal, data in other_cases(ladder, asymmetric_ladder)
+    }
+
+
+@pytest.mark.parametrize("case", ["ladder", "supported", "asymmetric", "3d"])
+@pytest.mark.parametrize("strategy", EVERY, ids=lambda s: s.name)
+def test_every_strategy_gives_a_physical_model_on_other_frames(
+    cases: Any, strategy: Strategy, case: str
+) -> None:
+    model, data = cases[case]
+    matrices = model.mass.copy(), model.stiffness.copy()
+    result = strategy.update(model, data, RNG)
+    modes = solve_modes(result.model)
+    assert modes.rigid.sum() == solve_modes(model).rigid.sum()
+    assert (modes.eigenvalues >= 0.0).all()
+    assert result.history[-1]["cost"] < 0.9 * result.history[0]["cost"]
+    assert result.diagnostics["paired_modes"] == len(data)
+    assert result.parameter_count == len(result.parameters)
+    # the nominal model is left as it was
+    for kept, now in zip(matrices, (model.mass, model.stiffness), strict=True):
+        assert abs(kept - now).max() == 0.0
+    # what the harness does with the result: sensors and a design change
+    assert result.model.observe(data.sensors).shape == (len(data.sensors), result.model.size)
+    middle = Place(member=model.frame_structure.frame.members[0].name, s=0.5)
+    masses, springs = [PointMass(middle, 0.5)], [GroundSpring(middle, "z", 1e6)]
+    changed = solve_modes(result.model.attach(masses, springs))
+    assert changed.rigid.sum() == max(modes.rigid.sum() - 1, 0)
+    assert (changed.eigenvalues >= 0.0).all()
+
+
+def test_the_softer_joint_of_the_asymmetric_frame_comes_out_softer(cases: Any) -> None:
+    model, data = cases["asymmetric"]
+    truth_free = Bayesian().update(model, data, RNG)
+    estimates = {p.name: p for p in truth_free.parameters}
+    assert estimates["E at L"].after < 1.0 - 2.0 * (estimates["E at L"].std or 0.0)
+
+
+def test_joint_groups(hframe: Any, ladder: Any, cases: Any) -> None:
+    groups = {group.name: group.ends for group in joint_groups(hframe())}
+    assert groups == {
+        "T through": ("lower1@T1", "upper1@T1", "lower2@T2", "upper2@T2"),
+        "T branch": ("horizontal@T1", "horizontal@T2"),
+    }
+    assert {g.name: len(g.ends) for g in joint_groups(ladder())} == {
+        "L": 8,
+        "T through": 4,
+        "T branch": 2,
+    }
+    space = cases["3d"][0].frame_structure.frame
+    assert {g.name: len(g.ends) for g in joint_groups(space)} == {
+        "corner": 12,
+        "T through": 4,
+        "T branch": 2,
+    }
+    untyped = replace(ladder(), joints=tuple(replace(j, type="") for j in ladder().joints))
+    assert len(joint_groups(untyped)) == 8
+    assert [g.name for g in groups_within(untyped, 3)] == ["all", "all through", "all branch"]
+    assert [g.name for g in groups_within(untyped, 2)] == ["all"]
+    assert half_depth(ladder(), "BE@B") == pytest.approx(0.0127)
+
+
+def test_the_springs_of_a_ladder_sit_at_the_faces(cases: Any) -> None:
+    model, data = cases["ladder"]
+    result = Spring().update(model, data, RNG)
+    springs = result.model.frame_structure.frame.joint_springs
+    ends = sorted(f"{s.member}@{s.joint}" for s in springs)
+    assert ends == ["AD@A", "AD@D", "BE@B", "BE@E", "CF@C", "CF@F"]
+    np.testing.assert_allclose([s.arm for s in springs], 0.0127)
+    assert {tuple(s.stiffness) for s in springs} == {("z", "rx", "ry")}
+    assert [p.name for p in result.parameters] == ["k_ry L", "k_ry T branch", "E all members"]
+
+
+def test_the_global_factor_takes_the_shear_stiffness_along(ladder: Any) -> None:
+    nominal = Model.of(ladder("timoshenko", polar=False, elements=2))
+    truth = Model.of(ladder("timoshenko", polar=False, elements=2, E=60e9))
+    result = Global().update(nominal, measured(truth, 4), RNG)
+    before = nominal.frame_structure.frame.members[0].material.E
+    assert result.parameters[0].after == pytest.approx(60e9 / before, rel=1e-6)
+    assert abs(result.model.stiffness - truth.stiffness).max() < 1e-5 * truth.stiffness.max()
+
+
+def test_what_is_not_there_is_not_applicable(hframe_case: Any) -> None:
+    model, data = hframe_case
+    matrices = replace(model, structure=None)
+    frame = model.frame_structure.frame
+    beam = replace(frame, members=frame.members[:1], joints=frame.joints, masses=())
+    beam = replace(beam, joints=tuple(j for j in beam.joints if j.name in ("T1", "T2")))
+    for strategy in EVERY:
+        with pytest.raises(NotApplicable, match="matrices"):
+            strategy.update(matrices, data, RNG)
+    for strategy in (Local(), Spring(), Offset()):
+        with pytest.raises(NotApplicable):
+            strategy.update(Model.of(beam), data, RNG)
+
+
+# Statistics -----------------------------------------------------------------------------------
+
+
+def test_the_linear_gaussian_limit_has_the_closed_form(ladder: Any) -> None:
+    model = Model.of(ladder(elements=2))
+    exact = measured(model, 6, std=1e-6)
+    rng = np.random.default_rng(8)
+    data = exact.with_noise(rng)
+    strategy = Bayesian(stiffness_std=1e-5, torsion_std=2e-5, joint_std=5e-5)
+    result = strategy.update(model, data, RNG)
+    unknowns = strategy.unknowns(model.frame_structure, weighed=False)
+    modes = solve_modes(model).elastic.take(slice(0, 6))
+    slope = eigenvalue_sensitivities(model, modes, [u.parameter for u in unknowns])
+    deviation = 8.0 * np.pi**2 * data.frequencies * data.frequency_std
+    s = slope / deviation[:, None]
+    prior = np.diag([1.0 / (u.prior_std or 0.0) ** 2 for u in unknowns])
+    covariance = np.linalg.inv(s.T @ s + prior)
+    expected = covariance @ s.T @ ((data.eigenvalues - modes.eigenvalues) / deviation)
+    found = np.array([p.after - 1.0 for p in result.parameters])
+    np.testing.assert_allclose(found, expected, atol=1e-3 * np.abs(expected).max())
+    np.testing.assert_allclose(
+        [p.std for p in result.parameters], np.sqrt(np.diagonal(covariance)), rtol=1e-3
+    )
+
+
+def test_the_stated_deviations_are_right(ladder: Any) -> None:
+    """Truths from the prior, data from the truths: (theta_hat - theta) / std is a unit normal."""
+    rng = np.random.default_rng(21)
+    model = Model.of(ladder(elements=2))
+    structure = model.frame_structure
+    strategy = Bayesian(joint_std=0.3)
+    unknowns = strategy.unknowns(structure, weighed=False)
+    std = np.array([u.prior_std for u in unknowns])
+    parameters = [u.parameter for u in unknowns]
+    scores = []
+    for _ in range(60):
+        truth = std * rng.standard_normal(len(std))
+        real = Model.of(structure.with_values(parameters, np.exp(truth)))
+        data = measured(real, 6, std=0.003).with_noise(rng)
+        result = strategy.update(model, data, rng)
+        found = np.array([np.log(p.after) for p in result.parameters])
+        deviation = np.array([(p.std or 0.0) / p.after for p in result.parameters])
+        assert (deviation < std).all()
+        scores.append((found - truth) / deviation)
+    squares = np.square(scores).sum(axis=0)
+    low, high = stats.chi2.ppf([1e-3, 1.0 - 1e-3], len(scores))
+    assert ((squares > low) & (squares < high)).all()
+    assert np.abs(np.mean(scores, axis=0)).max() < 3.5 / np.sqrt(len(scores))
+
+
+def test_weighing_tells_density_from_stiffness(ladder: Any) -> None:
+    model = Model.of(ladder(elements=4, accelerometer=False))
+    frame = ladder(elements=4, accelerometer=False)
+    heavier = tuple(
+        replace(m, material=replace(m.material, rho=1.05 * m.material.rho)) for m in frame.members
+    )
+    truth = Model.of(replace(frame, members=heavier))
+    structure = model.frame_structure
+    mass = float(structure.properties.rhoA @ structure.properties.length)
+    data = replace(measured(truth, 5, std=1e-4), total_mass=(1.05 * mass, 1e-4 * mass))
+    weighed = {p.name: p for p in Bayesian().update(model, data, RNG).parameters}
+    assert weighed["density all members"].after == pytest.approx(1.05, rel=1e-3)
+    assert weighed["E all members"].after == pytest.approx(1.0, abs=0.02)
+    bare = {
+        p.name: p for p in Bayesian().update(model, replace(data, total_mass=None), RNG).parameters
+    }
+    assert "density all members" not in bare
+    assert bare["E all members"].after == pytest.approx(1.0 / 1.05, rel=0.02)
+
+
+def test_shapes_as_data_sharpen_the_parameters(ladder: Any) -> None:
+    model = Model.of(ladder(elements=2))
+    options = replace(Bayesian().options, shapes=True)
+    structure = model.frame_structure
+    unknowns = Bayesian().unknowns(structure, weighed=False)
+    parameters = [u.parameter for u in unknowns]
+    values = [0.97, 0.8, 0.7, 1.1, 0.8]
+    truth = Model.of(structure.with_values(parameters, values))
+    rng = np.random.default_rng(5)
+    data = measured(truth, 4).with_noise(rng)
+    frequencies = Bayesian().update(model, data, RNG)
+    both = Bayesian(options=options).update(model, data, RNG)
+    for one, two, value in zip(frequencies.parameters, both.parameters, values, strict=True):
+        assert one.std is not None
+        assert two.std is not None
+        assert two.std < one.std
+        assert abs(two.after - value) < 4.0 * two.std
+
+
+def test_the_jacobian_of_scaled_shapes(ladder: Any) -> None:
+    model = Model.of(ladder(elements=2))
+    structure = model.frame_structure
+    data = Data(measured(model, 3).with_noise(np.random.default_rng(2)), "frequency", True, True)
+    labels = tuple(label for label in structure.labels if label)
+    parameters = [Parameter("GJ", "GJ", labels), Parameter("EI", "EI", labels[:3])]
+    slope = predict(data, structure).jacobian(parameters)
+    for p, parameter in enumerate(parameters):
+        up, down = (
+            predict(data, structure.with_values([parameter], [1.0 + h])).residual
+            for h in (1e-5, -1e-5)
+        )
+        difference = -(up - down) / 2e-5
+        np.testing.assert_allclose(slope[:, p], difference, atol=1e-5 * np.abs(difference).max())
+
+
+def test_statistics_need_deviations(hframe_case: Any) -> None:
+    model, data = hframe_case
+    with pytest.raises(NotApplicable, match="standard deviation"):
+        Bayesian().update(model, replace(data, frequency_std=np.zeros(5)), RNG)
+
+
+def test_matrices_of_the_result_are_sparse(hframe_case: Any) -> None:
+    result = Offset().update(*hframe_case, RNG)
+    assert isinstance(result.model.frame_structure, Structure)
+    assert sp.issparse(result.model.stiffness)
+    assert result.model.stiffness_change is None

@@ -1,0 +1,364 @@
+"""A tiny case and toy strategies, in a module that worker processes can import."""
+
+from __future__ import annotations
+
+import gc
+import hashlib
+import os
+import re
+import signal
+import sys
+import time
+import types
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench.core.case.case import Case, Modification
+from femubench.core.errors import Diverged, NotApplicable, SelfCheckFailed
+from femubench.core.fem.frame import Frame, GroundSpring, Joint, Material, Member, Place, PointMass
+from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.sections import Section
+from femubench.core.measurement import Measurement, Sensors
+from femubench.core.modal.eigen import solve_modes
+from femubench.core.model import LowRank, Model
+from femubench.core.strategy import ParameterEstimate, Strategy, UpdateResult
+
+SECRET = re.compile("zq[0-9]{12}")
+SECRET_BYTES = re.compile(b"zq[0-9]{12}")
+
+
+def frame(elements: int, modulus: float, masses: tuple[PointMass, ...] = ()) -> Frame:
+    """An L of two unequal members, out of plane."""
+    section = Section(A=2.0e-4, Iy=2.0e-8, Iz=2.0e-8, J=3.0e-8, Jp=4.0e-8)
+    material = Material(E=modulus, nu=0.3, rho=2700.0)
+    joints = (
+        Joint("A", (0.0, 0.0, 0.0)),
+        Joint("B", (0.6, 0.0, 0.0)),
+        Joint("C", (0.6, 0.45, 0.0)),
+    )
+    members = (
+        Member("long", ("A", "B"), elements, section, material),
+        Member("short", ("B", "C"), elements, section, material),
+    )
+    return Frame("out-of-plane", "euler-bernoulli", joints, members, masses=masses)
+
+
+def sensors() -> Sensors:
+    points = [(0.0, 0.0), (0.2, 0.0), (0.4, 0.0), (0.6, 0.0), (0.6, 0.15), (0.6, 0.3), (0.6, 0.45)]
+    xyz = np.array([(x, y, 0.0) for x, y in points])
+    return Sensors(tuple(f"s{i}" for i in range(len(xyz))), xyz, ("z",) * len(xyz))
+
+
+def measured(model: Model, numbers: tuple[int, ...]) -> Measurement:
+    """The lowest elastic modes of a model, as a test would give them."""
+    modes = solve_modes(model).elastic.take(slice(0, len(numbers)))
+    shapes = np.asarray(model.observe(sensors()) @ modes.shapes)
+    shapes = shapes / np.abs(shapes).max(axis=0) * np.linspace(-1.0, 2.0, len(numbers))
+    f = modes.natural_frequencies
+    nothing = np.full(len(numbers), np.nan)
+    return Measurement(sensors(), numbers, f, 0.002 * f, nothing, shapes, 0.01 * np.abs(shapes))
+
+
+MASSES = (PointMass(Place(joint="C"), 0.1),)
+SPRINGS = (GroundSpring(Place(member="long", s=0.5), "z", 1.0e5),)
+
+
+def tiny_case(name: str = "corner", modulus: float = 77.0e9, *, folder: str = "corner") -> Case:
+    """A coarse model 10 % too stiff, tested on a finer mesh at 70 GPa."""
+    truth = Model.of(frame(9, 70.0e9, (PointMass(Place(joint="A"), 0.005),)))
+    changed = measured(truth.attach(MASSES, SPRINGS), (1, 2, 3))
+    return Case(
+        name=name,
+        title="An L",
+        source="made up",
+        folder=Path(folder),
+        model=Model.of(frame(3, modulus)),
+        measurement=measured(truth, (1, 2, 3, 4, 5)),
+        used=(1, 2, 3),
+        held_out=(4, 5),
+        modifications=(Modification("mass at C", MASSES, SPRINGS, changed),),
+        digest="0123",
+    )
+
+
+def matrices_only(model: Model) -> Model:
+    """The same matrices without a frame behind them."""
+    return replace(model, structure=None)
+
+
+class Unchanged(Strategy):
+    name = "unchanged"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        return UpdateResult(model)
+
+
+class Softer(Strategy):
+    """Finds the modulus from the first frequency."""
+
+    name = "softer"
+    citation = "none"
+    needs = frozenset({"elements"})
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        structure = model.frame_structure
+        first = solve_modes(model).elastic.eigenvalues[0]
+        factor = float(measurement.eigenvalues[0] / first)
+        places = tuple(label for label in structure.labels if label)
+        changed = structure.with_values([Parameter("E", "E", places)], [factor])
+        estimate = ParameterEstimate("E", 1.0, factor, std=0.01)
+        return UpdateResult(
+            Model.of(changed), 1, (estimate,), ({"step": 1.0},), {"rng": rng.random()}
+        )
+
+
+class Grounded(Strategy):
+    """Ties the structure to ground by a low-rank change: rigid-body modes are lost."""
+
+    name = "grounded"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        basis = np.zeros((model.size, 1))
+        basis[model.dofs.direction.index("z")] = 1.0
+        change = LowRank(basis, np.array([[1.0e6]]))
+        return UpdateResult(replace(model, stiffness_change=change), 1)
+
+
+class Buckled(Strategy):
+    """Takes so much stiffness away that eigenvalues turn negative."""
+
+    name = "buckled"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        basis = np.zeros((model.size, 1))
+        basis[model.dofs.direction.index("z")] = 1.0
+        change = LowRank(basis, np.array([[-1.0e4]]))
+        return UpdateResult(replace(model, stiffness_change=change), 1)
+
+
+class Failing(Strategy):
+    name = "failing"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        raise SelfCheckFailed("used modes reproduced", 0.25, 1e-8)
+
+
+class Diverging(Strategy):
+    name = "diverging"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        raise Diverged("step 7: the residual grew to 1e9")
+
+
+class Declining(Strategy):
+    name = "declining"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        raise NotApplicable("needs two modes\nof one kind")
+
+
+class Needy(Strategy):
+    name = "needy"
+    citation = "none"
+    needs = frozenset({"geometry"})
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        return UpdateResult(model)
+
+
+class Exiting(Strategy):
+    """Leaves the process in a chosen way: an exit code, or a signal where it is negative."""
+
+    name = "exiting"
+    citation = "none"
+
+    def __init__(self, code: int) -> None:
+        self.code = code
+        self.name = f"exiting-{code}"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        if self.code < 0:
+            os.kill(os.getpid(), -self.code)
+            signal.pause()
+        os._exit(self.code)
+
+
+class Quitting(Strategy):
+    name = "quitting"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        sys.exit("enough")
+
+
+class Looping(Strategy):
+    name = "looping"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        while True:
+            time.sleep(0.05)
+
+
+class _LockedError(Exception):
+    def __init__(self, first: object, second: object) -> None:
+        self.payload = (lambda: first, second)
+
+    def __str__(self) -> str:
+        raise RuntimeError("no text either")
+
+    def __reduce__(self) -> str:
+        raise TypeError("cannot be pickled")
+
+
+class Locked(Strategy):
+    """Raises an exception that cannot be pickled and has no text."""
+
+    name = "locked"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        raise _LockedError(1, 2)
+
+
+class _Trap:
+    def __init__(self, spring: bool = False) -> None:
+        self.spring = spring
+
+    def __getstate__(self) -> dict[str, bool]:
+        if self.spring:
+            raise TypeError("this geometry stays here")
+        return {"spring": True}
+
+    def __setstate__(self, state: object) -> None:
+        raise RuntimeError("opened in the wrong place")
+
+
+class Unpicklable(Strategy):
+    """Returns a model that cannot be sent back."""
+
+    name = "unpicklable"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        return UpdateResult(replace(model, geometry=_Trap(spring=True)))
+
+
+class Unreadable(Strategy):
+    """Returns a model that can be sent but not read."""
+
+    name = "unreadable"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        return UpdateResult(replace(model, geometry=_Trap()))
+
+
+class WrongSize(Strategy):
+    name = "wrong-size"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        return UpdateResult(replace(model, stiffness=sp.csc_array(model.stiffness[:-1, :-1])))
+
+
+class Numbers(Strategy):
+    """Returns something that is no result at all."""
+
+    name = "numbers"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        return 42
+
+
+class Spy(Strategy):
+    """Looks for held-out data in everything the process holds, and reports what it finds.
+
+    It knows the held-out numbers by their hash alone, and secret words by their pattern.
+    """
+
+    name = "spy"
+    citation = "none"
+
+    def __init__(self, hashes: frozenset[str]) -> None:
+        self.hashes = hashes
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        found = search([model, measurement, rng, *gc.get_objects()], self.hashes)
+        return UpdateResult(model, diagnostics=found)
+
+
+def hashed(number: float) -> str:
+    return hashlib.sha256(float(number).hex().encode()).hexdigest()
+
+
+def search(roots: list[object], hashes: frozenset[str]) -> dict[str, float]:
+    """Walk all that can be reached and count what gives secret words or numbers away."""
+    seen, queue = {id(roots)}, list(roots)
+    found = {"objects": 0.0, "numbers": 0.0, "words": 0.0}
+    while queue:
+        item = queue.pop()
+        if id(item) in seen:
+            continue
+        seen.add(id(item))
+        found["objects"] += 1.0
+        if type(item) is np.ndarray:
+            small = item.ravel() if item.dtype == np.float64 and item.size < 1000 else ()
+            found["numbers"] += sum(hashed(number) in hashes for number in small)
+        elif isinstance(item, float):
+            found["numbers"] += hashed(item) in hashes
+        elif isinstance(item, str):
+            found["words"] += bool(SECRET.search(item))
+        elif isinstance(item, bytes):
+            found["words"] += bool(SECRET_BYTES.search(item))
+        elif not isinstance(item, type | types.ModuleType | types.FunctionType):
+            queue.extend(gc.get_referents(item))
+    return found
+
+
+def cannot_start() -> None:
+    os._exit(3)
