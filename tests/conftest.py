@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
+
 from femubench.core.fem.frame import (
     Frame,
     Joint,
@@ -124,6 +126,13 @@ def build_portal(seed: int, beam: str = "timoshenko", elements: int = 2, **parts
         ends = (f"J{a}", f"J{b}")
         members.append(Member(f"m{k}", ends, elements, section, material, (x, y, z)))
     return Frame("3d", beam, joints, tuple(members), **parts)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_thread() -> Iterator[None]:
+    """Keep linear algebra to one thread: matrices are small, and threads only wait for another."""
+    with threadpool_limits(1):
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+
 from femubench.core.fem.beam import (
     BeamProperties,
     mass_matrices,
@@ -17,7 +20,6 @@ from femubench.core.fem.sections import Section, constant_kappa
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.model import Model
 from femubench.core.typing import FloatArray
-from scipy.optimize import brentq
 
 LENGTH = 0.7
 VALUES = {
@@ -58,7 +60,7 @@ def derivative(coefficients: FloatArray) -> FloatArray:
 
 
 @pytest.mark.parametrize("shear_shape", [0.0, 1.0])
-def test_mass_is_the_quadrature_of_the_shape_functions(shear_shape):
+def test_mass_is_the_quadrature_of_the_shape_functions(shear_shape: float) -> None:
     p = one(**SHEAR, **ROTARY, shear_shape=shear_shape)
     N = polynomials(p)
     mass = sum(quadrature(N[:, i], VALUES["rhoA"]) for i in range(3))
@@ -69,7 +71,7 @@ def test_mass_is_the_quadrature_of_the_shape_functions(shear_shape):
 
 
 @pytest.mark.parametrize("shear", [{}, SHEAR])
-def test_stiffness_is_the_quadrature_of_the_strains(shear):
+def test_stiffness_is_the_quadrature_of_the_strains(shear: dict[str, float]) -> None:
     p = one(**shear, shear_shape=1.0)
     N = polynomials(p)
     slope = [derivative(N[:, i]) for i in range(6)]
@@ -82,7 +84,7 @@ def test_stiffness_is_the_quadrature_of_the_strains(shear):
     np.testing.assert_allclose(found, stiffness, rtol=0, atol=1e-12 * np.abs(found).max())
 
 
-def test_cubic_shape_functions_have_the_slope_as_rotation():
+def test_cubic_shape_functions_have_the_slope_as_rotation() -> None:
     N = polynomials(one(**SHEAR))
     np.testing.assert_allclose(N[:, 4], -derivative(N[:, 2]), atol=1e-11)
     np.testing.assert_allclose(N[:, 5], derivative(N[:, 1]), atol=1e-11)
@@ -101,7 +103,9 @@ def arm(first: float, second: float) -> FloatArray:
     ("first", "second"),
     [(0.1, 0.0), (0.0, 0.1), (0.05, 0.2), (-0.1, 0.0), (0.0, -1.0), (-0.2, 0.1)],
 )
-def test_partly_rigid_element_is_the_transformed_shorter_one(first, second, shear):
+def test_partly_rigid_element_is_the_transformed_shorter_one(
+    first: float, second: float, shear: dict[str, float]
+) -> None:
     short = one(**shear, length=LENGTH - first - second)
     T = arm(first, second)
     expected = T.T @ stiffness_matrices(short)[0] @ T
@@ -113,7 +117,7 @@ def test_partly_rigid_element_is_the_transformed_shorter_one(first, second, shea
 
 
 @pytest.mark.parametrize("a", [0.02, 0.3, -0.0283, -0.5])
-def test_partly_rigid_element_is_the_printed_equation(a):
+def test_partly_rigid_element_is_the_printed_equation(a: float) -> None:
     # Horton et al. (1999), equation (5); its dofs are w and dw/dx, ours w and ry = -dw/dx.
     L, EI = LENGTH, VALUES["EIy"]
     printed = EI * np.array(
@@ -138,7 +142,7 @@ def test_partly_rigid_element_is_the_printed_equation(a):
     np.testing.assert_allclose(mirrored, expected, atol=tolerance, rtol=0)
 
 
-def test_shape_functions_of_a_partly_rigid_element_move_with_its_nodes():
+def test_shape_functions_of_a_partly_rigid_element_move_with_its_nodes() -> None:
     p = one(rigid_1=0.1, rigid_2=0.2)
     np.testing.assert_allclose(shape_functions(p, 0, 0.0), np.eye(12)[:6], atol=1e-14)
     np.testing.assert_allclose(shape_functions(p, 0, 1.0), np.eye(12)[6:], atol=1e-14)
@@ -150,7 +154,7 @@ def test_shape_functions_of_a_partly_rigid_element_move_with_its_nodes():
     np.testing.assert_allclose(beyond, edge, atol=1e-7)
 
 
-def test_rigid_motion_costs_no_energy_and_carries_the_whole_mass():
+def test_rigid_motion_costs_no_energy_and_carries_the_whole_mass() -> None:
     p = one(**SHEAR, **ROTARY, rigid_1=-0.1, rigid_2=0.05, shear_shape=1.0)
     x = np.array([0.0, LENGTH])
     motions = np.zeros((12, 6))
@@ -167,7 +171,7 @@ def test_rigid_motion_costs_no_energy_and_carries_the_whole_mass():
     np.testing.assert_allclose(np.diag(inertia), expected, rtol=1e-12)
 
 
-def test_timoshenko_tends_to_euler_bernoulli_linearly_in_the_flexibility():
+def test_timoshenko_tends_to_euler_bernoulli_linearly_in_the_flexibility() -> None:
     def difference(scale: float) -> float:
         p = one(flex_y=scale * 5e-8, flex_z=scale * 3e-7, shear_shape=1.0)
         k = stiffness_matrices(p)[0] - stiffness_matrices(one())[0]
@@ -209,7 +213,7 @@ def roots_of(sign: float, count: int) -> FloatArray:
 
 
 def rates(errors: list[FloatArray]) -> FloatArray:
-    return np.array([np.log2(a / b) for a, b in zip(errors[:-1], errors[1:], strict=True)])
+    return np.array([np.log2(a / b) for a, b in pairwise(errors)])
 
 
 def errors_of(exact: FloatArray, meshes: tuple[int, ...], **case: object) -> list[FloatArray]:
@@ -226,7 +230,9 @@ def errors_of(exact: FloatArray, meshes: tuple[int, ...], **case: object) -> lis
     [(-1.0, {"A": ("x", "z", "ry")}, (8, 16, 32)), (1.0, {}, (16, 32, 64))],
     ids=["cantilever", "free-free"],
 )
-def test_frequencies_converge_with_the_fourth_power(sign, fixed, meshes):
+def test_frequencies_converge_with_the_fourth_power(
+    sign: float, fixed: dict[str, tuple[str, ...]], meshes: tuple[int, ...]
+) -> None:
     exact = euler_frequencies(roots_of(sign, 3))
     errors = errors_of(exact, meshes, fixed=fixed)
     np.testing.assert_allclose(rates(errors), 4.0, atol=0.1)
@@ -245,7 +251,8 @@ def wave_frequency(mode: int, cubic: bool) -> float:
     """Return the frequency of w = a sin kx, psi = b cos kx in Hz (Han, Benaroya & Wei 1999).
 
     With cubic mass functions the rotary inertia belongs to a slope that has the right mean w' in
-    each element but the nodal psi at its ends: on a fine mesh its square is w'^2 + (w' - psi)^2 / 5.
+    each element but the nodal psi at its ends: on a fine mesh its square is
+    w'^2 + (w' - psi)^2 / 5.
     """
     assert SECTION.kappa is not None
     k, GA = mode * np.pi / SPAN, SECTION.kappa(0.3)[1] * MATERIAL.G * SECTION.A
@@ -267,7 +274,7 @@ def bending_only(model: Model, count: int) -> FloatArray:
 
 
 @pytest.mark.parametrize("bending_mass", ["cubic", "shear-consistent"])
-def test_timoshenko_beam_meets_its_frequency_equation(bending_mass):
+def test_timoshenko_beam_meets_its_frequency_equation(bending_mass: str) -> None:
     exact = np.array([wave_frequency(mode, bending_mass == "cubic") for mode in (1, 2, 3)])
     found = [bending_only(horizontal(n, bending_mass=bending_mass), 3) for n in (32, 64, 128)]
     # Two nodes know the shear of a distributed load to first order only: the rate is 2, not 4.
@@ -276,7 +283,7 @@ def test_timoshenko_beam_meets_its_frequency_equation(bending_mass):
     np.testing.assert_allclose(extrapolated, exact, rtol=2e-7)
 
 
-def test_thin_timoshenko_beam_is_an_euler_bernoulli_beam():
+def test_thin_timoshenko_beam_is_an_euler_bernoulli_beam() -> None:
     thin = replace(SECTION, Iy=SECTION.Iy * 1e-6, kappa=constant_kappa(0.45))
     material = Material(70e9, 0.3, 2700.0)
     joints = (Joint("A", (0.0, 0.0, 0.0)), Joint("B", (SPAN, 0.0, 0.0)))

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import ortho_group
+
 from femubench.core.errors import NotApplicable
+from femubench.core.fem.frame import Frame
 from femubench.core.measurement import Sensors
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.expansion import (
@@ -19,7 +23,8 @@ from femubench.core.modal.expansion import (
 )
 from femubench.core.model import Model
 from femubench.core.typing import FloatArray
-from scipy.stats import ortho_group
+
+FrameBuilder = Callable[..., Frame]
 
 
 def thirteen_points(model: Model) -> Sensors:
@@ -35,12 +40,12 @@ def thirteen_points(model: Model) -> Sensors:
 
 
 @pytest.fixture
-def nominal(ladder) -> Model:
+def nominal(ladder: FrameBuilder) -> Model:
     return Model.of(ladder())
 
 
 @pytest.fixture
-def truth(asymmetric_ladder) -> Model:
+def truth(asymmetric_ladder: FrameBuilder) -> Model:
     return Model.of(asymmetric_ladder(accelerometer=False))
 
 
@@ -57,7 +62,7 @@ def mixed(seed: int, analytical: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_rotation_recovers_an_exact_mix(seed):
+def test_rotation_recovers_an_exact_mix(seed: int) -> None:
     analytical = np.random.default_rng(seed).standard_normal((13, 4))
     measured, rotation = mixed(seed, analytical)
     found = procrustes_rotation(measured, analytical)
@@ -68,7 +73,7 @@ def test_rotation_recovers_an_exact_mix(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_no_orthogonal_matrix_does_better(seed):
+def test_no_orthogonal_matrix_does_better(seed: int) -> None:
     rng = np.random.default_rng(seed)
     analytical, measured = rng.standard_normal((2, 13, 3))
     best = procrustes_rotation(measured, analytical)
@@ -79,7 +84,7 @@ def test_no_orthogonal_matrix_does_better(seed):
         assert np.linalg.norm(measured @ other - analytical) >= least
 
 
-def test_expansion_by_rotation_returns_the_full_shapes_of_an_exact_mix(nominal):
+def test_expansion_by_rotation_returns_the_full_shapes_of_an_exact_mix(nominal: Model) -> None:
     sensors, full = at_sensors(nominal)
     # Orthonormal at the sensors, so that a mix has the same column lengths.
     basis, upper = np.linalg.qr(sensors)
@@ -93,7 +98,7 @@ def test_expansion_by_rotation_returns_the_full_shapes_of_an_exact_mix(nominal):
     assert np.abs(np.abs(found) - np.abs(rotation)).max() < 1e-9
 
 
-def test_rotated_shapes_are_orthogonal_and_fit_better(nominal, truth):
+def test_rotated_shapes_are_orthogonal_and_fit_better(nominal: Model, truth: Model) -> None:
     sensors, full = at_sensors(nominal)
     measured, _ = at_sensors(truth)
     shapes, rotation = expand_by_rotation(measured, sensors, full)
@@ -108,21 +113,21 @@ def test_rotated_shapes_are_orthogonal_and_fit_better(nominal, truth):
     assert np.linalg.norm(expanded - aligned) == pytest.approx(after, rel=1e-9)
 
 
-def test_scale_and_sign_are_those_of_the_analytical_shapes(nominal):
+def test_scale_and_sign_are_those_of_the_analytical_shapes(nominal: Model) -> None:
     sensors, _ = at_sensors(nominal)
     np.testing.assert_allclose(
         same_length(sensors * [-3.0, 0.2, -7e4], sensors), sensors, rtol=1e-12
     )
 
 
-def test_serep_is_exact_in_the_span(nominal):
+def test_serep_is_exact_in_the_span(nominal: Model) -> None:
     sensors, full = at_sensors(nominal, 5)
     mix = np.random.default_rng(3).standard_normal((5, 3))
     expanded = expand_by_serep(sensors @ mix, sensors, full)
     np.testing.assert_allclose(expanded, full @ mix, rtol=0, atol=1e-10 * np.abs(full).max())
 
 
-def test_serep_is_the_least_squares_fit_outside_it(nominal, truth):
+def test_serep_is_the_least_squares_fit_outside_it(nominal: Model, truth: Model) -> None:
     sensors, full = at_sensors(nominal, 3)
     measured, _ = at_sensors(truth)
     expanded = nominal.observe(thirteen_points(nominal)) @ expand_by_serep(measured, sensors, full)
@@ -131,7 +136,7 @@ def test_serep_is_the_least_squares_fit_outside_it(nominal, truth):
     np.testing.assert_allclose(sensors.T @ residual, 0.0, atol=1e-10)
 
 
-def test_dynamic_expansion_is_exact_for_the_models_own_modes(truth):
+def test_dynamic_expansion_is_exact_for_the_models_own_modes(truth: Model) -> None:
     modes = solve_modes(truth).elastic
     rows = truth.observe(thirteen_points(truth))
     expanded = expand_by_dynamics(
@@ -142,7 +147,9 @@ def test_dynamic_expansion_is_exact_for_the_models_own_modes(truth):
     )
 
 
-def test_dynamic_expansion_meets_the_readings_with_the_least_force(nominal, truth):
+def test_dynamic_expansion_meets_the_readings_with_the_least_force(
+    nominal: Model, truth: Model
+) -> None:
     measured, _ = at_sensors(truth)
     eigenvalues = solve_modes(truth).elastic.eigenvalues[:3]
     rows = nominal.observe(thirteen_points(nominal))
@@ -158,7 +165,7 @@ def test_dynamic_expansion_meets_the_readings_with_the_least_force(nominal, trut
         assert np.abs(gradient).max() < 1e-9 * size.max()
 
 
-def test_sensors_with_a_gap_are_left_out():
+def test_sensors_with_a_gap_are_left_out() -> None:
     shapes = np.ones((5, 2))
     shapes[1, 1] = shapes[3, 0] = np.nan
     np.testing.assert_array_equal(measured_rows(shapes), [True, False, True, False, True])
@@ -166,7 +173,9 @@ def test_sensors_with_a_gap_are_left_out():
         measured_rows(np.array([[1.0, np.nan], [np.nan, 2.0], [1.0, 1.0]]))
 
 
-def test_asymmetry_is_seen_in_every_shape(ladder, asymmetric_ladder):
+def test_asymmetry_is_seen_in_every_shape(
+    ladder: FrameBuilder, asymmetric_ladder: FrameBuilder
+) -> None:
     """Tell that the asymmetric frame is no mirror image of itself, unlike the nominal one."""
     mirror = [2, 1, 0, 5, 4, 3]  # A B C D E F turned end for end
     for frame, symmetric in (

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from femubench.core.errors import ModelError
-from femubench.core.fem.frame import Place, Support
+from femubench.core.fem.frame import Frame, Place, Support
 from femubench.core.measurement import Sensors
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.frf import receptance
 from femubench.core.model import Model
 
+FrameBuilder = Callable[..., Frame]
 POINTS = Sensors(
     ("B", "E", "mid", "F"),
     np.array(
@@ -25,7 +28,9 @@ FREQUENCIES = np.array([20.0, 150.0, 255.0, 400.0, 580.0, 1000.0, 3000.0])
 
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("damping", [0.0, 0.01, "each"])
-def test_receptance_is_the_inverse_dynamic_stiffness(ladder, held, damping):
+def test_receptance_is_the_inverse_dynamic_stiffness(
+    ladder: FrameBuilder, held: bool, damping: float | str
+) -> None:
     frame = ladder("timoshenko", polar=False)
     if held:
         frame = replace(frame, supports=(Support(Place(joint="A"), ("z", "rx", "ry")),))
@@ -48,7 +53,7 @@ def test_receptance_is_the_inverse_dynamic_stiffness(ladder, held, damping):
         )
 
 
-def test_a_held_structure_tends_to_its_static_flexibility(ladder):
+def test_a_held_structure_tends_to_its_static_flexibility(ladder: FrameBuilder) -> None:
     frame = replace(ladder(), supports=(Support(Place(joint="A"), ("z", "rx", "ry")),))
     model = Model.of(frame)
     rows = model.observe(POINTS)
@@ -58,7 +63,7 @@ def test_a_held_structure_tends_to_its_static_flexibility(ladder):
     assert np.abs(found.imag).max() == 0.0
 
 
-def test_a_free_structure_tends_to_a_rigid_body(ladder):
+def test_a_free_structure_tends_to_a_rigid_body(ladder: FrameBuilder) -> None:
     model = Model.of(ladder(accelerometer=False))
     modes = solve_modes(model)
     mass = float(np.sum(np.square(modes.shapes[:, :3].T @ model.mass @ up(model))))
@@ -79,14 +84,14 @@ def up(model: Model) -> np.ndarray:  # type: ignore[type-arg]
     return np.array([float(d == "z") for d in model.dofs.direction])
 
 
-def test_zero_frequency_of_a_free_structure_is_refused(ladder):
+def test_zero_frequency_of_a_free_structure_is_refused(ladder: FrameBuilder) -> None:
     model = Model.of(ladder())
     rows = model.observe(POINTS)
     with pytest.raises(ModelError, match="infinite"):
         receptance(solve_modes(model), rows, rows, np.array([0.0]))
 
 
-def test_missing_damping_counts_as_none(ladder):
+def test_missing_damping_counts_as_none(ladder: FrameBuilder) -> None:
     model = Model.of(ladder())
     modes, rows = solve_modes(model), model.observe(POINTS)
     some = np.full(len(modes), np.nan)
@@ -94,7 +99,7 @@ def test_missing_damping_counts_as_none(ladder):
     np.testing.assert_array_equal(found, receptance(modes, rows, rows, FREQUENCIES))
 
 
-def test_the_peak_has_the_height_that_damping_gives_it(ladder):
+def test_the_peak_has_the_height_that_damping_gives_it(ladder: FrameBuilder) -> None:
     model = Model.of(ladder())
     modes, rows = solve_modes(model), model.observe(POINTS)[:1]
     frequency = modes.natural_frequencies[3]

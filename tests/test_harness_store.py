@@ -216,7 +216,7 @@ def test_one_row_a_job() -> None:
     assert frame["strategy"].tolist() == ["softer", "failing"]
     assert frame["used_percent"].tolist()[0] == 3.0
     assert np.isnan(frame["used_percent"].tolist()[1])
-    assert frame["rank"].tolist() == [2, 1]  # an unphysical model ranks below a failure
+    assert frame["rank"].tolist() == [1, 2]  # even an unphysical model is more than a failure
     assert frame["unphysical"].tolist() == [True, False]
     assert len(results_frame(Run({}, ()))) == 0
 

@@ -11,6 +11,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+
 from femubench.core.case.case import Case
 from femubench.core.case.reader import read_case
 from femubench.core.modal.eigen import solve_modes
@@ -33,7 +34,7 @@ def independent() -> ModuleType:
     return module
 
 
-def test_the_second_reader_shares_nothing():
+def test_the_second_reader_shares_nothing() -> None:
     tree = ast.parse((HERE / "independent_reader.py").read_text())
     names = {alias.name for n in ast.walk(tree) if isinstance(n, ast.Import) for alias in n.names}
     names |= {n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
@@ -41,7 +42,7 @@ def test_the_second_reader_shares_nothing():
 
 
 @pytest.fixture(params=[(f, b) for f in FOLDERS for b in ("euler-bernoulli", "timoshenko")])
-def folder(request, tmp_path) -> Path:
+def folder(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     """Return a copy of a folder with each beam theory."""
     name, beam = request.param
     copy = tmp_path / name
@@ -61,14 +62,14 @@ def elastic(model: Model, count: int) -> np.ndarray:  # type: ignore[type-arg]
     return modes.natural_frequencies[:count]
 
 
-def test_frequencies_agree(independent, folder):
+def test_frequencies_agree(independent: ModuleType, folder: Path) -> None:
     case = read_case(folder)
     expected = independent.IndependentCase(folder).frequencies
     assert len(expected) == case.model.size
     np.testing.assert_allclose(elastic(case.model, 25), expected[:25], rtol=1e-8)
 
 
-def test_readings_agree(independent, folder):
+def test_readings_agree(independent: ModuleType, folder: Path) -> None:
     case = read_case(folder)
     expected = independent.IndependentCase(folder).readings()[:, :10]
     shapes = solve_modes(case.model).shapes[:, :10]
@@ -78,7 +79,7 @@ def test_readings_agree(independent, folder):
     np.testing.assert_allclose(found * sign, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
 
 
-def test_modifications_agree_and_do_not_carry_over(independent, folder):
+def test_modifications_agree_and_do_not_carry_over(independent: ModuleType, folder: Path) -> None:
     case: Case = read_case(folder)
     assert case.modifications
     for index, change in enumerate(case.modifications):
@@ -87,7 +88,7 @@ def test_modifications_agree_and_do_not_carry_over(independent, folder):
         np.testing.assert_allclose(elastic(modified, 20), expected[:20], rtol=1e-8)
 
 
-def test_a_slip_of_the_sign_or_place_would_be_seen(independent, folder):
+def test_a_slip_of_the_sign_or_place_would_be_seen(independent: ModuleType, folder: Path) -> None:
     """Tell that the agreement is no luck: small changes of the folder move the frequencies."""
     expected = independent.IndependentCase(folder).frequencies[:10]
     text = (folder / "case.toml").read_text()

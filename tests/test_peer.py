@@ -9,11 +9,13 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+
 from femubench.core.fem.frame import Frame, Place, PointMass, Support
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.model import Model
@@ -21,8 +23,11 @@ from femubench.core.model import Model
 Peer = Callable[[dict[str, Any]], list[float]]
 
 
+FrameBuilder = Callable[..., Frame]
+
+
 @pytest.fixture(scope="module")
-def peer(tmp_path_factory) -> Peer:
+def peer(tmp_path_factory: pytest.TempPathFactory) -> Peer:
     """Return a call to OpenSees in a process of its own."""
     package = importlib.util.find_spec("openseespylinux")
     if importlib.util.find_spec("openseespy") is None or package is None or not package.origin:
@@ -66,7 +71,7 @@ def description(frame: Frame, count: int) -> dict[str, Any]:
         s, m = member.section, member.material
         constants = {"A": s.A, "E": m.E, "G": m.G, "J": s.J, "Iy": s.Iy, "Iz": s.Iz}
         constants |= {"rhoA": m.rho * s.A, "up": member.up}
-        elements += [constants | {"ends": pair} for pair in zip(chain[:-1], chain[1:], strict=True)]
+        elements += [constants | {"ends": pair} for pair in pairwise(chain)]
     return {
         "nodes": nodes,
         "elements": elements,
@@ -77,7 +82,9 @@ def description(frame: Frame, count: int) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_a_skew_spatial_frame_agrees_with_opensees(peer, portal, seed):
+def test_a_skew_spatial_frame_agrees_with_opensees(
+    peer: Peer, portal: FrameBuilder, seed: int
+) -> None:
     clamp = ("x", "y", "z", "rx", "ry", "rz")
     frame = portal(
         seed,

@@ -21,7 +21,9 @@ from femubench import (
     Strategy,
     UpdateResult,
     hookimpl,
+    solve_modes,
 )
+from femubench.core.case.reader import read_case
 from femubench.core.plugin import hookspecs
 from femubench.core.plugin.loader import HOOKS, Plugins, load_plugins
 from femubench.core.plugin.validation import (
@@ -294,6 +296,21 @@ def test_every_hook_is_documented() -> None:
         summary = inspect.getdoc(specification)
         assert summary
         assert summary in text.replace("\n", " ")
+
+
+def test_example_of_the_docs_works(site: Path) -> None:
+    """The strategy in docs/plugins.md, as printed: loads, and scales the stiffness as it says."""
+    text = (ROOT / "docs" / "plugins.md").read_text(encoding="utf-8")
+    (source,) = re.findall(r"```python\n# my_updating\.py\n(.*?)```", text, re.DOTALL)
+    distribution(site, "my-updating", source)
+    plugins = from_site(site)
+    assert plugins.broken == ()
+    case = read_case(ROOT / "scenarios" / "frame")
+    used = case.used_measurement()
+    changed = plugins.strategies["softer"].update(case.model, used, np.random.default_rng(0)).model
+    before, after = (solve_modes(m).elastic.natural_frequencies for m in (case.model, changed))
+    ratio = np.mean((used.frequencies / before[: len(used)]) ** 2)
+    np.testing.assert_allclose(after, np.sqrt(ratio) * before, rtol=1e-8)
 
 
 def test_hooks_are_all_in_the_specification() -> None:

@@ -208,10 +208,10 @@ def test_ranks_go_by_physics_then_score_then_name() -> None:
     places = [(item.strategy, item.rank) for item in ranked]
     assert places == [
         ("zeta", 2),
-        ("best", 4),
-        ("negative", 5),
+        ("best", 3),
+        ("negative", 4),
         ("alpha", 1),
-        ("gone", 3),
+        ("gone", 5),
         ("zeta", 1),
     ]
     assert [item.score for item in rank_results(ranked)] == [item.score for item in ranked]
@@ -246,15 +246,16 @@ def test_a_missing_result_scores_ten_and_a_strategy_without_any_is_there() -> No
     assert table.loc["s", ["ok", "total"]].tolist() == [1, 2]
 
 
-def test_the_unphysical_rank_below_all_others() -> None:
+def test_the_unphysical_rank_below_the_physical_and_no_model_at_all_below_both() -> None:
     lost = result("lost", rms=0.1, rigid_body_modes=1, rigid_body_modes_expected=3)
     fine = result("lost", rms=0.1, case="b", rigid_body_modes=3, rigid_body_modes_expected=3)
     bad = [result("bad", status="failed"), result("bad", status="failed", case="b")]
-    table = leaderboard(Run(META, (lost, fine, *bad)))
-    assert table["strategy"].tolist() == ["bad", "lost"]
-    assert table["rank"].tolist() == [1, 2]
-    assert table["unphysical"].tolist() == [False, True]
-    assert table["rigid_modes_lost"].tolist() == [0, 2]
+    poor = [result("poor", rms=50.0), result("poor", status="failed", case="b")]
+    table = leaderboard(Run(META, (lost, fine, *bad, *poor)))
+    assert table["strategy"].tolist() == ["poor", "lost", "bad"]
+    assert table["rank"].tolist() == [1, 2, 3]
+    assert table["unphysical"].tolist() == [False, True, False]
+    assert table["rigid_modes_lost"].tolist() == [0, 2, 0]
 
 
 def test_several_seeds_give_the_median_and_an_interval() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from femubench.core.fem.sections import (
     SHAPES,
     bredt,
@@ -14,15 +15,15 @@ from femubench.core.fem.sections import (
 )
 
 
-def test_tube_of_the_first_paper():
+def test_tube_of_the_first_paper() -> None:
     tube = rectangular_tube(0.0254, 0.0254, 0.00238)
-    assert tube.A == pytest.approx(219.15e-6, rel=1e-5)
+    assert pytest.approx(219.15e-6, rel=1e-5) == tube.A
     assert tube.Iy == pytest.approx(19562e-12, rel=3e-5)
     assert tube.Jp == pytest.approx(39125e-12, rel=3e-5)
-    assert tube.J == pytest.approx(29033e-12, rel=3e-5)
+    assert pytest.approx(29033e-12, rel=3e-5) == tube.J
 
 
-def test_tube_of_the_second_paper():
+def test_tube_of_the_second_paper() -> None:
     tube = rectangular_tube(0.040, 0.040, 0.0025)
     assert tube.kappa is not None
     assert tube.kappa(0.3)[1] == pytest.approx(0.4355, abs=5e-5)
@@ -39,7 +40,7 @@ def integrate(width: float, height: float, wall: float) -> tuple[float, float, f
     return float(cell.sum()), float((cell * Z**2).sum()), float((cell * Y**2).sum())
 
 
-def test_rectangular_tube_by_integration_with_the_axes_the_right_way_round():
+def test_rectangular_tube_by_integration_with_the_axes_the_right_way_round() -> None:
     tube = rectangular_tube(0.04, 0.08, 0.004)
     area, iy, iz = integrate(0.04, 0.08, 0.004)
     assert iy > 2 * iz
@@ -48,18 +49,18 @@ def test_rectangular_tube_by_integration_with_the_axes_the_right_way_round():
 
 
 @pytest.mark.parametrize(("ratio", "beta"), [(1.0, 0.1406), (2.0, 0.2287), (10.0, 0.3123)])
-def test_torsion_of_a_solid_rectangle(ratio, beta):
+def test_torsion_of_a_solid_rectangle(ratio: float, beta: float) -> None:
     # Timoshenko & Goodier, art. 109, table: J = beta * long * short^3.
     for a, b in ((ratio, 1.0), (1.0, ratio)):
         assert saint_venant_rectangle(a, b) == pytest.approx(beta * ratio, rel=5e-4)
 
 
-def test_bredt_is_four_area_squared_over_the_wall_integral():
+def test_bredt_is_four_area_squared_over_the_wall_integral() -> None:
     b, h, wall = 0.03, 0.05, 0.002
     assert bredt(b, h, wall) == pytest.approx(4 * (b * h) ** 2 / (2 * (b + h) / wall), rel=1e-14)
 
 
-def test_round_sections():
+def test_round_sections() -> None:
     solid, tube = round_tube(0.02, 0.01), round_tube(0.05, 0.002)
     np.testing.assert_allclose([solid.A, solid.Iy], [np.pi * 1e-4, np.pi * 1e-8 / 4], rtol=1e-12)
     assert tube.Iy == pytest.approx(np.pi / 64 * (0.05**4 - 0.046**4), rel=1e-12)
@@ -67,7 +68,7 @@ def test_round_sections():
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.25, 0.33, 0.5])
-def test_cowpers_coefficients(nu):
+def test_cowpers_coefficients(nu: float) -> None:
     # Cowper 1966, table 1: closed forms of the special sections.
     square = SHAPES["square-tube"][0](0.04, 0.002).kappa
     disc = SHAPES["solid-circle"][0](0.03).kappa
@@ -83,8 +84,8 @@ def test_cowpers_coefficients(nu):
         np.testing.assert_allclose(kappa(nu), [value, value], rtol=1e-8)
 
 
-def test_shear_in_a_deep_box_is_carried_by_its_webs():
-    # Without Poisson's effect kappa A of a deep box is about the area of its webs; wide flanges lag.
+def test_shear_in_a_deep_box_is_carried_by_its_webs() -> None:
+    # Without Poisson's effect kappa A of a deep box is about its web area; wide flanges lag.
     box = rectangular_tube(0.10, 0.04, 0.002)
     assert box.kappa is not None
     along_y, along_z = box.kappa(0.0)
@@ -92,7 +93,7 @@ def test_shear_in_a_deep_box_is_carried_by_its_webs():
     assert along_z * box.A < 2 * 0.038 * 0.002
 
 
-def test_every_shape_is_named_and_positive():
+def test_every_shape_is_named_and_positive() -> None:
     sizes = {"width": 0.04, "height": 0.05, "diameter": 0.03, "wall": 0.003}
     for name, (build, keys) in SHAPES.items():
         section = build(*(sizes[key] for key in keys))

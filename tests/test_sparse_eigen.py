@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
+
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import (
     Frame,
@@ -26,6 +28,7 @@ from femubench.core.modal.sparse_eigen import ShiftedModel, lowest_eigenpairs
 from femubench.core.model import LowRank, Model
 from femubench.core.typing import FloatArray
 
+FrameBuilder = Callable[..., Frame]
 SPRINGS = (
     JointSpring("J1", "m0", {"rx": 3e3, "ry": 2e3, "rz": 1e3}, 0.02),
     JointSpring("J3", "m3", {"x": 1e6, "ry": 2e3}),
@@ -53,17 +56,17 @@ def agree(model: Model, count: int, tolerance: float = 1e-8) -> FloatArray:
     return found
 
 
-def test_free_ladder(ladder):
+def test_free_ladder(ladder: FrameBuilder) -> None:
     agree(Model.of(ladder(elements=12)), 14)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_spatial_frames_with_massless_joints(portal, seed):
+def test_spatial_frames_with_massless_joints(portal: FrameBuilder, seed: int) -> None:
     masses = (PointMass(Place(member="m2", s=0.37), 0.5, (0.1, 0.2, -0.1)),)
     agree(Model.of(portal(seed, joint_springs=SPRINGS, masses=masses)), 16)
 
 
-def test_supported_and_suspended_frames(ladder):
+def test_supported_and_suspended_frames(ladder: FrameBuilder) -> None:
     frame = ladder(elements=8)
     held = replace(frame, supports=(Support(Place(joint="A"), ("z", "rx", "ry")),))
     agree(Model.of(held), 10)
@@ -71,7 +74,7 @@ def test_supported_and_suspended_frames(ladder):
     agree(Model.of(replace(frame, springs=soft)), 10, 1e-6)
 
 
-def test_low_rank_changes_with_negative_eigenvalues(ladder):
+def test_low_rank_changes_with_negative_eigenvalues(ladder: FrameBuilder) -> None:
     model = Model.of(ladder(elements=12))
     modes = solve_modes(model)
     basis = np.asarray(model.mass @ modes.shapes[:, 3:6])
@@ -83,7 +86,7 @@ def test_low_rank_changes_with_negative_eigenvalues(ladder):
     assert len(found) == 14  # the negative ones come besides
 
 
-def test_indefinite_sparse_stiffness(ladder):
+def test_indefinite_sparse_stiffness(ladder: FrameBuilder) -> None:
     model = Model.of(ladder(elements=12))
     dip = np.zeros(model.size)
     dip[30:33] = -3e4
@@ -91,7 +94,7 @@ def test_indefinite_sparse_stiffness(ladder):
     assert (found < -1.0).any()
 
 
-def test_changes_without_full_rank(ladder):
+def test_changes_without_full_rank(ladder: FrameBuilder) -> None:
     model = Model.of(ladder(elements=12))
     basis = np.asarray(model.mass @ solve_modes(model).shapes[:, 3:5])
     doubled = LowRank(np.hstack([basis, basis]), np.diag([1e6, 0.0, 2e6, 0.0]))
@@ -99,7 +102,7 @@ def test_changes_without_full_rank(ladder):
     agree(replace(model, stiffness_change=LowRank(basis, np.zeros((2, 2)))), 12)
 
 
-def test_repeated_eigenvalues_are_all_found():
+def test_repeated_eigenvalues_are_all_found() -> None:
     section = round_tube(0.02, 0.002)
     joints = (Joint("A", (0.0, 0.0, 0.0)), Joint("B", (0.3, 0.4, 0.5)))
     member = Member("m", ("A", "B"), 40, section, Material(70e9, 0.3, 2700.0))
@@ -109,7 +112,7 @@ def test_repeated_eigenvalues_are_all_found():
 
 
 @pytest.mark.parametrize("mirrors", [3])
-def test_many_equal_substructures(mirrors, ladder):
+def test_many_equal_substructures(mirrors: int, ladder: FrameBuilder) -> None:
     # Unconnected equal beams: every eigenvalue is repeated, and the zero ones too.
     section = round_tube(0.02, 0.002)
     material = Material(70e9, 0.3, 2700.0)
@@ -122,7 +125,7 @@ def test_many_equal_substructures(mirrors, ladder):
     agree(Model.of(replace(frame, supports=supports)), 8)
 
 
-def test_inertia_counts_the_eigenvalues_below_a_shift(portal):
+def test_inertia_counts_the_eigenvalues_below_a_shift(portal: FrameBuilder) -> None:
     model = Model.of(portal(1, joint_springs=SPRINGS))
     modes = solve_modes(model)
     shapes = np.asarray(model.mass @ modes.shapes[:, [7, 9]])
@@ -136,7 +139,7 @@ def test_inertia_counts_the_eigenvalues_below_a_shift(portal):
         assert ShiftedModel(candidate, -1e10).eigenvalues_below == 0
 
 
-def test_solve_is_the_inverse(portal):
+def test_solve_is_the_inverse(portal: FrameBuilder) -> None:
     model = Model.of(portal(2))
     shapes = np.asarray(model.mass @ solve_modes(model).shapes[:, 6:9])
     stiffness = LowRank(shapes, np.diag([1e4, -1e3, 0.0]))
@@ -151,7 +154,9 @@ def test_solve_is_the_inverse(portal):
     np.testing.assert_allclose(shifted.solve(right[:, 0]), shifted.solve(right)[:, 0], rtol=1e-9)
 
 
-def test_large_models_go_the_sparse_way(ladder, monkeypatch):
+def test_large_models_go_the_sparse_way(
+    ladder: FrameBuilder, monkeypatch: pytest.MonkeyPatch
+) -> None:
     model = Model.of(ladder(elements=30))
     assert model.size > eigen.DENSE_LIMIT
     sparse = solve_modes(model, 12)
@@ -162,13 +167,13 @@ def test_large_models_go_the_sparse_way(ladder, monkeypatch):
     assert len(solve_modes(model)) == model.size
 
 
-def test_the_same_bits_twice(ladder):
+def test_the_same_bits_twice(ladder: FrameBuilder) -> None:
     first, second = (lowest_eigenpairs(Model.of(ladder(elements=30)), 12) for _ in range(2))
     np.testing.assert_array_equal(first[0], second[0])
     np.testing.assert_array_equal(first[1], second[1])
 
 
-def test_a_mechanism_without_mass_is_refused(ladder):
+def test_a_mechanism_without_mass_is_refused(ladder: FrameBuilder) -> None:
     hinges = tuple(JointSpring("B", m, {"rx": 0.0, "ry": 0.0}) for m in ("AB", "BC", "BE"))
     model = Model.of(replace(ladder(elements=30), joint_springs=hinges))
     with pytest.raises(ModelError, match="neither mass nor stiffness"):

@@ -46,7 +46,7 @@ class _Grid:
 
 
 def leaderboard(run: Run) -> pd.DataFrame:
-    """Return one row a strategy, best first; physical strategies before all others.
+    """Return one row a strategy, best first: physical, then unphysical, then without any model.
 
     `skill` is the geometric mean over all blocks of all cases, and with several seeds the median
     over seeds, with a 95 % bootstrap interval in `skill_low` and `skill_high`. The three errors are
@@ -65,10 +65,15 @@ def leaderboard(run: Run) -> pd.DataFrame:
     names = list(run.meta.get("strategies", ()))
     names += sorted({result.strategy for result in ranked} - set(names))
     rows = [_row(n, [r for r in ranked if r.strategy == n], grid, seed) for n in names]
-    rows.sort(key=lambda row: (row["unphysical"], row["skill"], row["strategy"]))
+    rows.sort(key=_order)
     for place, row in enumerate(rows, start=1):
         row["rank"] = place
     return pd.DataFrame(rows, columns=list(COLUMNS))
+
+
+def _order(row: dict[str, Any]) -> tuple[bool, bool, float, str]:
+    """Sort physical models first, then unphysical ones, then who never gave a model."""
+    return row["ok"] == 0, row["unphysical"], row["skill"], row["strategy"]
 
 
 def _row(strategy: str, results: Sequence[JobResult], grid: _Grid, seed: int) -> dict[str, Any]:

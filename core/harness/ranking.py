@@ -49,7 +49,8 @@ def rank_results(
 ) -> tuple[JobResult, ...]:
     """Return the results with their ranks within case and seed, and scores where missing.
 
-    Physical models come first, then scores count, then names, so that no two ranks are equal.
+    Physical models come first, then unphysical ones, then jobs without a model; within each the
+    score counts, then the name, so that no two ranks are equal.
 
     Arguments:
         results: in any order, which is kept.
@@ -85,6 +86,7 @@ def _of_unchanged(results: Iterable[JobResult]) -> dict[tuple[str, int], dict[st
     }
 
 
-def _order(result: JobResult) -> tuple[bool, float, str]:
+def _order(result: JobResult) -> tuple[bool, bool, float, str]:
     assert result.score is not None
-    return result.unphysical, result.score, result.strategy
+    nothing = result.status not in ("ok", "not-applicable")
+    return nothing, result.unphysical, result.score, result.strategy

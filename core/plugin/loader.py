@@ -235,7 +235,7 @@ def _broken(source: _Source, fault: BaseException, hook: str = "") -> BrokenPlug
     return BrokenPlugin(
         source.name,
         source.distribution,
-        getattr(fault, "hook", hook),
+        fault.hook if isinstance(fault, _HookError) else hook,
         message,
         "".join(traceback.format_exception(fault)),
     )

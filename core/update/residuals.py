@@ -18,7 +18,7 @@ from femubench.core.modal.eigen import DENSE_LIMIT, Modes, solve_modes
 from femubench.core.modal.pairing import pair_modes
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities, shape_sensitivities
 from femubench.core.model import Model
-from femubench.core.typing import BoolArray, FloatArray, IntArray
+from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 Residual = Literal["eigenvalue", "relative-eigenvalue", "frequency"]
 # Two vectors with a cosine above this to the same third one cannot be orthogonal to each other.
@@ -99,6 +99,7 @@ class Prediction:
         model: its matrices.
         modes: its modes.
         partner: which of them belongs to every measured mode; -1 where none does, (m,).
+        observer: sensor readings from dofs, sparse (n_sensors, n).
     """
 
     data: Data
@@ -106,6 +107,7 @@ class Prediction:
     model: Model
     modes: Modes
     partner: IntArray
+    observer: SparseArray
 
     @cached_property
     def residual(self) -> FloatArray:
@@ -124,8 +126,7 @@ class Prediction:
 
     @cached_property
     def _at_sensors(self) -> FloatArray:
-        observed = self.model.observe(self.data.measurement.sensors) @ self.modes.shapes
-        return np.asarray(observed[:, self.partner])
+        return np.asarray((self.observer @ self.modes.shapes)[:, self.partner])
 
     @cached_property
     def _factor(self) -> FloatArray:
@@ -154,7 +155,7 @@ class Prediction:
     def _shape_rows(self, parameters: Sequence[Parameter], change: Derivatives) -> FloatArray:
         """Return the sensitivities of s phi with the modal scale factor's own, (n_s m, p)."""
         data = self.data
-        observe = self.model.observe(data.measurement.sensors)
+        observe = self.observer
         rows = np.zeros((len(self.partner), observe.shape[0], len(parameters)))
         for j, index in enumerate(self.partner):
             weight, seen = data.shape_weight[:, j], self._at_sensors[:, j]
@@ -204,16 +205,26 @@ def predict(data: Data, structure: Structure, previous: Prediction | None = None
     count = None if model.size <= DENSE_LIMIT else 2 * len(data.measurement) + 12
     modes = solve_modes(model, count)
     elastic = np.flatnonzero(~modes.rigid)
+    if previous is None or _observed_anew(structure):
+        observer = model.observe(data.measurement.sensors)
+    else:
+        observer = previous.observer
     pairing = pair_modes(
         data.measurement.frequencies,
         data.measurement.shapes,
         modes.natural_frequencies[elastic],
-        model.observe(data.measurement.sensors) @ modes.shapes[:, elastic],
+        observer @ modes.shapes[:, elastic],
     )
     partner = np.where(pairing.index >= 0, elastic[pairing.index], -1)
     if previous is not None:
         partner = _followed(partner, model, modes, previous)
-    return Prediction(data, structure, model, modes, partner)
+    return Prediction(data, structure, model, modes, partner, observer)
+
+
+def _observed_anew(structure: Structure) -> bool:
+    """Tell whether the interpolation between nodes depends on parameters."""
+    p = structure.properties
+    return any(array.any() for array in (p.rigid_1, p.rigid_2, p.shear_shape))
 
 
 def _followed(partner: IntArray, model: Model, modes: Modes, previous: Prediction) -> IntArray:

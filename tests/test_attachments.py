@@ -1,0 +1,172 @@
+"""Springs, supports, masses, arms: where they act, how they split a member, what is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from femubench.core.errors import ModelError
+from femubench.core.fem.frame import (
+    Frame,
+    GroundSpring,
+    Joint,
+    JointSpring,
+    Place,
+    PointMass,
+    RigidEnd,
+    Support,
+)
+from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.structure import Structure
+from femubench.core.modal.eigen import solve_modes
+from femubench.core.model import Model
+from femubench.core.typing import FloatArray
+
+FrameBuilder = Callable[..., Frame]
+
+
+def elastic(frame: Frame, count: int = 8) -> FloatArray:
+    return solve_modes(Model.of(frame)).elastic.natural_frequencies[:count]
+
+
+def test_a_spring_takes_no_notice_of_its_sign(ladder: FrameBuilder) -> None:
+    frames = [
+        replace(ladder(), springs=(GroundSpring(Place(joint="B"), d, 1e5),))
+        for d in ("z", "-z", "+z")
+    ]
+    first, *others = (elastic(frame) for frame in frames)
+    for other in others:
+        np.testing.assert_array_equal(other, first)
+    assert first[0] < elastic(ladder())[0] + 200.0
+
+
+def test_supports_remove_exactly_the_named_dofs(ladder: FrameBuilder) -> None:
+    frame = ladder()
+    free, held = Model.of(frame), Model.of(
+        replace(frame, supports=(Support(Place(joint="A"), ("z", "rx")),))
+    )  # fmt: skip
+    assert held.size == free.size - 2
+    keep = [
+        i
+        for i, (node, d) in enumerate(zip(free.dofs.node, free.dofs.direction, strict=True))
+        if not (node == 0 and d in ("z", "rx"))
+    ]
+    for a, b in ((held.mass, free.mass), (held.stiffness, free.stiffness)):
+        np.testing.assert_array_equal(a.toarray(), b.toarray()[np.ix_(keep, keep)])
+
+
+def test_an_attachment_between_nodes_splits_its_element(ladder: FrameBuilder) -> None:
+    at = Place(member="EF", s=0.4)
+    spring = GroundSpring(at, "z", 1e5)
+    frame = replace(ladder(), masses=(PointMass(at, 0.3),), springs=(spring,))
+    model = Model.of(frame)
+    assert model.size == 84
+    structure = model.frame_structure
+    assert structure.labels.count("EF/2") == 2
+    node = int(np.argmin(np.linalg.norm(structure.mesh.xyz - [0.2921 * 1.4, 0.2794, 0.0], axis=1)))
+    index = [i for i in range(84) if model.dofs.node[i] == node and model.dofs.direction[i] == "z"]
+    plain = Model.of(replace(frame, masses=(PointMass(at, 0.0),), springs=()))
+    change = (model.mass - plain.mass).toarray()
+    assert change[index[0], index[0]] == pytest.approx(0.3)
+    assert np.count_nonzero(np.abs(change) > 1e-12) == 1
+
+
+def test_a_support_between_nodes_splits_its_element(ladder: FrameBuilder) -> None:
+    frame = replace(ladder(), supports=(Support(Place(member="EF", s=0.4), ("z",)),))
+    assert Model.of(frame).size == 83
+
+
+@pytest.mark.parametrize("distance", [1e-8, 1e-6, 1e-5, 1e-4, 1e-3])
+def test_an_attachment_close_to_a_node_spoils_nothing(
+    ladder: FrameBuilder, distance: float
+) -> None:
+    # A station such as 0.3333333 makes no needle of an element, whose stiffness drowns the rest.
+    def with_mass(s: float) -> FloatArray:
+        masses = (PointMass(Place(member="EF", s=s), 0.3),)
+        return elastic(replace(ladder(accelerometer=False), masses=masses))
+
+    at_node, further = with_mass(0.25), with_mass(0.25 + 0.02)
+    slope = (further - at_node) / 0.02
+    np.testing.assert_allclose(
+        with_mass(0.25 + distance), at_node + slope * distance, rtol=2e-6 + 0.2 * distance
+    )
+
+
+def test_a_support_close_to_a_node_holds_the_node(ladder: FrameBuilder) -> None:
+    near = replace(ladder(), supports=(Support(Place(member="EF", s=0.2500001), ("z",)),))
+    exact = replace(ladder(), supports=(Support(Place(member="EF", s=0.25), ("z",)),))
+    np.testing.assert_array_equal(elastic(near), elastic(exact))
+
+
+ARM = JointSpring("A", "AB", {"rx": 1e4, "ry": 1e4}, 0.02)
+
+
+def test_a_mass_on_a_rigid_arm_is_a_mass_with_an_offset(ladder: FrameBuilder) -> None:
+    base = replace(ladder(accelerometer=False), joint_springs=(ARM,))
+    on_arm = replace(base, masses=(PointMass(Place(member="AB", s=0.01 / 0.2921), 0.3),))
+    offset = replace(base, masses=(PointMass(Place(joint="A"), 0.3, (0.01, 0.0, 0.0)),))
+    np.testing.assert_allclose(elastic(on_arm), elastic(offset), rtol=1e-10)
+    at_end = replace(base, masses=(PointMass(Place(member="AB", s=0.0), 0.3),))
+    at_joint = replace(base, masses=(PointMass(Place(joint="A"), 0.3),))
+    np.testing.assert_array_equal(elastic(at_end), elastic(at_joint))
+
+
+def test_stiff_joint_springs_are_no_springs(ladder: FrameBuilder) -> None:
+    stiff = JointSpring("A", "AB", {"rx": 1e9, "ry": 1e9})
+    np.testing.assert_allclose(
+        elastic(replace(ladder(), joint_springs=(stiff,))), elastic(ladder()), rtol=1e-4
+    )
+
+
+def test_soft_joint_springs_are_hinges(ladder: FrameBuilder) -> None:
+    # A bending hinge at both ends of the middle rung leaves it torsion and shear alone.
+    soft = tuple(JointSpring(j, "BE", {"ry": 1e-3}) for j in "BE")
+    hinged = elastic(replace(ladder(), joint_springs=soft))
+    harder = tuple(JointSpring(j, "BE", {"ry": 1.0}) for j in "BE")
+    assert (hinged <= elastic(ladder()) + 1e-6).all()
+    np.testing.assert_allclose(hinged, elastic(replace(ladder(), joint_springs=harder)), rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"joint_springs": (JointSpring("A", "nothing", {"ry": 1.0}),)}, "no member end"),
+        ({"joint_springs": (JointSpring("E", "AB", {"ry": 1.0}),)}, "no member end"),
+        ({"rigid_ends": (RigidEnd("A", "BE", 0.01),)}, "no member end"),
+        ({"rigid_ends": (RigidEnd("A", "AB", 0.09),)}, "longer than its element"),
+        ({"rigid_ends": (RigidEnd("A", "AB", 0.0, 0.09),)}, "longer than its element"),
+        ({"joint_springs": (JointSpring("A", "AB", {"ry": 1.0}, 0.08),)}, "past its end element"),
+        ({"masses": (PointMass(Place(member="AB", s=1.2), 0.1),)}, "not within 0..1"),
+        ({"masses": (PointMass(Place(member="ZZ", s=0.2), 0.1),)}, "no member"),
+        ({"masses": (PointMass(Place(joint="ZZ"), 0.1),)}, "no joint"),
+        (
+            {"joint_springs": (ARM,), "supports": (Support(Place(member="AB", s=0.03), ("z",)),)},
+            "on the arm",
+        ),
+    ],
+)
+def test_what_cannot_be_meshed_is_refused(
+    ladder: FrameBuilder, change: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ModelError, match=message):
+        Model.of(replace(ladder(), **change))
+
+
+def test_a_member_that_leaves_the_plane_is_refused(ladder: FrameBuilder) -> None:
+    frame = ladder()
+    joints = (*frame.joints[:-1], Joint("F", (0.5842, 0.2794, 0.01)))
+    with pytest.raises(ModelError, match="leaves the plane"):
+        Model.of(replace(frame, joints=joints))
+
+
+def test_a_rigid_length_beyond_the_element_is_refused(hframe: FrameBuilder) -> None:
+    rigid = (RigidEnd("T1", "horizontal", 0.01),)
+    structure = Structure.build(hframe(rigid_ends=rigid))
+    parameter = Parameter("a", "rigid", ("horizontal@T1",))
+    assert structure.with_values([parameter], [-0.05]).properties.rigid_1.min() == -0.05
+    with pytest.raises(ModelError, match="longer than its element"):
+        structure.with_values([parameter], [0.06])

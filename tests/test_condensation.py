@@ -1,0 +1,148 @@
+"""Massless motions follow exactly, aligned with dofs or not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+
+from femubench.core.errors import ModelError
+from femubench.core.fem.frame import (
+    Frame,
+    JointSpring,
+    Place,
+    PointMass,
+    RigidEnd,
+)
+from femubench.core.modal.eigen import (
+    condense_massless,
+    dense_matrices,
+    solve_dense,
+    solve_modes,
+)
+from femubench.core.model import Model
+from femubench.core.typing import FloatArray
+
+FrameBuilder = Callable[..., Frame]
+JOINTS = (
+    JointSpring("J1", "m0", {"rx": 3e3, "ry": 2e3, "rz": 1e3}, 0.02),
+    JointSpring("J1", "m1", {"rx": 3e3, "ry": 2e3, "rz": 1e3}, 0.02),
+    JointSpring("J1", "m8", {"rx": 3e3, "ry": 2e3, "rz": 1e3}, 0.02),
+    JointSpring("J3", "m3", {"x": 1e6, "ry": 2e3}),
+    JointSpring("J6", "m5", {"x": 1e7, "z": 1e7, "ry": 1e4}, 0.02, 5.0),
+)
+ENDS = (RigidEnd("J4", "m4", -0.03), RigidEnd("J5", "m8", 0.03, 0.02))
+MASSES = (
+    PointMass(Place(member="m2", s=0.37), 0.5, (0.1, 0.2, -0.1)),
+    PointMass(Place(joint="J0"), 0.5, (0.1, 0.2, -0.1)),
+)
+
+
+def dense(model: Model) -> tuple[FloatArray, FloatArray]:
+    return dense_matrices(model)
+
+
+def random_pencil(seed: int, n: int, massless: int, aligned: bool) -> tuple[FloatArray, FloatArray]:
+    rng = np.random.default_rng(seed)
+    half = rng.standard_normal((n, n))
+    stiffness = half @ half.T + 0.1 * np.eye(n)
+    factor = rng.standard_normal((n, n - massless))
+    mass = factor @ factor.T
+    if aligned:
+        mass = np.zeros((n, n))
+        block = rng.standard_normal((n - massless, n - massless))
+        mass[massless:, massless:] = block @ block.T + 0.1 * np.eye(n - massless)
+    return mass, stiffness
+
+
+def static_condensation(mass: FloatArray, stiffness: FloatArray) -> FloatArray:
+    """Return the eigenvalues by a Schur complement on the exact null space of the mass."""
+    null = la.null_space(mass, rcond=1e-10)
+    carrying = la.orth(mass, rcond=1e-10)
+    inner, across = null.T @ stiffness @ null, null.T @ stiffness @ carrying
+    schur = carrying.T @ stiffness @ carrying - across.T @ np.linalg.solve(inner, across)
+    return np.asarray(la.eigh(schur, carrying.T @ mass @ carrying, eigvals_only=True))
+
+
+@pytest.mark.parametrize("aligned", [True, False])
+@pytest.mark.parametrize("seed", range(3))
+def test_condensation_is_exact(seed: int, aligned: bool) -> None:
+    mass, stiffness = random_pencil(seed, 20, 6, aligned)
+    expected = static_condensation(mass, stiffness)
+    K, M, expand = condense_massless(mass, stiffness)
+    assert K.shape == (14, 14)
+    eigenvalues, shapes = la.eigh(K, M)
+    np.testing.assert_allclose(eigenvalues, expected, rtol=1e-10)
+    solved, full = solve_dense(mass, stiffness)
+    np.testing.assert_allclose(solved, expected, rtol=1e-10)
+    for vectors in (expand @ shapes, full):
+        residual = stiffness @ vectors - mass @ vectors * expected
+        assert np.abs(residual).max() < 1e-9 * np.abs(stiffness @ np.abs(vectors)).max()
+        np.testing.assert_allclose(vectors.T @ mass @ vectors, np.eye(14), atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_tiny_mass_tends_to_no_mass(seed: int) -> None:
+    mass, stiffness = random_pencil(seed, 12, 3, aligned=True)
+    exact, _ = solve_dense(mass, stiffness)
+    deviation = []
+    for tiny in (1e-3, 1e-4, 1e-5):
+        filled = mass + tiny * np.diag([1.0] * 3 + [0.0] * 9)
+        values = la.eigh(stiffness, filled, eigvals_only=True)[:5]
+        deviation.append(np.abs(values / exact[:5] - 1.0).max())
+    assert deviation[0] / deviation[1] == pytest.approx(10.0, rel=0.2)
+    assert deviation[2] < 1e-3
+
+
+def massless_frames(portal: FrameBuilder) -> list[Model]:
+    """Return frames with massless joints, springs along skew members, arms and offset masses."""
+    return [
+        Model.of(portal(seed, joint_springs=JOINTS, rigid_ends=ENDS, masses=MASSES))
+        for seed in range(2)
+    ]
+
+
+def test_massless_joints_follow_exactly_and_satisfy_the_equations(portal: FrameBuilder) -> None:
+    for model in massless_frames(portal):
+        modes = solve_modes(model)
+        mass, stiffness = dense(model)
+        assert len(modes) == np.linalg.matrix_rank(mass, tol=1e-12, hermitian=True) < model.size
+        shapes, eigenvalues = modes.elastic.shapes[:, :20], modes.elastic.eigenvalues[:20]
+        residual = np.abs(stiffness @ shapes - mass @ shapes * eigenvalues)
+        scale = np.abs(stiffness) @ np.abs(shapes)
+        assert (residual.max(axis=0) / scale.max(axis=0)).max() < 1e-12
+        gram = modes.shapes[:, :30].T @ mass @ modes.shapes[:, :30]
+        np.testing.assert_allclose(gram, np.eye(30), atol=1e-9)
+
+
+def test_the_mass_of_an_offset_lump_alone_is_condensed(ladder: FrameBuilder) -> None:
+    # A massless frame that carries four lumps on arms: eight massless combinations of twelve dofs.
+    frame = ladder(elements=1, accelerometer=False)
+    weightless = replace(frame.members[0].material, rho=0.0)
+    lumps = tuple(PointMass(Place(joint=j), 0.3, (0.02, 0.03, 0.0)) for j in "ACDF")
+    members = tuple(replace(m, material=weightless) for m in frame.members)
+    model = Model.of(replace(frame, members=members, masses=lumps))
+    mass, stiffness = dense(model)
+    modes = solve_modes(model)
+    assert len(modes) == 4
+    flexibility = np.linalg.pinv(stiffness, rcond=1e-10)
+    assert modes.rigid.sum() == 3
+    one = modes.elastic
+    np.testing.assert_allclose(
+        stiffness @ one.shapes, mass @ one.shapes * one.eigenvalues, atol=1e-7 * stiffness.max()
+    )
+    # With rigid modes projected out the lone elastic eigenvalue is 1 / trace(F M).
+    R = modes.shapes[:, :3]
+    P = np.eye(18) - mass @ R @ R.T
+    assert one.eigenvalues[0] == pytest.approx(
+        1.0 / np.trace(P.T @ flexibility @ P @ mass), rel=1e-8
+    )
+
+
+def test_a_massless_mechanism_is_refused(ladder: FrameBuilder) -> None:
+    hinges = tuple(JointSpring("B", m, {"rx": 0.0, "ry": 0.0}) for m in ("AB", "BC", "BE"))
+    with pytest.raises(ModelError, match="neither mass nor stiffness"):
+        solve_modes(Model.of(replace(ladder(), joint_springs=hinges)))

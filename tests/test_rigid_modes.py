@@ -1,0 +1,171 @@
+"""Rigid-body modes: as many as supports and springs leave, on any mesh, in any orientation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from femubench.core.fem.frame import (
+    Frame,
+    GroundSpring,
+    JointSpring,
+    Place,
+    PointMass,
+    RigidEnd,
+    Support,
+)
+from femubench.core.measurement import DIRECTIONS
+from femubench.core.modal.eigen import (
+    dense_matrices,
+    solve_dense,
+    solve_modes,
+    zero_tolerance,
+)
+from femubench.core.modal.rigid import rigid_body_vectors, rigid_modes_of
+from femubench.core.model import Dofs, LowRank, Model
+from femubench.core.typing import FloatArray
+
+FrameBuilder = Callable[..., Frame]
+JOINTS = (
+    JointSpring("J1", "m0", {"rx": 3e3, "ry": 2e3, "rz": 1e3}, 0.02),
+    JointSpring("J1", "m1", {"rx": 3e3, "ry": 2e3, "rz": 1e3}, 0.02),
+    JointSpring("J1", "m8", {"rx": 3e3, "ry": 2e3, "rz": 1e3}, 0.02),
+    JointSpring("J3", "m3", {"x": 1e6, "ry": 2e3}),
+    JointSpring("J6", "m5", {"x": 1e7, "z": 1e7, "ry": 1e4}, 0.02, 5.0),
+)
+ENDS = (RigidEnd("J4", "m4", -0.03), RigidEnd("J5", "m8", 0.03, 0.02))
+MASSES = (
+    PointMass(Place(member="m2", s=0.37), 0.5, (0.1, 0.2, -0.1)),
+    PointMass(Place(joint="J0"), 0.5, (0.1, 0.2, -0.1)),
+)
+
+
+def dense(model: Model) -> tuple[FloatArray, FloatArray]:
+    return dense_matrices(model)
+
+
+def straining(model: Model, vectors: FloatArray) -> float:
+    """Return the largest nodal force of motions, relative to its own summands."""
+    force = np.abs(model.stiffness @ vectors).max()
+    return float(force / (np.abs(model.stiffness) @ np.abs(vectors)).max())
+
+
+@pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
+@pytest.mark.parametrize("seed", range(4))
+def test_any_free_spatial_frame_has_six_rigid_modes(
+    portal: FrameBuilder, seed: int, theory: str
+) -> None:
+    frame = portal(seed, theory, joint_springs=JOINTS, rigid_ends=ENDS, masses=MASSES)
+    model = Model.of(frame)
+    modes = solve_modes(model)
+    assert modes.rigid[:6].all()
+    assert modes.rigid.sum() == 6
+    assert np.abs(modes.eigenvalues[:6]).max() <= 1e-9 * modes.eigenvalues[6]
+    raw, _ = solve_dense(*dense(model))
+    assert np.abs(raw[:6]).max() <= 2e-9 * raw[6]  # before rounding is taken for what it is
+    assert straining(model, rigid_body_vectors(model.dofs)) < 1e-14
+
+
+def turned_ladder(frame: Frame, plane: str, angle: float) -> Frame:
+    c, s = np.cos(angle), np.sin(angle)
+    joints = []
+    for joint in frame.joints:
+        a, b = c * joint.xyz[0] - s * joint.xyz[1] + 3.0, s * joint.xyz[0] + c * joint.xyz[1] - 2.0
+        xyz = (a, b, 0.7) if plane == "out-of-plane" else (a, 0.7, b)
+        joints.append(replace(joint, xyz=xyz))
+    return replace(frame, joints=tuple(joints), plane=plane)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 1.0, np.pi / 2, 2.5])
+@pytest.mark.parametrize("plane", ["in-plane", "out-of-plane"])
+def test_planar_frames_have_three_in_every_orientation(
+    asymmetric_ladder: FrameBuilder, plane: str, angle: float
+) -> None:
+    frame = asymmetric_ladder(accelerometer=False)
+    model = Model.of(turned_ladder(frame, plane, angle))
+    modes = solve_modes(model)
+    assert modes.rigid.sum() == 3
+    assert modes.rigid[:3].all()
+    assert np.abs(modes.eigenvalues[:3]).max() <= 1e-9 * modes.eigenvalues[3]
+    straight = Model.of(turned_ladder(frame, plane, 0.0))
+    np.testing.assert_allclose(
+        modes.natural_frequencies[3:12], solve_modes(straight).natural_frequencies[3:12], rtol=1e-8
+    )
+
+
+@pytest.mark.parametrize("elements", [4, 20, 60, 150])
+def test_fine_meshes_keep_their_rigid_modes(ladder: FrameBuilder, elements: int) -> None:
+    model = Model.of(ladder(elements=elements))
+    modes = solve_modes(model, 8)
+    assert modes.rigid[:3].all()
+    assert modes.rigid.sum() == 3
+    assert np.abs(modes.eigenvalues[:3]).max() <= 1e-9 * modes.eigenvalues[3]
+    assert straining(model, rigid_body_vectors(model.dofs)) < 1e-14
+
+
+@pytest.mark.parametrize("elements", [4, 12, 60])
+def test_a_soft_suspension_makes_rigid_modes_elastic_on_any_mesh(
+    ladder: FrameBuilder, elements: int
+) -> None:
+    springs = tuple(GroundSpring(Place(joint=j), "z", 100.0) for j in "ACDF")
+    frame = replace(ladder(elements=elements, accelerometer=False), springs=springs)
+    modes = solve_modes(Model.of(frame), 8)
+    assert not modes.rigid.any()
+    area, density = frame.members[0].section.A, 2700.0
+    length = 4 * 0.2921 + 3 * 0.2794
+    bounce = np.sqrt(400.0 / (area * density * length)) / (2 * np.pi)
+    assert modes.natural_frequencies[0] == pytest.approx(bounce, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("fixed", "left"), [(("z",), 2), (("z", "rx"), 1), (("z", "rx", "ry"), 0), (("ry",), 2)]
+)
+def test_supports_take_rigid_modes_away(
+    ladder: FrameBuilder, fixed: tuple[str, ...], left: int
+) -> None:
+    frame = replace(ladder(), supports=(Support(Place(joint="B"), fixed),))
+    modes = solve_modes(Model.of(frame))
+    assert modes.rigid.sum() == left
+    assert np.sum(modes.eigenvalues <= zero_tolerance(modes)) == left
+
+
+def test_one_spring_leaves_two(ladder: FrameBuilder) -> None:
+    frame = replace(ladder(), springs=(GroundSpring(Place(member="EF", s=0.4), "z", 1e4),))
+    modes = solve_modes(Model.of(frame))
+    assert modes.rigid.sum() == 2
+    no_spring = replace(frame, springs=(GroundSpring(Place(member="EF", s=0.4), "z", 0.0),))
+    assert solve_modes(Model.of(no_spring)).rigid.sum() == 3
+
+
+def test_matrices_without_geometry_are_judged_by_energy(ladder: FrameBuilder) -> None:
+    model = Model.of(ladder())
+    bare = replace(model, structure=None, dofs=replace(model.dofs, axes=None))
+    assert rigid_modes_of(bare).shape == (81, 3)
+    held = replace(bare, stiffness=bare.stiffness + sp.diags_array(np.eye(81)[0] * 1e5))
+    assert rigid_modes_of(held).shape == (81, 2)
+
+
+def test_a_lost_rigid_mode_is_not_counted_as_one(ladder: FrameBuilder) -> None:
+    model = Model.of(ladder())
+    rigid = rigid_modes_of(model)
+    force = np.asarray(model.mass @ rigid[:, :1])
+    stiff = replace(model, stiffness_change=LowRank(force, np.array([[(2 * np.pi * 90) ** 2]])))
+    modes = solve_modes(stiff)
+    kept = modes.rigid & (np.abs(modes.eigenvalues) <= zero_tolerance(modes))
+    assert kept.sum() == 2
+    assert np.abs(modes.natural_frequencies - 90.0).min() < 1e-6
+
+
+def test_rigid_vectors_of_labelled_dofs() -> None:
+    xyz = np.array([[1.0, 2.0, 3.0]] * 6 + [[-1.0, 0.5, 2.0]] * 6)
+    dofs = Dofs(np.repeat([0, 1], 6), DIRECTIONS * 2, xyz)
+    vectors = rigid_body_vectors(dofs)
+    assert vectors.shape == (12, 6)
+    assert np.linalg.matrix_rank(vectors) == 6
+    # Every motion keeps the distance of the two points to first order.
+    gap = xyz[0] - xyz[6]
+    assert np.abs(gap @ (vectors[:3] - vectors[6:9])).max() < 1e-14
