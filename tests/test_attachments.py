@@ -115,6 +115,13 @@ def test_a_mass_on_a_rigid_arm_is_a_mass_with_an_offset(ladder: FrameBuilder) ->
     np.testing.assert_array_equal(elastic(at_end), elastic(at_joint))
 
 
+def test_a_mass_on_a_rigid_end_is_a_mass_with_an_offset(hframe: FrameBuilder) -> None:
+    base = hframe(accelerometers=False, rigid_ends=(RigidEnd("T1", "horizontal", 0.02, 0.02),))
+    on_end = replace(base, masses=(PointMass(Place(member="horizontal", s=0.01 / 0.74), 0.3),))
+    offset = replace(base, masses=(PointMass(Place(joint="T1"), 0.3, (0.01, 0.0, 0.0)),))
+    np.testing.assert_allclose(elastic(on_end), elastic(offset), rtol=1e-10)
+
+
 def test_stiff_joint_springs_are_no_springs(ladder: FrameBuilder) -> None:
     stiff = JointSpring("A", "AB", {"rx": 1e9, "ry": 1e9})
     np.testing.assert_allclose(

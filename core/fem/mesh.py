@@ -22,8 +22,7 @@ from femubench.core.typing import FloatArray, IntArray
 ON_MEMBER = 1e-6  # m, how far from the axis a sensor may lie
 SAME_STATION = 1e-9
 # An attachment nearer than this share of an element to a node splits nothing: the piece would be so
-# stiff that rounding drowns everything else, and the shape functions miss its local flexibility by
-# no more than the cube of this share.
+# stiff that its rounding errors outweigh what the finer mesh gains (both 1e-7 of a frequency here).
 _SHORTEST_PIECE = 2e-3
 
 
@@ -152,6 +151,11 @@ class _Builder:
         self.connections.append(Connection(spring, base, node, arm, axes))
         return node, spring.arm
 
+    def rigid_length(self, member: Member, end: int) -> float:
+        """Return how far from an end nothing can be split, since the element is rigid there."""
+        spec = self.rigid_ends.get((member.name, member.ends[end]))
+        return 0.0 if spec is None else max(spec.stiffness_length, spec.mass_length)
+
     def member(self, m: int) -> None:
         member = self.frame.members[m]
         axes, length = member_axes(self.frame, member)
@@ -164,8 +168,9 @@ class _Builder:
             raise ModelError(
                 f"member {member.name!r}: the arm of a joint spring reaches past its end element"
             )
-        held, splits = self.held.get(member.name, []), self.splits.get(member.name, [])
-        grid = _stations([low, *regular, high], held, ON_MEMBER / length)
+        grid = _stations([low, *regular, high], self.held.get(member.name, []), ON_MEMBER / length)
+        stiff = [self.rigid_length(member, end) / length for end in (0, 1)]
+        splits = [s for s in self.splits.get(member.name, []) if stiff[0] < s < 1.0 - stiff[1]]
         inner = _stations(grid, splits, _SHORTEST_PIECE / member.elements)[1:-1]
         start = self.xyz[self.joint_index[member.ends[0]]]
         nodes = [first, *(self.node(start + axes[0] * length * s) for s in inner), last]

@@ -59,7 +59,7 @@ class UpdateOptions:
     weighting: str = "unit"
     shapes: bool = False
     damping: float = 3e-3
-    max_iterations: int = 60
+    max_iterations: int = 100
     tolerance: float = 1e-6
     cost_tolerance: float = 1e-4
     max_step: float = 0.5
