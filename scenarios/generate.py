@@ -98,7 +98,9 @@ def write_modes(
     table = pd.DataFrame({"mode": np.arange(1, count + 1), "frequency": frequencies})
     table["frequency_std"] = std * table["frequency"]
     table["damping"] = np.full(count, np.nan) if damping is None else damping
-    peak = shapes[np.nanargmax(np.abs(np.nan_to_num(shapes)), axis=0), np.arange(count)]
+    # Symmetric structures have several largest components: take the first, whatever roundoff says.
+    size = np.abs(np.nan_to_num(shapes))
+    peak = shapes[np.argmax(size >= 0.999 * size.max(axis=0), axis=0), np.arange(count)]
     scaled = pd.DataFrame((shapes / peak).T, columns=list(sensors.labels))
     text = pd.concat([table, scaled.round(6) + 0.0], axis=1)
     text.to_csv(path, index=False, float_format="%.7g", lineterminator="\n")

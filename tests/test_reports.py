@@ -135,12 +135,12 @@ class TestTerminal:
     def test_table_is_ranked_and_shows_every_figure(self) -> None:
         text = TerminalReporter().render(RUN)
         rows = [line.split() for line in text.splitlines()[3:8]]
-        assert [row[1] for row in rows] == ["good", "picky", "worse", "broken", "imaginary"]
-        assert [row[0] for row in rows] == ["1", "2", "3", "4", "!5"]
+        assert [row[1] for row in rows] == ["good", "picky", "worse", "imaginary", "broken"]
+        assert [row[0] for row in rows] == ["1", "2", "3", "!4", "5"]
         # rms 1 % over used and higher; one of three modified modes has no partner
         modified = 100.0 * math.sqrt((0.01**2 + 1.0 + 0.01**2) / 3.0)
         assert rows[0][3:] == ["1.00", "1.00", f"{modified:.1f}", "0", "0", "4", "17", "1.25"]
-        assert rows[4][6:8] == ["2", "2"]
+        assert rows[3][6:8] == ["2", "2"]
         assert "unphysical" in text
 
     def test_fits_80_columns_whatever_the_names_and_figures(self) -> None:
@@ -204,10 +204,10 @@ class TestMarkdown:
             ["1", "good"],
             ["2", "picky"],
             ["3", "worse"],
-            ["4", "broken"],
-            ["5", "imaginary (unphysical)"],
+            ["4", "imaginary (unphysical)"],
+            ["5", "broken"],
         ]
-        assert rows[3][2] == "10.000"
+        assert rows[4][2] == "10.000"
 
     def test_coverage_and_reasons(self) -> None:
         rows = {row[0]: row[1:] for row in with_header(self.TEXT, "strategy", "ok")}

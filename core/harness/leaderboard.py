@@ -73,7 +73,8 @@ def leaderboard(run: Run) -> pd.DataFrame:
 
 def _order(row: dict[str, Any]) -> tuple[bool, bool, float, str]:
     """Sort physical models first, then unphysical ones, then who never gave a model."""
-    return row["ok"] == 0, row["unphysical"], row["skill"], row["strategy"]
+    nothing = row["ok"] + row["not_applicable"] == 0
+    return nothing, row["unphysical"], row["skill"], row["strategy"]
 
 
 def _row(strategy: str, results: Sequence[JobResult], grid: _Grid, seed: int) -> dict[str, Any]:

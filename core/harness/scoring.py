@@ -14,6 +14,7 @@ from femubench.core.harness.leaderboard import leaderboard
 from femubench.core.harness.ranking import rank_results, score_of
 from femubench.core.harness.results import Block, PairedMode
 from femubench.core.measurement import Measurement
+from femubench.core.modal.close_modes import align_close_modes
 from femubench.core.modal.eigen import DENSE_LIMIT, Modes, solve_modes, zero_tolerance
 from femubench.core.modal.pairing import LEAST_SENSORS, WINDOW, pair_modes
 from femubench.core.modal.rigid import rigid_modes_of
@@ -157,6 +158,9 @@ def _predict(
     largest = np.abs(readings).max(axis=0, initial=0.0)
     readings = np.where(largest > _UNSEEN * largest.max(initial=0.0), readings, 0.0)
     frequencies = elastic.natural_frequencies
+    # Modes within two standard deviations of each other are one to the test.
+    closeness = 2.0 * float(np.median(measurement.frequency_std / measurement.frequencies))
+    readings = align_close_modes(frequencies, readings, measurement.shapes, closeness)
     pairing = pair_modes(measurement.frequencies, measurement.shapes, frequencies, readings)
     return tuple(
         PairedMode(

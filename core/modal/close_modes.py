@@ -1,0 +1,64 @@
+"""Modes that lie closer together than a test can tell: only the space they span has a meaning."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as la
+
+from femubench.core.modal.correlation import mac
+from femubench.core.typing import FloatArray, IntArray
+
+
+def clusters_of(frequencies: FloatArray, closeness: float) -> list[IntArray]:
+    """Return groups of two or more neighbouring modes, each within a share of its first.
+
+    Arguments:
+        frequencies: Hz, in any order, negative for imaginary ones, (p,).
+        closeness: largest relative distance from the first to the last mode of a group.
+    """
+    order = np.argsort(frequencies)
+    groups: list[IntArray] = []
+    start = 0
+    for stop in range(1, len(order) + 1):
+        first = frequencies[order[start]]
+        if stop == len(order) or frequencies[order[stop]] - first > closeness * abs(first):
+            if stop - start > 1:
+                groups.append(order[start:stop])
+            start = stop
+    return groups
+
+
+def align_close_modes(
+    frequencies: FloatArray, shapes: FloatArray, measured: FloatArray, closeness: float
+) -> FloatArray:
+    """Return shapes in which modes of nearly one frequency are turned towards measured ones.
+
+    The eigenvectors of nearly repeated eigenvalues mix at the least perturbation of the model, so
+    that none of them need look like a measured mode that their space contains. Within each group
+    an orthogonal matrix turns them to the measured shapes that the space holds best; frequencies
+    and mass-orthogonality are not touched.
+
+    Arguments:
+        frequencies: of the model in Hz, (p,).
+        shapes: mass-normalised, at the sensors, (n_sensors, p).
+        measured: (n_sensors, m); nan where missing.
+        closeness: relative distance below which frequencies count as one.
+
+    Source: D'Ambrogio & Fregolent (2003), Higher-order MAC for the correlation of close and
+    multiple modes.
+    """
+    seen = np.isfinite(measured).all(axis=1)
+    aligned = np.array(shapes, dtype=float)
+    for group in clusters_of(frequencies, closeness):
+        space = aligned[np.ix_(seen, group)]
+        if len(space) < len(group) or np.linalg.matrix_rank(space) < len(group):
+            continue
+        coordinates = la.lstsq(space, measured[seen])[0]
+        likeness = np.diagonal(mac(space @ coordinates, measured[seen]))
+        best = np.argsort(-likeness, kind="stable")[: len(group)]
+        target = coordinates[:, best] / np.linalg.norm(coordinates[:, best], axis=0)
+        left, _, right = la.svd(target * likeness[best])
+        turn = left[:, : len(best)] @ right
+        rest = la.null_space(turn.T)
+        aligned[:, group] = aligned[:, group] @ np.column_stack([turn, rest])
+    return aligned
