@@ -101,7 +101,7 @@ def failures(failed: list[Trouble]) -> str:
 
 def _row(row: dict[Any, Any]) -> list[str]:
     return [
-        ("!" if row["unphysical"] else "") + whole(row["rank"]),
+        _marks(row) + whole(row["rank"]),
         shortened(plain(row["strategy"]), _NAME_WIDTH),
         fixed(row["skill"], 3),
         *(fixed(row[f"{block}_percent"], 2, 4) for block in ("used", "higher", "modified")),
@@ -111,6 +111,12 @@ def _row(row: dict[Any, Any]) -> list[str]:
         whole(row["evaluations"], 5),
         fixed(row["seconds"], 2, 4),
     ]
+
+
+def _marks(row: dict[Any, Any]) -> str:
+    """Return what must not be overlooked: lost physics, and jobs that the errors leave out."""
+    incomplete = row["ok"] + row["not_applicable"] < row["total"]
+    return ("!" if row["unphysical"] else "") + ("*" if incomplete else "")
 
 
 def _table(rows: list[list[str]], headers: tuple[str, ...], align: tuple[str, ...]) -> str:
@@ -131,3 +137,5 @@ def _legend(board: pd.DataFrame) -> Iterator[str]:
     yield "used, high., mod.: rms frequency error, median over the cases"
     if board["unphysical"].any():
         yield "!: unphysical (rigid modes lost or negative eigenvalues), below all others"
+    if (board["ok"] + board["not_applicable"] < board["total"]).any():
+        yield "*: some jobs gave no model; they count 10 in the skill, the errors leave them out"

@@ -136,7 +136,7 @@ class TestTerminal:
         text = TerminalReporter().render(RUN)
         rows = [line.split() for line in text.splitlines()[3:8]]
         assert [row[1] for row in rows] == ["good", "picky", "worse", "imaginary", "broken"]
-        assert [row[0] for row in rows] == ["1", "2", "3", "!4", "5"]
+        assert [row[0] for row in rows] == ["1", "2", "3", "!4", "*5"]
         # rms 1 % over used and higher; one of three modified modes has no partner
         modified = 100.0 * math.sqrt((0.01**2 + 1.0 + 0.01**2) / 3.0)
         assert rows[0][3:] == ["1.00", "1.00", f"{modified:.1f}", "0", "0", "4", "17", "1.25"]
