@@ -138,4 +138,4 @@ def _legend(board: pd.DataFrame) -> Iterator[str]:
     if board["unphysical"].any():
         yield "!: unphysical (rigid modes lost or negative eigenvalues), below all others"
     if (board["ok"] + board["not_applicable"] < board["total"]).any():
-        yield "*: some jobs gave no model; they count 10 in the skill, the errors leave them out"
+        yield "*: some jobs gave no model: 10 each in the skill, left out of the errors"

@@ -180,7 +180,5 @@ def _next_quasi(
     except StrategyFailure as lost:
         if not history:
             raise
-        promise = (
-            f"used modes reproduced by changed entries of K (step {len(history)} lost one: {lost})"
-        )
+        promise = f"used modes reproduced, pattern of K kept (after step {len(history)}: {lost})"
         raise SelfCheckFailed(promise, history[-1]["residual"], ALLOWED) from lost
