@@ -319,7 +319,7 @@ class TestRun:
     def test_screen(self, done: tuple[Path, Result]) -> None:
         lines = done[1].stdout.splitlines()
         assert max(len(line) for line in lines if not line.startswith("markdown: ")) <= 80
-        found = [re.match(r" *(\d)  (test-\w+) +\d", line) for line in lines]
+        found = [re.match(r"[ *]*(\d)  (test-\w+) +\d", line) for line in lines]
         ranks = {match[2]: match[1] for match in found if match}
         assert ranks == {"test-nothing": "1", "test-picky": "2", "test-fails": "3"}
         assert "failed x2" in done[1].stdout
