@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 from femubench.core.fem.sections import Section
@@ -163,13 +164,25 @@ class Frame:
         """Tell whether rho I takes part in the mass matrix."""
         return self.beam == "timoshenko" if self.rotary_inertia is None else self.rotary_inertia
 
+    @cached_property
+    def _joints(self) -> Mapping[str, Joint]:
+        return {joint.name: joint for joint in self.joints}
+
+    @cached_property
+    def _ends(self) -> Mapping[str, tuple[str, ...]]:
+        ends: dict[str, list[str]] = {}
+        for member in self.members:
+            for joint in dict.fromkeys(member.ends):
+                ends.setdefault(joint, []).append(member.name)
+        return {joint: tuple(members) for joint, members in ends.items()}
+
     def joint(self, name: str) -> Joint:
         """Return the joint of that name; raises KeyError."""
-        return next(joint for joint in self.joints if joint.name == name)
+        return self._joints[name]
 
     def ends_at(self, joint: str) -> tuple[str, ...]:
         """Return the names of the members that end at a joint."""
-        return tuple(member.name for member in self.members if joint in member.ends)
+        return self._ends.get(joint, ())
 
     def with_attachments(
         self, masses: tuple[PointMass, ...], springs: tuple[GroundSpring, ...]

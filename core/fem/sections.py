@@ -161,6 +161,7 @@ SHAPES: Mapping[str, tuple[Callable[..., Section], tuple[str, ...]]] = {
     "rectangular-tube": (rectangular_tube, ("width", "height", "wall")),
     "round-tube": (round_tube, ("diameter", "wall")),
     "solid-square": (_solid_square, ("width",)),
+    "solid": (solid_rectangle, ("width", "height")),
     "solid-rectangle": (solid_rectangle, ("width", "height")),
     "solid-circle": (_solid_circle, ("diameter",)),
 }
