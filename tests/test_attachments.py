@@ -177,3 +177,12 @@ def test_a_rigid_length_beyond_the_element_is_refused(hframe: FrameBuilder) -> N
     assert structure.with_values([parameter], [-0.05]).properties.rigid_1.min() == -0.05
     with pytest.raises(ModelError, match="longer than its element"):
         structure.with_values([parameter], [0.06])
+
+
+def test_out_of_plane_a_mass_acts_along_z_alone(ladder: FrameBuilder) -> None:
+    base = ladder()
+    flat, high = (
+        elastic(replace(base, masses=(PointMass(Place(joint="A"), 0.3, (0.02, -0.05, z)),)))
+        for z in (0.0, 0.1)
+    )
+    np.testing.assert_allclose(high, flat, rtol=1e-12)

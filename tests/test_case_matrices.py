@@ -10,6 +10,7 @@ import scipy.io
 import scipy.sparse as sp
 
 from femubench import InputError, Model, read_case, solve_modes
+from femubench.core.case.matrices import read_matrix
 from femubench.core.fem.frame import Place
 
 CASES = Path(__file__).parent / "cases"
@@ -223,3 +224,37 @@ def test_broken_matrices(tmp_path: Path, file: str, content: str, named: str, wh
     text = str(message(folder))
     assert named in text
     assert what in text
+
+
+@pytest.mark.parametrize(
+    ("entries", "says"),
+    [
+        ("1 1 1e300", r"entry \(1, 1\) is 1e\+300"),
+        ("2 2 nan", r"entry \(2, 2\) is nan"),
+        ("2 1 5.0", r"not symmetric at \(\d, \d\)"),
+    ],
+)
+def test_a_wrong_entry_is_named(tmp_path: Path, entries: str, says: str) -> None:
+    file = tmp_path / "k.mtx"
+    header = "%%MatrixMarket matrix coordinate real general\n2 2 3\n"
+    file.write_text(f"{header}1 1 1.0\n2 2 1.0\n{entries}\n")
+    with pytest.raises(InputError, match=says):
+        read_matrix(file, 2, ())
+
+
+class Careless:
+    """A reader plugin that trips over its file."""
+
+    name = "careless"
+    suffixes = (".npz",)
+
+    def read_matrix(self, path: Path) -> Any:
+        raise KeyError("a")
+
+    def read_modes(self, path: Path) -> Any:
+        raise ZeroDivisionError("division by zero")
+
+
+def test_a_reader_that_raises_is_named_with_its_file(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"k\.npz: reader 'careless' failed: KeyError: 'a'"):
+        read_matrix(tmp_path / "k.npz", 2, (Careless(),))

@@ -255,7 +255,13 @@ class TestWrongInput:
     def test_usage(self, invoke: Invoke, words: list[str]) -> None:
         result = invoke(*words)
         assert result.exit_code == 2
-        assert "Error: " in result.stderr
+        assert len(result.stderr.splitlines()) == 1
+        assert result.stderr.startswith("bench: ")
+
+    def test_no_verb_shows_the_help(self, invoke: Invoke) -> None:
+        result = invoke()
+        assert "bench --help" in result.output or "Commands:" in result.output
+        assert len(result.output.splitlines()) > 5
 
     def test_nearest_verb(self, invoke: Invoke) -> None:
         assert "Did you mean report?" in invoke("reprt").stderr
@@ -508,3 +514,20 @@ def test_files_are_replaced_in_one_step(tmp_path: Path, monkeypatch: pytest.Monk
         write_atomically(path, "new")
     assert path.read_text() == "old\n"
     assert sorted(tmp_path.iterdir()) == [plain, path]
+
+
+class Faulty:
+    name = "faulty"
+    suffix = ".faulty"
+
+    def render(self, run: object) -> str:
+        raise ZeroDivisionError("division by zero")
+
+
+def test_a_reporter_that_raises_is_named() -> None:
+    from femubench.core.cli.reporting import rendered
+    from femubench.core.errors import PluginError
+    from femubench.core.harness.results import Run
+
+    with pytest.raises(PluginError, match="reporter 'faulty' failed: ZeroDivisionError"):
+        rendered(Faulty(), Run({}, ()))

@@ -55,6 +55,7 @@ def test_an_ok_job_returns_the_model_and_plain_figures() -> None:
         (toys.Diverging(), "diverged", "step 7: the residual grew to 1e9"),
         (toys.Declining(), "not-applicable", "needs two modes of one kind"),
         (toys.Quitting(), "failed", "SystemExit: enough"),
+        (toys.Interrupting(), "failed", "KeyboardInterrupt"),
         (toys.Locked(), "failed", "_LockedError"),
         (toys.Numbers(), "failed", "TypeError: update returned int, expected UpdateResult"),
     ],
@@ -179,3 +180,9 @@ def test_a_model_within_the_contract_passes() -> None:
     check_model(replace(CASE.model, mass_change=LowRank(BASIS, np.eye(2))), CASE.model)
     check_model(replace(CASE.model, mass_change=LowRank(BASIS[:, :0], np.eye(0))), CASE.model)
     check_model(toys.Model.of(toys.frame(4, 1e9)), CASE.model)
+
+
+def test_a_model_that_was_changed_in_place_is_refused() -> None:
+    outcome = execute(job(toys.InPlace()))
+    assert outcome.status == "failed"
+    assert outcome.reason.startswith("the nominal model was changed in place")

@@ -169,3 +169,16 @@ def test_rigid_vectors_of_labelled_dofs() -> None:
     # Every motion keeps the distance of the two points to first order.
     gap = xyz[0] - xyz[6]
     assert np.abs(gap @ (vectors[:3] - vectors[6:9])).max() < 1e-14
+
+
+@pytest.mark.parametrize("height", [0.0, 0.1, 0.2, 0.7])
+def test_a_plane_off_the_origin_has_no_further_rigid_modes(
+    hframe: FrameBuilder, height: float
+) -> None:
+    base = hframe()
+    joints = tuple(replace(j, xyz=(j.xyz[0], height, j.xyz[2])) for j in base.joints)
+    raised = replace(base, joints=joints)
+    assert rigid_modes_of(Model.of(raised)).shape[1] == 3
+    clamped = replace(raised, supports=(Support(Place(joint="T1"), ("x", "z", "ry")),))
+    assert rigid_modes_of(Model.of(clamped)).shape[1] == 0
+    assert rigid_body_vectors(Model.of(raised).dofs).shape[1] == 3

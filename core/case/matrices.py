@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,8 @@ from femubench.core.case.checks import check_unique
 from femubench.core.case.faults import Fault, Misfit, at_key
 from femubench.core.case.files import CaseFiles
 from femubench.core.case.nodes import MatrixGeometry, read_dofs
-from femubench.core.case.schema import GroupSpec, MatricesSpec
-from femubench.core.errors import InputError
+from femubench.core.case.schema import LARGEST, GroupSpec, MatricesSpec
+from femubench.core.errors import FemubenchError, InputError
 from femubench.core.model import Model
 from femubench.core.plugin.roles import Reader
 from femubench.core.typing import SparseArray
@@ -42,26 +43,55 @@ def read_matrix(file: Path, size: int, readers: Sequence[Reader]) -> SparseArray
         if reader is None:
             known = [*_MATRIX_MARKET[:2], *(s for r in readers for s in r.suffixes)]
             raise InputError("unknown kind of file", file=file, expected=", ".join(known))
-        matrix = sp.csc_array(reader.read_matrix(file))
+        with reading_with(reader, file):
+            matrix = sp.csc_array(reader.read_matrix(file))
     if matrix.shape != (size, size):
         what = f"the matrix has {matrix.shape[0]} rows and {matrix.shape[1]} columns"
         raise InputError(what, file=file, expected=f"{size} of both as in the dofs file")
-    if matrix.dtype.kind not in "fiu" or not np.isfinite(matrix.data).all():
-        raise InputError("an entry is not a finite number", file=file, expected="real numbers")
+    if matrix.dtype.kind not in "fiu":
+        raise InputError("an entry is not a number", file=file, expected="real numbers")
     matrix = sp.csc_array(matrix, dtype=float)
+    _check_entries(matrix, file)
     largest = np.abs(matrix.data).max(initial=0.0)
-    if np.abs((matrix - matrix.T).data).max(initial=0.0) > _ASYMMETRY * largest:
-        raise InputError("the matrix is not symmetric", file=file, expected="A = A'")
     if largest == 0.0 or matrix.diagonal().min() < 0.0:
         what = "the matrix is zero" if largest == 0.0 else "a diagonal entry is negative"
         raise InputError(what, file=file, expected="a positive semidefinite matrix")
     return sp.csc_array(0.5 * (matrix + matrix.T))
 
 
+def _check_entries(matrix: SparseArray, file: Path) -> None:
+    """Raise for the first entry that is not finite or has no equal across the diagonal."""
+    entries = sp.coo_array(matrix)
+    size = np.abs(entries.data)
+    wrong = np.flatnonzero(~(size <= LARGEST))
+    if len(wrong):
+        i, j = entries.row[wrong[0]] + 1, entries.col[wrong[0]] + 1
+        what = f"entry ({i}, {j}) is {entries.data[wrong[0]]:g}"
+        raise InputError(what, file=file, expected=f"finite numbers up to {LARGEST:g}")
+    apart = sp.coo_array(matrix - matrix.T)
+    wrong = np.flatnonzero(np.abs(apart.data) > _ASYMMETRY * size.max(initial=0.0))
+    if len(wrong):
+        i, j = apart.row[wrong[0]] + 1, apart.col[wrong[0]] + 1
+        what = f"the matrix is not symmetric at ({i}, {j})"
+        raise InputError(what, file=file, expected="A = A'")
+
+
 def reader_of(file: Path, readers: Sequence[Reader]) -> Reader | None:
     """Return the first reader that knows the suffix of a file."""
     name = file.name.lower()
     return next((r for r in readers if any(name.endswith(s) for s in r.suffixes)), None)
+
+
+@contextmanager
+def reading_with(reader: Reader, file: Path) -> Iterator[None]:
+    """Turn whatever a reader plugin raises into one line that names it and the file."""
+    try:
+        yield
+    except FemubenchError:
+        raise
+    except Exception as error:
+        what = f"reader {reader.name!r} failed: {type(error).__name__}: {error}"
+        raise InputError(what, file=file, expected=f"a file that {reader.name!r} reads") from error
 
 
 def _matrix_market(file: Path, size: int) -> SparseArray:

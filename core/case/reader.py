@@ -16,7 +16,7 @@ from femubench.core.case.checks import check_unique
 from femubench.core.case.faults import Fault, KeyPath, at_key, dotted, first_fault
 from femubench.core.case.files import CaseFiles, read_text
 from femubench.core.case.frames import FrameSite, Site, frame_of, ground_springs, point_masses
-from femubench.core.case.matrices import matrix_model, reader_of
+from femubench.core.case.matrices import matrix_model, reader_of, reading_with
 from femubench.core.case.modes import (
     NO_SENSORS,
     fitted_modes,
@@ -143,7 +143,8 @@ class _Building:
             known = [".csv", *(suffix for r in self.readers for suffix in r.suffixes)]
             raise Fault(key, f"unknown kind of file {name!r}", ", ".join(known))
         if path not in self.readings:
-            self.readings[path] = reader.read_modes(path)
+            with reading_with(reader, path):
+                self.readings[path] = reader.read_modes(path)
         return path, self.readings[path]
 
     def measurement(self, site: Site) -> Measurement:

@@ -88,8 +88,11 @@ def _exit_code(call: Callable[[], Any], kwargs: dict[str, Any]) -> int:
     kwargs["standalone_mode"] = False
     try:
         code = call()
-    except click.ClickException as fault:
+    except click.exceptions.NoArgsIsHelpError as fault:
         fault.show()
+        return WRONG_INPUT
+    except click.ClickException as fault:
+        click.echo(f"bench: {' '.join(fault.format_message().split())}", err=True)
         return WRONG_INPUT
     except (click.Abort, KeyboardInterrupt):
         click.echo("bench: interrupted", err=True)

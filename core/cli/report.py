@@ -9,7 +9,7 @@ import click
 
 from femubench.core.cli.files import make_folder, write_atomically
 from femubench.core.cli.registry import chosen, plugins_for, store_folder
-from femubench.core.cli.reporting import run_name
+from femubench.core.cli.reporting import rendered, run_name
 from femubench.core.errors import InputError
 from femubench.core.harness.frames import run_from_json
 from femubench.core.harness.results import Run
@@ -57,7 +57,7 @@ def report(
         make_folder(output)
     for name in names:
         writer = plugins.reporters[name]
-        text = writer.render(found)
+        text = rendered(writer, found)
         if output is None:
             click.echo(text)
             continue

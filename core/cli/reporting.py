@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from femubench.core.cli.registry import unknown
-from femubench.core.errors import InputError, PluginError
+from femubench.core.errors import FemubenchError, InputError, PluginError
 from femubench.core.harness.results import Run
 from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.roles import Reporter
@@ -29,6 +29,24 @@ def reporter(plugins: Plugins, name: str) -> Reporter:
     if name not in plugins.reporters:
         raise PluginError(unknown("report format", name, plugins.reporters))
     return plugins.reporters[name]
+
+
+def rendered(found: Reporter, run: Run) -> str:
+    """Return a reporter's text.
+
+    Raises:
+        PluginError: naming the reporter, whatever it raised.
+    """
+    try:
+        text = found.render(run)
+    except FemubenchError:
+        raise
+    except Exception as error:
+        what = f"reporter {found.name!r} failed: {type(error).__name__}: {error}"
+        raise PluginError(what) from error
+    if not isinstance(text, str):
+        raise PluginError(f"reporter {found.name!r} gave {type(text).__name__}, expected str")
+    return text
 
 
 def reporter_for(plugins: Plugins, path: Path) -> Reporter:

@@ -15,8 +15,14 @@ from femubench.core.cli.durations import seconds_of, spoken
 from femubench.core.cli.files import check_writable, make_folder, write_atomically
 from femubench.core.cli.progress import progress_bar
 from femubench.core.cli.registry import chosen, counted, plugins_for, store_folder, wrapped
-from femubench.core.cli.reporting import exit_code, reporter, reporter_for, run_name
-from femubench.core.errors import InputError
+from femubench.core.cli.reporting import (
+    exit_code,
+    rendered,
+    reporter,
+    reporter_for,
+    run_name,
+)
+from femubench.core.errors import InputError, PluginError
 from femubench.core.harness.results import Run
 from femubench.core.harness.runner import run_jobs
 from femubench.core.harness.store import Store
@@ -165,11 +171,15 @@ def _header(
 
 def _finish(run: Run, outputs: dict[Path, Reporter], screen: Reporter | None) -> None:
     """Write the files, then show the ranking and where the files are."""
+    written, broken = [], None
     for path, writer in outputs.items():
-        write_atomically(path, writer.render(run))
-    if screen is None:
-        return
-    click.echo()
-    click.echo(screen.render(run))
-    for path, writer in outputs.items():
-        click.echo(f"{writer.name}: {path}")
+        try:
+            write_atomically(path, rendered(writer, run))
+            written.append(f"{writer.name}: {path}")
+        except PluginError as fault:
+            broken = fault
+    if screen is not None:
+        click.echo()
+        click.echo("\n".join([rendered(screen, run), *written]))
+    if broken is not None:
+        raise broken

@@ -209,8 +209,9 @@ class Structure:
         mass, stiffness = sp.csc_array((n, n)), sp.csc_array((n, n))
         for item in masses:
             point = point_rows(self.frame, self.mesh, self.properties, item.at)
-            arm = sp.csr_array(rigid_arm(np.array(item.offset))[:3])
-            rows = arm @ point @ transform
+            # In a plane a mass acts in the directions of the plane, and in no other.
+            arm = rigid_arm(np.array(item.offset))[:3][self.active_local[:3]]
+            rows = sp.csr_array(arm) @ point @ transform
             mass = mass + item.mass * (rows.T @ rows)
         for spring in springs:
             rows = self._ground_row(spring)

@@ -107,7 +107,15 @@ def execute(job: Job) -> JobOutcome:
         # A result is judged by its figures; what numerical libraries mutter on the way is not.
         warnings.simplefilter("ignore")
         outcome = _attempt(strategy, model, measurement, rng)
+    if outcome.status == "ok" and _changed(model, pickle.loads(job.model)):
+        outcome = JobOutcome("failed", "the nominal model was changed in place, expected a new one")
     return replace(outcome, seconds=time.perf_counter() - start, evaluations=counter.count)
+
+
+def _changed(model: Model, nominal: Model) -> bool:
+    """Tell whether a strategy wrote into the matrices that it was given."""
+    pairs = ((model.mass, nominal.mass), (model.stiffness, nominal.stiffness))
+    return any((now != before).nnz > 0 for now, before in pairs)
 
 
 def one_line(error: BaseException) -> str:
@@ -130,7 +138,7 @@ def _attempt(
         return JobOutcome("diverged", _text(error), traceback.format_exc())
     except StrategyFailure as error:
         return JobOutcome("failed", _text(error), traceback.format_exc())
-    except (Exception, SystemExit) as error:
+    except BaseException as error:  # Ctrl-C does not reach a worker: this is the strategy's own
         return JobOutcome("failed", one_line(error), traceback.format_exc())
 
 

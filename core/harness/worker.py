@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import signal
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -43,6 +44,8 @@ def prepare() -> None:
 
     Loading here keeps imports out of the first job's time limit.
     """
+    # Ctrl-C goes to the whole foreground group; it is the parent that stops the workers.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     import scipy.linalg
     import scipy.optimize
     import scipy.sparse.linalg  # noqa: F401 - loaded for its threads and its time

@@ -9,7 +9,7 @@ import scipy.linalg as la
 
 from femubench.core.measurement import DIRECTIONS
 from femubench.core.model import Dofs, Model
-from femubench.core.typing import FloatArray
+from femubench.core.typing import BoolArray, FloatArray
 
 _ZERO_ENERGY = 1e-12
 _HELD = 1e-9  # of a motion whose largest translation is 1
@@ -21,8 +21,12 @@ def rigid_body_vectors(dofs: Dofs) -> FloatArray:
     Three translations and three rotations about the centroid, those that move nothing left out.
     """
     vectors = _motions(dofs)(dofs.xyz, _axes(dofs))
-    moving = np.abs(vectors).max(axis=0) > 0.0
-    return np.asarray(vectors[:, moving])
+    return np.asarray(vectors[:, _moving(vectors)])
+
+
+def _moving(vectors: FloatArray) -> BoolArray:
+    """Tell which motions move anything: a plane off the origin leaves roundoff in the others."""
+    return np.asarray(np.abs(vectors).max(axis=0, initial=0.0) > _HELD)
 
 
 def _axes(dofs: Dofs) -> FloatArray:
@@ -62,7 +66,7 @@ def rigid_modes_of(model: Model) -> FloatArray:
     """
     motion, structure = _motions(model.dofs), model.structure
     vectors = motion(model.dofs.xyz, _axes(model.dofs))
-    moving = np.abs(vectors).max(axis=0) > 0.0
+    moving = _moving(vectors)
     if structure is None:
         candidates = _without_energy(model, vectors[:, moving])
     else:

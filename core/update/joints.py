@@ -140,25 +140,15 @@ def flexible_ends(frame: Frame, group: JointGroup) -> tuple[str, ...]:
 
 
 def section_depth(section: Section) -> tuple[float, float]:
-    """Return the sizes along local y and z in m.
-
-    A section that was given as numbers has those of the thin square tube with its area and its
-    second moments: centre-line width sqrt(6 I / A), wall A / (4 width).
-    """
-    if section.width is not None and section.height is not None:
-        return section.width, section.height
-    sizes = []
-    for second_moment in (section.Iz, section.Iy):
-        middle = float(np.sqrt(6.0 * second_moment / section.A))
-        sizes.append(middle + section.A / (4.0 * middle))
-    return sizes[0], sizes[1]
+    """Return the sizes along local y and z in m; a section given as numbers has none, that is 0."""
+    return section.width or 0.0, section.height or 0.0
 
 
 def half_depth(frame: Frame, end: str) -> float:
     """Return half the depth of the member that crosses a member end, along that member, in m.
 
     Of several, the one that stands squarest on it counts; a member that only continues it has no
-    depth to offer.
+    depth to offer, nor has one whose section was given as numbers.
     """
     name, _, joint = end.rpartition("@")
     members = _members_at(frame, joint)

@@ -73,8 +73,11 @@ def _newton(
     second = np.zeros((n + 1, n + 1))
     np.add.at(second, (row[:, :, None], row[:, None, :]), bend)
     total = hessian @ (x - best) + barrier * gradient[:n]
-    factor = la.cho_factor(hessian + barrier * second[:n, :n])
-    step = -la.cho_solve(factor, total)
+    curvature = hessian + barrier * second[:n, :n]
+    try:
+        step = -la.cho_solve(la.cho_factor(curvature), total)
+    except la.LinAlgError:  # singular to roundoff: the shortest step will do
+        step = -la.lstsq(curvature, total)[0]
     return total, step, float(-total @ step)
 
 

@@ -26,6 +26,7 @@ from femubench import (
     with_rigid_ends,
 )
 
+_SHARE_WITHOUT_DEPTH = 0.1  # of the element
 _ALMOST_NOTHING = 3.12e-6  # m, the initial offset of the passing member in table 4(e)
 _LONGEST_EXTENSION = 3.0  # negative lengths, in those available
 
@@ -86,9 +87,10 @@ class Offset(Strategy):
         """Return the rigid lengths in the stiffness and in the mass matrix in m."""
         if group.role == "through":
             return _ALMOST_NOTHING, 0.0
-        half = [half_depth(structure.frame, end) for end in group.ends]
-        wanted = float(np.mean(half)) if self.length is None else self.length
+        half = float(np.mean([half_depth(structure.frame, end) for end in group.ends]))
         room = min(available_length(structure, end) for end in group.ends)
+        # A length moves by multiples of its start, so it must have one.
+        wanted = self.length or half or _SHARE_WITHOUT_DEPTH * room
         start = min(max(wanted, _ALMOST_NOTHING), room / 2.0)
         return start, start if group.role == "branch" else 0.0
 

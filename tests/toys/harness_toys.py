@@ -220,6 +220,27 @@ class Quitting(Strategy):
         sys.exit("enough")
 
 
+class Interrupting(Strategy):
+    name = "interrupting"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        raise KeyboardInterrupt
+
+
+class InPlace(Strategy):
+    name = "in-place"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        model.stiffness.data[:] *= 0.9
+        return UpdateResult(model)
+
+
 class Looping(Strategy):
     name = "looping"
     citation = "none"
