@@ -18,6 +18,7 @@ from femubench.reports.summary import (
     header,
     strategies_of,
     troubles,
+    unconverged,
 )
 
 _SPECIAL = re.compile(r"([\\`*_\[\]|~])")
@@ -107,6 +108,10 @@ def _coverage(run: Run) -> Iterator[str]:
         counts = (found.count("ok"), found.count("not-applicable"))
         rows.append([escape(name), *map(str, (*counts, len(found) - sum(counts), len(found)))])
     yield table(["strategy", "ok", "not applicable", "failed", "jobs"], rows, "lrrrr")
+    moving = unconverged(run.results)
+    if moving:
+        named = ", ".join(f"{escape(name)} ({count})" for name, count in moving.items())
+        yield f"Still moving at their last iteration (jobs): {named}."
     for title, items in (
         ("### Failures", troubles(run.results)),
         ("### Not applicable", troubles(run.results, fine=True)),

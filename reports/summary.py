@@ -40,6 +40,25 @@ def troubles(results: Iterable[JobResult], *, fine: bool = False) -> list[Troubl
     ]
 
 
+def spared(results: Iterable[JobResult]) -> dict[str, list[str]]:
+    """Return from the reason for which strategies are not applicable to their names."""
+    reasons: dict[str, list[str]] = {}
+    for item in troubles(results, fine=True):
+        names = reasons.setdefault(item.reason, [])
+        if item.strategy not in names:
+            names.append(item.strategy)
+    return reasons
+
+
+def unconverged(results: Iterable[JobResult]) -> dict[str, int]:
+    """Return how many jobs of a strategy ended with its iteration still moving."""
+    counts: dict[str, int] = {}
+    for result in results:
+        if result.status == "ok" and result.diagnostics.get("converged") == 0.0:
+            counts[result.strategy] = counts.get(result.strategy, 0) + 1
+    return counts
+
+
 def first_seed(run: Run) -> int:
     """Return the lowest seed of a run, the one whose frequencies are shown."""
     return min((result.seed for result in run.results), default=0)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from femubench import Run, leaderboard
 from femubench.reports.cells import fixed, interval, plain, shortened, whole
-from femubench.reports.summary import Trouble, troubles
+from femubench.reports.summary import Trouble, spared, troubles, unconverged
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,15 +40,7 @@ class TerminalReporter:
         failed = troubles(run.results)
         if failed:
             parts.append(failures(failed))
-        spared = sum(result.status == "not-applicable" for result in run.results)
-        if spared:
-            parts.append(
-                textwrap.fill(
-                    f"Not applicable: {spared} of {len(run.results)} jobs, where the case lacks "
-                    "what the strategy needs; the model counts as unchanged (skill 1).",
-                    WIDTH,
-                )
-            )
+        parts += [textwrap.fill(text, WIDTH) for text in _notes(run)]
         return "\n\n".join(parts)
 
 
@@ -130,6 +122,16 @@ def _table(rows: list[list[str]], headers: tuple[str, ...], align: tuple[str, ..
     lines = [*heads, rule, *rows]
     text: str = tabulate(lines, tablefmt="plain", disable_numparse=True, colalign=align)
     return "\n".join(line.rstrip() for line in text.splitlines())
+
+
+def _notes(run: Run) -> Iterator[str]:
+    moving = unconverged(run.results)
+    if moving:
+        named = ", ".join(f"{plain(name)} ({count})" for name, count in moving.items())
+        yield f"Still moving at their last iteration (jobs): {named}."
+    for reason, names in spared(run.results).items():
+        listed = ", ".join(map(plain, names))
+        yield f"Not applicable, counted as unchanged (skill 1): {listed}: {reason}."
 
 
 def _legend(board: pd.DataFrame) -> Iterator[str]:

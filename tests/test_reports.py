@@ -177,7 +177,7 @@ class TestTerminal:
     def test_failures_are_told_and_counted(self) -> None:
         text = TerminalReporter().render(RUN)
         assert re.search(r"beam +broken +failed +stiffness: measured 3e-2,", text)
-        assert "Not applicable: 1 of 5 jobs" in text
+        assert "counted as unchanged (skill 1): picky: the model has no joints." in text
         many = [replace(FAILED, case=f"case{number}") for number in range(30)]
         assert "... and 10 more in the report" in TerminalReporter().render(run_of(*many))
 
@@ -325,3 +325,14 @@ def test_errors_by_design_change_match_the_definition() -> None:
     imaginary = result("x", blocks={"modified": block(mode(1, 50.0, -3.0, "c"))})
     assert change_errors(imaginary) == {"c": pytest.approx(100.0)}
     assert math.isnan(rms_percent([]))
+
+
+def test_notes_name_what_still_moves_and_what_does_not_apply() -> None:
+    slow = replace(result("slow"), diagnostics={"converged": 0.0, "iterations": 100.0})
+    done = replace(result("done"), diagnostics={"converged": 1.0})
+    run = run_of(slow, done, SPARED)
+    for text in (TerminalReporter().render(run), MarkdownReporter().render(run)):
+        assert "Still moving at their last iteration (jobs): slow (1)." in text
+    lines = " ".join(TerminalReporter().render(run).split())
+    assert f"Not applicable, counted as unchanged (skill 1): picky: {SPARED.reason}." in lines
+    assert "Still moving" not in TerminalReporter().render(run_of(done))
