@@ -318,8 +318,8 @@ class TestRun:
     def test_header_tells_what_decides_on_the_outcome(self, done: tuple[Path, Result]) -> None:
         header = " ".join(done[1].stdout.partition("\n\n")[0].split())
         assert header == (
-            f"femubench {femubench.__version__}: 1 case, 3 strategies, seeds 0-1 (0: data as "
-            "recorded, else noise added), 6 jobs, 2 workers, timeout 1m"
+            f"femubench {femubench.__version__}: 1 case, 3 strategies, seeds 1-2 (noise "
+            "added), 6 jobs, 2 workers, timeout 1m"
         )
 
     def test_screen(self, done: tuple[Path, Result]) -> None:
@@ -336,12 +336,12 @@ class TestRun:
         data = json.loads((folder / "r.json").read_text(encoding="utf-8"))
         jobs = [(entry["strategy"], entry["seed"], entry["status"]) for entry in data["results"]]
         assert sorted(jobs) == [
-            ("test-fails", 0, "failed"),
             ("test-fails", 1, "failed"),
-            ("test-nothing", 0, "ok"),
+            ("test-fails", 2, "failed"),
             ("test-nothing", 1, "ok"),
-            ("test-picky", 0, "not-applicable"),
+            ("test-nothing", 2, "ok"),
             ("test-picky", 1, "not-applicable"),
+            ("test-picky", 2, "not-applicable"),
         ]
         assert (folder / "r.csv").read_text(encoding="utf-8").count("\n") == 7
         report = folder / "store" / f"{data['meta']['run']}.md"

@@ -24,6 +24,7 @@ from femubench import (
     UpdateResult,
     solve_modes,
 )
+from femubench.core.modal.correlation import mac
 from femubench.core.modal.eigen import dense_matrices
 from femubench.core.modal.expansion import expand_by_dynamics
 from femubench.core.modal.pairing import pair_modes
@@ -220,8 +221,7 @@ def test_berman_corrects_the_mass_first_and_uses_it(frame_case: Case) -> None:
     assert result.diagnostics["largest_off_diagonal_mass"] > 0.01
     mass, stiffness = dense_matrices(result.model)
     rigid = rigid_modes_of(model)
-    raw = expand_measured_shapes(model, data)
-    free = raw - rigid @ (rigid.T @ (model.mass @ raw))
+    free = expand_measured_shapes(model, data, rigid)
     shapes = free / np.sqrt(np.einsum("ij,ij->j", free, mass @ free))
     np.testing.assert_allclose(shapes.T @ mass @ shapes, np.eye(3), atol=1e-10)
     inertia = mass @ shapes * data.eigenvalues
@@ -232,6 +232,25 @@ def test_berman_corrects_the_mass_first_and_uses_it(frame_case: Case) -> None:
     off = stiffness @ shapes - model.mass @ shapes * data.eigenvalues
     assert np.abs(off).max() > 1e-3 * np.abs(inertia).max()
     assert np.linalg.eigvalsh(mass)[0] > 0.0
+
+
+@pytest.mark.parametrize("limit", [500, 50])
+def test_berman_meets_every_reading_and_has_no_momentum(
+    frame_case: Case, limit: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("femubench.core.update.dynamic.DENSE_LIMIT", limit)
+    model, data = frame_case
+    rigid = rigid_modes_of(model)
+    shapes = expand_measured_shapes(model, data, rigid)
+    readings = data.shapes / np.abs(data.shapes).max(axis=0)
+    np.testing.assert_allclose(model.observe(data.sensors) @ shapes, readings, atol=1e-7)
+    assert np.abs(rigid.T @ (model.mass @ shapes)).max() < 1e-8
+    updated = update(Berman, frame_case).model
+    modes = solve_modes(updated).elastic
+    for j, frequency in enumerate(data.frequencies):
+        found = int(np.abs(modes.natural_frequencies - frequency).argmin())
+        seen = model.observe(data.sensors) @ modes.shapes[:, found]
+        assert mac(seen, data.shapes[:, j])[0, 0] > 1.0 - 1e-6
 
 
 def test_berman_needs_elastic_shapes_free_of_rigid_motion(frame_case: Case) -> None:

@@ -53,10 +53,8 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
 @click.option(
     "--seeds",
     type=click.IntRange(1),
-    default=1,
     metavar="N",
-    show_default=True,
-    help="Run seeds S .. S+N-1; seed 0 is the data as recorded, others add noise.",
+    help="Run N draws of measurement noise, seeds S+1 .. S+N, instead of the data as recorded.",
 )
 @click.option(
     "--seed",
@@ -75,7 +73,7 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
     help="Give up on a job after this time, e.g. 90s, 10m, 1h.",
 )
 @click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the results as JSON.")
-@click.option("--csv", "csv_file", type=FILE, metavar="FILE", help="Write one line a mode as CSV.")
+@click.option("--csv", "csv_file", type=FILE, metavar="FILE", help="Write one line a job as CSV.")
 @click.option(
     "--store",
     type=FOLDER,
@@ -96,7 +94,7 @@ def run(
     cases: tuple[str, ...],
     strategies: tuple[str, ...],
     jobs: int | None,
-    seeds: int,
+    seeds: int | None,
     seed: int,
     timeout: float,
     json_file: Path | None,
@@ -119,7 +117,8 @@ def run(
     folder = store_folder(store)
     make_folder(folder)
     workers = jobs or len(os.sched_getaffinity(0))
-    all_seeds = range(seed, seed + seeds)
+    # Seed 0 is the data as recorded; several runs are draws of noise and nothing else.
+    all_seeds = range(seed, seed + 1) if seeds is None else range(seed + 1, seed + seeds + 1)
     if not quiet:
         click.echo(wrapped(_header(read, names, all_seeds, workers, timeout), hanging=2))
     with progress_bar(quiet=quiet) as progress:
@@ -160,7 +159,7 @@ def _header(
 ) -> str:
     """Return one line with everything that decides on the outcome."""
     named = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]}-{seeds[-1]}"
-    meaning = "data as recorded" if seeds == range(1) else "0: data as recorded, else noise added"
+    meaning = "data as recorded" if seeds == range(1) else "noise added"
     total = len(cases) * len(strategies) * len(seeds)
     return (
         f"femubench {femubench.__version__}: {counted(len(cases), 'case')}, "

@@ -7,7 +7,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
+import numpy as np
+
 from femubench.core.fem.sections import Section
+from femubench.core.typing import FloatArray, IntArray
 
 Plane = Literal["in-plane", "out-of-plane", "3d"]
 BeamTheory = Literal["euler-bernoulli", "timoshenko"]
@@ -167,6 +170,27 @@ class Frame:
     @cached_property
     def _joints(self) -> Mapping[str, Joint]:
         return {joint.name: joint for joint in self.joints}
+
+    @cached_property
+    def joint_index(self) -> Mapping[str, int]:
+        """Return the position of every joint in `joints`."""
+        return {joint.name: i for i, joint in enumerate(self.joints)}
+
+    @cached_property
+    def member_index(self) -> Mapping[str, int]:
+        """Return the position of every member in `members`."""
+        return {member.name: i for i, member in enumerate(self.members)}
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """Return the positions of the joints in m, (n_joints, 3)."""
+        return np.array([joint.xyz for joint in self.joints], dtype=float)
+
+    @cached_property
+    def member_ends(self) -> IntArray:
+        """Return the joint numbers of every member's ends, (n_members, 2)."""
+        index = self.joint_index
+        return np.array([[index[name] for name in m.ends] for m in self.members], dtype=np.int64)
 
     @cached_property
     def _ends(self) -> Mapping[str, tuple[str, ...]]:

@@ -60,19 +60,17 @@ def node_at(frame: Frame, mesh: Mesh, place: Place, tolerance: float = SAME_STAT
 
 
 def _joint_index(frame: Frame, name: str) -> int:
-    names = [joint.name for joint in frame.joints]
-    if name not in names:
+    if name not in frame.joint_index:
         raise ModelError(f"there is no joint {name!r}")
-    return names.index(name)
+    return frame.joint_index[name]
 
 
 def _element_at(frame: Frame, mesh: Mesh, place: Place) -> tuple[int, float]:
-    names = [member.name for member in frame.members]
-    if place.member not in names or place.s is None:
+    if place.member is None or place.member not in frame.member_index or place.s is None:
         raise ModelError(f"there is no member {place.member!r}")
     if not -SAME_STATION <= place.s <= 1.0 + SAME_STATION:
         raise ModelError(f"station {place.s:g} of member {place.member!r} is not within 0..1")
-    rows = np.flatnonzero(mesh.member == names.index(place.member))
+    rows = np.flatnonzero(mesh.member == frame.member_index[place.member])
     low, high = mesh.stations[rows, 0], mesh.stations[rows, 1]
     gap = np.maximum(low - place.s, place.s - high)
     return int(rows[gap.argmin()]), place.s

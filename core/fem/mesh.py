@@ -249,12 +249,10 @@ def locate(frame: Frame, xyz: FloatArray) -> Place:
     Raises:
         ModelError: when the point lies further than 1e-6 m from every member.
     """
-    corners = np.array([joint.xyz for joint in frame.joints])
+    corners, ends = frame.corners, frame.member_ends
     distance = np.linalg.norm(corners - xyz, axis=1)
     if distance.min() <= ON_MEMBER:
         return Place(joint=frame.joints[int(distance.argmin())].name)
-    index = {joint.name: i for i, joint in enumerate(frame.joints)}
-    ends = np.array([[index[name] for name in member.ends] for member in frame.members])
     start, along = corners[ends[:, 0]], corners[ends[:, 1]] - corners[ends[:, 0]]
     s = np.einsum("ij,ij->i", xyz - start, along) / np.einsum("ij,ij->i", along, along)
     foot = start + np.clip(s, 0.0, 1.0)[:, None] * along

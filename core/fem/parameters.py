@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
@@ -66,7 +66,7 @@ class Parameter:
 def _targets(structure: Structure, parameter: Parameter) -> list[tuple[str, IntArray]]:
     """Return (property, element indices) pairs; springs come under the property ``spring``."""
     if parameter.quantity == "spring":
-        return [("spring", _lookup(structure.spring_labels, parameter))]
+        return [("spring", _lookup(structure.spring_index, parameter))]
     if parameter.quantity == "rigid":
         ends = structure.element_ends
         found = [ends.get(place) for place in parameter.places]
@@ -78,7 +78,7 @@ def _targets(structure: Structure, parameter: Parameter) -> list[tuple[str, IntA
             for end in (0, 1)
             if any(k == end for _, k in pairs)
         ]
-    index = _lookup(structure.labels, parameter)
+    index = _lookup(structure.label_index, parameter)
     return [(name, index) for name in QUANTITIES[parameter.quantity]]
 
 
@@ -87,12 +87,12 @@ def _exponent(parameter: Parameter, name: str) -> float:
     return -1.0 if name in _DIVIDED.get(parameter.quantity, ()) else 1.0
 
 
-def _lookup(labels: Sequence[str], parameter: Parameter) -> IntArray:
-    wanted = set(parameter.places)
-    missing = wanted.difference(labels)
+def _lookup(positions: Mapping[str, IntArray], parameter: Parameter) -> IntArray:
+    missing = [place for place in parameter.places if place not in positions]
     if missing:
-        raise ModelError(f"{parameter.name}: there is no place {sorted(missing)[0]!r}")
-    return np.array([i for i, label in enumerate(labels) if label in wanted], dtype=np.int64)
+        raise ModelError(f"{parameter.name}: there is no place {missing[0]!r}")
+    found = [positions[place] for place in dict.fromkeys(parameter.places)]
+    return np.concatenate(found) if found else np.zeros(0, dtype=np.int64)
 
 
 def present_value(structure: Structure, parameter: Parameter) -> float:

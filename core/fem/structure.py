@@ -23,7 +23,7 @@ from femubench.core.fem.kinematics import (
 from femubench.core.fem.mesh import Mesh, build_mesh, locate
 from femubench.core.fem.parameters import Parameter, apply_values
 from femubench.core.measurement import DIRECTIONS, Sensors
-from femubench.core.typing import BoolArray, FloatArray, SparseArray
+from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 
 def _nominal_properties(frame: Frame, mesh: Mesh) -> BeamProperties:
@@ -54,6 +54,13 @@ def _nominal_properties(frame: Frame, mesh: Mesh) -> BeamProperties:
     columns = (length, *table.T, *mesh.rigid.T, *mesh.rigid_mass.T, shape)
     names = [f.name for f in fields(BeamProperties)]
     return BeamProperties(**dict(zip(names, (np.array(c) for c in columns), strict=True)))
+
+
+def _positions(labels: Sequence[str]) -> dict[str, IntArray]:
+    found: dict[str, list[int]] = {}
+    for i, label in enumerate(labels):
+        found.setdefault(label, []).append(i)
+    return {label: np.array(where, dtype=np.int64) for label, where in found.items()}
 
 
 @dataclass(frozen=True)
@@ -111,7 +118,15 @@ class Structure:
         changed = replace(
             self, properties=properties, springs=springs, changes=self.changes + changes
         )
-        for name in ("gather", "spring_rows", "labels", "element_ends", "spring_labels"):
+        for name in (
+            "gather",
+            "spring_rows",
+            "labels",
+            "label_index",
+            "element_ends",
+            "spring_labels",
+            "spring_index",
+        ):
             changed.__dict__[name] = getattr(self, name)
         return changed
 
@@ -162,6 +177,16 @@ class Structure:
             for c in self.mesh.connections
             for direction in c.spring.stiffness
         )
+
+    @cached_property
+    def label_index(self) -> dict[str, IntArray]:
+        """Return the elements of every ``member/k``; a split element has several."""
+        return _positions(self.labels)
+
+    @cached_property
+    def spring_index(self) -> dict[str, IntArray]:
+        """Return the position of every label of `spring_labels`."""
+        return _positions(self.spring_labels)
 
     @cached_property
     def element_ends(self) -> dict[str, tuple[int, int]]:

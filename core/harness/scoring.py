@@ -15,7 +15,13 @@ from femubench.core.harness.ranking import rank_results, score_of
 from femubench.core.harness.results import Block, PairedMode
 from femubench.core.measurement import Measurement
 from femubench.core.modal.close_modes import align_close_modes
-from femubench.core.modal.eigen import DENSE_LIMIT, Modes, solve_modes, zero_tolerance
+from femubench.core.modal.eigen import (
+    DENSE_LIMIT,
+    Modes,
+    enough_modes,
+    solve_modes,
+    zero_tolerance,
+)
 from femubench.core.modal.pairing import LEAST_SENSORS, WINDOW, pair_modes
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.model import Model
@@ -140,7 +146,7 @@ def _modes_for(model: Model, measurements: Sequence[Measurement]) -> Modes:
         return solve_modes(model)
     measured = np.concatenate([item.frequencies for item in measurements])
     top = WINDOW * float(measured.max(initial=0.0))
-    count, limit = 2 * len(measured) + 12, model.size // 2
+    count, limit = enough_modes(model, len(measured)) or model.size, model.size // 2
     modes = solve_modes(model, min(count, limit))
     while modes.natural_frequencies[-1] < top and count < limit:
         count = min(2 * count, limit)

@@ -227,6 +227,16 @@ def _without_roundoff(model: Model, eigenvalues: FloatArray, shapes: FloatArray)
     return np.where(np.abs(eigenvalues) <= _ROUNDOFF * bound, 0.0, eigenvalues)
 
 
+def enough_modes(model: Model, measured: int) -> int | None:
+    """Return how many modes to ask of a model so that measured ones find their partners.
+
+    Arguments:
+        model: a small one is solved completely: None.
+        measured: number of measured modes.
+    """
+    return None if model.size <= DENSE_LIMIT else 2 * measured + 12
+
+
 def zero_tolerance(modes: Modes) -> float:
     """Return the eigenvalue below which a mode counts as one of zero frequency."""
     elastic = modes.eigenvalues[~modes.rigid & (modes.eigenvalues > 0.0)]

@@ -73,7 +73,7 @@ def rigid_modes_of(model: Model) -> FloatArray:
         _, singular, turn = la.svd(np.linalg.qr(structure.held(motion)[:, moving], mode="r"))
         rank = int(np.sum(singular > _HELD))
         candidates = vectors[:, moving] @ turn[rank:].T
-    return _orthonormal(candidates, candidates.T @ (model.mass @ candidates))
+    return _orthonormal(candidates, candidates.T @ model.mass_times(candidates))
 
 
 def _without_energy(model: Model, vectors: FloatArray) -> FloatArray:
@@ -101,7 +101,7 @@ def rigid_share(model: Model, shapes: FloatArray, rigid: FloatArray) -> FloatArr
     """Return the share of each shape's kinetic energy that is rigid-body motion, 0..1, (m,)."""
     if rigid.shape[1] == 0:
         return np.zeros(shapes.shape[1])
-    weighted = model.mass @ shapes
+    weighted = model.mass_times(shapes)
     norm = np.einsum("ij,ij->j", shapes, weighted)
     share = np.square(rigid.T @ weighted).sum(axis=0)
     return np.asarray(share / np.where(norm > 0.0, norm, 1.0))

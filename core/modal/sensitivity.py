@@ -92,6 +92,8 @@ def _mass_part(shape: FloatArray, change: Derivatives) -> FloatArray:
 
 
 def _nelson(model: Model, modes: Modes, index: int, change: Derivatives) -> FloatArray:
+    if model.stiffness_change is not None or model.mass_change is not None:
+        raise ModelError("shape sensitivities of a model with low-rank changes need all its modes")
     shape, eigenvalue = modes.shapes[:, index], float(modes.eigenvalues[index])
     cluster = modes.shapes[:, _same_eigenvalue(modes, index)]
     weighted = model.mass_times(cluster)

@@ -190,7 +190,9 @@ def _shift_invert(
     mass = LinearOperator((size, size), matvec=model.mass_times, dtype=float)
     stiffness = LinearOperator((size, size), matvec=model.stiffness_times, dtype=float)
     start = operate(model.mass_times(np.random.default_rng(1).standard_normal(size)))
-    below = shifted.eigenvalues_below or 0
+    below = shifted.eigenvalues_below
+    if below is None:
+        raise ModelError("negative eigenvalues cannot be counted: the factors were pivoted")
     pieces = []
     for which, k in (("LA", count), ("SA", below)):
         if k > 0:
@@ -213,9 +215,12 @@ def _missed(model: Model, eigenvalues: FloatArray, rigid: int, wanted: int) -> i
     if len(gaps) == 0:
         return 0
     at = last + int(np.argmax(gaps))
-    middle = 0.5 * (eigenvalues[at] + eigenvalues[at + 1])
-    below = ShiftedModel(model, float(middle)).eigenvalues_below
-    return 0 if below is None else below - rigid - (at + 1)
+    for share in (0.5, 0.4, 0.6):
+        shift = eigenvalues[at] + share * (eigenvalues[at + 1] - eigenvalues[at])
+        below = ShiftedModel(model, float(shift)).eigenvalues_below
+        if below is not None:
+            return below - rigid - (at + 1)
+    raise ModelError(f"eigenvalues below {eigenvalues[at + 1]:.6g} cannot be counted")
 
 
 def _check(model: Model, eigenvalues: FloatArray, shapes: FloatArray) -> None:

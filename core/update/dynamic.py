@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.linalg as la
+import scipy.sparse as sp
 
 from femubench.core.errors import NotApplicable
 from femubench.core.measurement import Measurement
@@ -17,7 +18,9 @@ from femubench.core.update.promise import force_scale
 _DEPENDENT = 1e-10
 
 
-def expand_measured_shapes(model: Model, measurement: Measurement) -> FloatArray:
+def expand_measured_shapes(
+    model: Model, measurement: Measurement, rigid: FloatArray | None = None
+) -> FloatArray:
     """Return shapes that meet every reading and leave the smallest force residual, (n, m).
 
     A sensor without a reading in one mode still counts in the others.
@@ -25,6 +28,7 @@ def expand_measured_shapes(model: Model, measurement: Measurement) -> FloatArray
     Arguments:
         model: any model; small ones are solved densely.
         measurement: modes with shapes.
+        rigid: rigid-body modes to which the shapes shall be orthogonal with the mass, (n, r).
 
     Raises:
         NotApplicable: when a mode has no reading at all.
@@ -33,19 +37,29 @@ def expand_measured_shapes(model: Model, measurement: Measurement) -> FloatArray
     Source: Ahmadian, Gladwell & Ismail (1997), equation (15).
     """
     rows = model.observe(measurement.sensors)
+    at_rest = _at_rest(model, rigid)
     shapes = np.zeros((model.size, len(measurement)))
     for j, eigenvalue in enumerate(measurement.eigenvalues):
         known = np.isfinite(measurement.shapes[:, j])
         readings = measurement.shapes[known, j]
         if not np.any(readings):
             raise NotApplicable(f"measured mode {measurement.numbers[j]} has no shape")
-        readings = readings / np.abs(readings).max()
+        readings = np.append(readings / np.abs(readings).max(), np.zeros(at_rest.shape[0]))
+        met = sp.csr_array(sp.vstack([rows[known], at_rest]))
         if model.size <= DENSE_LIMIT:
-            one = expand_by_dynamics(model, rows[known], readings[:, None], np.array([eigenvalue]))
+            one = expand_by_dynamics(model, met, readings[:, None], np.array([eigenvalue]))
             shapes[:, j] = one[:, 0]
         else:
-            shapes[:, j] = expand_one_by_dynamics(model, rows[known], readings, float(eigenvalue))
+            shapes[:, j] = expand_one_by_dynamics(model, met, readings, float(eigenvalue))
     return shapes
+
+
+def _at_rest(model: Model, rigid: FloatArray | None) -> SparseArray:
+    """Return rows of unit length that read the momentum of a shape, sparse (r, n)."""
+    if rigid is None or rigid.shape[1] == 0:
+        return sp.csr_array((0, model.size))
+    momentum = model.mass_times(rigid)
+    return sp.csr_array((momentum / np.linalg.norm(momentum, axis=0)).T)
 
 
 def expand_one_by_dynamics(

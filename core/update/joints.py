@@ -53,7 +53,7 @@ def _outward(frame: Frame, member: Member, joint: str) -> FloatArray:
 
 
 def _members_at(frame: Frame, joint: str) -> list[Member]:
-    return [member for member in frame.members if joint in member.ends]
+    return [frame.members[frame.member_index[name]] for name in frame.ends_at(joint)]
 
 
 def _roles(frame: Frame, joint: str) -> dict[str, str]:

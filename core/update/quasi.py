@@ -8,7 +8,7 @@ import numpy as np
 
 from femubench.core.errors import StrategyFailure
 from femubench.core.measurement import Measurement
-from femubench.core.modal.eigen import Modes, solve_modes
+from femubench.core.modal.eigen import Modes, enough_modes, solve_modes
 from femubench.core.modal.expansion import expand_by_rotation, measured_rows
 from femubench.core.modal.pairing import pair_modes
 from femubench.core.model import Model
@@ -42,7 +42,7 @@ def paired_modes(model: Model, measurement: Measurement) -> tuple[Modes, IntArra
     Raises:
         StrategyFailure: when a measured mode has no partner in the model.
     """
-    modes = solve_modes(model, None if model.size <= 500 else 2 * len(measurement) + 12)
+    modes = solve_modes(model, enough_modes(model, len(measurement)))
     candidates = np.flatnonzero(~modes.rigid)
     at_sensors = model.observe(measurement.sensors) @ modes.shapes[:, candidates]
     pairing = pair_modes(

@@ -14,7 +14,7 @@ from femubench.core.fem.parameters import Derivatives, Parameter, derivatives
 from femubench.core.fem.structure import Structure
 from femubench.core.measurement import Measurement
 from femubench.core.modal.correlation import modal_scale_factor
-from femubench.core.modal.eigen import DENSE_LIMIT, Modes, solve_modes
+from femubench.core.modal.eigen import Modes, enough_modes, solve_modes
 from femubench.core.modal.pairing import pair_modes
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities, shape_sensitivities
 from femubench.core.model import Model
@@ -202,7 +202,7 @@ def predict(data: Data, structure: Structure, previous: Prediction | None = None
         ModelError: when the eigenvalue problem has no solution.
     """
     model = Model.of(structure)
-    count = None if model.size <= DENSE_LIMIT else 2 * len(data.measurement) + 12
+    count = enough_modes(model, len(data.measurement))
     modes = solve_modes(model, count)
     elastic = np.flatnonzero(~modes.rigid)
     if previous is None or _observed_anew(structure):

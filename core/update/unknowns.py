@@ -58,7 +58,7 @@ class UpdateOptions:
     residual: Residual = "eigenvalue"
     weighting: str = "unit"
     shapes: bool = False
-    damping: float = 3e-3
+    damping: float = 1e-5
     max_iterations: int = 100
     tolerance: float = 1e-6
     cost_tolerance: float = 1e-4

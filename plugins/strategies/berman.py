@@ -36,16 +36,15 @@ class _Expanded:
 
 
 def _expanded(model: Model, measurement: Measurement) -> _Expanded:
-    """Return shapes by dynamic expansion, free of rigid-body motion.
+    """Return shapes by dynamic expansion that meet the readings and have no momentum.
 
     A free structure vibrates without moving its centre of mass, so its elastic shapes are
-    orthogonal to its rigid-body modes; where measured shapes are not, the update would give the
-    rigid-body modes stiffness. Therefore that part is taken out.
+    orthogonal to its rigid-body modes; were expanded ones not, the update would give the
+    rigid-body modes stiffness. Both are conditions of the expansion.
     """
-    shapes = expand_measured_shapes(model, measurement)
     rigid = rigid_modes_of(model)
-    for _ in range(2):  # twice is enough (Giraud et al. 2005)
-        shapes = shapes - rigid @ (rigid.T @ model.mass_times(shapes))
+    shapes = expand_measured_shapes(model, measurement, rigid)
+    shapes = shapes - rigid @ (rigid.T @ model.mass_times(shapes))  # what rounding left
     norm = np.sqrt(np.einsum("ij,ij->j", shapes, model.mass_times(shapes)))
     shapes = shapes / norm
     mass = shapes.T @ model.mass_times(shapes)

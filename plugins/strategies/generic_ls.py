@@ -36,7 +36,7 @@ class GenericLS(Strategy):
     name: ClassVar[str] = "generic-ls"
     citation: ClassVar[str] = (
         "Ahmadian, Gladwell & Ismail (1997), section 4.3, table 4, LS solution; Gladwell & "
-        "Ahmadian (1996), Generic element matrices for finite element model updating"
+        "Ahmadian (1995), Generic element matrices suitable for finite element model updating"
     )
     needs: ClassVar[frozenset[str]] = frozenset({"shapes", "elements"})
 

@@ -31,8 +31,9 @@ class Nobari(Strategy):
 
     name: ClassVar[str] = "nobari"
     citation: ClassVar[str] = (
-        "Nobari, Robb & Ewins (1993), Model updating and joint identification methods; as in "
-        "Ahmadian, Gladwell & Ismail (1997), equation (20), table 3"
+        "Nobari, Robb & Ewins (1993), Model updating and joint identification methods: "
+        "applications, restrictions and overlap; as in Ahmadian, Gladwell & Ismail (1997), "
+        "equation (20), table 3"
     )
     needs: ClassVar[frozenset[str]] = frozenset({"shapes", "elements"})
 

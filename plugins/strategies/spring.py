@@ -30,6 +30,8 @@ from femubench import (
 )
 
 _BENDING, _TORSION, _TRANSLATION = ("ry", "rz"), ("rx",), ("x", "y", "z")
+# Springs that hardly matter run away as far as the damping lets them: it has to be strong.
+_OPTIONS = UpdateOptions(damping=3e-3)
 _SOFTEST, _STIFFEST = 1e-4, 1e3  # of the initial stiffness: a hinge, and rigid
 
 
@@ -69,7 +71,7 @@ class Spring(Strategy):
     arm: float | None = None
     arm_factor: float | None = 5.0
     stiffness: Mapping[str, float] = field(default_factory=dict)
-    options: UpdateOptions = field(default_factory=UpdateOptions)
+    options: UpdateOptions = _OPTIONS
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator
