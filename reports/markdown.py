@@ -26,7 +26,8 @@ _ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
 _FOOTNOTES = (
     "**skill**: geometric mean over blocks and cases of (rms + 0.05 %) / (rms of the unchanged "
     "model + 0.05 %); 1 is no better than the unchanged model, less is better. A job that failed, "
-    "crashed or timed out counts 10, one that is not applicable 1.",
+    "crashed or timed out counts 10, one that is not applicable 1. **unseen**: the same without "
+    "the block that the strategy was given.",
     "**used, higher, modified**: rms relative frequency error in percent over the modes that the "
     "strategy was given, those above that it was not given, and those of the structure with a "
     "known design change; median over the cases. A measured mode without partner counts 100 %.",
@@ -76,7 +77,7 @@ def table(headers: Sequence[str], rows: Iterable[Sequence[str]], align: str) -> 
 def _leaderboard(run: Run) -> str:
     board = leaderboard(run)
     headers = [
-        *("rank", "strategy", "skill", "used %", "higher %", "modified %"),
+        *("rank", "strategy", "skill", "unseen", "used %", "higher %", "modified %"),
         *("rigid lost", "negative", "parameters", "evaluations", "seconds"),
     ]
     several = bool(board["skill_low"].notna().any())
@@ -88,6 +89,7 @@ def _leaderboard(run: Run) -> str:
             whole(row["rank"]),
             escape(row["strategy"]) + (" (unphysical)" if row["unphysical"] else ""),
             fixed(row["skill"], 3, 6),
+            fixed(row["skill_unseen"], 3, 6),
             *(fixed(row[f"{block}_percent"], 2, 7) for block in ("used", "higher", "modified")),
             *(whole(row[key]) for key in ("rigid_modes_lost", "negative_eigenvalues")),
             *(whole(row[key]) for key in ("parameters", "evaluations")),

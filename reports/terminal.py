@@ -37,6 +37,8 @@ class TerminalReporter:
         if board["skill_low"].notna().any():
             parts.append(intervals(board))
         parts.append("\n".join(_legend(board)))
+        if board["skill_unseen"].notna().any():
+            parts.append(_unseen(board))
         failed = troubles(run.results)
         if failed:
             parts.append(failures(failed))
@@ -122,6 +124,15 @@ def _table(rows: list[list[str]], headers: tuple[str, ...], align: tuple[str, ..
     lines = [*heads, rule, *rows]
     text: str = tabulate(lines, tablefmt="plain", disable_numparse=True, colalign=align)
     return "\n".join(line.rstrip() for line in text.splitlines())
+
+
+def _unseen(board: pd.DataFrame) -> str:
+    """Return the order of the strategies on what they were not given."""
+    rows = sorted(board.to_dict("records"), key=lambda row: (row["skill_unseen"], row["strategy"]))
+    named = (
+        f"{_marks(row)}{plain(row['strategy'])} {fixed(row['skill_unseen'], 2)}" for row in rows
+    )
+    return textwrap.fill(f"skill on unseen data (higher, modified): {', '.join(named)}", WIDTH)
 
 
 def _notes(run: Run) -> Iterator[str]:

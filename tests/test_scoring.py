@@ -246,6 +246,23 @@ def test_a_missing_result_scores_ten_and_a_strategy_without_any_is_there() -> No
     assert table.loc["s", ["ok", "total"]].tolist() == [1, 2]
 
 
+def test_skill_on_unseen_data_leaves_the_given_block_out() -> None:
+    reference = {"a": {"used": 4.0, "higher": 2.0, "modified": 1.0}, "b": {"used": 3.0}}
+    blocks = {
+        name: Block(rms, None, ())
+        for name, rms in (("used", 0.0), ("higher", 1.0), ("modified", 2.0))
+    }
+    seen = replace(result("s"), blocks=blocks)
+    run = Run({**META, "reference": reference}, (seen, result("s", rms=0.0, case="b")))
+    table = leaderboard(run)
+    expected = math.sqrt((1.05 / 2.05) * (2.05 / 1.05))
+    assert table["skill_unseen"][0] == pytest.approx(expected, rel=1e-12)
+    missing = leaderboard(Run({**META, "reference": reference}, (result("s", case="b"),)))
+    assert missing["skill_unseen"][0] == pytest.approx(10.0)
+    given = leaderboard(Run({**META, "reference": {"b": {"used": 3.0}}}, (result("s", case="b"),)))
+    assert np.isnan(given["skill_unseen"][0])
+
+
 def test_the_unphysical_rank_below_the_physical_and_no_model_at_all_below_both() -> None:
     lost = result("lost", rms=0.1, rigid_body_modes=1, rigid_body_modes_expected=3)
     fine = result("lost", rms=0.1, case="b", rigid_body_modes=3, rigid_body_modes_expected=3)

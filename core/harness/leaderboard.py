@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femubench.core.harness.ranking import SCORE_OF_FAILURE, geometric_mean, rank_results
+from femubench.core.harness.ranking import (
+    SCORE_OF_FAILURE,
+    geometric_mean,
+    rank_results,
+    score_of,
+)
 from femubench.core.harness.results import BLOCKS, JobResult, Run
 
 if TYPE_CHECKING:
@@ -16,7 +21,7 @@ if TYPE_CHECKING:
 
 _RESAMPLES = 999
 COLUMNS = (
-    *("rank", "strategy", "skill", "skill_low", "skill_high"),
+    *("rank", "strategy", "skill", "skill_low", "skill_high", "skill_unseen"),
     *(f"{block}_percent" for block in BLOCKS),
     *("rigid_modes_lost", "negative_eigenvalues", "parameters", "evaluations", "seconds"),
     *("ok", "not_applicable", "total", "unphysical"),
@@ -49,8 +54,9 @@ def leaderboard(run: Run) -> pd.DataFrame:
     """Return one row a strategy, best first: physical, then unphysical, then without any model.
 
     `skill` is the geometric mean over all blocks of all cases, and with several seeds the median
-    over seeds, with a 95 % bootstrap interval in `skill_low` and `skill_high`. The three errors are
-    the median over cases of the median over seeds of the rms error in percent, over the jobs that
+    over seeds, with a 95 % bootstrap interval in `skill_low` and `skill_high`; `skill_unseen` is
+    that over all seeds without the block that the strategy was given. The three errors are the
+    median over cases of the median over seeds of the rms error in percent, over the jobs that
     are ok; so are `parameters`, `evaluations` and `seconds`. Rigid-body modes lost and negative
     eigenvalues are sums. A job without result scores 10.
 
@@ -64,7 +70,8 @@ def leaderboard(run: Run) -> pd.DataFrame:
     ranked = rank_results(run.results, run.meta.get("reference") or None)
     names = list(run.meta.get("strategies", ()))
     names += sorted({result.strategy for result in ranked} - set(names))
-    rows = [_row(n, [r for r in ranked if r.strategy == n], grid, seed) for n in names]
+    reference = run.meta.get("reference") or {}
+    rows = [_row(n, [r for r in ranked if r.strategy == n], grid, seed, reference) for n in names]
     rows.sort(key=_order)
     for place, row in enumerate(rows, start=1):
         row["rank"] = place
@@ -77,7 +84,13 @@ def _order(row: dict[str, Any]) -> tuple[bool, bool, float, str]:
     return nothing, row["unphysical"], row["skill"], row["strategy"]
 
 
-def _row(strategy: str, results: Sequence[JobResult], grid: _Grid, seed: int) -> dict[str, Any]:
+def _row(
+    strategy: str,
+    results: Sequence[JobResult],
+    grid: _Grid,
+    seed: int,
+    reference: Mapping[str, Mapping[str, float]],
+) -> dict[str, Any]:
     skills = _skills(results, grid)
     low, high = _interval(skills, strategy, seed)
     fine = [result for result in results if result.status == "ok"]
@@ -90,6 +103,7 @@ def _row(strategy: str, results: Sequence[JobResult], grid: _Grid, seed: int) ->
         "skill": float(np.median(skills)),
         "skill_low": low,
         "skill_high": high,
+        "skill_unseen": _unseen(results, grid, reference),
         **{f"{block}_percent": _median(fine, _error_in(block)) for block in BLOCKS},
         "rigid_modes_lost": sum(lost(result) for result in fine),
         "negative_eigenvalues": sum(result.negative_eigenvalues or 0 for result in fine),
@@ -112,6 +126,21 @@ def _skills(results: Sequence[JobResult], grid: _Grid) -> list[float]:
         numbers = [SCORE_OF_FAILURE if score is None else score for score in found]
         skills.append(geometric_mean(numbers, grid.blocks.values()))
     return skills
+
+
+def _unseen(
+    results: Sequence[JobResult], grid: _Grid, reference: Mapping[str, Mapping[str, float]]
+) -> float:
+    """Return the skill over the blocks that the strategy was not given; nan without any."""
+    found = {(result.case, result.seed): result for result in results}
+    scores, weights = [], []
+    for case, errors in reference.items():
+        hidden = {name: error for name, error in errors.items() if name != "used"}
+        for seed in grid.seeds if hidden else ():
+            result = found.get((case, seed))
+            scores.append(SCORE_OF_FAILURE if result is None else score_of(result, hidden))
+            weights.append(len(hidden))
+    return geometric_mean(scores, weights) if scores else float("nan")
 
 
 def _interval(skills: Sequence[float], strategy: str, seed: int) -> tuple[float, float]:
