@@ -28,6 +28,7 @@ from femubench.core.harness.runner import run_jobs
 from femubench.core.harness.store import Store
 from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.roles import Reporter
+from femubench.core.plugin.variants import strategy_of
 
 FILE = click.Path(path_type=Path, dir_okay=False)
 FOLDER = click.Path(path_type=Path, file_okay=False)
@@ -41,7 +42,7 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
     "strategies",
     multiple=True,
     metavar="STRATEGY",
-    help="Run this strategy; may be repeated. Default: all.",
+    help="Run this strategy, or STRATEGY:OPTION=VALUE,...; may be repeated. Default: all.",
 )
 @click.option(
     "-j",
@@ -109,9 +110,11 @@ def run(
     folder with a case.toml. Without any, all built-in scenarios run.
     """
     plugins = plugins_for(ctx)
-    names = chosen("strategy", strategies, plugins.strategies) or tuple(plugins.strategies)
+    chosen("strategy", (words.partition(":")[0] for words in strategies), plugins.strategies)
+    names = tuple(dict.fromkeys(strategies)) or tuple(plugins.strategies)
     if not names:
         raise InputError("there is no strategy to run", expected="a plugin that brings one")
+    selected = [strategy_of(words, plugins.strategies) for words in names]
     outputs = _outputs(plugins, json_file, csv_file, report_file)
     read = read_cases(cases, plugins)
     folder = store_folder(store)
@@ -124,7 +127,7 @@ def run(
     with progress_bar(quiet=quiet) as progress:
         outcome = run_jobs(
             read,
-            [plugins.strategies[name] for name in names],
+            selected,
             seeds=tuple(all_seeds),
             jobs=workers,
             timeout=timeout,

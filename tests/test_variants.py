@@ -1,0 +1,54 @@
+"""Strategies with other options, chosen by name."""
+
+from __future__ import annotations
+
+import pickle
+
+import pytest
+
+from femubench import InputError, Strategy
+from femubench.core.plugin.variants import Variant, strategy_of
+from femubench.plugins.strategies.generic_ls import GenericLS
+from femubench.plugins.strategies.spring import Spring
+from femubench.plugins.strategies.unchanged import Unchanged
+
+KNOWN: dict[str, Strategy] = {s.name: s for s in (GenericLS(), Spring(), Unchanged())}
+
+
+def test_a_plain_name_is_the_strategy_itself() -> None:
+    assert strategy_of("generic-ls", KNOWN) is KNOWN["generic-ls"]
+
+
+def test_options_are_set_and_told_by_the_name() -> None:
+    words = "generic-ls:orthogonality=false, plain=full"
+    found = strategy_of(words, KNOWN)
+    assert isinstance(found, Variant)
+    assert found.base == GenericLS(orthogonality=False, plain="full")
+    assert (found.name, found.citation, found.needs) == (
+        words,
+        GenericLS.citation,
+        GenericLS.needs,
+    )
+    assert pickle.loads(pickle.dumps(found)) == found
+
+
+def test_an_option_without_a_value_yet_takes_any_and_numbers_become_floats() -> None:
+    found = strategy_of("spring:arm=0.02,arm_factor=7", KNOWN)
+    assert isinstance(found, Variant)
+    assert found.base == Spring(arm=0.02, arm_factor=7.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("generic-ls:orthogonalty=false", "no option 'orthogonalty'; did you mean 'orthogonality'"),
+        ("generic-ls:orthogonality", "no option|orthogonality"),
+        ("generic-ls:orthogonality=7", r"option orthogonality is '7' \(expected bool\)"),
+        ("unchanged:x=1", "no option 'x'; there are none"),
+        ("spring:options=1", "no option 'options'"),
+    ],
+)
+def test_a_wrong_option_is_one_line(words: str, says: str) -> None:
+    with pytest.raises(InputError, match=says) as caught:
+        strategy_of(words, KNOWN)
+    assert "\n" not in str(caught.value)
