@@ -1,0 +1,39 @@
+"""All strategies on all scenarios under measurement noise; the figures stand in docs/noise.md."""
+
+from __future__ import annotations
+
+import pytest
+
+from femubench import Run, leaderboard, read_case, run_jobs
+from femubench.core.plugin.loader import load_plugins
+
+pytestmark = pytest.mark.sweep
+SEEDS = tuple(range(1, 11))
+
+
+@pytest.fixture(scope="module")
+def noisy() -> Run:
+    plugins = load_plugins()
+    cases = [
+        read_case(folder, name)
+        for scenario in plugins.scenarios.values()
+        for name, folder in scenario.cases.items()
+    ]
+    return run_jobs(cases, list(plugins.strategies.values()), seeds=SEEDS)
+
+
+def test_only_kabe_fails_and_only_on_the_h_frame(noisy: Run) -> None:
+    failed = [result for result in noisy.results if result.status != "ok"]
+    assert {result.status for result in failed} == {"failed"}
+    assert {result.strategy for result in failed} == {"kabe", "kabe-rigid"}
+    assert all("hframe" in result.case for result in failed)
+    assert all("measured" in result.reason for result in failed)
+
+
+def test_with_noise_few_parameters_beat_many(noisy: Run) -> None:
+    board = leaderboard(noisy).set_index("strategy")
+    for few in ("bayesian", "local"):
+        for many in ("baruch", "berman", "generic-ls", "physical"):
+            assert board["skill_high"][few] < board["skill_low"][many]
+    for kept in ("baruch", "berman", "physical", "generic-ls", "generic-adjusted"):
+        assert not board["unphysical"][kept]
