@@ -250,3 +250,16 @@ def test_a_model_that_cannot_be_solved_has_failed() -> None:
     assert result.status == "failed"
     assert result.reason
     assert np.isclose(result.score, 10.0)
+
+
+def test_a_process_that_a_strategy_started_ends_with_it(tmp_path: Path) -> None:
+    file = tmp_path / "child"
+    run = run_jobs([toys.tiny_case()], [toys.Parent(str(file))], jobs=1, timeout=2.0)
+    assert [result.status for result in run.results] == ["timeout"]
+    child = int(file.read_text())
+    for _ in range(50):
+        status = Path(f"/proc/{child}/status")
+        if not status.exists() or "State:\tZ" in status.read_text():
+            return
+        time.sleep(0.1)
+    pytest.fail("the child is still running")

@@ -46,6 +46,7 @@ def prepare() -> None:
     """
     # Ctrl-C goes to the whole foreground group; it is the parent that stops the workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _take_children_along()
     import scipy.linalg
     import scipy.optimize
     import scipy.sparse.linalg  # noqa: F401 - loaded for its threads and its time
@@ -53,6 +54,12 @@ def prepare() -> None:
 
     threadpool_limits(1)
     _leave_visibly()
+
+
+def _take_children_along() -> None:
+    """Let the end of a worker that is told to stop be that of the processes it started, too."""
+    os.setpgrp()
+    signal.signal(signal.SIGTERM, lambda *_: os.killpg(0, signal.SIGKILL))
 
 
 def _leave_visibly() -> None:
