@@ -216,15 +216,6 @@ class Structure:
                 groups[key] = groups.get(key, ()) + ends
         return groups
 
-    @cached_property
-    def joint_types(self) -> tuple[str, ...]:
-        """Return the joint type that every element touches; empty where it touches none."""
-        types = [""] * len(self.mesh.ends)
-        for kind, ends in self.joint_ends.items():
-            for end in ends:
-                types[self.element_ends[end][0]] = kind
-        return tuple(types)
-
     def attached(
         self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]
     ) -> tuple[SparseArray, SparseArray]:
