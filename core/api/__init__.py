@@ -17,6 +17,7 @@ _HOME = {
     "Diverged": "femubench.core.errors",
     "Effect": "femubench.core.plugin.roles",
     "ElementFamily": "femubench.core.update.element_families",
+    "ElementStrategy": "femubench.core.update.element_strategy",
     "FemubenchError": "femubench.core.errors",
     "FloatArray": "femubench.core.typing",
     "Frame": "femubench.core.fem.frame",
@@ -226,6 +227,7 @@ if TYPE_CHECKING:
         nobari_family as nobari_family,
         physical_family as physical_family,
     )
+    from femubench.core.update.element_strategy import ElementStrategy as ElementStrategy
     from femubench.core.update.element_symmetry import Symmetry as Symmetry
     from femubench.core.update.entries import (
         update_entries as update_entries,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -82,7 +82,6 @@ class Structure:
     properties: BeamProperties
     springs: FloatArray
     changes: tuple[tuple[Parameter, float], ...] = ()
-    plan: AssemblyPlan | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         p = self.properties
@@ -100,14 +99,8 @@ class Structure:
         mesh = build_mesh(frame)
         springs = [k for c in mesh.connections for k in c.spring.stiffness.values()]
         kinematics = build_kinematics(frame, mesh)
-        base = cls(
-            frame,
-            mesh,
-            kinematics,
-            _nominal_properties(frame, mesh),
-            np.array(springs, dtype=float),
-        )
-        return replace(base, plan=plan_assembly(base.gather, 12))
+        properties = _nominal_properties(frame, mesh)
+        return cls(frame, mesh, kinematics, properties, np.array(springs, dtype=float))
 
     def with_values(
         self, parameters: Sequence[Parameter], values: Sequence[float] | FloatArray
@@ -118,16 +111,10 @@ class Structure:
         changed = replace(
             self, properties=properties, springs=springs, changes=self.changes + changes
         )
-        for name in (
-            "gather",
-            "spring_rows",
-            "labels",
-            "label_index",
-            "element_ends",
-            "spring_labels",
-            "spring_index",
-        ):
-            changed.__dict__[name] = getattr(self, name)
+        # All that is cached follows from frame, mesh and kinematics, which stay.
+        for name, member in vars(Structure).items():
+            if isinstance(member, cached_property):
+                changed.__dict__[name] = getattr(self, name)
         return changed
 
     def rebuilt(self, frame: Frame) -> Structure:
@@ -152,6 +139,11 @@ class Structure:
         gather = turn @ self.kinematics.transform
         gather.eliminate_zeros()
         return gather
+
+    @cached_property
+    def plan(self) -> AssemblyPlan:
+        """Return where the entries of the element matrices go."""
+        return plan_assembly(self.gather, 12)
 
     @cached_property
     def spring_rows(self) -> SparseArray:
@@ -259,7 +251,6 @@ class Structure:
 
     def matrices(self) -> tuple[SparseArray, SparseArray]:
         """Return mass and stiffness on the free dofs, sparse, (n, n) each."""
-        assert self.plan is not None
         mass = self.plan.assemble(mass_matrices(self.properties))
         stiffness = self.plan.assemble(stiffness_matrices(self.properties))
         more_mass, more_stiffness = self.attached(self.frame.masses, self.frame.springs)

@@ -165,9 +165,8 @@ def rigid_basis(model: Model, family: ElementFamily, rigid: FloatArray) -> Float
 
 def updated(model: Model, family: ElementFamily, x: FloatArray) -> Model:
     """Return the model with element matrices changed by x."""
-    plan = family.structure.plan
-    assert plan is not None
-    return replace(model, stiffness=model.stiffness + plan.assemble(family.change(x)))
+    change = family.structure.plan.assemble(family.change(x))
+    return replace(model, stiffness=model.stiffness + change)
 
 
 def update_by_equation_error(

@@ -1,0 +1,54 @@
+"""The base of strategies that look for other element matrices by their equation error."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from femubench.core.fem.structure import Structure
+from femubench.core.measurement import Measurement
+from femubench.core.model import Model
+from femubench.core.strategy import Strategy, UpdateResult
+from femubench.core.update.element_families import ElementFamily
+from femubench.core.update.equation_error import update_by_equation_error
+
+
+@dataclass(frozen=True)
+class ElementStrategy(Strategy):
+    """Base class of the element methods: override `family`, set `name` and `citation`.
+
+    Arguments:
+        orthogonality: whether the orthogonality of the modes adds equations: the paper counts them
+            in, and without them the used frequencies are not met.
+    """
+
+    needs: ClassVar[frozenset[str]] = frozenset({"shapes", "elements"})
+    keep_rigid: ClassVar[bool] = False
+
+    orthogonality: bool = True
+
+    @abstractmethod
+    def family(self, structure: Structure) -> ElementFamily:
+        """Return where the updated element matrices are looked for."""
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        """Return the model with other element matrices.
+
+        Raises:
+            StrategyFailure: when a measured mode has no partner in the model.
+            SelfCheckFailed: when a promise is not kept: a stiffness that is positive semidefinite
+                where element cores are, rigid-body modes where they shall be kept.
+            NotApplicable: when there are too many unknowns, or no rigid-body modes to keep.
+        """
+        return update_by_equation_error(
+            model,
+            measurement,
+            self.family(model.frame_structure),
+            orthogonality=self.orthogonality,
+            keep_rigid=self.keep_rigid,
+        )
