@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,20 @@ FrameBuilder = Callable[..., Frame]
 HALF_SIDE, RUNG = 0.2921, 0.2794  # m
 ALUMINIUM = Material(68.367e9, 0.33, 2700.0)  # sqrt(E / rho) = 5032 m/s
 STEEL_E, EI, EA, RHO_A = 207e9, 17015.0, 7.420e7, 2.814
+
+
+PORTAL_JOINTS = (
+    JointSpring("J1", "m0", {"rx": 3e3, "ry": 2e3, "rz": 1e3}, 0.02),
+    JointSpring("J1", "m1", {"rx": 3e3, "ry": 2e3, "rz": 1e3}, 0.02),
+    JointSpring("J1", "m8", {"rx": 3e3, "ry": 2e3, "rz": 1e3}, 0.02),
+    JointSpring("J3", "m3", {"x": 1e6, "ry": 2e3}),
+    JointSpring("J6", "m5", {"x": 1e7, "z": 1e7, "ry": 1e4}, 0.02, 5.0),
+)
+PORTAL_ENDS = (RigidEnd("J4", "m4", -0.03), RigidEnd("J5", "m8", 0.03, 0.02))
+PORTAL_MASSES = (
+    PointMass(Place(member="m2", s=0.37), 0.5, (0.1, 0.2, -0.1)),
+    PointMass(Place(joint="J0"), 0.5, (0.1, 0.2, -0.1)),
+)
 
 
 def build_ladder(
@@ -153,3 +168,14 @@ def asymmetric_ladder() -> FrameBuilder:
 @pytest.fixture(scope="session")
 def portal() -> FrameBuilder:
     return build_portal
+
+
+@pytest.fixture(scope="session")
+def fitted_portal() -> FrameBuilder:
+    """Return the portal with flexible joints, partly rigid ends and offset masses."""
+    return partial(
+        build_portal,
+        joint_springs=PORTAL_JOINTS,
+        rigid_ends=PORTAL_ENDS,
+        masses=PORTAL_MASSES,
+    )

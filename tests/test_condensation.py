@@ -15,7 +15,6 @@ from femubench.core.fem.frame import (
     JointSpring,
     Place,
     PointMass,
-    RigidEnd,
 )
 from femubench.core.modal.eigen import (
     condense_massless,
@@ -27,22 +26,6 @@ from femubench.core.model import Model
 from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]
-JOINTS = (
-    JointSpring("J1", "m0", {"rx": 3e3, "ry": 2e3, "rz": 1e3}, 0.02),
-    JointSpring("J1", "m1", {"rx": 3e3, "ry": 2e3, "rz": 1e3}, 0.02),
-    JointSpring("J1", "m8", {"rx": 3e3, "ry": 2e3, "rz": 1e3}, 0.02),
-    JointSpring("J3", "m3", {"x": 1e6, "ry": 2e3}),
-    JointSpring("J6", "m5", {"x": 1e7, "z": 1e7, "ry": 1e4}, 0.02, 5.0),
-)
-ENDS = (RigidEnd("J4", "m4", -0.03), RigidEnd("J5", "m8", 0.03, 0.02))
-MASSES = (
-    PointMass(Place(member="m2", s=0.37), 0.5, (0.1, 0.2, -0.1)),
-    PointMass(Place(joint="J0"), 0.5, (0.1, 0.2, -0.1)),
-)
-
-
-def dense(model: Model) -> tuple[FloatArray, FloatArray]:
-    return dense_matrices(model)
 
 
 def random_pencil(seed: int, n: int, massless: int, aligned: bool) -> tuple[FloatArray, FloatArray]:
@@ -97,18 +80,17 @@ def test_a_tiny_mass_tends_to_no_mass(seed: int) -> None:
     assert deviation[2] < 1e-3
 
 
-def massless_frames(portal: FrameBuilder) -> list[Model]:
+def massless_frames(fitted_portal: FrameBuilder) -> list[Model]:
     """Return frames with massless joints, springs along skew members, arms and offset masses."""
-    return [
-        Model.of(portal(seed, joint_springs=JOINTS, rigid_ends=ENDS, masses=MASSES))
-        for seed in range(2)
-    ]
+    return [Model.of(fitted_portal(seed)) for seed in range(2)]
 
 
-def test_massless_joints_follow_exactly_and_satisfy_the_equations(portal: FrameBuilder) -> None:
-    for model in massless_frames(portal):
+def test_massless_joints_follow_exactly_and_satisfy_the_equations(
+    fitted_portal: FrameBuilder,
+) -> None:
+    for model in massless_frames(fitted_portal):
         modes = solve_modes(model)
-        mass, stiffness = dense(model)
+        mass, stiffness = dense_matrices(model)
         assert len(modes) == np.linalg.matrix_rank(mass, tol=1e-12, hermitian=True) < model.size
         shapes, eigenvalues = modes.elastic.shapes[:, :20], modes.elastic.eigenvalues[:20]
         residual = np.abs(stiffness @ shapes - mass @ shapes * eigenvalues)
@@ -125,7 +107,7 @@ def test_the_mass_of_an_offset_lump_alone_is_condensed(ladder: FrameBuilder) -> 
     lumps = tuple(PointMass(Place(joint=j), 0.3, (0.02, 0.03, 0.0)) for j in "ACDF")
     members = tuple(replace(m, material=weightless) for m in frame.members)
     model = Model.of(replace(frame, members=members, masses=lumps))
-    mass, stiffness = dense(model)
+    mass, stiffness = dense_matrices(model)
     modes = solve_modes(model)
     assert len(modes) == 4
     flexibility = np.linalg.pinv(stiffness, rcond=1e-10)

@@ -183,8 +183,8 @@ def _mass_slope(structure: Structure, parameter: Parameter) -> float:
         return 0.0
     p = structure.properties
     mass = p.rhoA * (p.length - p.rigid_mass_1 - p.rigid_mass_2)
-    wanted = set(parameter.places)
-    return float(sum(m for m, label in zip(mass, structure.labels, strict=True) if label in wanted))
+    elements = [structure.label_index[place] for place in dict.fromkeys(parameter.places)]
+    return float(mass[np.concatenate(elements)].sum())
 
 
 def predict(data: Data, structure: Structure, previous: Prediction | None = None) -> Prediction:
