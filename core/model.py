@@ -161,7 +161,7 @@ class Model:
         frame = self.structure.frame.with_attachments(tuple(masses), tuple(springs))
         new = Model.of(self.structure.rebuilt(frame))
         old_mass, old_stiffness = self.structure.matrices()
-        keep = _common_dofs(self.structure, new.frame_structure)
+        keep = common_dofs(self.structure, new.frame_structure)
         return replace(
             new,
             mass=new.mass + _spread(self.mass - old_mass, keep, new.size),
@@ -179,7 +179,7 @@ def _keys(structure: Structure) -> list[tuple[object, ...]]:
     return [(*nodes[node], direction) for node, direction in pairs]
 
 
-def _common_dofs(old: Structure, new: Structure) -> IntArray:
+def common_dofs(old: Structure, new: Structure) -> IntArray:
     """Return the position of every old dof among the new ones, (n_old,)."""
     index = {key: i for i, key in enumerate(_keys(new))}
     try:

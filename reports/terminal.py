@@ -48,7 +48,7 @@ class TerminalReporter:
 
 def ranking(board: pd.DataFrame) -> str:
     """Return the leaderboard as a text of 80 columns at most."""
-    return _table([_row(row) for row in board.to_dict("records")], _HEADERS, _ALIGN)
+    return aligned_table([_row(row) for row in board.to_dict("records")], _HEADERS, _ALIGN)
 
 
 def intervals(board: pd.DataFrame) -> str:
@@ -61,7 +61,9 @@ def intervals(board: pd.DataFrame) -> str:
         ]
         for row in board.to_dict("records")
     ]
-    return _table(rows, ("strategy", "median skill", "95 % interval"), ("left", "right", "left"))
+    return aligned_table(
+        rows, ("strategy", "median skill", "95 % interval"), ("left", "right", "left")
+    )
 
 
 def failures(failed: list[Trouble]) -> str:
@@ -113,7 +115,7 @@ def _marks(row: dict[Any, Any]) -> str:
     return ("!" if row["unphysical"] else "") + ("*" if incomplete else "")
 
 
-def _table(rows: list[list[str]], headers: tuple[str, ...], align: tuple[str, ...]) -> str:
+def aligned_table(rows: list[list[str]], headers: tuple[str, ...], align: tuple[str, ...]) -> str:
     """Return a table no wider than its cells; tabulate pads headers, so they go in as rows."""
     from tabulate import tabulate
 

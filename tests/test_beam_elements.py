@@ -26,6 +26,7 @@ VALUES = {
     "length": LENGTH, "EA": 7.4e7, "EIy": 1.7e4, "EIz": 0.9e4, "GJ": 1.1e4,
     "flex_y": 0.0, "flex_z": 0.0, "rhoA": 2.8, "rhoJp": 1.3e-3, "rhoIy": 0.0, "rhoIz": 0.0,
     "rigid_1": 0.0, "rigid_2": 0.0, "rigid_mass_1": 0.0, "rigid_mass_2": 0.0, "shear_shape": 0.0,
+    "coupling": 0.0, "ecc_y": 0.0, "ecc_z": 0.0,
 }  # fmt: skip
 SHEAR = {"flex_y": 5e-8, "flex_z": 3e-7}
 ROTARY = {"rhoIy": 0.02, "rhoIz": 0.03}

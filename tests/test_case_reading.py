@@ -30,7 +30,7 @@ def frame_of(case: Case) -> Frame:
 
 def test_in_plane_frame() -> None:
     frame = frame_of(read_case(CASES / "in-plane"))
-    assert (frame.plane, frame.beam, frame.with_rotary_inertia) == ("in-plane", "timoshenko", False)
+    assert (frame.plane, frame.beam, frame.rotary_share) == ("in-plane", "timoshenko", 0.0)
     assert [joint.type for joint in frame.joints] == ["foot", "corner", "corner", "foot"]
     assert frame.joint("C").xyz == (1.5, 0.0, 1.2)
     left, girder, right = frame.members
@@ -92,7 +92,7 @@ def test_out_of_plane_frame() -> None:
     case = read_case(CASES / "out-of-plane")
     frame = frame_of(case)
     assert (case.title, case.source, case.held_out, case.modifications) == ("grid", "", (), ())
-    assert not frame.with_rotary_inertia
+    assert frame.rotary_share == 0.0
     tube, stiff, numbers = (member.section for member in frame.members)
     assert stiff.J == 3.9125e-8
     assert stiff == replace(tube, J=3.9125e-8, kappa=stiff.kappa)
@@ -111,7 +111,7 @@ def test_frame_in_space() -> None:
     assert frame.members[0].up == (0.0, 1.0, 0.0)
     assert frame.members[1].up is None
     assert frame.members[1].section.Jp == 5.5e-8
-    assert frame.with_rotary_inertia
+    assert frame.rotary_share == 1.0
     assert case.model.size == 6 * 10
     assert case.measurement.sensors.directions == ("x", "y", "-rz")
     assert (solve_modes(case.model, 3).natural_frequencies > 0.0).all()

@@ -11,6 +11,8 @@ from femubench.core.fem.frame import GroundSpring, PointMass
 from femubench.core.measurement import Measurement
 from femubench.core.model import Model
 
+TOLERANCE = 0.005
+
 
 @dataclass(frozen=True)
 class Modification:
@@ -38,6 +40,8 @@ class Case:
         modifications: known changes with their modes.
         band: every mode between these frequencies in Hz was found; None where not stated.
         digest: hash of the content of all files of the case.
+        tolerance: standard deviation of the relative scatter of every element's stiffness and
+            mass that counts as ordinary in a diagnosis; 0 turns it off.
     """
 
     name: str
@@ -51,6 +55,7 @@ class Case:
     modifications: tuple[Modification, ...] = ()
     band: tuple[float, float] | None = None
     digest: str = ""
+    tolerance: float = TOLERANCE
 
     def used_measurement(self, seed: int = 0) -> Measurement:
         """Return what a strategy may know: the used modes, noise added for a seed other than 0.

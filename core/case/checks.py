@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from femubench.core.case.extension_checks import check_extensions
 from femubench.core.case.faults import Fault, KeyPath
 from femubench.core.case.schema import FrameSpec, JointSpringSpec, RigidEndSpec
 from femubench.core.fem.frame import ACTIVE, Plane
@@ -28,6 +29,7 @@ def check_frame(model: FrameSpec) -> None:
     _check_joint_springs(model)
     for i, support in enumerate(model.supports):
         _check_directions(support.fixed, model.plane, ("supports", i, "fixed"))
+    check_extensions(model)
 
 
 def check_unique(names: Iterable[tuple[KeyPath, str]]) -> None:

@@ -9,20 +9,27 @@ from typing import Protocol
 import numpy as np
 
 from femubench.core.case.checks import check_frame
+from femubench.core.case.extensions import OscillatorSpec
 from femubench.core.case.faults import Misfit, WrongDirection, at_key
 from femubench.core.case.schema import FrameSpec, MassSpec, SpringSpec
 from femubench.core.case.sections import section_of
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import (
     ACTIVE,
+    Brace,
+    Coupling,
+    Eccentricity,
+    Factor,
     Frame,
     GroundSpring,
     Joint,
     JointSpring,
     Material,
     Member,
+    Oscillator,
     Place,
     PointMass,
+    Preload,
     RigidEnd,
     Support,
     Vector,
@@ -107,6 +114,13 @@ def frame_of(model: FrameSpec) -> Frame:
         ),
         rotary_inertia=model.rotary_inertia,
         bending_mass=model.bending_mass,
+        factors=tuple(Factor(item.quantity, item.at, item.factor) for item in model.factors),
+        preloads=tuple(Preload(item.member, item.force) for item in model.preloads),
+        eccentricities=tuple(
+            Eccentricity(item.member, item.y, item.z) for item in model.eccentricities
+        ),
+        couplings=tuple(Coupling(item.member, item.coefficient) for item in model.couplings),
+        braces=tuple(Brace(item.ends, item.stiffness) for item in model.braces),
     )
     return _with_attachments(frame, model)
 
@@ -128,7 +142,26 @@ def _with_attachments(frame: Frame, model: FrameSpec) -> Frame:
         with at_key("supports", i, "at"):
             site.point(support.at)
         supports.append(Support(support.at, support.fixed))
-    return replace(frame, masses=masses, springs=springs, supports=tuple(supports))
+    return replace(
+        frame,
+        masses=masses,
+        springs=springs,
+        supports=tuple(supports),
+        oscillators=_oscillators(model.oscillators, site),
+    )
+
+
+def _oscillators(specs: Sequence[OscillatorSpec], site: FrameSite) -> tuple[Oscillator, ...]:
+    oscillators = []
+    for i, spec in enumerate(specs):
+        with at_key("oscillators", i, "at"):
+            site.point(spec.at)
+        with at_key("oscillators", i, "direction"):
+            site.check_direction(spec.at, spec.direction)
+            if "r" in spec.direction:
+                raise Misfit(f"{spec.direction!r} is a rotation", "a translation")
+        oscillators.append(Oscillator(spec.at, spec.direction, spec.mass, spec.frequency))
+    return tuple(oscillators)
 
 
 def point_masses(specs: Sequence[MassSpec], site: Site) -> tuple[PointMass, ...]:

@@ -12,9 +12,10 @@ import scipy.sparse as sp
 
 from femubench.core.case.checks import check_unique
 from femubench.core.case.faults import Fault, Misfit, at_key
+from femubench.core.case.fields import LARGEST
 from femubench.core.case.files import CaseFiles
 from femubench.core.case.nodes import MatrixGeometry, read_dofs
-from femubench.core.case.schema import LARGEST, GroupSpec, MatricesSpec
+from femubench.core.case.schema import GroupSpec, MatricesSpec
 from femubench.core.errors import FemubenchError, InputError
 from femubench.core.model import Model
 from femubench.core.plugin.roles import Reader

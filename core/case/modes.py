@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from femubench.core.case.faults import Misfit, WrongDirection
+from femubench.core.case.fields import SMALLEST
 from femubench.core.case.frames import Site
-from femubench.core.case.schema import SMALLEST
 from femubench.core.case.tables import RESERVED, Complex, Row, Table, read_table
 from femubench.core.errors import InputError
 from femubench.core.measurement import DIRECTIONS, Measurement, Sensors

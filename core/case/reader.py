@@ -34,6 +34,12 @@ from femubench.core.model import Model
 from femubench.core.plugin.roles import Reader
 
 _TABLES = (".csv", ".txt")
+# Key, what an error of the mesher calls its items, what would have been right.
+_MESHED = (
+    ("joint_springs", "joint spring", "a shorter one"),
+    ("rigid_ends", "rigid end", "a shorter one"),
+    ("preloads", "lack of fit", "a member of a ring with all constants of its section"),
+)
 _AT_LINE = re.compile(r"\s*\(at line (\d+), column \d+\)")
 
 
@@ -110,6 +116,7 @@ class _Building:
             modifications=self.modifications(model, site, measurement.sensors),
             band=self.spec.measurement.band,
             digest=self.files.digest(),
+            tolerance=self.spec.diagnosis.tolerance,
         )
 
     def model(self) -> Model:
@@ -220,11 +227,11 @@ class _Building:
 
 def _key_of(message: str, model: FrameSpec) -> tuple[KeyPath, str]:
     """Return the key, below `model`, that an error of the mesher most likely means."""
-    for key, word in (("joint_springs", "joint spring"), ("rigid_ends", "rigid end")):
+    for key, word, expected in _MESHED:
         items = getattr(model, key)
         if word in message and items:
             named = [i for i, item in enumerate(items) if repr(item.member) in message]
             one = named[:1] or list(range(len(items)))
-            return ((key, one[0]) if len(one) == 1 else (key,)), "a shorter one"
+            return ((key, one[0]) if len(one) == 1 else (key,)), expected
     named = [i for i, member in enumerate(model.members) if repr(member.name) in message]
     return (("members", named[0]) if named else ()), "a frame that can be meshed"

@@ -6,81 +6,45 @@ Every description says what is expected there: it is the text of the error messa
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, InstanceOf, PlainValidator
-from pydantic_core import PydanticCustomError
+from pydantic import Field
 
-from femubench.core.fem.frame import BeamTheory, BendingMass, Place, Plane
-
-T = TypeVar("T")
-
-LARGEST, SMALLEST = 1e30, 1e-30
-_ID = r"^[^\s\x00-\x1f\x7f@/:](?:[^\x00-\x1f\x7f@/:]*[^\s\x00-\x1f\x7f@/:])?$"
-_AT = 'a joint "A", a point "member@0.25" or {member = "name", s = 0.25}'
-_CASE = r"^[^\s\x00-\x1f\x7f](?:[^\x00-\x1f\x7f]*[^\s\x00-\x1f\x7f])?$"
-_LINE = r"^[^\x00-\x1f\x7f]*$"
-_DIRECTION = r"^[+-]?(x|y|z|rx|ry|rz)$"
-
-
-def _misfit(what: str, expected: str) -> PydanticCustomError:
-    return PydanticCustomError("misfit", "{what}", {"what": what, "expected": expected})
-
-
-def _place(value: object) -> Place:
-    if isinstance(value, str) and value:
-        member, found, station = value.rpartition("@")
-        if not found:
-            return Place(joint=value)
-        try:
-            s = float(station)
-        except ValueError:
-            raise _misfit(f"{station[:20]!r} is not a station", _AT) from None
-        return _station(member, s)
-    if isinstance(value, dict) and set(value) == {"member", "s"}:
-        member, s = value["member"], value["s"]
-        if isinstance(member, str) and isinstance(s, (int, float)) and not isinstance(s, bool):
-            return _station(member, s)
-    raise _misfit("not a place", _AT)
-
-
-def _station(member: str, s: float) -> Place:
-    if not 0 <= s <= 1:
-        raise _misfit("the station lies outside 0..1", _AT)
-    return Place(member=member, s=float(s))
+from femubench.core.case.case import TOLERANCE
+from femubench.core.case.extensions import (
+    BraceSpec,
+    CouplingSpec,
+    EccentricitySpec,
+    FactorSpec,
+    OscillatorSpec,
+    PreloadSpec,
+    Share,
+)
+from femubench.core.case.fields import (
+    AT,
+    DIRECTIONS,
+    ID,
+    NAME,
+    XYZ,
+    At,
+    CaseName,
+    Count,
+    Direction,
+    DofName,
+    FileName,
+    Many,
+    Name,
+    NotNegative,
+    Number,
+    Positive,
+    Table,
+    Text,
+    Vector,
+)
+from femubench.core.fem.frame import BeamTheory, BendingMass, Plane
 
 
-def _dof_name(value: object) -> int | str:
-    if isinstance(value, (int, str)) and not isinstance(value, bool):
-        return value
-    raise _misfit("not a degree of freedom", 'a row number, "node" or "node:direction"')
-
-
-Number = Annotated[float, Field(strict=True, ge=-LARGEST, le=LARGEST, allow_inf_nan=False)]
-Positive = Annotated[float, Field(strict=True, ge=SMALLEST, le=LARGEST, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(strict=True, ge=0, le=LARGEST, allow_inf_nan=False)]
-Count = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
-Flag = Annotated[bool, Field(strict=True)]
-Name = Annotated[str, Field(strict=True, pattern=_ID, max_length=80)]
-CaseName = Annotated[str, Field(strict=True, pattern=_CASE, max_length=80)]
-Text = Annotated[str, Field(strict=True, pattern=_LINE, max_length=2000)]
-FileName = Annotated[str, Field(strict=True, pattern=_LINE, min_length=1, max_length=255)]
-Direction = Annotated[str, Field(strict=True, pattern=_DIRECTION)]
-At = Annotated[InstanceOf[Place], BeforeValidator(_place)]
-DofName = Annotated[int | str, PlainValidator(_dof_name)]
-Vector = tuple[Number, Number, Number]
-Many = tuple[T, ...]
-
-_DIRECTIONS = "one of x, y, z, rx, ry, rz, with an optional sign"
-_NAME = "a name without @, / and :, in quotes"
-_XYZ = "[x, y, z] in m, finite numbers"
-
-
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class CaseInfo(_Table):
+class CaseInfo(Table):
     """`[case]`."""
 
     name: CaseName = Field(description="a name without blanks at its ends, in quotes")
@@ -88,7 +52,7 @@ class CaseInfo(_Table):
     source: Text = Field("", description="one line: where the numbers come from")
 
 
-class MaterialSpec(_Table):
+class MaterialSpec(Table):
     """`[model.materials.NAME]`."""
 
     E: Positive = Field(description="Young's modulus, a number > 0 in Pa")
@@ -98,7 +62,7 @@ class MaterialSpec(_Table):
     rho: Positive = Field(description="density, a number > 0 in kg/m3")
 
 
-class SectionSpec(_Table):
+class SectionSpec(Table):
     """`[model.sections.NAME]`: a shape with its sizes, or numbers."""
 
     shape: Annotated[str, Field(strict=True)] | None = Field(None, description="name of a shape")
@@ -114,20 +78,20 @@ class SectionSpec(_Table):
     kappa: Positive | None = Field(None, description="shear coefficient, a number > 0")
 
 
-class JointSpec(_Table):
+class JointSpec(Table):
     """`[[model.joints]]`."""
 
-    name: Name = Field(description=_NAME)
-    xyz: Vector = Field(description=_XYZ)
-    type: Annotated[str, Field(strict=True, pattern=rf"^$|{_ID}", max_length=80)] = Field(
-        "", description=_NAME
+    name: Name = Field(description=NAME)
+    xyz: Vector = Field(description=XYZ)
+    type: Annotated[str, Field(strict=True, pattern=rf"^$|{ID}", max_length=80)] = Field(
+        "", description=NAME
     )
 
 
-class MemberSpec(_Table):
+class MemberSpec(Table):
     """`[[model.members]]`."""
 
-    name: Name = Field(description=_NAME)
+    name: Name = Field(description=NAME)
     ends: tuple[Name, Name] = Field(description="the names of two joints")
     elements: Count = Field(1, description="a whole number >= 1")
     section: Name = Field(description="the name of a section")
@@ -135,32 +99,32 @@ class MemberSpec(_Table):
     up: Vector | None = Field(None, description="a vector in the local x-z plane, 3d only")
 
 
-class MassSpec(_Table):
+class MassSpec(Table):
     """`[[model.masses]]`."""
 
-    at: At = Field(description=_AT)
+    at: At = Field(description=AT)
     mass: NotNegative = Field(description="a number >= 0 in kg")
-    offset: Vector = Field((0.0, 0.0, 0.0), description=_XYZ)
+    offset: Vector = Field((0.0, 0.0, 0.0), description=XYZ)
 
 
-class SpringSpec(_Table):
+class SpringSpec(Table):
     """`[[model.springs]]`."""
 
-    at: At = Field(description=_AT)
-    direction: Direction = Field(description=_DIRECTIONS)
+    at: At = Field(description=AT)
+    direction: Direction = Field(description=DIRECTIONS)
     stiffness: NotNegative = Field(description="a number >= 0 in N/m or N m/rad")
 
 
-class SupportSpec(_Table):
+class SupportSpec(Table):
     """`[[model.supports]]`."""
 
-    at: At = Field(description=_AT)
+    at: At = Field(description=AT)
     fixed: Annotated[Many[Direction], Field(min_length=1, max_length=6)] = Field(
         description="a list of directions"
     )
 
 
-class JointSpringSpec(_Table):
+class JointSpringSpec(Table):
     """`[[model.joint_springs]]`."""
 
     joint: Name = Field(description="the name of a joint")
@@ -172,7 +136,7 @@ class JointSpringSpec(_Table):
     arm_factor: Positive | None = Field(None, description="a number > 0")
 
 
-class RigidEndSpec(_Table):
+class RigidEndSpec(Table):
     """`[[model.rigid_ends]]`."""
 
     joint: Name = Field(description="the name of a joint")
@@ -181,13 +145,15 @@ class RigidEndSpec(_Table):
     mass_length: Number = Field(0.0, description="a length in m")
 
 
-class FrameSpec(_Table):
+class FrameSpec(Table):
     """`[model]` with ``kind = "frame"``."""
 
     kind: Literal["frame"] = Field(description="'frame' or 'matrices'")
     plane: Plane = Field(description="'in-plane', 'out-of-plane' or '3d'")
     beam: BeamTheory = Field("euler-bernoulli", description="'euler-bernoulli' or 'timoshenko'")
-    rotary_inertia: Flag | None = Field(None, description="true or false")
+    rotary_inertia: Share | None = Field(
+        None, description="true, false or a multiple of rho I, a number >= 0"
+    )
     bending_mass: BendingMass = Field("cubic", description="'cubic' or 'shear-consistent'")
     materials: dict[Name, MaterialSpec] = Field(description="tables [model.materials.NAME]")
     sections: dict[Name, SectionSpec] = Field(description="tables [model.sections.NAME]")
@@ -202,19 +168,27 @@ class FrameSpec(_Table):
     supports: Many[SupportSpec] = Field((), description="tables [[model.supports]]")
     joint_springs: Many[JointSpringSpec] = Field((), description="tables [[model.joint_springs]]")
     rigid_ends: Many[RigidEndSpec] = Field((), description="tables [[model.rigid_ends]]")
+    factors: Many[FactorSpec] = Field((), description="tables [[model.factors]]")
+    preloads: Many[PreloadSpec] = Field((), description="tables [[model.preloads]]")
+    eccentricities: Many[EccentricitySpec] = Field(
+        (), description="tables [[model.eccentricities]]"
+    )
+    couplings: Many[CouplingSpec] = Field((), description="tables [[model.couplings]]")
+    braces: Many[BraceSpec] = Field((), description="tables [[model.braces]]")
+    oscillators: Many[OscillatorSpec] = Field((), description="tables [[model.oscillators]]")
 
 
-class GroupSpec(_Table):
+class GroupSpec(Table):
     """`[[model.groups]]`: a named part of the stiffness."""
 
-    name: Name = Field(description=_NAME)
+    name: Name = Field(description=NAME)
     stiffness: FileName | None = Field(None, description="a matrix file in the case folder")
     dofs: Annotated[Many[DofName], Field(min_length=1)] | None = Field(
         None, description='a list of row numbers, "node" or "node:direction"'
     )
 
 
-class MatricesSpec(_Table):
+class MatricesSpec(Table):
     """`[model]` with ``kind = "matrices"``."""
 
     kind: Literal["matrices"] = Field(description="'frame' or 'matrices'")
@@ -224,14 +198,14 @@ class MatricesSpec(_Table):
     groups: Many[GroupSpec] = Field((), description="tables [[model.groups]]")
 
 
-class WeightSpec(_Table):
+class WeightSpec(Table):
     """`mass` in `[measurement]`."""
 
     value: Positive = Field(description="a number > 0 in kg")
     std: Positive = Field(description="a number > 0 in kg")
 
 
-class MeasurementSpec(_Table):
+class MeasurementSpec(Table):
     """`[measurement]`."""
 
     sensors: FileName | None = Field(None, description="a file in the case folder")
@@ -247,7 +221,7 @@ class MeasurementSpec(_Table):
     mass: WeightSpec | None = Field(None, description="{value, std} in kg")
 
 
-class ModificationSpec(_Table):
+class ModificationSpec(Table):
     """`[[modification]]`."""
 
     name: Text = Field(description="one line of text")
@@ -256,7 +230,16 @@ class ModificationSpec(_Table):
     modes: FileName = Field(description="a file in the case folder")
 
 
-class CaseSpec(_Table):
+class DiagnosisSpec(Table):
+    """`[diagnosis]`."""
+
+    tolerance: Annotated[float, Field(strict=True, ge=0, le=0.2, allow_inf_nan=False)] = Field(
+        default=TOLERANCE,
+        description="a number >= 0 and <= 0.2, the relative scatter of every element",
+    )
+
+
+class CaseSpec(Table):
     """The whole of `case.toml`."""
 
     case: CaseInfo = Field(description="the table [case]")
@@ -265,6 +248,7 @@ class CaseSpec(_Table):
     )
     measurement: MeasurementSpec = Field(description="the table [measurement]")
     modification: Many[ModificationSpec] = Field((), description="tables [[modification]]")
+    diagnosis: DiagnosisSpec = Field(DiagnosisSpec(), description="the table [diagnosis]")
 
 
 def parse_spec(data: Mapping[str, Any]) -> CaseSpec:

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from femubench.core.case.faults import Misfit, WrongDirection
+from femubench.core.case.fields import LARGEST
 from femubench.core.case.files import read_text
 from femubench.core.case.frames import Site
-from femubench.core.case.schema import LARGEST
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Place, Vector
 from femubench.core.measurement import DIRECTIONS, Sensors

@@ -26,9 +26,14 @@ DONE, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 VERBS = {
     "run": ("femubench.core.cli.run", "Run strategies on cases and rank them."),
     "report": ("femubench.core.cli.report", "Write a report on a stored run."),
+    "diagnose": ("femubench.core.cli.diagnose", "Find what a model lacks, and extend it."),
     "init": (
         "femubench.core.cli.init",
         "Write a commented example case into FOLDER, which must be new or empty.",
+    ),
+    "challenge": (
+        "femubench.core.cli.challenge",
+        "Write blind cases with a hidden fault, and judge answers.",
     ),
     "scenarios": ("femubench.core.cli.scenarios", "List the built-in scenarios, or show one."),
     "plugins": ("femubench.core.cli.plugins", "List the plugins and what is wrong with them."),

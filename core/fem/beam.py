@@ -11,14 +11,20 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from femubench.core.fem.interpolation import (
+    AXIAL,
+    BEND_XY,
+    BEND_XZ,
+    GAUSS,
+    SLOPE_SIGN,
+    TWIST,
+    bending_functions,
+    interpolation,
+    rigid_part,
+)
 from femubench.core.typing import AnyArray, FloatArray, IntArray
 
-_AXIAL = np.array([0, 6])
-_TWIST = np.array([3, 9])
-# (v, rz) pairs with dv/dx = rz; (w, ry) pairs need the sign of the slope turned.
-_BEND_XY = np.array([1, 5, 7, 11])
-_BEND_XZ = np.array([2, 4, 8, 10])
-_SLOPE_SIGN = np.array([1.0, -1.0, 1.0, -1.0])
+_CURVE = np.array([4, 10])
 
 
 @dataclass(frozen=True)
@@ -36,6 +42,8 @@ class BeamProperties:
         rigid_mass_1, rigid_mass_2: rigid massless lengths in the mass matrix in m.
         shear_shape: how far the mass matrix and the interpolation know of the shear: 0 keeps
             cubic Hermite functions, 1 takes those of the Timoshenko element.
+        coupling: coefficient c of the bending-torsion coupling, -1 < c < 1.
+        ecc_y, ecc_z: where the mass centre of the section lies in local axes in m.
     """
 
     length: FloatArray
@@ -54,6 +62,9 @@ class BeamProperties:
     rigid_mass_1: FloatArray
     rigid_mass_2: FloatArray
     shear_shape: FloatArray
+    coupling: FloatArray
+    ecc_y: FloatArray
+    ecc_z: FloatArray
 
     def __len__(self) -> int:
         return len(self.length)
@@ -131,11 +142,12 @@ def _add_rigid_ends(matrix: AnyArray, first: AnyArray, second: AnyArray) -> AnyA
     """Return T' k T: the ends of the flexible part move rigidly with the nodes."""
     if not (np.any(first) or np.any(second)):
         return matrix
-    transform = _rigid_transform(first, second)
+    transform = rigid_transform(first, second)
     return np.swapaxes(transform, 1, 2) @ matrix @ transform
 
 
-def _rigid_transform(first: AnyArray, second: AnyArray) -> AnyArray:
+def rigid_transform(first: AnyArray, second: AnyArray) -> AnyArray:
+    """Return the motion of the ends of the flexible part from that of the nodes, (n, 12, 12)."""
     transform = np.zeros((len(first), 12, 12), dtype=np.result_type(first, second))
     transform[:, range(12), range(12)] = 1.0
     transform[:, 1, 5], transform[:, 2, 4] = first, -first
@@ -152,11 +164,28 @@ def stiffness_matrices(p: BeamProperties) -> AnyArray:
     dtype = np.result_type(*(getattr(p, f.name) for f in fields(p)))
     k = np.zeros((len(p), 12, 12), dtype=dtype)
     bar = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    _place(k, _AXIAL, bar * (p.EA / L)[:, None, None])
-    _place(k, _TWIST, bar * (p.GJ / L)[:, None, None])
-    _place(k, _BEND_XY, bending_stiffness(p.EIz, p.flex_y, L))
-    _place(k, _BEND_XZ, bending_stiffness(p.EIy, p.flex_z, L), _SLOPE_SIGN)
-    return _add_rigid_ends(k, p.rigid_1, p.rigid_2)
+    _place(k, AXIAL, bar * (p.EA / L)[:, None, None])
+    _place(k, TWIST, bar * (p.GJ / L)[:, None, None])
+    _place(k, BEND_XY, bending_stiffness(p.EIz, p.flex_y, L))
+    _place(k, BEND_XZ, bending_stiffness(p.EIy, p.flex_z, L), SLOPE_SIGN)
+    k = _add_rigid_ends(k, p.rigid_1, p.rigid_2)
+    if np.any(p.coupling):
+        k += p.coupling[:, None, None] * coupling_matrices(p)
+    return k
+
+
+def coupling_matrices(p: BeamProperties) -> AnyArray:
+    """Return what a bending-torsion coupling of coefficient 1 adds in N, N m, (n, 12, 12).
+
+    The strain energy is the integral of sqrt(EI GJ) d(ry)/dx d(rx)/dx; with a linear twist it
+    depends on the rotations of the ends alone, so that rigid ends change nothing but the length.
+    """
+    k = np.zeros((len(p), 12, 12), dtype=np.result_type(p.EIy, p.GJ, p.length, p.rigid_1))
+    block = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    block = block * (np.sqrt(p.EIy * p.GJ) / _flexible(p))[:, None, None]
+    k[:, TWIST[:, None], _CURVE[None, :]] = block
+    k[:, _CURVE[:, None], TWIST[None, :]] = block
+    return k
 
 
 def mass_matrices(p: BeamProperties) -> AnyArray:
@@ -170,13 +199,45 @@ def mass_matrices(p: BeamProperties) -> AnyArray:
     dtype = np.result_type(*(getattr(p, f.name) for f in fields(p)))
     m = np.zeros((len(p), 12, 12), dtype=dtype)
     bar = np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
-    _place(m, _AXIAL, bar * (p.rhoA * L)[:, None, None])
-    _place(m, _TWIST, bar * (p.rhoJp * L)[:, None, None])
+    _place(m, AXIAL, bar * (p.rhoA * L)[:, None, None])
+    _place(m, TWIST, bar * (p.rhoJp * L)[:, None, None])
     phi_y = p.shear_shape * 12 * p.EIz * p.flex_y / L**2
     phi_z = p.shear_shape * 12 * p.EIy * p.flex_z / L**2
-    _place(m, _BEND_XY, bending_mass(p.rhoA, p.rhoIz, phi_y, L))
-    _place(m, _BEND_XZ, bending_mass(p.rhoA, p.rhoIy, phi_z, L), _SLOPE_SIGN)
-    return _add_rigid_ends(m, p.rigid_mass_1, p.rigid_mass_2)
+    _place(m, BEND_XY, bending_mass(p.rhoA, p.rhoIz, phi_y, L))
+    _place(m, BEND_XZ, bending_mass(p.rhoA, p.rhoIy, phi_z, L), SLOPE_SIGN)
+    m = _add_rigid_ends(m, p.rigid_mass_1, p.rigid_mass_2)
+    if np.any(p.ecc_y) or np.any(p.ecc_z):
+        y, z = p.ecc_y[:, None, None], p.ecc_z[:, None, None]
+        parts = eccentric_mass_parts(p)
+        m += y * parts["y"] + z * parts["z"]
+        m += y * y * parts["yy"] + z * z * parts["zz"] + y * z * parts["yz"]
+    return m
+
+
+def eccentric_mass_parts(p: BeamProperties) -> dict[str, AnyArray]:
+    """Return what an eccentric mass centre adds to the mass matrices, each (n, 12, 12).
+
+    The mass with its centre at (y, z) is M0 + y My + z Mz + y^2 Myy + z^2 Mzz + y z Myz, under
+    the keys ``y``, ``z``, ``yy``, ``zz``, ``yz``: rho A acts on u + r x (0, y, z), and the inertias
+    about the mass centre stay. `ecc_y` and `ecc_z` do not enter.
+    """
+    L = p.length - p.rigid_mass_1 - p.rigid_mass_2
+    phi_y = p.shear_shape * 12 * p.EIz * p.flex_y / L**2
+    phi_z = p.shear_shape * 12 * p.EIy * p.flex_z / L**2
+    parts: dict[str, AnyArray] = dict.fromkeys(("y", "z", "yy", "zz", "yz"), np.zeros(1))
+    for x, weight in GAUSS:
+        rows = interpolation(x, L, phi_y, phi_z)
+        by_y, by_z = np.zeros_like(rows[:, :3]), np.zeros_like(rows[:, :3])
+        by_y[:, 0], by_y[:, 2] = -rows[:, 5], rows[:, 3]
+        by_z[:, 0], by_z[:, 1] = rows[:, 4], -rows[:, 3]
+        share = (weight * p.rhoA * L)[:, None, None]
+        terms = {"y": (rows[:, :3], by_y), "z": (rows[:, :3], by_z), "yz": (by_y, by_z)}
+        for name, (left, right) in terms.items():
+            product = np.swapaxes(left, 1, 2) @ right
+            parts[name] = parts[name] + share * (product + np.swapaxes(product, 1, 2))
+        for name, one in (("yy", by_y), ("zz", by_z)):
+            parts[name] = parts[name] + share * (np.swapaxes(one, 1, 2) @ one)
+    return {k: _add_rigid_ends(m, p.rigid_mass_1, p.rigid_mass_2) for k, m in parts.items()}
 
 
 def shape_functions(p: BeamProperties, element: int, xi: float) -> FloatArray:
@@ -195,37 +256,12 @@ def shape_functions(p: BeamProperties, element: int, xi: float) -> FloatArray:
     x = (xi * float(one.length[0]) - first) / L
     rows = np.zeros((6, 12))
     clear = min(max(x, 0.0), 1.0)
-    rows[0, _AXIAL] = rows[3, _TWIST] = [1.0 - clear, clear]
+    rows[0, AXIAL] = rows[3, TWIST] = [1.0 - clear, clear]
     phi_y = one.shear_shape[0] * 12 * one.EIz[0] * one.flex_y[0] / L**2
     phi_z = one.shear_shape[0] * 12 * one.EIy[0] * one.flex_z[0] / L**2
-    rows[1, _BEND_XY], rows[5, _BEND_XY] = _bending_functions(x, L, float(phi_y))
-    deflection, slope = _bending_functions(x, L, float(phi_z))
-    rows[2, _BEND_XZ], rows[4, _BEND_XZ] = deflection * _SLOPE_SIGN, -slope * _SLOPE_SIGN
-    return np.asarray(rows @ _rigid_transform(np.array([first]), np.array([second]))[0])
-
-
-def _bending_functions(x: float, L: float, phi: float) -> FloatArray:
-    if x < 0.0 or x > 1.0:
-        return _rigid_part(x, L)
-    c = 1.0 / (1.0 + phi)
-    cubic = 2 * x**3 - 3 * x**2 - phi * x
-    w = [
-        c * (cubic + 1 + phi),
-        c * L * (x**3 - (2 + phi / 2) * x**2 + (1 + phi / 2) * x),
-        -c * cubic,
-        c * L * (x**3 - (1 - phi / 2) * x**2 - phi / 2 * x),
-    ]
-    slope = 6 * c / L * (x**2 - x)
-    theta = [
-        slope,
-        c * (3 * x**2 - (4 + phi) * x + 1 + phi),
-        -slope,
-        c * (3 * x**2 - (2 - phi) * x),
-    ]
-    return np.array([w, theta])
-
-
-def _rigid_part(x: float, L: float) -> FloatArray:
-    if x < 0.0:
-        return np.array([[1.0, x * L, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
-    return np.array([[0.0, 0.0, 1.0, (x - 1.0) * L], [0.0, 0.0, 0.0, 1.0]])
+    inside = 0.0 <= x <= 1.0
+    across = bending_functions(x, L, phi_y) if inside else rigid_part(x, L)
+    rows[1, BEND_XY], rows[5, BEND_XY] = across
+    deflection, slope = bending_functions(x, L, phi_z) if inside else rigid_part(x, L)
+    rows[2, BEND_XZ], rows[4, BEND_XZ] = deflection * SLOPE_SIGN, -slope * SLOPE_SIGN
+    return np.asarray(rows @ rigid_transform(np.array([first]), np.array([second]))[0])

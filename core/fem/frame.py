@@ -141,11 +141,86 @@ class RigidEnd:
 
 
 @dataclass(frozen=True)
+class Factor:
+    """A multiple of what sections and materials give, at some places of the frame.
+
+    Arguments:
+        quantity: a key of `femubench.core.fem.parameters.QUANTITIES` that is a factor, e.g. ``E``.
+        at: ``all``, member names or ``member/k`` for one element.
+        factor: of the property; several factors on one place multiply.
+    """
+
+    quantity: str
+    at: tuple[str, ...]
+    factor: float
+
+
+@dataclass(frozen=True)
+class Preload:
+    """The self-equilibrated state of stress that a lack of fit of one member leaves.
+
+    Arguments:
+        member: the member that was too short or too long.
+        force: the normal force of largest magnitude anywhere in the frame in N, with the sign of
+            the force in `member`, tension positive.
+    """
+
+    member: str
+    force: float
+
+
+@dataclass(frozen=True)
+class Eccentricity:
+    """The line of the mass centres of a member, off its axis by (y, z) in local axes, in m."""
+
+    member: str
+    y: float = 0.0
+    z: float = 0.0
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """Bending-torsion coupling of a member's sections.
+
+    Arguments:
+        member: its name.
+        coefficient: c in the strain energy (EI k^2 + 2 c sqrt(EI GJ) k t + GJ t^2) / 2 of the
+            curvature k about local y and the twist t, -1 < c < 1.
+    """
+
+    member: str
+    coefficient: float
+
+
+@dataclass(frozen=True)
+class Brace:
+    """A massless axial spring between two joints, N/m."""
+
+    ends: tuple[str, str]
+    stiffness: float
+
+
+@dataclass(frozen=True)
+class Oscillator:
+    """A mass in kg that rides on a place and moves on a spring in one global direction.
+
+    Arguments:
+        frequency: natural frequency on a fixed base in Hz.
+    """
+
+    at: Place
+    direction: str
+    mass: float
+    frequency: float
+
+
+@dataclass(frozen=True)
 class Frame:
     """A frame of beams with everything that is attached to it.
 
     Arguments:
-        rotary_inertia: whether rho I takes part; None follows the beam theory.
+        rotary_inertia: whether rho I takes part, or a multiple of it; None follows the beam
+            theory.
         bending_mass: ``cubic`` takes Hermite's functions in every theory; ``shear-consistent``
             takes those of the Timoshenko element (Friedman & Kosmatka 1993).
     """
@@ -159,13 +234,20 @@ class Frame:
     supports: tuple[Support, ...] = ()
     joint_springs: tuple[JointSpring, ...] = ()
     rigid_ends: tuple[RigidEnd, ...] = ()
-    rotary_inertia: bool | None = None
+    rotary_inertia: bool | float | None = None
     bending_mass: BendingMass = "cubic"
+    factors: tuple[Factor, ...] = ()
+    preloads: tuple[Preload, ...] = ()
+    eccentricities: tuple[Eccentricity, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
+    braces: tuple[Brace, ...] = ()
+    oscillators: tuple[Oscillator, ...] = ()
 
     @property
-    def with_rotary_inertia(self) -> bool:
-        """Tell whether rho I takes part in the mass matrix."""
-        return self.beam == "timoshenko" if self.rotary_inertia is None else self.rotary_inertia
+    def rotary_share(self) -> float:
+        """Return how much of rho I takes part in the mass matrix, 0 for none, 1 for all."""
+        share = self.rotary_inertia
+        return float(self.beam == "timoshenko" if share is None else share)
 
     @cached_property
     def _joints(self) -> Mapping[str, Joint]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,12 +25,14 @@ class Kinematics:
         node: node of every free dof, (n,).
         direction: its direction, (n,).
         axes: its unit motion in (x, y, z, rx, ry, rz), (n, 6).
+        active: which of x, y, z, rx, ry, rz may move at all, (6,).
     """
 
     transform: SparseArray
     node: IntArray
     direction: tuple[str, ...]
     axes: FloatArray
+    active: BoolArray
 
 
 def rigid_arm(offset: FloatArray) -> FloatArray:
@@ -38,6 +41,16 @@ def rigid_arm(offset: FloatArray) -> FloatArray:
     motion = np.eye(6)
     motion[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
     return motion
+
+
+def rigid_motions(xyz: FloatArray, axes: FloatArray) -> FloatArray:
+    """Return the six motions of a rigid body seen by dofs, (n, 6), rotations about the origin.
+
+    Arguments:
+        xyz: positions of the dofs in m, (n, 3).
+        axes: their unit motions in (x, y, z, rx, ry, rz), (n, 6).
+    """
+    return np.hstack([axes[:, :3], np.cross(xyz, axes[:, :3]) + axes[:, 3:]])
 
 
 def node_at(frame: Frame, mesh: Mesh, place: Place, tolerance: float = SAME_STATION) -> int | None:
@@ -115,10 +128,19 @@ def spring_rows(mesh: Mesh, connection: Connection) -> SparseArray:
     return sp.csr_array((block.ravel(), (rows, np.tile(columns, len(index)))), shape=shape)
 
 
-def build_kinematics(frame: Frame, mesh: Mesh) -> Kinematics:
-    """Return which node displacements are free and how the others follow from them."""
-    active = np.array([name in ACTIVE[frame.plane] for name in DIRECTIONS])
+def build_kinematics(
+    frame: Frame, mesh: Mesh, directions: Sequence[str] | None = None
+) -> Kinematics:
+    """Return which node displacements are free and how the others follow from them.
+
+    Arguments:
+        directions: what may move; those of the frame's plane by default.
+    """
+    active = np.isin(DIRECTIONS, ACTIVE[frame.plane] if directions is None else directions)
     free = np.tile(active, (len(mesh.xyz), 1))
+    free[mesh.oscillators] = False
+    for oscillator, item in zip(mesh.oscillators, frame.oscillators, strict=False):
+        free[oscillator, DIRECTIONS.index(item.direction.lstrip("+-"))] = True
     hanging = {connection.node: connection for connection in mesh.connections}
     for support in frame.supports:
         node = _support_node(frame, mesh, support.at)
@@ -204,4 +226,5 @@ def _assemble_transform(
         node=np.array(node, dtype=np.int64)[order],
         direction=tuple(direction[i] for i in order),
         axes=axes[order],
+        active=active,
     )

@@ -12,9 +12,12 @@ import numpy as np
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import (
     Frame,
+    GroundSpring,
     JointSpring,
     Member,
+    Oscillator,
     Place,
+    PointMass,
     RigidEnd,
 )
 from femubench.core.typing import FloatArray, IntArray
@@ -52,6 +55,7 @@ class Mesh:
         rigid_mass: rigid lengths in the mass matrix in m, (n_elements, 2).
         arm_factor: nan for an ordinary element, else the massless arm's rigidity factor.
         connections: the joint springs.
+        oscillators: the node of every oscillator's mass; they come last and belong to no element.
     """
 
     xyz: FloatArray
@@ -64,11 +68,13 @@ class Mesh:
     rigid_mass: FloatArray
     arm_factor: FloatArray
     connections: tuple[Connection, ...]
+    oscillators: IntArray
 
     def node_keys(self, joints: int) -> list[tuple[int, int, bool]]:
         """Return a name of every node that stays the same when other elements are split.
 
-        Member (-1 for a joint), joint or station in 1e-9, and whether it is the tip of an arm.
+        Member (-1 for a joint, -2 for an oscillator), joint or station in 1e-9 or number, and
+        whether it is the tip of an arm.
 
         Arguments:
             joints: number of joints, which are the first nodes.
@@ -79,6 +85,8 @@ class Mesh:
             for node, s in zip(ends, stations, strict=True):
                 if node >= joints:
                     keys[node] = (int(member), round(float(s) / SAME_STATION), bool(arm))
+        for number, node in enumerate(self.oscillators):
+            keys[node] = (-2, number, False)
         return keys
 
 
@@ -123,8 +131,9 @@ class _Builder:
         self.springs = {(s.member, s.joint): s for s in frame.joint_springs}
         self.rigid_ends = {(r.member, r.joint): r for r in frame.rigid_ends}
         self.held = _places([item.at for item in frame.supports])
-        places = [item.at for item in frame.masses] + [item.at for item in frame.springs]
-        self.splits = _places(places)
+        attached: tuple[PointMass | GroundSpring | Oscillator, ...]
+        attached = (*frame.masses, *frame.springs, *frame.oscillators)
+        self.splits = _places([item.at for item in attached])
 
     def node(self, xyz: FloatArray) -> int:
         self.xyz.append(xyz)
@@ -186,6 +195,7 @@ class _Builder:
     def mesh(self) -> Mesh:
         for m in range(len(self.frame.members)):
             self.member(m)
+        hung = [self.node(place_xyz(self.frame, item.at)) for item in self.frame.oscillators]
         table = np.array(self.rows, dtype=float).reshape(-1, 7)
         member = table[:, 2].astype(np.int64)
         rigid, rigid_mass = np.zeros((len(table), 2)), np.zeros((len(table), 2))
@@ -202,7 +212,24 @@ class _Builder:
             rigid_mass=rigid_mass,
             arm_factor=table[:, 6],
             connections=tuple(self.connections),
+            oscillators=np.array(hung, dtype=np.int64),
         )
+
+
+def place_xyz(frame: Frame, place: Place) -> FloatArray:
+    """Return where a place lies in m, (3,).
+
+    Raises:
+        ModelError: when there is no such joint or member.
+    """
+    if place.joint is not None:
+        if place.joint not in frame.joint_index:
+            raise ModelError(f"there is no joint {place.joint!r}")
+        return np.asarray(frame.corners[frame.joint_index[place.joint]])
+    if place.member is None or place.member not in frame.member_index or place.s is None:
+        raise ModelError(f"there is no member {place.member!r}")
+    first, second = frame.corners[frame.member_ends[frame.member_index[place.member]]]
+    return np.asarray((1.0 - place.s) * first + place.s * second)
 
 
 def _places(places: Sequence[Place]) -> dict[str, list[float]]:

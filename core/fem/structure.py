@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.assembly import AssemblyPlan, plan_assembly, prune
+from femubench.core.fem.attachments import (
+    brace_stiffness,
+    check_attachments,
+    oscillator_matrices,
+)
 from femubench.core.fem.beam import BeamProperties, mass_matrices, stiffness_matrices
-from femubench.core.fem.frame import ACTIVE, Frame, GroundSpring, PointMass
+from femubench.core.fem.frame import Frame, GroundSpring, PointMass
 from femubench.core.fem.kinematics import (
     Kinematics,
     build_kinematics,
@@ -21,39 +27,11 @@ from femubench.core.fem.kinematics import (
     spring_rows,
 )
 from femubench.core.fem.mesh import Mesh, build_mesh, locate
+from femubench.core.fem.nominal import factored_properties, nominal_properties
 from femubench.core.fem.parameters import Parameter, apply_values
+from femubench.core.fem.preload import preload_stiffness
 from femubench.core.measurement import DIRECTIONS, Sensors
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
-
-
-def _nominal_properties(frame: Frame, mesh: Mesh) -> BeamProperties:
-    """Return the element properties that sections, materials and beam theory give."""
-    shear = 1.0 if frame.beam == "timoshenko" else 0.0
-    rotary = 1.0 if frame.with_rotary_inertia else 0.0
-    rows = []
-    for member in frame.members:
-        s, m = member.section, member.material
-        if shear and s.kappa is None:
-            raise ModelError(
-                f"member {member.name!r}: a Timoshenko beam needs the shear coefficient kappa"
-            )
-        ky, kz = s.kappa(m.nu) if s.kappa is not None else (1.0, 1.0)
-        flex = shear / (m.G * s.A)
-        inertia = rotary * m.rho
-        rigidities = (m.E * s.A, m.E * s.Iy, m.E * s.Iz, m.G * s.J, flex / ky, flex / kz)
-        inertias = (m.rho * s.A, m.rho * s.Jp, inertia * s.Iy, inertia * s.Iz)
-        rows.append((*rigidities, *inertias))
-    table = np.array(rows)[mesh.member]
-    arm = np.isfinite(mesh.arm_factor)
-    factor = np.where(arm, mesh.arm_factor, 1.0)[:, None]
-    table[:, :4] *= factor
-    table[:, 4:6] /= factor
-    table[arm, 6:] = 0.0
-    length = np.linalg.norm(mesh.xyz[mesh.ends[:, 1]] - mesh.xyz[mesh.ends[:, 0]], axis=1)
-    shape = np.full(len(length), 1.0 if frame.bending_mass == "shear-consistent" else 0.0)
-    columns = (length, *table.T, *mesh.rigid.T, *mesh.rigid_mass.T, shape)
-    names = [f.name for f in fields(BeamProperties)]
-    return BeamProperties(**dict(zip(names, (np.array(c) for c in columns), strict=True)))
 
 
 def _positions(labels: Sequence[str]) -> dict[str, IntArray]:
@@ -96,11 +74,13 @@ class Structure:
         Raises:
             ModelError: when the frame cannot be meshed.
         """
+        check_attachments(frame)
         mesh = build_mesh(frame)
         springs = [k for c in mesh.connections for k in c.spring.stiffness.values()]
         kinematics = build_kinematics(frame, mesh)
-        properties = _nominal_properties(frame, mesh)
-        return cls(frame, mesh, kinematics, properties, np.array(springs, dtype=float))
+        properties = nominal_properties(frame, mesh)
+        built = cls(frame, mesh, kinematics, properties, np.array(springs, dtype=float))
+        return replace(built, properties=factored_properties(built)) if frame.factors else built
 
     def with_values(
         self, parameters: Sequence[Parameter], values: Sequence[float] | FloatArray
@@ -176,6 +156,25 @@ class Structure:
         return _positions(self.labels)
 
     @cached_property
+    def member_labels(self) -> dict[str, tuple[str, ...]]:
+        """Return the labels of the elements of every member."""
+        return {
+            member.name: tuple(f"{member.name}/{k + 1}" for k in range(member.elements))
+            for member in self.frame.members
+        }
+
+    @cached_property
+    def kept(self) -> dict[str, Any]:
+        """Return a store of what follows from the frame alone, whatever the parameters are."""
+        return {}
+
+    @cached_property
+    def preload(self) -> SparseArray | None:
+        """Return the geometric stiffness of all preloads on the free dofs, (n, n), or None."""
+        parts = [preload_stiffness(self, p.member, p.force) for p in self.frame.preloads]
+        return sum(parts[1:], start=parts[0]) if parts else None
+
+    @cached_property
     def spring_index(self) -> dict[str, IntArray]:
         """Return the position of every label of `spring_labels`."""
         return _positions(self.spring_labels)
@@ -243,19 +242,38 @@ class Structure:
         """
         transform, xyz = self.kinematics.transform, self.mesh.xyz
         own = motion(xyz[self.kinematics.node], self.kinematics.axes)
-        active = np.flatnonzero(np.tile(self.active_local[:6], len(xyz)))
+        free = np.tile(self.active_local[:6], (len(xyz), 1))
+        free[self.mesh.oscillators] = False  # they have dofs of their own and hold nothing
+        active = np.flatnonzero(free)
         all_nodes = motion(xyz[active // 6], np.eye(6)[active % 6])
         rows = [self._ground_row(spring) for spring in self.frame.springs if spring.stiffness]
         pulled = [np.asarray(row @ own) for row in rows]
         return np.vstack([transform[active] @ own - all_nodes, *pulled])
 
-    def matrices(self) -> tuple[SparseArray, SparseArray]:
-        """Return mass and stiffness on the free dofs, sparse, (n, n) each."""
-        mass = self.plan.assemble(mass_matrices(self.properties))
+    def elastic_stiffness(self) -> SparseArray:
+        """Return the stiffness without preloads and oscillators, (n, n)."""
         stiffness = self.plan.assemble(stiffness_matrices(self.properties))
-        more_mass, more_stiffness = self.attached(self.frame.masses, self.frame.springs)
         joint = self.spring_rows.T @ sp.diags_array(self.springs) @ self.spring_rows
-        return prune(mass + more_mass), prune(stiffness + more_stiffness + joint)
+        ground = self.attached((), self.frame.springs)[1]
+        if self.frame.braces:
+            ground = ground + brace_stiffness(self)
+        return stiffness + ground + joint
+
+    def matrices(self) -> tuple[SparseArray, SparseArray]:
+        """Return mass and stiffness on the free dofs, sparse, (n, n) each.
+
+        Raises:
+            ModelError: when a preload has no redundancy to live on.
+        """
+        mass = self.plan.assemble(mass_matrices(self.properties))
+        mass = mass + self.attached(self.frame.masses, ())[0]
+        stiffness = self.elastic_stiffness()
+        if self.frame.oscillators:
+            more_mass, more_stiffness = oscillator_matrices(self)
+            mass, stiffness = mass + more_mass, stiffness + more_stiffness
+        if self.preload is not None:
+            stiffness = stiffness + self.preload
+        return prune(mass), prune(stiffness)
 
     def observe(self, sensors: Sensors) -> SparseArray:
         """Return sensor readings from free dofs, sparse (n_sensors, n).
@@ -275,5 +293,4 @@ class Structure:
     @cached_property
     def active_local(self) -> BoolArray:
         """Tell which of the twelve local dofs the plane lets move, (12,)."""
-        one = [name in ACTIVE[self.frame.plane] for name in DIRECTIONS]
-        return np.array(one + one)
+        return np.tile(self.kinematics.active, 2)

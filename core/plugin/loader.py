@@ -122,6 +122,11 @@ def load_plugins(
     )
 
 
+def registered_effects() -> tuple[Effect, ...]:
+    """Return every effect that plugins offer, the built-in ones first."""
+    return tuple(load_plugins().effects.values())
+
+
 class _HookError(PluginError):
     """A PluginError that knows its hook."""
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 if TYPE_CHECKING:
+    from femubench.core.diagnosis.effect import EffectParameter
     from femubench.core.harness.results import Run
     from femubench.core.measurement import Measurement
     from femubench.core.model import Model
@@ -69,19 +70,25 @@ class Reporter(Protocol):
 
 @runtime_checkable
 class Effect(Protocol):
-    """A physical cause that a model can lack.
+    """A physical cause that a model can lack; `femubench.FrameEffect` is a base class for frames.
 
-    Attributes:
-        name: a slug such as ``"joint-rotation"``.
+    An effect may offer more than is asked here:
+
+    - ``summary``: what the model lacks, as a clause: ``"the joints rotate"``.
+    - ``change(model, place) -> Change``: what it does to mass and stiffness as fixed matrices with
+      varying factors. Without it the diagnosis reads the change off `extend` at a few values.
     """
 
-    name: str
-
-    def places(self, model: Model) -> Sequence[str]:
-        """Return where the effect may sit in this model."""
+    @property
+    def name(self) -> str:
+        """Return a slug such as ``"joint-rotation"``; a plain attribute will do."""
         ...
 
-    def parameters(self, model: Model, place: str) -> Sequence[Any]:
+    def places(self, model: Model) -> Sequence[str]:
+        """Return where the effect may sit in this model; nothing where it does not apply."""
+        ...
+
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return its parameters there, with unit, prior and bounds."""
         ...
 

@@ -36,12 +36,8 @@ class QuasiModes:
     partners: IntArray
 
 
-def paired_modes(model: Model, measurement: Measurement) -> tuple[Modes, IntArray]:
-    """Return enough modes of a model and the index of every measured mode's partner.
-
-    Raises:
-        StrategyFailure: when a measured mode has no partner in the model.
-    """
+def partners_of(model: Model, measurement: Measurement) -> tuple[Modes, IntArray]:
+    """Return enough modes of a model and every measured mode's partner among them, -1 for none."""
     modes = solve_modes(model, enough_modes(model, len(measurement)))
     candidates = np.flatnonzero(~modes.rigid)
     at_sensors = model.observe(measurement.sensors) @ modes.shapes[:, candidates]
@@ -51,10 +47,20 @@ def paired_modes(model: Model, measurement: Measurement) -> tuple[Modes, IntArra
         modes.natural_frequencies[candidates],
         at_sensors,
     )
-    lost = [n for n, p in zip(measurement.numbers, pairing.index, strict=True) if p < 0]
+    return modes, np.where(pairing.index >= 0, candidates[pairing.index], -1)
+
+
+def paired_modes(model: Model, measurement: Measurement) -> tuple[Modes, IntArray]:
+    """Return enough modes of a model and the index of every measured mode's partner.
+
+    Raises:
+        StrategyFailure: when a measured mode has no partner in the model.
+    """
+    modes, partner = partners_of(model, measurement)
+    lost = [n for n, p in zip(measurement.numbers, partner, strict=True) if p < 0]
     if lost:
         raise StrategyFailure(f"no mode of the model matches measured mode {lost[0]}")
-    return modes, candidates[pairing.index]
+    return modes, partner
 
 
 def quasi_measured_modes(model: Model, measurement: Measurement) -> QuasiModes:

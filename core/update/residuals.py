@@ -171,10 +171,11 @@ class Prediction:
 
 
 def total_mass(structure: Structure) -> float:
-    """Return the mass of members and attached masses in kg."""
+    """Return the mass of members, attached masses and oscillators in kg."""
     p = structure.properties
     beams = p.rhoA @ (p.length - p.rigid_mass_1 - p.rigid_mass_2)
-    return float(beams + sum(item.mass for item in structure.frame.masses))
+    attached = sum(item.mass for item in structure.frame.masses)
+    return float(beams + attached + sum(item.mass for item in structure.frame.oscillators))
 
 
 def _mass_slope(structure: Structure, parameter: Parameter) -> float:

@@ -7,10 +7,11 @@ from femubench import Strategy, hookimpl
 
 @hookimpl
 def femubench_strategies() -> tuple[type[Strategy], ...]:
-    """Return the strategies of both papers, in the papers' order."""
+    """Return the strategies of both papers in the papers' order, then `diagnosed`."""
     from femubench.plugins.strategies.baruch import Baruch
     from femubench.plugins.strategies.bayesian import Bayesian
     from femubench.plugins.strategies.berman import Berman
+    from femubench.plugins.strategies.diagnosed import Diagnosed
     from femubench.plugins.strategies.generic_adjusted import GenericAdjusted
     from femubench.plugins.strategies.generic_ls import GenericLS
     from femubench.plugins.strategies.global_ import Global
@@ -40,4 +41,5 @@ def femubench_strategies() -> tuple[type[Strategy], ...]:
         Spring,
         Offset,
         Bayesian,
+        Diagnosed,
     )

@@ -1,0 +1,280 @@
+"""Diagnose some 860 blind cases and write the figures of docs/diagnosis-sweep.md.
+
+    python benchmarks/diagnosis_sweep.py run --jobs 2          # appends, goes on where it stopped
+    python benchmarks/diagnosis_sweep.py tables                # table, confusion, calibration
+
+The figures need `pip install femubench[figures]`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import sys
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from threadpoolctl import threadpool_limits
+
+from femubench.core.challenge.sweep import (
+    GROUPS,
+    Record,
+    Task,
+    bars_table,
+    run_task,
+    tasks,
+    wilson,
+)
+
+ROOT = Path(__file__).parents[1]
+RESULTS = ROOT / "femubench-results" / "diagnosis-sweep.jsonl"
+DOCS = ROOT / "docs"
+EDGES = (0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 0.999, 1.0 + 1e-12)
+NO_NAME = ("none", "unknown", "not-confirmed", "error")
+
+
+def diagnosed(task: Task) -> Record:
+    """Return the record of one case, on one thread."""
+    from femubench.core.diagnosis.diagnose import diagnose
+
+    with threadpool_limits(1):
+        return run_task(task, diagnose)
+
+
+def read_records(path: Path) -> list[Record]:
+    """Return the records of a results file; a line that was cut off is left out."""
+    if not path.exists():
+        return []
+    records = {}
+    for line in path.read_text(encoding="utf-8").splitlines():
+        try:
+            record = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        records[record["group"], record["number"]] = record
+    return list(records.values())
+
+
+def run(path: Path, wanted: Sequence[Task], jobs: int) -> None:
+    """Diagnose what is not in the results file yet; append a line a case."""
+    known = {(record["group"], record["number"]) for record in read_records(path)}
+    rest = [task for task in wanted if task.key not in known]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    print(f"{len(wanted) - len(rest)} of {len(wanted)} cases are in {path}", file=sys.stderr)
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, mp_context=context) as pool, path.open("a") as stream:
+        futures = [pool.submit(diagnosed, task) for task in rest]
+        for i, future in enumerate(as_completed(futures), 1):
+            record = future.result()
+            stream.write(json.dumps(record) + "\n")
+            stream.flush()
+            mark = "right" if record["right"] else "WRONG"
+            line = f"{i}/{len(rest)} {mark} {record['group']} {record['seed']}"
+            print(f"{line}: {record['truth']} -> {record['verdict']}", file=sys.stderr)
+
+
+def group_rows(records: Sequence[Record]) -> list[dict[str, str]]:
+    """Return one row a group of cases."""
+    rows = []
+    for group in GROUPS:
+        own = [record for record in records if record["group"] == group.name]
+        if not own:
+            continue
+        right = sum(record["right"] for record in own)
+        low, high = wilson(right, len(own))
+        placed = [r["place_right"] for r in own if r.get("place_right") is not None]
+        in_group = [r["group_size"] for r in own if r.get("group_size", 0) > 1]
+        rows.append(
+            {
+                "cases": group.name,
+                "number": str(len(own)),
+                "right": f"{100.0 * right / len(own):.1f} %",
+                "95 % interval": f"{100.0 * low:.1f} to {100.0 * high:.1f} %",
+                "place right": f"{100.0 * np.mean(placed):.1f} %" if placed else "-",
+                "too small": str(sum(bool(r.get("too_small")) for r in own)),
+                "groups": f"{len(in_group)}, {np.mean(in_group):.1f} names" if in_group else "-",
+                "seconds, median": f"{np.median([r['seconds'] for r in own]):.2f}",
+            }
+        )
+    return rows
+
+
+def effect_rows(records: Sequence[Record]) -> list[dict[str, str]]:
+    """Return one row an effect, over all cases that hide one effect."""
+    rows = []
+    singles = [record for record in records if record["hidden"] == "one"]
+    for effect in sorted({record["effects"][0] for record in singles}):
+        own = [record for record in singles if record["effects"][0] == effect]
+        right = sum(record["right"] for record in own)
+        low, high = wilson(right, len(own))
+        wrong = Counter(_column(record) for record in own if not record["right"])
+        rows.append(
+            {
+                "hidden": effect,
+                "cases": str(len(own)),
+                "right": f"{100.0 * right / len(own):.0f} %",
+                "95 % interval": f"{100.0 * low:.0f} to {100.0 * high:.0f} %",
+                "too small": str(sum(bool(r.get("too_small")) for r in own)),
+                "else it says": ", ".join(f"{k} {n}" for k, n in wrong.most_common(4)) or "-",
+            }
+        )
+    return rows
+
+
+def _column(record: Record) -> str:
+    """Return what a record says, in one word."""
+    if record["verdict"] in NO_NAME:
+        return str(record["verdict"])
+    if record["right"]:
+        return " + ".join(record["effects"])
+    named = record["named"]
+    return str(named[0]) if record["verdict"] == "ambiguous" else " + ".join(named)
+
+
+def _figure(width: float, height: float) -> tuple[Any, Any]:
+    """Return figure and axes of matplotlib, which is only needed here."""
+    import matplotlib
+
+    matplotlib.use("svg")
+    matplotlib.rcParams.update({"svg.hashsalt": "femubench", "font.size": 9})
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, figure.subplots()
+
+
+def draw_confusion(records: Sequence[Record], path: Path) -> None:
+    """Draw which effect is taken for which, over all cases with one hidden effect."""
+    singles = [record for record in records if record["hidden"] == "one"]
+    rows = sorted({record["effects"][0] for record in singles})
+    said = [_column(record) for record in singles]
+    others = sorted(set(said) - set(rows) - set(NO_NAME))
+    columns = [*rows, *(word for word in others if " + " not in word)]
+    columns += ["several"] if any(" + " in word for word in said) else []
+    columns += [word for word in NO_NAME if word in said]
+    counts = np.zeros((len(rows), len(columns)), dtype=int)
+    for record, word in zip(singles, said, strict=True):
+        word = "several" if " + " in word else word
+        counts[rows.index(record["effects"][0]), columns.index(word)] += 1
+    figure, axes = _figure(9.5, 7.5)
+    share = counts / counts.sum(axis=1, keepdims=True)
+    image = axes.imshow(share, cmap="Blues", vmin=0.0, vmax=1.0)
+    for (i, j), n in np.ndenumerate(counts):
+        if n:
+            axes.text(j, i, str(n), ha="center", va="center", fontsize=7,
+                      color="white" if share[i, j] > 0.5 else "black")  # fmt: skip
+    axes.set_xticks(range(len(columns)), columns, rotation=60, ha="right")
+    axes.set_yticks(range(len(rows)), rows)
+    axes.set_xlabel("what the diagnosis says (a group with the right name counts as the name)")
+    axes.set_ylabel("hidden effect")
+    axes.set_title(f"{len(singles)} blind cases with one hidden effect; numbers are cases")
+    figure.colorbar(image, ax=axes, label="share of the row", shrink=0.7)
+    _save(figure, path)
+
+
+def draw_calibration(records: Sequence[Record], path: Path) -> None:
+    """Draw how often verdicts are right against the probability that they state."""
+    pairs = np.array(
+        [(r["probability"], r["right"]) for r in records if r.get("probability") is not None]
+    ).reshape(-1, 2)
+    figure, axes = _figure(6.0, 5.0)
+    axes.plot([0.5, 1.0], [0.5, 1.0], color="grey", linestyle="--", label="calibrated")
+    for low, high in pairwise(EDGES):
+        own = pairs[(pairs[:, 0] >= low) & (pairs[:, 0] < high)]
+        if not len(own):
+            continue
+        hits, mean = int(own[:, 1].sum()), float(own[:, 0].mean())
+        share, interval = hits / len(own), wilson(hits, len(own))
+        error = [[max(share - interval[0], 0.0)], [max(interval[1] - share, 0.0)]]
+        axes.errorbar(mean, share, error, fmt="o", color="tab:blue", capsize=3)
+        axes.annotate(f" {len(own)}", (mean, share), fontsize=7, va="top")
+    axes.set_xlabel("stated probability (mean of the bin)")
+    axes.set_ylabel("share of right verdicts, 95 % interval")
+    axes.set_title(f"{len(pairs)} verdicts that state a probability; numbers are cases")
+    axes.set_xlim(0.48, 1.02)
+    axes.set_ylim(0.0, 1.04)
+    axes.legend(loc="lower right")
+    _save(figure, path)
+
+
+def _save(figure: Any, path: Path) -> None:  # noqa: ANN401 - matplotlib is optional
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path.with_suffix(".svg"), metadata={"Date": None})
+    figure.savefig(path.with_suffix(".png"), dpi=130)
+
+
+def _markdown(rows: Iterable[Any]) -> str:
+    return str(pd.DataFrame(list(rows)).to_markdown(index=False, disable_numparse=True))
+
+
+def page(records: Sequence[Record]) -> str:
+    """Return docs/diagnosis-sweep.md."""
+    groups, effects = _markdown(group_rows(records)), _markdown(effect_rows(records))
+    return f"""\
+# How often the diagnosis is right
+
+{len(records)} blind cases, drawn and judged as [challenge](challenge.md) says; `python
+benchmarks/diagnosis_sweep.py run` and `tables` make this page again.
+
+## What it must reach
+
+{_markdown(bars_table(records))}
+
+A name counts as right when the diagnosis gives it, alone or as a member of one group of at most
+six names. Where the hidden effect lowers chi-square by less than 12, `none` is right and a wrong
+name still wrong. Intervals are Wilson's.
+
+## By kind of case
+
+{groups}
+
+`too small`: cases whose effect lowers chi-square by less than 12. `groups`: verdicts that name
+several effects which the data cannot tell apart, and how many on average.
+
+## By hidden effect
+
+{effects}
+
+![Confusion matrix](figures/diagnosis-confusion.svg)
+
+![Calibration](figures/diagnosis-calibration.svg)
+"""
+
+
+def main() -> None:
+    """Run the sweep, or write its page."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("what", choices=("run", "tables"))
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
+    parser.add_argument("--cases", type=int, default=None, help="at most so many of each group")
+    parser.add_argument("--groups", default="", help="groups by name, parted by semicolons")
+    parser.add_argument("--results", type=Path, default=RESULTS)
+    parser.add_argument("--docs", type=Path, default=DOCS)
+    options = parser.parse_args()
+    names = [name for name in options.groups.split(";") if name]
+    unknown = set(names) - {group.name for group in GROUPS}
+    if unknown:
+        parser.error(f"no group {sorted(unknown)}; there are {[g.name for g in GROUPS]}")
+    if options.what == "run":
+        chosen = [group for group in GROUPS if not names or group.name in names]
+        run(options.results, tasks(chosen, options.cases), options.jobs)
+        return
+    records = read_records(options.results)
+    if not records:
+        parser.error(f"no results in {options.results}: run the sweep first")
+    draw_confusion(records, options.docs / "figures" / "diagnosis-confusion")
+    draw_calibration(records, options.docs / "figures" / "diagnosis-calibration")
+    (options.docs / "diagnosis-sweep.md").write_text(page(records), encoding="utf-8")
+    for row in bars_table(records):
+        print(*row.values(), sep=" | ")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,187 @@
+"""The matrices of a model as files: Matrix Market, the table of their dofs, groups."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from io import BytesIO
+
+import numpy as np
+import scipy.io
+import scipy.sparse as sp
+
+from femubench.core.case.faults import Fault
+from femubench.core.case.naming import Keys
+from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.case.table_text import csv_bytes, number
+from femubench.core.fem.frame import Place
+from femubench.core.fem.kinematics import node_at
+from femubench.core.fem.mesh import SAME_STATION
+from femubench.core.fem.structure import Structure
+from femubench.core.measurement import DIRECTIONS
+from femubench.core.model import LowRank, Model
+from femubench.core.typing import IntArray, SparseArray
+
+Files = dict[str, bytes]
+_MOST_DENSE = 4_000  # dofs; a low-rank change fills the whole matrix
+
+
+def matrix_market(matrix: SparseArray) -> bytes:
+    """Return a symmetric matrix as Matrix Market text in full double precision.
+
+    Arguments:
+        matrix: sparse or dense, (n, n).
+    """
+    stream = BytesIO()
+    # The shortest text that reads back to the same number is the writer's default.
+    scipy.io.mmwrite(stream, sp.coo_array(matrix), symmetry="symmetric")
+    return stream.getvalue()
+
+
+def matrices_of(model: Model) -> tuple[SparseArray, SparseArray]:
+    """Return mass and stiffness with low-rank changes multiplied out, sparse (n, n) each.
+
+    Raises:
+        Fault: when that would fill a large matrix.
+    """
+    pairs = ((model.mass, model.mass_change), (model.stiffness, model.stiffness_change))
+    mass, stiffness = (_whole(matrix, change) for matrix, change in pairs)
+    return mass, stiffness
+
+
+def _whole(matrix: SparseArray, change: LowRank | None) -> SparseArray:
+    if change is not None:
+        if matrix.shape[0] > _MOST_DENSE:
+            what = f"a low-rank change of {matrix.shape[0]} degrees of freedom has no sparse matrix"
+            raise Fault(("model",), what, f"at most {_MOST_DENSE}")
+        matrix = sp.csc_array(matrix).toarray() + change.toarray()
+    matrix = sp.csc_array(matrix)
+    return sp.csc_array(0.5 * (matrix + matrix.T))
+
+
+def frame_files(model: Model) -> Files:
+    """Return the files that show a frame model to other programs, in a folder of their own.
+
+    `dofs.csv` names directions; those of a flexible connection of a skew member lie along the
+    member, and then `axes.csv` has the unit motion of every dof.
+    """
+    geometry = frame_geometry(model)
+    files = {
+        "mass.mtx": matrix_market(model.mass),
+        "stiffness.mtx": matrix_market(model.stiffness),
+        "dofs.csv": dofs_csv(geometry),
+    }
+    axes = model.dofs.axes
+    if axes is not None and has_skew_dofs(model):
+        rows = [[i + 1, *(number(v) for v in row)] for i, row in enumerate(axes)]
+        files["axes.csv"] = csv_bytes(["row", *DIRECTIONS], rows)
+    return {f"matrices/{name}": content for name, content in files.items()}
+
+
+def has_skew_dofs(model: Model) -> bool:
+    """Tell whether a dof moves along another direction than the one that it is named after."""
+    if model.dofs.axes is None:
+        return False
+    named = np.eye(6)[[DIRECTIONS.index(name) for name in model.dofs.direction]]
+    return not np.array_equal(model.dofs.axes, named)
+
+
+def frame_geometry(model: Model) -> MatrixGeometry:
+    """Return the dofs of a frame model under readable node names.
+
+    Joints keep their names, other nodes are ``member 0.25`` after their station, ``member 0.02
+    arm`` at the tip of a joint's arm, ``oscillator 1``.
+    """
+    structure = model.frame_structure
+    names = node_names(structure)
+    used = list(dict.fromkeys(int(node) for node in model.dofs.node))
+    index = {node: i for i, node in enumerate(used)}
+    nodes = np.array([index[int(node)] for node in model.dofs.node], dtype=np.int64)
+    dofs = replace(model.dofs, node=nodes, axes=None)
+    return MatrixGeometry(tuple(names[node] for node in used), dofs)
+
+
+def node_names(structure: Structure) -> list[str]:
+    """Return a name of its own for every node of the mesh."""
+    frame = structure.frame
+    names: dict[str, None] = {}
+    for part, where, arm in structure.mesh.node_keys(len(frame.joints)):
+        if part == -1:
+            name = frame.joints[where].name
+        elif part == -2:
+            name = f"oscillator {where + 1}"
+        else:
+            name = f"{frame.members[part].name} {where * SAME_STATION:g}" + (" arm" if arm else "")
+        free, count = name, 1
+        while free in names:
+            count += 1
+            free = f"{name} ({count})"
+        names[free] = None
+    return list(names)
+
+
+def frame_places(model: Model, places: Sequence[Place]) -> dict[Place, Place]:
+    """Return the nodes, by name, at places of a frame.
+
+    Raises:
+        Fault: for a place between nodes.
+    """
+    structure = model.frame_structure
+    names, found = node_names(structure), {}
+    for place in places:
+        node = node_at(structure.frame, structure.mesh, place)
+        if node is None:
+            what = f"the model has changed matrices and no node at {place}"
+            raise Fault(("modification",), what, "attachments at nodes")
+        found[place] = Place(joint=names[node])
+    return found
+
+
+def dofs_csv(geometry: MatrixGeometry) -> bytes:
+    """Return the table row,node,direction,x,y,z, nodes in the order of their names."""
+    dofs = geometry.dofs
+    rows = [
+        [
+            int(i) + geometry.first_row,
+            geometry.names[dofs.node[i]],
+            dofs.direction[i],
+            *(number(v) for v in dofs.xyz[i]),
+        ]
+        for i in _order(dofs.node)
+    ]
+    return csv_bytes(["row", "node", "direction", "x", "y", "z"], rows)
+
+
+def _order(node: IntArray) -> IntArray:
+    """Return the rows such that nodes come first in the order of their numbers."""
+    first = np.unique(node, return_index=True)[1]
+    rows = np.arange(len(node))
+    return rows if np.all(np.diff(first) > 0) else np.argsort(node, kind="stable")
+
+
+def matrix_keys(
+    mass: SparseArray,
+    stiffness: SparseArray,
+    geometry: MatrixGeometry,
+    groups: Mapping[str, SparseArray],
+) -> tuple[Keys, Files]:
+    """Return the table `[model]` of a pair of matrices, and the files that it names.
+
+    Arguments:
+        mass, stiffness: sparse, (n, n).
+        geometry: what their rows are.
+        groups: named parts of the stiffness, sparse (n, n) each.
+    """
+    files = {
+        "mass.mtx": matrix_market(mass),
+        "stiffness.mtx": matrix_market(stiffness),
+        "dofs.csv": dofs_csv(geometry),
+    }
+    keys: Keys = {"kind": "matrices", "mass": "mass.mtx", "stiffness": "stiffness.mtx"}
+    keys["dofs"] = "dofs.csv"
+    tables = []
+    for i, (name, part) in enumerate(groups.items(), start=1):
+        file = f"group-{i}.mtx"
+        files[file] = matrix_market(part)
+        tables.append({"name": name, "stiffness": file})
+    return (keys | {"groups": tables} if tables else keys), files

@@ -1,0 +1,192 @@
+"""Write a case folder that reads back to the same case, with another model where one is given."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from femubench.core.case.case import TOLERANCE, Case, Modification
+from femubench.core.case.described import described_frame
+from femubench.core.case.faults import Fault, dotted
+from femubench.core.case.files import CASE_FILE
+from femubench.core.case.matrix_files import (
+    Files,
+    frame_files,
+    frame_geometry,
+    frame_places,
+    has_skew_dofs,
+    matrices_of,
+    matrix_keys,
+)
+from femubench.core.case.naming import Keys, Known, known_from
+from femubench.core.case.new_folder import new_folder
+from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.case.read_back import alike, check_written, refused
+from femubench.core.case.spec_of import frame_keys, keys_of
+from femubench.core.case.table_text import (
+    common_share,
+    modes_csv,
+    sensors_csv,
+    toml_bytes,
+)
+from femubench.core.errors import ModelError
+from femubench.core.fem.frame import Frame
+from femubench.core.model import Model
+
+
+def write_case(
+    folder: Path,
+    case: Case,
+    model: Model | None = None,
+    *,
+    comment: Sequence[str] = (),
+    name: str | None = None,
+    title: str | None = None,
+) -> None:
+    """Write a new case folder that `read_case` reads back to an equal case.
+
+    Of a frame, `case.toml` says everything, and `matrices/` holds mass, stiffness and dofs for
+    other programs. A model whose matrices an update has changed is written as matrices.
+
+    Arguments:
+        folder: new or empty; it appears complete or not at all.
+        case: whose measurement, modifications and settings are written.
+        model: the nominal model to write; None for that of the case.
+        comment: lines to put on top of `case.toml`.
+        name, title: None for those of the case.
+
+    Raises:
+        InputError: when the folder holds anything or cannot be written, or for what no case
+            folder can say.
+    """
+    folder = Path(folder)
+    name = case.name if name is None else name
+    title = (case.title if title is None else title) or name
+    model = case.model if model is None else model
+    wanted = replace(case, name=name, title=title, model=model)
+    lines = comment.splitlines() if isinstance(comment, str) else comment
+    flat = [line for entry in lines for line in entry.splitlines() or [""]]
+    try:
+        files = case_files(wanted, known_from(case.folder / CASE_FILE), flat)
+    except Fault as fault:
+        raise refused(folder, fault.what, dotted(fault.path), fault.expected) from None
+    except UnicodeEncodeError as error:
+        what = f"{error.object[:40]!r} is not a text"
+        raise refused(folder, what, None, "characters of Unicode") from None
+    with new_folder(folder) as fresh:
+        for file, content in files.items():
+            (fresh / file).parent.mkdir(exist_ok=True)
+            (fresh / file).write_bytes(content)
+        check_written(fresh, folder, wanted)
+
+
+def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
+    """Return the files of a case folder.
+
+    Arguments:
+        case: what to write.
+        known: what the file of the case that it comes from says besides.
+        comment: lines for the top of `case.toml`.
+
+    Raises:
+        Fault: for what no case folder can say.
+    """
+    keys, files, modifications = _model_part(case, known)
+    share = common_share(
+        [case.measurement, *(m.measurement for m in modifications)], known.shape_std
+    )
+    measurement: Keys = {"modes": "modes.csv", "shape_std": share}
+    if len(case.measurement.sensors):
+        measurement = {"sensors": "sensors.csv", **measurement}
+        files["sensors.csv"] = sensors_csv(case.measurement.sensors)
+    files["modes.csv"] = modes_csv(case.measurement, share)
+    measurement |= _settings(case)
+    info = {"name": case.name, "title": case.title, "source": case.source}
+    content: Keys = {
+        "case": {key: value for key, value in info.items() if value},
+        "model": keys,
+        "measurement": measurement,
+    }
+    tables = []
+    for item in modifications:
+        file = _file_name(item.name, files)
+        files[file] = modes_csv(item.measurement, share)
+        attached = {"masses": item.masses, "springs": item.springs}
+        plain = {key: [keys_of(one) for one in many] for key, many in attached.items() if many}
+        tables.append({"name": item.name, **plain, "modes": file})
+    if tables:
+        content["modification"] = tables
+    if case.tolerance != TOLERANCE:
+        content["diagnosis"] = {"tolerance": float(case.tolerance)}
+    return {CASE_FILE: toml_bytes(content, comment), **files}
+
+
+def _settings(case: Case) -> Keys:
+    """Return the keys of `[measurement]` behind the files."""
+    keys: Keys = {"used": [int(number) for number in case.used]}
+    if case.held_out:
+        keys["held_out"] = [int(number) for number in case.held_out]
+    if case.band is not None:
+        keys["band"] = [float(frequency) for frequency in case.band]
+    if case.measurement.total_mass is not None:
+        value, std = case.measurement.total_mass
+        keys["mass"] = {"value": float(value), "std": float(std)}
+    return keys
+
+
+def _file_name(name: str, taken: Files) -> str:
+    slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:60] or "structure"
+    file, count = f"modified-{slug}.csv", 1
+    while file in taken:
+        count += 1
+        file = f"modified-{slug}-{count}.csv"
+    return file
+
+
+def _model_part(case: Case, known: Known) -> tuple[Keys, Files, tuple[Modification, ...]]:
+    """Return the table `[model]`, its files, and the modifications at the places of that model."""
+    model = case.model
+    if model.structure is not None and not _matrices_changed(model):
+        frame = described_frame(model.structure)
+        keys = frame_keys(frame, known)
+        return keys, frame_files(_model_of(frame)), case.modifications
+    mass, stiffness = matrices_of(model)
+    if isinstance(model.geometry, MatrixGeometry):
+        keys, files = matrix_keys(mass, stiffness, model.geometry, model.groups)
+        return keys, files, case.modifications
+    if model.structure is None:
+        what = "a model without elements and without nodes by name cannot be written"
+        raise Fault(("model",), what, "a frame, or matrices from files")
+    if has_skew_dofs(model):
+        what = "the model has changed matrices and flexible connections of skew members"
+        raise Fault(("model",), what, "degrees of freedom along x, y or z")
+    keys, files = matrix_keys(mass, stiffness, frame_geometry(model), model.groups)
+    return keys, files, tuple(_at_nodes(item, model) for item in case.modifications)
+
+
+def _model_of(frame: Frame) -> Model:
+    """Return the model that the keys give, whose last digits may differ from those of an update."""
+    try:
+        return Model.of(frame)
+    except ModelError as error:
+        raise Fault(("model",), str(error), "parameters that keys can say") from None
+
+
+def _at_nodes(item: Modification, model: Model) -> Modification:
+    wanted = [mass.at for mass in item.masses] + [spring.at for spring in item.springs]
+    places = frame_places(model, wanted)
+    return replace(
+        item,
+        masses=tuple(replace(mass, at=places[mass.at]) for mass in item.masses),
+        springs=tuple(replace(spring, at=places[spring.at]) for spring in item.springs),
+    )
+
+
+def _matrices_changed(model: Model) -> bool:
+    """Tell whether the matrices of a frame model are others than those of its frame."""
+    if model.mass_change is not None or model.stiffness_change is not None:
+        return True
+    mass, stiffness = model.frame_structure.matrices()
+    return not (alike(model.mass, mass) and alike(model.stiffness, stiffness))

@@ -1,0 +1,117 @@
+"""The answer to a blind case, in the JSON of ``bench diagnose``; strangers write it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from femubench.core.challenge.sealed import read_small
+from femubench.core.diagnosis.result import Diagnosis, Verdict
+from femubench.core.errors import InputError
+
+_LARGEST = 4 * 2**20  # bytes
+_AND = " + "
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Probability = Annotated[float, Field(ge=0.0, le=1.0 + 1e-9, allow_inf_nan=False)]
+Word = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
+
+
+class _Part(BaseModel):
+    # An answer may say more than is judged: rivals, residuals, advice.
+    model_config = ConfigDict(extra="ignore", frozen=True)
+
+
+class AnswerParameter(_Part):
+    """A size: `std` is None where it was not fitted."""
+
+    name: Word
+    value: Finite
+    std: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None = None
+    unit: Word = ""
+
+
+class AnswerCause(_Part):
+    """An effect at a place; ``a + b`` at ``p + q`` for a pair within a group."""
+
+    effect: Word
+    place: Word = ""
+    parameters: tuple[AnswerParameter, ...] = Field((), max_length=20)
+    probability: Probability | None = None
+
+    @property
+    def parts(self) -> tuple[tuple[str, str], ...]:
+        """Return effect and place of everything that the entry names."""
+        effects, places = self.effect.split(_AND), self.place.split(_AND)
+        if len(effects) != len(places):
+            return ((self.effect, self.place),)
+        return tuple(zip(effects, places, strict=True))
+
+
+class Answer(_Part):
+    """What somebody says of a blind case.
+
+    Arguments:
+        verdict: one word.
+        causes: with ``named`` all that the model lacks, with ``ambiguous`` the members of one
+            group of which one is right.
+        nothing: probability that the model lacks nothing, if stated.
+    """
+
+    verdict: Verdict
+    causes: tuple[AnswerCause, ...] = Field((), max_length=200)
+    nothing: Probability | None = None
+
+    @classmethod
+    def of(cls, diagnosis: Diagnosis) -> Answer:
+        """Return the answer that a diagnosis gives."""
+        fields: dict[str, Any] = {
+            "verdict": diagnosis.verdict,
+            "nothing": min(diagnosis.nothing, 1.0),
+            "causes": tuple(
+                AnswerCause(
+                    effect=cause.effect,
+                    place=cause.place,
+                    probability=min(cause.probability, 1.0),
+                    parameters=tuple(
+                        AnswerParameter(name=p.name, value=p.value, std=p.std, unit=p.unit)
+                        for p in cause.parameters
+                    ),
+                )
+                for cause in diagnosis.causes
+            ),
+        }
+        return cls(**fields)
+
+    @property
+    def probability(self) -> float | None:
+        """Return the probability that the answer claims for what it says; None where it does not.
+
+        A group claims the sum over its members, several causes together the smallest of theirs;
+        ``unknown`` and ``not-confirmed`` claim none.
+        """
+        stated = [cause.probability for cause in self.causes if cause.probability is not None]
+        if self.verdict == "none":
+            return self.nothing
+        if self.verdict not in ("named", "ambiguous") or not stated:
+            return None
+        return min(1.0, sum(stated)) if self.verdict == "ambiguous" else min(stated)
+
+
+def read_answer(path: Path) -> Answer:
+    """Return the answer in a JSON file.
+
+    Raises:
+        InputError: when the file cannot be read, is too large or is no answer.
+    """
+    text = read_small(path, _LARGEST)
+    try:
+        return Answer.model_validate_json(text)
+    except ValidationError as error:
+        fault = error.errors(include_url=False, include_input=False)[0]
+        key = ".".join(str(part) for part in fault["loc"][:6])
+        what = str(fault["msg"])[:200]
+        expected = "the JSON of `bench diagnose --json`"
+        raise InputError(what, file=path, key=key or None, expected=expected) from None

@@ -1,0 +1,179 @@
+"""Judge an answer to a blind case."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from femubench.core.challenge.answer import Answer, AnswerCause
+from femubench.core.challenge.structures import structure_named
+from femubench.core.challenge.truth import TrueCause, Truth
+from femubench.core.diagnosis.places import match
+from femubench.core.fem.frame import Frame
+
+TOO_SMALL = 12.0  # of chi-square: what lowers it by less cannot be seen
+# More names than this are no answer: among 20 effects, such a group is right by itself.
+LARGEST_GROUP = 6
+
+Parts = tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class SizeError:
+    """A size that was answered beside the true one.
+
+    Arguments:
+        effect, name, unit: of the parameter.
+        true, stated: values.
+        deviations: (stated - true) / std; None where no std was stated.
+    """
+
+    effect: str
+    name: str
+    unit: str
+    true: float
+    stated: float
+    deviations: float | None
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What an answer is worth.
+
+    Arguments:
+        right: whether verdict and names are right; a group that holds the truth counts.
+        names: whether all names are right; None where there was nothing to name.
+        places: whether a right name also has the right place; None likewise.
+        group: number of names in the answer's group, 0 without a group.
+        found: number of true causes among the names.
+        too_small: whether what is hidden lowers chi-square too little to be seen.
+        false_alarm: whether anything but `none` was said of a model that lacks nothing.
+        sizes: of causes whose name and place are right.
+        reason: one sentence.
+    """
+
+    right: bool
+    names: bool | None
+    places: bool | None
+    group: int
+    found: int
+    too_small: bool
+    false_alarm: bool
+    sizes: tuple[SizeError, ...]
+    reason: str
+
+
+def judge_answer(truth: Truth, answer: Answer, delta_chi2: Sequence[float]) -> Judgement:
+    """Judge an answer.
+
+    `none` is right where nothing is hidden, or nothing that can be seen. A name is right when it
+    holds every visible cause and no other; with ``ambiguous``, when one member of the group does.
+    For a cause outside the catalogue ``unknown`` and ``not-confirmed`` are right.
+
+    Arguments:
+        truth: what is hidden.
+        answer: what is said.
+        delta_chi2: by how much every true cause lowers chi-square beside the others, one a
+            cause; for a cause outside the catalogue by how much it raises it.
+    """
+    if truth.outside:
+        return _judge_outside(answer, min(delta_chi2, default=0.0))
+    group = _group_size(answer)
+    if not truth.causes:
+        right = answer.verdict == "none"
+        reason = "nothing is hidden" if right else f"nothing is hidden, but it says {_said(answer)}"
+        alarm = answer.verdict != "none"
+        return Judgement(right, None, None, group, 0, False, alarm, (), reason)
+    return _judge_causes(truth, answer, delta_chi2, group)
+
+
+def _judge_causes(
+    truth: Truth, answer: Answer, delta_chi2: Sequence[float], group: int
+) -> Judgement:
+    frame = structure_named(truth.structure).frame
+    pairs = list(zip(truth.causes, delta_chi2, strict=True))
+    visible = frozenset(cause.effect for cause, delta in pairs if delta >= TOO_SMALL)
+    every = frozenset(cause.effect for cause in truth.causes)
+    candidates = _candidates(answer)
+    named = [parts for parts in candidates if parts and visible <= _effects(parts) <= every]
+    fits = [parts for parts in named if _places_fit(frame, parts, truth.causes)]
+    found = len(every & frozenset(effect for parts in candidates for effect, _ in parts))
+    too_small = not visible
+    if answer.verdict == "none":
+        reason = "too small to see" if too_small else f"it misses {truth}"
+        names = None if too_small else False
+        return Judgement(too_small, names, names, 0, 0, too_small, False, (), reason)
+    names, places = bool(named), bool(fits)
+    sizes = _sizes(frame, answer, truth.causes) if places else ()
+    if group > LARGEST_GROUP:
+        names = places = False
+        reason = f"a group of {group} names says nothing"
+    elif names:
+        reason = "name and place are right" if places else f"the place is wrong: it is {truth}"
+    else:
+        reason = f"it says {_said(answer)}; hidden is {truth}"
+    return Judgement(names, names, places, group, found, too_small, False, sizes, reason)
+
+
+def _judge_outside(answer: Answer, excess: float) -> Judgement:
+    too_small = excess < TOO_SMALL
+    right = answer.verdict in ("unknown", "not-confirmed")
+    right = right or (too_small and answer.verdict == "none")
+    reason = "the cause is outside the catalogue"
+    reason = reason if right else f"{reason}, but it says {_said(answer)}"
+    return Judgement(right, None, None, _group_size(answer), 0, too_small, False, (), reason)
+
+
+def _candidates(answer: Answer) -> tuple[Parts, ...]:
+    """Return every set of causes that the answer takes for possible."""
+    if answer.verdict == "ambiguous":
+        return tuple(cause.parts for cause in answer.causes)
+    if answer.verdict == "named":
+        return (tuple(part for cause in answer.causes for part in cause.parts),)
+    return ()
+
+
+def _effects(parts: Parts) -> frozenset[str]:
+    return frozenset(effect for effect, _ in parts)
+
+
+def _group_size(answer: Answer) -> int:
+    """Return the number of different names in the answer's group; 0 without one."""
+    if answer.verdict != "ambiguous":
+        return 0
+    return len({_effects(cause.parts) for cause in answer.causes})
+
+
+def _places_fit(frame: Frame, parts: Parts, causes: Sequence[TrueCause]) -> bool:
+    """Tell whether every effect named sits where it truly sits."""
+    return all(
+        any(effect == cause.effect and match(frame, place, cause.place) for cause in causes)
+        for effect, place in parts
+    )
+
+
+def _sizes(frame: Frame, answer: Answer, causes: Sequence[TrueCause]) -> tuple[SizeError, ...]:
+    """Return true and stated sizes wherever effect and place are right."""
+    return tuple(
+        error
+        for cause in causes
+        for said in answer.causes
+        if said.effect == cause.effect and match(frame, said.place, cause.place)
+        for error in _size_errors(cause, said)
+    )
+
+
+def _size_errors(cause: TrueCause, said: AnswerCause) -> list[SizeError]:
+    stated = {parameter.name: parameter for parameter in said.parameters}
+    errors = []
+    for name, value, unit in zip(cause.names, cause.values, cause.units, strict=True):
+        if name in stated:
+            said_value, std = stated[name].value, stated[name].std
+            deviations = (said_value - value) / std if std else None
+            errors.append(SizeError(cause.effect, name, unit, value, said_value, deviations))
+    return errors
+
+
+def _said(answer: Answer) -> str:
+    names = ", ".join(dict.fromkeys(cause.effect for cause in answer.causes))
+    return f"{answer.verdict} ({names})" if names else answer.verdict

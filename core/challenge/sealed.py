@@ -1,0 +1,121 @@
+"""Seal a truth so that nobody sees it by accident, and so that nobody can change it unnoticed.
+
+The seal hides from a casual look and commits the one who drew the case: the sha256 of nonce and
+truth can be told to everyone. It is no cryptography against a determined reader: the truth is in
+the file, merely compressed and encoded.
+"""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import hashlib
+import json
+import secrets
+import zlib
+from dataclasses import asdict
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
+
+from femubench.core.challenge.truth import Truth
+from femubench.core.errors import InputError
+
+SEALED_FILE = "truth.sealed"
+_FORMAT = "femubench-sealed-1"
+_LARGEST = 2**20  # bytes
+_TRUTH = TypeAdapter(Truth)
+
+
+class _Seal(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    format: str = Field(max_length=40)
+    commitment: str = Field(pattern=r"^[0-9a-f]{64}$")
+    sealed: str
+
+
+def seal(truth: Truth, nonce: str | None = None) -> tuple[str, str]:
+    """Return the text of a sealed file and the commitment to it.
+
+    Arguments:
+        truth: what is sealed.
+        nonce: hexadecimal; None for a random one, so that a truth cannot be guessed from its
+            commitment.
+    """
+    content = json.dumps(
+        {"nonce": nonce or secrets.token_hex(16), "truth": asdict(truth)}, sort_keys=True
+    ).encode()
+    commitment = hashlib.sha256(content).hexdigest()
+    text = base64.b64encode(zlib.compress(content, 9)).decode()
+    file = {"format": _FORMAT, "commitment": commitment, "sealed": text}
+    return json.dumps(file, indent=1) + "\n", commitment
+
+
+def unseal(text: str, file: Path | None = None) -> tuple[Truth, str]:
+    """Return the truth of a sealed file and the commitment that it keeps.
+
+    Arguments:
+        text: of the file.
+        file: for messages.
+
+    Raises:
+        InputError: when it is no sealed truth, or was changed after it was sealed.
+    """
+    wanted = "a file that `bench challenge new` wrote"
+    try:
+        content = _Seal.model_validate_json(text)
+        if content.format != _FORMAT:
+            raise InputError(f"format {content.format!r}", file=file, expected=repr(_FORMAT))
+        unpacking = zlib.decompressobj()
+        raw = unpacking.decompress(base64.b64decode(content.sealed, validate=True), _LARGEST)
+    except (ValidationError, binascii.Error, zlib.error, ValueError):
+        raise InputError("not a sealed truth", file=file, expected=wanted) from None
+    if hashlib.sha256(raw).hexdigest() != content.commitment:
+        raise InputError("changed since it was sealed", file=file, expected=wanted)
+    try:
+        truth = _TRUTH.validate_python(_tuples(json.loads(raw)["truth"]))
+    except (ValidationError, ValueError, KeyError, TypeError, RecursionError):
+        raise InputError("not a sealed truth", file=file, expected=wanted) from None
+    return truth, content.commitment
+
+
+def read_sealed(path: Path) -> tuple[Truth, str]:
+    """Return the truth in a sealed file and its commitment.
+
+    Raises:
+        InputError: when the file is missing, too large, no sealed truth, or was changed.
+    """
+    return unseal(read_small(path, _LARGEST), path)
+
+
+def read_small(path: Path, largest: int) -> str:
+    """Return the text of a file from a stranger.
+
+    Arguments:
+        path: the file.
+        largest: the size in bytes up to which it is read.
+
+    Raises:
+        InputError: when it cannot be read, is larger, or is no text.
+    """
+    try:
+        with path.open("rb") as stream:
+            content = stream.read(largest + 1)
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", file=path) from None
+    if len(content) > largest:
+        raise InputError("file is too large", file=path, expected=f"at most {largest} bytes")
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError:
+        raise InputError("not a text", file=path, expected="UTF-8") from None
+
+
+def _tuples(value: object) -> object:
+    """Return plain data with tuples for lists, as the data class has them."""
+    if isinstance(value, list):
+        return tuple(_tuples(item) for item in value)
+    if isinstance(value, dict):
+        return {key: _tuples(item) for key, item in value.items()}
+    return value

@@ -1,0 +1,273 @@
+"""Many blind cases, diagnosed and judged: the record of each, and the figures over all."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from femubench.core.case.case import Case
+from femubench.core.challenge.answer import Answer
+from femubench.core.challenge.draw import BlindCase, draw_case, registered_effects
+from femubench.core.challenge.score import Judgement, judge_answer
+from femubench.core.challenge.structures import STRUCTURES
+from femubench.core.challenge.truth import DataKind, Hidden
+from femubench.core.challenge.visibility import delta_chi2
+from femubench.core.diagnosis.result import Diagnosis
+from femubench.core.errors import FemubenchError
+
+Diagnose = Callable[[Case], Diagnosis]
+Record = dict[str, Any]
+
+LADDERS = ("ladder", "ladder-asymmetric")
+OTHERS = ("hframe", "portal", "table")
+
+
+@dataclass(frozen=True)
+class Group:
+    """Cases that are counted together.
+
+    Arguments:
+        name: in tables.
+        count: number of cases.
+        hidden: how much is hidden.
+        kind: of the data.
+        structures: taken in turn.
+        scatter: of the elements, relative.
+    """
+
+    name: str
+    count: int
+    hidden: Hidden
+    kind: DataKind
+    structures: tuple[str, ...] = STRUCTURES
+    scatter: float = 0.0
+
+
+GROUPS = (
+    Group("A, ladders", 220, "one", "A", LADDERS),
+    Group("A, other structures", 80, "one", "A", OTHERS),
+    Group("B", 80, "one", "B"),
+    Group("C", 100, "one", "C"),
+    Group("A with scatter", 60, "one", "A", scatter=0.005),
+    Group("clean A", 50, "none", "A"),
+    Group("clean B", 50, "none", "B"),
+    Group("clean C", 50, "none", "C"),
+    Group("clean A with scatter", 50, "none", "A", scatter=0.005),
+    Group("pairs", 60, "pair", "A"),
+    Group("outside", 60, "outside", "A"),
+)
+
+
+@dataclass(frozen=True)
+class Task:
+    """One case of a sweep; group and number give it again."""
+
+    group: str
+    number: int
+    seed: int
+    kind: DataKind
+    structure: str
+    hidden: Hidden
+    scatter: float
+
+    @property
+    def key(self) -> tuple[str, int]:
+        """Return what tells this task from all others."""
+        return self.group, self.number
+
+    def draw(self) -> BlindCase:
+        """Return its case and truth."""
+        return draw_case(
+            self.seed,
+            self.kind,
+            structure=self.structure,
+            hidden=self.hidden,
+            scatter=self.scatter,
+        )
+
+
+def tasks(groups: Iterable[Group] = GROUPS, limit: int | None = None) -> list[Task]:
+    """Return the cases of groups, at most `limit` a group; every case has a seed of its own."""
+    order = {group.name: 1000 * i for i, group in enumerate(GROUPS, 1)}
+    return [
+        Task(
+            group.name,
+            i,
+            order[group.name] + i,
+            group.kind,
+            group.structures[i % len(group.structures)],
+            group.hidden,
+            group.scatter,
+        )
+        for group in groups
+        for i in range(group.count if limit is None else min(limit, group.count))
+    ]
+
+
+def run_task(task: Task, diagnose: Diagnose) -> Record:
+    """Return the record of one case; an error of the diagnosis is a wrong answer.
+
+    Arguments:
+        task: what to draw.
+        diagnose: from a case to its diagnosis.
+    """
+    blind = task.draw()
+    delta = delta_chi2(blind.case, blind.truth, registered_effects())
+    begin = time.perf_counter()
+    record = {**asdict(task), "truth": str(blind.truth), "delta_chi2": list(delta)}
+    record["effects"] = [cause.effect for cause in blind.truth.causes]
+    record["places"] = [cause.place for cause in blind.truth.causes]
+    try:
+        diagnosis = diagnose(blind.case)
+    except (FemubenchError, ArithmeticError, ValueError, LookupError) as error:
+        failed = {"error": f"{type(error).__name__}: {error}", "right": False, "alarm": True}
+        return {**record, **failed, "verdict": "error", "seconds": time.perf_counter() - begin}
+    record["seconds"] = time.perf_counter() - begin
+    answer = Answer.of(diagnosis)
+    judged = judge_answer(blind.truth, answer, delta)
+    gain = diagnosis.gain
+    return {
+        **record,
+        **_said(answer, judged),
+        "gain": {"held_out": gain.held_out_percent, "modified": gain.modified_percent},
+        "adequacy_p": diagnosis.adequacy_p,
+        "chi2": list(diagnosis.chi2),
+    }
+
+
+def _said(answer: Answer, judged: Judgement) -> Record:
+    return {
+        "verdict": answer.verdict,
+        "named": [cause.effect for cause in answer.causes],
+        "named_places": [cause.place for cause in answer.causes],
+        "probability": answer.probability,
+        "right": judged.right,
+        "place_right": judged.places,
+        "found": judged.found,
+        "group_size": judged.group,
+        "too_small": judged.too_small,
+        "alarm": judged.false_alarm,
+        "size_deviations": [s.deviations for s in judged.sizes if s.deviations is not None],
+        "reason": judged.reason,
+    }
+
+
+def wilson(hits: int, count: int, z: float = 1.96) -> tuple[float, float]:
+    """Return the confidence interval of a proportion, 95 % by default (Wilson 1927, (17))."""
+    if count == 0:
+        return 0.0, 1.0
+    share, square = hits / count, z * z / count
+    middle = share + square / 2.0
+    half = z * math.sqrt(share * (1.0 - share) / count + square / (4.0 * count))
+    scale = 1.0 + square
+    return max(0.0, (middle - half) / scale), min(1.0, (middle + half) / scale)
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A figure and what it must reach.
+
+    Arguments:
+        what: in words.
+        chosen: which records count.
+        hit: which of them are hits.
+        target: the share of hits.
+        at_least: whether the share must be at least the target, else at most.
+        prototype: the figure to beat, as text.
+    """
+
+    what: str
+    chosen: Callable[[Record], bool]
+    hit: Callable[[Record], bool]
+    target: float
+    at_least: bool = True
+    prototype: str = ""
+
+    def counts(self, records: Sequence[Record]) -> tuple[int, int]:
+        """Return hits and cases."""
+        chosen = [record for record in records if self.chosen(record)]
+        return sum(self.hit(record) for record in chosen), len(chosen)
+
+    def reached(self, hits: int, count: int) -> bool:
+        """Tell whether the share is what it must be; no case reaches nothing."""
+        if count == 0:
+            return False
+        share = hits / count
+        return share >= self.target if self.at_least else share <= self.target
+
+
+def _in(*names: str) -> Callable[[Record], bool]:
+    return lambda record: record["group"].startswith(names)
+
+
+def _right(record: Record) -> bool:
+    return bool(record["right"])
+
+
+def _wrong(record: Record) -> bool:
+    return not record["right"]
+
+
+def _alarm(record: Record) -> bool:
+    return bool(record["alarm"])
+
+
+def _stated(low: float, high: float) -> Callable[[Record], bool]:
+    def chosen(record: Record) -> bool:
+        p = record.get("probability")
+        return p is not None and low <= p < high
+
+    return chosen
+
+
+_DATA_A = ("A, ladders", "A, other")
+BARS = (
+    Bar("A: name right", _in(*_DATA_A), _right, 0.98, prototype="94.4 %"),
+    Bar(
+        "A: name right where chi-square falls by 30 or more",
+        lambda r: _in(*_DATA_A)(r) and min(r["delta_chi2"]) >= 30.0,
+        _right,
+        0.995,
+        prototype="198 of 198",
+    ),
+    Bar(
+        "A: place right",
+        lambda r: _in(*_DATA_A)(r) and r.get("place_right") is not None,
+        lambda r: bool(r["place_right"]),
+        0.96,
+        prototype="91.7 %",
+    ),
+    Bar("B: name right", _in("B"), _right, 0.90, prototype="80.6 %"),
+    Bar("C: name right", _in("C"), _right, 0.90, prototype="85.9 %"),
+    Bar("A with scatter: name right", _in("A with"), _right, 0.92, prototype="83 %"),
+    Bar("Clean with scatter: false alarms", _in("clean A with"), _alarm, 0.02, False, "0 of 12"),
+    Bar("Clean: false alarms", _in("clean"), _alarm, 0.02, False, "0 of 85"),
+    Bar("Outside the catalogue: flagged", _in("outside"), _right, 0.90, prototype="80 %"),
+    Bar("Pairs: both named", _in("pairs"), _right, 0.90, prototype="82.5 %"),
+    Bar("Stated P >= 0.99: wrong", _stated(0.99, 2.0), _wrong, 0.01, False, "1 of 185"),
+    Bar("Stated 0.9 <= P < 0.99: wrong", _stated(0.9, 0.99), _wrong, 0.10, False, "25 %"),
+)
+
+
+def bars_table(records: Sequence[Record], bars: Sequence[Bar] = BARS) -> list[dict[str, str]]:
+    """Return one row a bar: cases, figure, 95 % interval, what it must be, whether it is."""
+    rows = []
+    for bar in bars:
+        hits, count = bar.counts(records)
+        low, high = wilson(hits, count)
+        sign = ">=" if bar.at_least else "<="
+        rows.append(
+            {
+                "figure": bar.what,
+                "cases": str(count),
+                "measured": f"{100.0 * hits / count:.1f} %" if count else "-",
+                "95 % interval": f"{100.0 * low:.1f} to {100.0 * high:.1f} %" if count else "-",
+                "must be": f"{sign} {100.0 * bar.target:.1f} %",
+                "reached": "yes" if bar.reached(hits, count) else "no",
+                "prototype": bar.prototype,
+            }
+        )
+    return rows

@@ -1,0 +1,118 @@
+"""The verb ``bench challenge``: write blind cases, and judge answers to them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+if TYPE_CHECKING:
+    from femubench.core.challenge.score import Judgement
+    from femubench.core.challenge.truth import DataKind, Hidden
+
+_HIDDEN = ("one", "none", "pair", "outside", "any")
+
+
+@click.group()
+def challenge() -> None:
+    """Write blind cases with a hidden fault, and judge answers."""
+
+
+@challenge.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("--seed", type=click.IntRange(min=0), required=True, help="Of all that is random.")
+@click.option(
+    "--kind",
+    type=click.Choice(("A", "B", "C")),
+    default="A",
+    show_default=True,
+    help="How good the data are: A precise shapes, B poor shapes, C frequencies alone.",
+)
+@click.option("--structure", default="ladder", show_default=True, help="What is measured.")
+@click.option(
+    "--hidden",
+    type=click.Choice(_HIDDEN),
+    default="any",
+    show_default=True,
+    help="One effect, none, two, one outside the catalogue, or any of these.",
+)
+@click.option(
+    "--scatter",
+    type=click.FloatRange(0.0, 0.05),
+    default=0.0,
+    show_default=True,
+    help="Standard deviation of each element's stiffness and mass, relative.",
+)
+@click.option(
+    "--truth",
+    "sealed",
+    type=click.Path(path_type=Path),
+    help="Where the sealed truth goes; FOLDER/truth.sealed by default.",
+)
+def new(
+    folder: Path,
+    seed: int,
+    kind: DataKind,
+    structure: str,
+    hidden: Hidden | Literal["any"],
+    scatter: float,
+    sealed: Path | None,
+) -> None:
+    """Write a blind case into FOLDER, which must be new or empty, and a sealed truth."""
+    from femubench.core.challenge.folder import any_hidden, write_blind
+
+    path, commitment = write_blind(
+        folder,
+        seed,
+        kind,
+        structure=structure,
+        hidden=any_hidden(seed) if hidden == "any" else hidden,
+        scatter=scatter,
+        sealed=sealed,
+    )
+    click.echo(f"wrote {folder}")
+    click.echo(f"wrote {path}, the sealed truth, sha256 {commitment}")
+    click.echo(f"Now say what the model lacks: bench diagnose {folder} --json answer.json")
+
+
+@challenge.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.argument("answer", type=click.Path(path_type=Path))
+@click.option(
+    "--truth",
+    "sealed",
+    type=click.Path(path_type=Path),
+    help="The sealed truth; FOLDER/truth.sealed by default.",
+)
+@click.option("--json", "json_file", type=click.Path(path_type=Path), help="Write the judgement.")
+def score(folder: Path, answer: Path, sealed: Path | None, json_file: Path | None) -> None:
+    """Judge ANSWER, a file as `bench diagnose --json` writes it, to the blind case in FOLDER."""
+    from femubench.core.challenge.folder import score_folder
+    from femubench.core.cli.files import check_writable, write_atomically
+
+    if json_file is not None:
+        check_writable(json_file)
+    scored = score_folder(folder, answer, sealed)
+    if json_file is not None:
+        write_atomically(json_file, scored.to_json())
+    click.echo(f"hidden: {scored.truth}")
+    click.echo(f"chi-square falls by {', '.join(f'{d:.1f}' for d in scored.delta_chi2) or '0'}")
+    for line in _lines(scored.judgement):
+        click.echo(line)
+    click.echo(f"sealed truth sha256 {scored.commitment}")
+
+
+def _lines(judgement: Judgement) -> list[str]:
+    verdict = "right" if judgement.right else "wrong"
+    lines = [f"{verdict}: {judgement.reason}"]
+    if judgement.names is not None:
+        marks = {True: "right", False: "wrong", None: "-"}
+        lines.append(f"name {marks[judgement.names]}, place {marks[judgement.places]}")
+    if judgement.group:
+        lines.append(f"out of a group of {judgement.group}")
+    for size in judgement.sizes:
+        off = "" if size.deviations is None else f", {size.deviations:+.1f} standard deviations off"
+        stated, true = (f"{v:.4g} {size.unit}".strip() for v in (size.stated, size.true))
+        lines.append(f"{size.effect}, {size.name}: {stated}, true {true}{off}")
+    return lines

@@ -1,0 +1,1 @@
+"""What a model lacks: effects, evidence, verdict, gain."""

@@ -1,0 +1,222 @@
+"""Diagnose a case: name what the model gets wrong, extend it, measure the gain on unseen data."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from femubench.core.case.case import Case
+from femubench.core.diagnosis.advice import advise
+from femubench.core.diagnosis.exact import extended
+from femubench.core.diagnosis.examine import Examination, examine
+from femubench.core.diagnosis.explanation import Explanation
+from femubench.core.diagnosis.gain import Unseen, gain_of, held_out, left_out, modified
+from femubench.core.diagnosis.localisation import locate
+from femubench.core.diagnosis.look import look
+from femubench.core.diagnosis.result import Advice, Cause, Diagnosis, Gain
+from femubench.core.diagnosis.sentences import sentence_of
+from femubench.core.diagnosis.tables import (
+    causes_in,
+    evidence_rows,
+    residual_rows,
+    rivals_of,
+    smallest_visible,
+)
+from femubench.core.diagnosis.verdict import Decision, causes_of, decide
+from femubench.core.harness.scoring import score_model
+from femubench.core.model import Model
+from femubench.core.plugin.roles import Effect
+
+_SAME_MODEL = 0.3  # deviations by which the extended model may differ from the fit
+
+
+@dataclass(frozen=True)
+class _Proof:
+    """Data that did not name the cause."""
+
+    unseen: tuple[Unseen, ...]
+    gain: Gain
+    crossed: bool
+
+
+def diagnose(
+    case: Case,
+    effects: Iterable[Effect] | None = None,
+    *,
+    pairs: bool = True,
+    tolerance: float | None = None,
+) -> Diagnosis:
+    """Return what is missing in a case's model, where, how sure, and what it gains.
+
+    Held-out modes and modified structures never enter the naming; they confirm it or not.
+
+    Arguments:
+        case: with at least one used mode.
+        effects: what may be missing; all registered effects by default.
+        pairs: whether more than one cause is sought.
+        tolerance: standard deviation of every element's relative scatter; the case's by default.
+
+    Raises:
+        NotApplicable: when a used frequency has no standard deviation.
+        ModelError: when the model has no modes.
+    """
+    begin = time.perf_counter()
+    used = case.measurement.select(case.used)
+    scatter = case.tolerance if tolerance is None else tolerance
+    examination = examine(case.model, used, registered(effects), tolerance=scatter, pairs=pairs)
+    best = examination.best
+    model = extended_by(case.model, best)
+    proof = _proof(case, examination, best, model)
+    decision = decide(examination.posterior, examination.adequacy, confirmed=proof.unseen.confirms)
+    return _written(case, examination, decision, model, proof, begin)
+
+
+def registered(effects: Iterable[Effect] | None) -> tuple[Effect, ...]:
+    """Return the given effects, or all that plugins offer."""
+    if effects is not None:
+        return tuple(effects)
+    from femubench.core.plugin.loader import load_plugins
+
+    return tuple(load_plugins().effects.values())
+
+
+def extended_by(model: Model, explanation: Explanation) -> Model:
+    """Return the model with textbook effects and causes in it."""
+    base = extended(model, explanation.base.parts, explanation.base.x)
+    return extended(base, explanation.parts, explanation.fit.state.x)
+
+
+def _proof(case: Case, examination: Examination, best: Explanation, model: Model) -> _Proof:
+    problem = examination.problem_of(best)
+    bias = examination.problem.data.bias
+    unseen = (
+        held_out(case, examination.problem, problem, best.fit, examination.scatter),
+        modified(case, model, bias, examination.scatter),
+    )
+    crossed = None
+    if not any(len(part.before) for part in unseen):
+        nominal, slopes = examination.problem, examination.slopes
+        crossed = left_out(nominal, problem, best.fit, slopes, examination.tolerance)
+    gain = gain_of(score_model(case, case.model), score_model(case, model), crossed)
+    return _Proof(unseen if crossed is None else (crossed,), gain, crossed is not None)
+
+
+def _written(
+    case: Case,
+    examination: Examination,
+    decision: Decision,
+    model: Model,
+    proof: _Proof,
+    begin: float,
+) -> Diagnosis:
+    best, posterior = examination.best, examination.posterior
+    group = causes_of(posterior, decision.group)
+    shown = group if decision.verdict == "ambiguous" else group[:1]
+    causes = [
+        cause
+        for explanation, share in shown
+        for cause in _causes(examination, explanation, share, decision.verdict == "ambiguous")
+    ]
+    top = posterior.names[decision.group[0]] if decision.group else decision.nothing
+    named = bool(decision.group)
+    after = best.fit.state if named else examination.nominal
+    used = case.measurement.select(case.used)
+    return Diagnosis(
+        case=case.name,
+        verdict=decision.verdict,
+        sentence=sentence_of(decision.verdict, causes, decision.nothing, top, proof.gain),
+        causes=tuple(causes),
+        rivals=rivals_of(examination, best if named else None),
+        reason=_reason(decision),
+        advice=_advice(examination, [e for e, _ in group]),
+        smallest_visible=smallest_visible(examination.found[0]),
+        residuals=residual_rows(examination.nominal, after),
+        gain=proof.gain,
+        chi2=(examination.nominal.chi2, after.chi2),
+        data_count=len(examination.problem.data),
+        adequacy_p=examination.adequacy,
+        nothing=decision.nothing,
+        looks=look(case.model, used),
+        locations=(*evidence_rows(examination), *locate(case.model, used)),
+        base=best.base.names if named else (),
+        extended=model if named else case.model,
+        notes=_notes(examination, proof, best),
+        seconds=time.perf_counter() - begin,
+    )
+
+
+def _causes(
+    examination: Examination, explanation: Explanation, share: float, together: bool
+) -> list[Cause]:
+    """Return the causes of an explanation, as one entry where it is a member of a group.
+
+    Arguments:
+        examination: what it was weighed in.
+        explanation: base and causes.
+        share: probability of its places, given its name.
+        together: whether it is one of several in a group.
+    """
+    posterior = examination.posterior
+    probability = share * posterior.names[posterior.key(explanation)]
+    causes = causes_in(explanation, probability, posterior.earned)
+    if not together or len(causes) == 1:
+        return causes
+    return [
+        Cause(
+            " + ".join(cause.effect for cause in causes),
+            " + ".join(cause.place for cause in causes),
+            tuple(p for cause in causes for p in cause.parameters),
+            probability,
+            " and ".join(cause.summary for cause in causes if cause.summary),
+        )
+    ]
+
+
+def _reason(decision: Decision) -> str:
+    if decision.verdict != "ambiguous":
+        return ""
+    parts = [
+        f"{' + '.join(key)} ({angle:.1f} degrees)"
+        for key, angle in zip(decision.group[1:], decision.angles[1:], strict=True)
+        if np.isfinite(angle)
+    ]
+    if not parts:
+        return "the data are explained about as well by either"
+    first = " + ".join(decision.group[0])
+    return f"angle of the sensitivities to those of {first}: {', '.join(parts)}"
+
+
+def _advice(examination: Examination, group: Sequence[Explanation]) -> tuple[Advice, ...]:
+    if len(group) < 2:
+        return ()
+    problems = [examination.problem_of(e) for e in group]
+    fits = [e.fit for e in group]
+    return advise(examination.model, problems, fits, tolerance=examination.tolerance)
+
+
+def _notes(examination: Examination, proof: _Proof, best: Explanation) -> tuple[str, ...]:
+    notes = []
+    if proof.crossed:
+        notes.append(
+            "The case holds nothing back: the gain is that on used modes left out in turn."
+        )
+    elif best.parts and not any(part.visible for part in proof.unseen):
+        notes.append("The unseen data hardly change with the cause, so they cannot confirm it.")
+    unearned = [name for name in best.base.names if name not in examination.posterior.earned]
+    if unearned:
+        notes.append(
+            f"The extended model takes {' and '.join(unearned)} at the textbook value too: "
+            "these data neither ask for it nor speak against it."
+        )
+    if "youngs-modulus" in {part.hypothesis.name for part in best.parts}:
+        notes.append(
+            "A stiffness that falls with the amplitude looks like youngs-modulus until a second "
+            "excitation level is measured."
+        )
+    return tuple(notes)
+
+
+__all__ = ["diagnose", "extended_by", "registered"]

@@ -1,0 +1,206 @@
+"""An explanation: textbook effects and fitted causes, with its weight among all explanations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from math import factorial, log
+
+import numpy as np
+from scipy.special import logsumexp
+
+from femubench.core.diagnosis.fit import Fit
+from femubench.core.diagnosis.space import Projection
+
+# How many causes a model lacks besides textbook physics, before any datum is seen.
+PRIOR_OF_COUNT = (0.5, 0.4, 0.08, 0.015, 0.005)
+# The same where the textbook already mends something.
+PRIOR_BEYOND_TEXTBOOK = (0.6, 0.3, 0.08, 0.015, 0.005)
+# Physics that every beam has need not earn its place: a model that lacks it most likely lacks all
+# of it. Some textbook effects without the others share the rest.
+_AS_DRAWN, _ALL_TEXTBOOK = 0.1, 0.8
+# A textbook effect is part of a name only where it is likely, and the data made it so.
+_EARNED, _FACTOR = 0.6, 3.0
+
+Key = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Base:
+    """Effects of the textbook that are in the model before causes are sought.
+
+    Arguments:
+        parts: at their textbook coordinates.
+        log_prior: ln of the probability of this set.
+    """
+
+    parts: tuple[Projection, ...]
+    log_prior: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the slugs."""
+        return tuple(part.hypothesis.name for part in self.parts)
+
+    @property
+    def x(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        """Return the textbook coordinates, (k,)."""
+        found = [part.hypothesis.textbook for part in self.parts]
+        return np.concatenate([x for x in found if x is not None] or [np.zeros(0)])
+
+
+def textbook_bases(projections: Iterable[Projection]) -> list[Base]:
+    """Return every set of textbook effects that the model lacks, the empty one first."""
+    known = [p for p in projections if p.hypothesis.textbook is not None]
+    if not known:
+        return [Base((), 0.0)]
+    some = max(2 ** len(known) - 2, 1)
+    shares = {0: _AS_DRAWN, len(known): _ALL_TEXTBOOK}
+    rest = (1.0 - _AS_DRAWN - _ALL_TEXTBOOK) / some
+    return [
+        Base(parts, log(shares.get(count, rest)))
+        for count in range(len(known) + 1)
+        for parts in combinations(known, count)
+    ]
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A base with causes on top.
+
+    Arguments:
+        base: textbook effects.
+        fit: of the causes; its parts are the causes, none for a model that lacks nothing more.
+        names: number of effects that were candidates.
+    """
+
+    base: Base
+    fit: Fit
+    names: int
+
+    @property
+    def parts(self) -> tuple[Projection, ...]:
+        """Return the causes."""
+        return self.fit.parts
+
+    @property
+    def chi2(self) -> float:
+        """Return chi-square at the best fit."""
+        return self.fit.state.chi2
+
+    @cached_property
+    def log_weight(self) -> float:
+        """Return ln of prior times evidence."""
+        counts = PRIOR_BEYOND_TEXTBOOK if self.base.parts else PRIOR_OF_COUNT
+        prior = log_prior(self.parts, self.names, counts)
+        return self.base.log_prior + prior + self.fit.log_evidence
+
+    @property
+    def searched(self) -> Key:
+        """Return the slugs of the causes, sorted."""
+        return tuple(sorted(part.hypothesis.name for part in self.parts))
+
+    @property
+    def place(self) -> str:
+        """Return the places of the causes in the order of `searched`."""
+        pairs = sorted((part.hypothesis.name, part.hypothesis.place) for part in self.parts)
+        return " + ".join(place for _, place in pairs)
+
+
+def log_prior(parts: Sequence[Projection], names: int, counts: Sequence[float]) -> float:
+    """Return ln of the prior probability of causes at places.
+
+    Arguments:
+        parts: the causes.
+        names: number of effects that were candidates.
+        counts: prior probability of so many causes.
+    """
+    count = len(parts)
+    result = log(counts[min(count, len(counts) - 1)]) + log(factorial(count))
+    for part in parts:
+        result -= log(names) + log(part.hypothesis.places)
+    return result
+
+
+def selection_cost(names: int, places: float) -> float:
+    """Return by how much chi-square must fall for one more cause to be worth its prior."""
+    return 2.0 * (log(names) + log(max(places, 1.0)) + log(PRIOR_OF_COUNT[1] / PRIOR_OF_COUNT[2]))
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """All explanations with their probabilities.
+
+    Arguments:
+        explanations: most probable first.
+        probabilities: of each, (k,).
+    """
+
+    explanations: tuple[Explanation, ...]
+    probabilities: tuple[float, ...]
+
+    @classmethod
+    def of(cls, explanations: Iterable[Explanation], temper: float = 1.0) -> Posterior:
+        """Weigh explanations against each other.
+
+        Arguments:
+            explanations: each with prior and evidence.
+            temper: exponent on the evidence, below 1 where the likelihood is known to be
+                sharper than the truth.
+        """
+        ranked = sorted(explanations, key=lambda e: -e.log_weight)
+        weights = temper * np.array([e.log_weight for e in ranked])
+        shares = np.exp(weights - logsumexp(weights))
+        return cls(tuple(ranked), tuple(float(p) for p in shares))
+
+    @cached_property
+    def earned(self) -> frozenset[str]:
+        """Return the textbook effects that the data made part of the name."""
+        known = {name for e in self.explanations for name in e.base.names}
+        return frozenset(name for name in known if self._is_earned(name))
+
+    def _is_earned(self, name: str) -> bool:
+        """Compare the best explanations with and without an effect, all else as it may be."""
+        total = sum(
+            p
+            for e, p in zip(self.explanations, self.probabilities, strict=True)
+            if name in e.base.names or name in e.searched
+        )
+        if total < _EARNED:
+            return False
+        best = next(e for e in self.explanations if name in e.base.names)
+        rest = set(best.base.names) - {name}
+        for other in self.explanations:
+            if set(other.base.names) == rest and other.searched == best.searched:
+                gain = best.fit.log_evidence - other.fit.log_evidence
+                return gain > log(_FACTOR)
+        return True
+
+    def key(self, explanation: Explanation) -> Key:
+        """Return the name of an explanation: its causes and the textbook effects that count."""
+        physics = [name for name in explanation.base.names if name in self.earned]
+        return tuple(sorted({*explanation.searched, *physics}))
+
+    @cached_property
+    def names(self) -> dict[Key, float]:
+        """Return the probability of every name, most probable first."""
+        totals: dict[Key, float] = {}
+        for e, p in zip(self.explanations, self.probabilities, strict=True):
+            key = self.key(e)
+            totals[key] = totals.get(key, 0.0) + p
+        return dict(sorted(totals.items(), key=lambda item: -item[1]))
+
+    def inclusion(self, name: str) -> float:
+        """Return the probability that an effect is part of the name."""
+        return sum(p for key, p in self.names.items() if name in key)
+
+    def best(self, key: Key) -> Explanation:
+        """Return the most probable explanation of that name."""
+        return next(e for e in self.explanations if self.key(e) == key)
+
+    def members(self, key: Key) -> list[tuple[Explanation, float]]:
+        """Return the explanations of that name with their probabilities."""
+        pairs = zip(self.explanations, self.probabilities, strict=True)
+        return [(e, p) for e, p in pairs if self.key(e) == key]

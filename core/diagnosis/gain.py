@@ -1,0 +1,180 @@
+"""What a cause gains on data that did not name it: held-out modes, the modified structure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2 as chi_square
+
+from femubench.core.case.case import Case
+from femubench.core.diagnosis.data import Data, Noise
+from femubench.core.diagnosis.fit import Fit, Problem, fit, state_at
+from femubench.core.diagnosis.result import Gain
+from femubench.core.harness.results import Block, PairedMode
+from femubench.core.harness.scoring import frequency_error, predict_block
+from femubench.core.model import Model
+from femubench.core.typing import FloatArray
+
+# Below this many squared deviations unseen data cannot tell with the cause from without.
+_BLIND = 9.0
+_HALF_WAY = 0.5
+_INADEQUATE, _GOOD = 2e-3, 0.05
+# What unseen chi-square must fall by where it stays inadequate: a real structure is no beam model.
+# Physics from the textbook need not be all that is missing; a fitted cause must carry further.
+_HALVED, _FOURFOLD = 4.0, 16.0
+_FEW = 2
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """Relative frequency errors of unseen modes, without and with the causes.
+
+    Arguments:
+        before, after: f_measured / f_predicted - 1 or alike, (k,).
+        std: of a datum: measurement, scatter, and the uncertainty of the causes, (k,).
+    """
+
+    before: FloatArray
+    after: FloatArray
+    std: FloatArray
+
+    @property
+    def share(self) -> float:
+        """Return how far the causes move the prediction towards the data: 1 for all the way."""
+        shift = (self.before - self.after) / self.std
+        size = float(shift @ shift)
+        return float(shift @ (self.before / self.std)) / size if size > 0.0 else 1.0
+
+    @property
+    def visible(self) -> bool:
+        """Tell whether the causes change unseen modes by more than noise."""
+        shift = (self.before - self.after) / self.std
+        return float(shift @ shift) > _BLIND
+
+    @property
+    def probability(self) -> float:
+        """Return the probability of errors as large as those left, were they noise."""
+        rest = self.after / self.std
+        return float(chi_square.sf(rest @ rest, len(rest))) if len(rest) else 1.0
+
+    def confirms(self, fitted: int) -> bool:
+        """Tell whether unseen data bear the causes out, or cannot see them.
+
+        More than two fitted causes may bend to any used data: what they leave of unseen data must
+        be noise.
+
+        Arguments:
+            fitted: number of causes that are more than textbook physics.
+        """
+        if len(self.before) == 0:
+            return True
+        if self.visible and self.share < _HALF_WAY:
+            return False
+        if fitted > _FEW:
+            return self.probability > _GOOD
+        if self.probability > _INADEQUATE:
+            return True
+        ratio = np.square(self.before / self.std).sum() / np.square(self.after / self.std).sum()
+        return bool(ratio >= (_FOURFOLD if fitted else _HALVED))
+
+
+def held_out(case: Case, nominal: Problem, best: Problem, found: Fit, scatter: float) -> Unseen:
+    """Return the errors of the held-out modes.
+
+    Arguments:
+        case: with its held-out modes.
+        nominal, best: data and modal coordinates without and with textbook effects.
+        found: the causes, in the coordinates of `best`.
+        scatter: relative standard deviation of a frequency by ordinary tolerances.
+    """
+    used, hidden = len(case.used), len(case.held_out)
+    if hidden == 0:
+        return Unseen(np.zeros(0), np.zeros(0), np.zeros(0))
+    everything = case.measurement.select([*case.used, *case.held_out])
+    data = Data(everything, nominal.data.bias)
+    noise = Noise.of(np.zeros((len(data), 0)), 0.0)
+    rows = slice(used, used + hidden)
+    before = state_at(Problem(nominal.model, nominal.space, data, noise), (), np.zeros(0))
+    after = state_at(Problem(best.model, best.space, data, noise), found.parts, found.state.x)
+    relative = everything.frequency_std[rows] / everything.frequencies[rows]
+    spread = after.jacobian[rows]
+    own = np.einsum("ik,kl,il->i", spread, found.covariance, spread) if spread.shape[1] else 0.0
+    std = np.sqrt(np.square(relative) * (1.0 + own) + scatter**2)
+    return Unseen(before.raw[rows] * relative, after.raw[rows] * relative, std)
+
+
+def modified(case: Case, extended: Model, bias: FloatArray, scatter: float) -> Unseen:
+    """Return the errors of the modified structures, all modes in one list."""
+    before, after, std = [], [], []
+    for change in case.modifications:
+        pairs = []
+        for model in (case.model, extended):
+            changed = model.attach(change.masses, change.springs)
+            pairs.append(predict_block(changed, change.measurement, change.name))
+        m = change.measurement
+        relative = m.frequency_std / m.frequencies
+        for i, (first, second) in enumerate(zip(*pairs, strict=True)):
+            if first.predicted_hz and second.predicted_hz:
+                correct = 1.0 + (bias[min(i, len(bias) - 1)] if len(bias) else 0.0)
+                before.append(first.measured_hz / (first.predicted_hz * correct) - 1.0)
+                after.append(second.measured_hz / (second.predicted_hz * correct) - 1.0)
+                std.append(float(np.hypot(relative[i], scatter)))
+    return Unseen(np.array(before), np.array(after), np.array(std))
+
+
+def left_out(
+    nominal: Problem, problem: Problem, found: Fit, slopes: FloatArray, tolerance: float
+) -> Unseen:
+    """Return the errors of every used mode, predicted by a fit to the others.
+
+    Arguments:
+        nominal: data and modal coordinates of the model as drawn.
+        problem: with the textbook effects of the explanation.
+        found: its causes.
+        slopes: sensitivities of the data to scatter, (n_data, n_scatter).
+        tolerance: standard deviation of the scatter.
+    """
+    data = problem.data
+    numbers = data.measurement.numbers
+    nothing = state_at(nominal, (), np.zeros(0))
+    mode, _ = data.shape_rows
+    before, after, std = [], [], []
+    for j, number in enumerate(numbers):
+        kept = [other for other in numbers if other != number]
+        if not kept:
+            break
+        rows = np.ones(len(data), dtype=bool)
+        rows[: len(numbers) + len(mode)] = np.append(np.arange(len(numbers)), mode) != j
+        part = Data(data.measurement.select(kept), data.bias)
+        noise = Noise.of(slopes[rows], tolerance)
+        again = fit(Problem(problem.model, problem.space, part, noise), found.parts, found.state.x)
+        if again is None:
+            continue
+        point = state_at(problem, found.parts, again.state.x)
+        relative = data.measurement.frequency_std[j] / data.measurement.frequencies[j]
+        before.append(nothing.raw[j] * relative)
+        after.append(point.raw[j] * relative)
+        std.append(relative)
+    return Unseen(np.array(before), np.array(after), np.array(std))
+
+
+def gain_of(before: dict[str, Block], after: dict[str, Block], crossed: Unseen | None) -> Gain:
+    """Return medians of absolute frequency errors in percent, before and after."""
+
+    def pair(name: str) -> tuple[float, float] | None:
+        if name not in before or name not in after:
+            return None
+        return _median(before[name].modes), _median(after[name].modes)
+
+    used = pair("used")
+    assert used is not None
+    cross = None
+    if crossed is not None and len(crossed.before):
+        cross = tuple(100.0 * float(np.median(np.abs(e))) for e in (crossed.before, crossed.after))
+    return Gain(used, pair("higher"), pair("modified"), cross)  # type: ignore[arg-type]
+
+
+def _median(modes: Sequence[PairedMode]) -> float:
+    return 100.0 * float(np.median([frequency_error(mode) for mode in modes]))

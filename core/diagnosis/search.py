@@ -1,0 +1,220 @@
+"""Search the explanations: nothing, one cause, two, and more, on top of textbook physics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from femubench.core.diagnosis.adequacy import adequacy
+from femubench.core.diagnosis.atlas import Screened, screen
+from femubench.core.diagnosis.exact import agreed, extended
+from femubench.core.diagnosis.explanation import (
+    Base,
+    Explanation,
+    Posterior,
+    selection_cost,
+    textbook_bases,
+)
+from femubench.core.diagnosis.fit import Fit, Problem, fit, state_at
+from femubench.core.diagnosis.hypothesis import hypotheses_of
+from femubench.core.diagnosis.space import Projection, nominal_space
+from femubench.core.modal.eigen import solve_modes
+from femubench.core.plugin.roles import Effect
+from femubench.core.typing import FloatArray
+
+_REFINED = 40  # hypotheses that are fitted exactly at most
+_NEAR = 16.0  # of the cost, below which the interpolation may have ranked wrongly
+_CURVED = 0.05  # share of the explained chi-square that the interpolation may miss
+_LOST = 20.0  # behind the best by so much, a fit is not brought to its end
+_SINGLES_FOR_PAIRS, _PARTNERS = 6, 8
+_MOST_CAUSES = 4
+_ADEQUATE = 0.05
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found on one base.
+
+    Arguments:
+        base: textbook effects.
+        problem: with the base in the modal coordinates.
+        explanations: every one that was tried.
+        screened: the atlas.
+    """
+
+    base: Base
+    problem: Problem
+    explanations: tuple[Explanation, ...]
+    screened: tuple[Screened, ...]
+
+    @property
+    def best(self) -> Explanation:
+        """Return the most probable explanation."""
+        return max(self.explanations, key=lambda e: e.log_weight)
+
+
+class Search:
+    """State of one search.
+
+    Arguments:
+        problem: data and modal coordinates of the nominal model.
+        effects: what may be missing.
+        pairs: whether more than one cause is sought.
+    """
+
+    def __init__(self, problem: Problem, effects: Sequence[Effect], *, pairs: bool = True) -> None:
+        self.problem, self.effects, self.pairs = problem, effects, pairs
+        projections = problem.space.projections
+        self.names = len({p.hypothesis.name for p in projections})
+        self.places = len(projections) / max(self.names, 1)
+
+    def run(self) -> tuple[Posterior, list[Found]]:
+        """Return all explanations and the atlas of every base that was searched."""
+        bases = textbook_bases(self.problem.space.projections)
+        found = [self.on(bases[0])]
+        found += [self.on(base) for base in self.promising(bases[1:], found[0])]
+        explanations = [e for item in found for e in item.explanations]
+        if self.pairs and self.names:
+            explanations += self.combined(found)
+        return Posterior.of(explanations), found
+
+    def promising(self, bases: Sequence[Base], plain: Found) -> list[Base]:
+        """Return the textbook sets that come nearer to the data than the model as drawn."""
+        nothing = plain.explanations[0].chi2
+        scored = []
+        for base in bases:
+            chi2 = state_at(self.problem, base.parts, base.x).chi2
+            scored.append((chi2 - 2.0 * base.log_prior, chi2, base))
+        scored.sort(key=lambda item: item[0])
+        better = [base for _, chi2, base in scored if chi2 < nothing - 6.0]
+        return better[: 1 if self.adequate(plain.best) else 2]
+
+    def adequate(self, explanation: Explanation) -> bool:
+        """Tell whether an explanation leaves no more than noise."""
+        state = explanation.fit.state
+        return adequacy(state, len(state.x)) > _ADEQUATE
+
+    def on(self, base: Base) -> Found:
+        """Return nothing and every single cause on top of a textbook set."""
+        problem = self.grounded(base) if base.parts else self.problem
+        start = fit(problem, (), np.zeros(0))
+        assert start is not None
+        screened = screen(problem, start.state, problem.space.projections)
+        fits = self.refined(problem, start, screened)
+        explanations = [Explanation(base, item, self.names) for item in (start, *fits)]
+        return Found(base, problem, tuple(explanations), tuple(screened))
+
+    def grounded(self, base: Base) -> Problem:
+        """Return the data in the modal coordinates of the model with textbook effects in it.
+
+        All effects are sought there anew: what they do depends on what is there, and a textbook
+        value may be off.
+        """
+        model = extended(self.problem.model, base.parts, base.x)
+        known = hypotheses_of(model, self.effects)
+        sensors = self.problem.data.measurement.sensors
+        space = nominal_space(model, solve_modes(model), sensors, known)
+        return replace(self.problem, model=model, space=space)
+
+    def refined(self, problem: Problem, start: Fit, screened: Sequence[Screened]) -> list[Fit]:
+        """Return exact fits of the hypotheses that the atlas does not rule out."""
+        if not screened:
+            return []
+        lowest = min(s.cost for s in screened)
+        explained = start.state.chi2 - lowest
+        limit = lowest + _NEAR + _CURVED * max(explained, 0.0)
+        near = [s for s in screened if s.cost <= limit]
+        near.sort(key=lambda s: np.log(s.projection.hypothesis.places) - s.log_evidence)
+        fits: list[Fit] = []
+        best = start.state.cost
+        for item in near[:_REFINED]:
+            result = fit(problem, (item.projection,), item.x, give_up=best + _LOST)
+            if result is not None:
+                fits.append(result)
+                best = min(best, result.state.cost)
+        return fits
+
+    def combined(self, found: Sequence[Found]) -> list[Explanation]:
+        """Return explanations with two causes, then greedily more while that is worth it."""
+        by_base = {item.base.names: item for item in found}
+        singles = [e for item in found for e in item.explanations if e.parts]
+        singles.sort(key=lambda e: -e.log_weight)
+        seeds = singles[: _SINGLES_FOR_PAIRS if not self.enough(found) else 1]
+        result: list[Explanation] = []
+        tried: set[tuple[object, ...]] = set()
+        for seed in seeds:
+            result += self.grown(by_base[seed.base.names], seed, tried)
+        if not result:
+            return result
+        best = max(result, key=lambda e: e.log_weight)
+        result += self.swapped(by_base[best.base.names], best, tried)
+        while True:
+            best = max(result, key=lambda e: e.log_weight)
+            if len(best.parts) >= _MOST_CAUSES or self.adequate(best):
+                return result
+            more = self.grown(by_base[best.base.names], best, tried)
+            result += more
+            if not more or max(e.log_weight for e in more) <= best.log_weight:
+                return result
+
+    def enough(self, found: Sequence[Found]) -> bool:
+        """Tell whether nothing or one cause leaves no more than noise."""
+        return any(self.adequate(e) for item in found for e in item.explanations)
+
+    def grown(
+        self, found: Found, seed: Explanation, tried: set[tuple[object, ...]]
+    ) -> list[Explanation]:
+        """Return an explanation with one cause more, for every partner that is worth it."""
+        problem, state = found.problem, seed.fit.state
+        space = problem.space.rebased(seed.parts, state.x)
+        above = replace(problem, space=space, offset=state.problem.offset)
+        start = fit(above, (), np.zeros(0))
+        assert start is not None
+        originals = {id(p.hypothesis): p for p in problem.space.projections}
+        taken = {id(part.hypothesis) for part in seed.parts}
+        free = [p for p in above.space.projections if id(p.hypothesis) not in taken]
+        floor = 0.5 * selection_cost(self.names, self.places)
+        ranked = sorted(screen(above, start.state, free, state.jacobian), key=lambda s: s.cost)
+        result = []
+        for item in ranked[:_PARTNERS]:
+            if start.state.chi2 - item.cost < floor:
+                break
+            partner = originals[id(item.projection.hypothesis)]
+            joint = self.joint(problem, (*seed.parts, partner), state.x, item.x, tried)
+            if joint is not None:
+                result.append(Explanation(found.base, joint, self.names))
+        return result
+
+    def joint(
+        self,
+        problem: Problem,
+        parts: tuple[Projection, ...],
+        first: FloatArray,
+        last: FloatArray,
+        tried: set[tuple[object, ...]],
+    ) -> Fit | None:
+        """Return the joint fit of several causes, None where it was tried before or fails."""
+        order = np.argsort([id(part.hypothesis) for part in parts])
+        key = (id(problem), *(id(parts[i].hypothesis) for i in order))
+        if key in tried:
+            return None
+        tried.add(key)
+        found = fit(problem, parts, np.concatenate([first, last]))
+        return None if found is None else agreed(found)
+
+    def swapped(
+        self, found: Found, pair: Explanation, tried: set[tuple[object, ...]]
+    ) -> list[Explanation]:
+        """Return pairs in which either cause of the best pair has another partner."""
+        result = []
+        for i, part in enumerate(pair.parts):
+            counts = [len(p.hypothesis.parameters) for p in pair.parts]
+            first = sum(counts[:i])
+            x = pair.fit.state.x[first : first + counts[i]]
+            alone = fit(found.problem, (part,), x, steps=0)
+            if alone is not None:
+                seed = Explanation(found.base, alone, self.names)
+                result += self.grown(found, seed, tried)
+        return result

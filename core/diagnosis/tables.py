@@ -1,0 +1,176 @@
+"""The tables of a diagnosis: residuals, rivals, causes with their numbers, smallest visible."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from femubench.core.diagnosis.effect import EffectParameter
+from femubench.core.diagnosis.examine import Examination
+from femubench.core.diagnosis.explanation import Explanation
+from femubench.core.diagnosis.fit import State
+from femubench.core.diagnosis.result import (
+    Cause,
+    CauseParameter,
+    LocationRow,
+    ResidualRow,
+    Rival,
+    SmallestVisible,
+)
+from femubench.core.diagnosis.search import Found
+from femubench.core.diagnosis.verdict import angle_between
+from femubench.core.typing import FloatArray
+
+TOO_SMALL = 12.0  # of chi-square: an effect below is too small to see
+_LISTED = 12
+_STEP = 1e-4
+
+
+def residual_rows(before: State, after: State) -> tuple[ResidualRow, ...]:
+    """Return every datum in standard deviations of the measurement, before and after."""
+    data = after.problem.data
+    m = data.measurement
+    mode, sensor = data.shape_rows
+    rows = []
+    for i, number in enumerate(m.numbers):
+        pair = float(before.raw[i]), float(after.raw[i])
+        rows.append(ResidualRow("frequency", number, "", float(m.frequencies[i]), *pair))
+    for k, (j, s) in enumerate(zip(mode, sensor, strict=True), start=len(m)):
+        pair = float(before.raw[k]), float(after.raw[k])
+        label, value = m.sensors.labels[s], float(m.shapes[s, j])
+        rows.append(ResidualRow("shape", m.numbers[j], label, value, *pair))
+    if data.mass is not None:
+        pair = float(before.raw[-1]), float(after.raw[-1])
+        rows.append(ResidualRow("mass", None, "", data.mass[0], *pair))
+    return tuple(rows)
+
+
+def causes_in(explanation: Explanation, share: float, earned: frozenset[str]) -> list[Cause]:
+    """Return the causes of an explanation with values and deviations.
+
+    Arguments:
+        explanation: fitted.
+        share: probability of the name and, within it, of these places.
+        earned: textbook effects that are part of the name.
+    """
+    causes = []
+    book = {part.hypothesis.name: part.hypothesis for part in explanation.base.parts}
+    for name, h in book.items():
+        if name in earned and name not in explanation.searched:
+            fixed = tuple(
+                CauseParameter(p.name, float(p.textbook or 0.0), None, p.unit, textbook=True)
+                for p in h.parameters
+            )
+            causes.append(Cause(h.name, h.place, fixed, share, _summary(h.effect)))
+    x, spread = explanation.fit.state.x, explanation.fit.covariance
+    start = 0
+    for part in explanation.parts:
+        h = part.hypothesis
+        fitted = []
+        for i, parameter in enumerate(h.parameters, start=start):
+            std = float(np.sqrt(spread[i, i])) * _slope(parameter, float(x[i]))
+            value = float(parameter.value(np.array(x[i])))
+            if h.name in book and parameter.neutral == 0.0:
+                # A relative change on top of the textbook's: what matters is the product.
+                textbook = 1.0 + float(book[h.name].parameters[i - start].textbook or 0.0)
+                value, std = textbook * (1.0 + value) - 1.0, textbook * std
+            fitted.append(CauseParameter(parameter.name, value, std, parameter.unit))
+        start += len(h.parameters)
+        causes.append(Cause(h.name, h.place, tuple(fitted), share, _summary(h.effect)))
+    return causes
+
+
+def _summary(effect: object) -> str:
+    return str(getattr(effect, "summary", "") or "")
+
+
+def _slope(parameter: EffectParameter, x: float) -> float:
+    """Return |d value / d x|."""
+    low, high = max(x - _STEP, parameter.range[0]), min(x + _STEP, parameter.range[1])
+    ends = [float(parameter.value(np.array(v))) for v in (low, high)]
+    return abs(ends[1] - ends[0]) / max(high - low, 1e-12)
+
+
+def rivals_of(examination: Examination, best: Explanation | None) -> tuple[Rival, ...]:
+    """Return other explanations by probability, one row a name and place."""
+    nothing = examination.nominal.chi2
+    posterior = examination.posterior
+    totals: dict[tuple[str, str], float] = {}
+    first: dict[tuple[str, str], Explanation] = {}
+    for explanation, p in zip(posterior.explanations, posterior.probabilities, strict=True):
+        if not explanation.parts:
+            continue
+        label = " + ".join(explanation.searched), explanation.place
+        totals[label] = totals.get(label, 0.0) + p
+        first.setdefault(label, explanation)
+    own = (" + ".join(best.searched), best.place) if best is not None else ("", "")
+    ranked = sorted((label for label in totals if label != own), key=lambda k: -totals[k])
+    return tuple(
+        Rival(
+            *label,
+            delta_chi2=nothing - first[label].chi2,
+            probability=totals[label],
+            angle=angle_between(best, first[label]) if best is not None else float("nan"),
+        )
+        for label in ranked[:_LISTED]
+    )
+
+
+def smallest_visible(found: Found) -> tuple[SmallestVisible, ...]:
+    """Return the size of every effect at which it would have changed chi-square by 12.
+
+    Taken from the atlas on the model as drawn, at the place where the effect shows best; for an
+    effect with several parameters along the direction of its grid that shows best.
+    """
+    base = found.explanations[0].fit.state.residual
+    best: dict[str, SmallestVisible] = {}
+    for item in found.screened:
+        h = item.projection.hypothesis
+        effect = np.linalg.norm(item.residuals - base, axis=1) / np.sqrt(TOO_SMALL)
+        x = _visible(item.grid[:, 0], effect)
+        if x is None:
+            continue
+        parameter = h.parameters[0]
+        value = float(parameter.value(np.array(x)))
+        neutral = parameter.neutral if np.isfinite(parameter.neutral) else 0.0
+        size = value if parameter.scaling == "compliance" else abs(value - neutral)
+        row = SmallestVisible(h.name, h.place, size, parameter.unit)
+        softer = parameter.scaling == "compliance"
+        old = best.get(h.name)
+        if old is None or (row.size > old.size if softer else row.size < old.size):
+            best[h.name] = row
+    return tuple(best[name] for name in sorted(best))
+
+
+def _visible(x: FloatArray, effect: FloatArray) -> float | None:
+    """Return the least |x| at which an effect reaches 1, growing in proportion below the grid."""
+    order = np.argsort(np.abs(x))
+    reach: float | None = None
+    last, seen = 0.0, 0.0
+    for i in order:
+        size, height = float(abs(x[i])), float(effect[i])
+        if height >= 1.0:
+            share = (1.0 - seen) / max(height - seen, 1e-12)
+            found = last + share * (size - last)
+            return float(np.copysign(max(found, 1e-6), x[i]))
+        if height > seen:
+            last, seen = size, height
+    return reach
+
+
+def evidence_rows(examination: Examination) -> tuple[LocationRow, ...]:
+    """Return the probability by place of all single causes, scaled to 1 at its largest."""
+    totals: dict[str, float] = {}
+    posterior = examination.posterior
+    for explanation, p in zip(posterior.explanations, posterior.probabilities, strict=True):
+        for part in explanation.parts:
+            place = part.hypothesis.place
+            totals[place] = totals.get(place, 0.0) + p
+    top = max(totals.values(), default=0.0)
+    ranked: Sequence[str] = sorted(totals, key=lambda k: -totals[k])
+    return tuple(
+        LocationRow("evidence", place, totals[place] / top)
+        for place in ranked
+        if top > 0.0 and totals[place] > 1e-4 * top
+    )

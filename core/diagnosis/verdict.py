@@ -1,0 +1,121 @@
+"""From probabilities to a verdict: nothing, a name, a group, unknown, not confirmed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from femubench.core.diagnosis.explanation import Explanation, Key, Posterior
+from femubench.core.diagnosis.result import Verdict
+
+# Rivals at least this probable, or nearly parallel and not yet excluded, stay in the group.
+_RIVAL, _PARALLEL_RIVAL = 0.05, 0.005
+_PARALLEL = 10.0  # degrees
+_SURE = 0.98
+# A cause in all that is left, as probable as this and behind so much of what is explained, is
+# named, whatever little cannot be told apart beside it.
+_COMMON, _MOST = 0.95, 0.8
+_NOISE = 1e-3
+_LARGEST_GROUP = 6
+
+
+@dataclass(frozen=True)
+class Decision:
+    """A verdict with the explanations that it rests on.
+
+    Arguments:
+        verdict: see `Verdict`.
+        group: the names that stay, most probable first; the first one is the best guess.
+        nothing: probability that nothing is missing.
+        angles: of every name of the group to the first one, degrees.
+    """
+
+    verdict: Verdict
+    group: tuple[Key, ...]
+    nothing: float
+    angles: tuple[float, ...]
+
+
+def angle_between(first: Explanation, second: Explanation) -> float:
+    """Return the largest principal angle of two sensitivity subspaces in degrees.
+
+    Each is spanned by the derivatives of the prediction at the best fit, in units of the noise;
+    nan where one of them is empty.
+    """
+    one, two = (e.fit.state.jacobian for e in (first, second))
+    one, two = (j[:, np.linalg.norm(j, axis=0) > 0.0] for j in (one, two))
+    if one.shape[1] == 0 or two.shape[1] == 0:
+        return float("nan")
+    return float(np.degrees(la.subspace_angles(one, two)[0]))
+
+
+def decide(posterior: Posterior, adequate: float, *, confirmed: bool) -> Decision:
+    """Return the verdict.
+
+    Arguments:
+        posterior: all explanations.
+        adequate: probability of what the best explanation leaves, were it noise.
+        confirmed: whether unseen data bear the best explanation out.
+    """
+    nothing = posterior.names.get((), 0.0)
+    if nothing >= 0.5:
+        verdict: Verdict = "none" if adequate > _NOISE else "unknown"
+        return Decision(verdict, (), nothing, ())
+    group, angles = inseparable(posterior)
+    if adequate <= _NOISE:
+        verdict = "unknown"
+    elif not confirmed:
+        verdict = "not-confirmed"
+    else:
+        verdict = "ambiguous" if len(group) > 1 and not mostly_common(posterior, group) else "named"
+    return Decision(verdict, group, nothing, angles)
+
+
+def mostly_common(posterior: Posterior, group: Sequence[Key]) -> bool:
+    """Tell whether the names of a group share what matters and differ in the rest."""
+    common = set(group[0]).intersection(*group[1:])
+    best = posterior.best(group[0])
+    share = sum(p for key, p in posterior.names.items() if common <= set(key))
+    if not common or share < _COMMON:
+        return False
+    nothing = next(e for e in posterior.explanations if not e.parts and not e.base.parts)
+    core = [e.chi2 for e in posterior.explanations if set(posterior.key(e)) == common]
+    if not core:
+        return False
+    return nothing.chi2 - min(core) >= _MOST * (nothing.chi2 - best.chi2)
+
+
+def inseparable(posterior: Posterior) -> tuple[tuple[Key, ...], tuple[float, ...]]:
+    """Return the best name with all that these data cannot exclude, and their angles to it."""
+    names = {key: p for key, p in posterior.names.items() if key}
+    something = sum(names.values())
+    ranked = list(names)
+    best = posterior.best(ranked[0])
+    group, angles, covered = [ranked[0]], [0.0], names[ranked[0]] / something
+    for key in ranked[1:]:
+        share = names[key] / something
+        if share < _PARALLEL_RIVAL or len(group) == _LARGEST_GROUP:
+            break
+        angle = angle_between(best, posterior.best(key))
+        if share >= _RIVAL or angle < _PARALLEL or covered < _SURE:
+            group.append(key)
+            angles.append(angle)
+            covered += share
+    return tuple(group), tuple(angles)
+
+
+def causes_of(posterior: Posterior, group: Sequence[Key]) -> list[tuple[Explanation, float]]:
+    """Return the best explanation of every name in a group with the probability of its place."""
+    result = []
+    for key in group:
+        members = posterior.members(key)
+        places: dict[str, float] = {}
+        for explanation, p in members:
+            places[explanation.place] = places.get(explanation.place, 0.0) + p
+        best = members[0][0]
+        total = sum(places.values())
+        result.append((best, places[best.place] / total if total > 0.0 else 0.0))
+    return result

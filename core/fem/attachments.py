@@ -1,0 +1,107 @@
+"""Braces and oscillators: springs between two points, and masses that hang on one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench.core.errors import ModelError
+from femubench.core.fem.frame import ACTIVE, Brace, Frame, Oscillator
+from femubench.core.fem.kinematics import point_rows
+from femubench.core.measurement import DIRECTIONS
+from femubench.core.typing import FloatArray, IntArray, SparseArray
+
+if TYPE_CHECKING:
+    from femubench.core.fem.structure import Structure
+
+
+def check_attachments(frame: Frame) -> None:
+    """Check braces and oscillators.
+
+    Raises:
+        ModelError: for a brace out of plane or without two joints, or an oscillator without mass
+            or frequency or in a direction that is no translation of the plane.
+    """
+    for brace in frame.braces:
+        if frame.plane == "out-of-plane":
+            raise ModelError("a brace does nothing out of plane")
+        if brace.ends[0] == brace.ends[1] or not set(brace.ends) <= set(frame.joint_index):
+            raise ModelError(f"a brace needs two joints, not {' and '.join(brace.ends)}")
+    allowed = [name for name in ACTIVE[frame.plane] if len(name) == 1]
+    for item in frame.oscillators:
+        if item.direction.lstrip("+-") not in allowed:
+            expected = ", ".join(allowed)
+            raise ModelError(f"an oscillator moves in one of {expected}, not {item.direction!r}")
+        if not (item.mass > 0.0 and item.frequency > 0.0):
+            raise ModelError(f"the oscillator at {item.at} needs a mass and a frequency above 0")
+
+
+def brace_ends(frame: Frame) -> IntArray:
+    """Return the joint numbers of the ends of every brace, (n_braces, 2)."""
+    index = frame.joint_index
+    ends = [[index[name] for name in brace.ends] for brace in frame.braces]
+    return np.array(ends, dtype=np.int64).reshape(-1, 2)
+
+
+def brace_lines(frame: Frame) -> tuple[FloatArray, FloatArray]:
+    """Return unit vectors (n_braces, 3) and lengths in m (n_braces,) of the braces."""
+    ends = brace_ends(frame)
+    along = frame.corners[ends[:, 1]] - frame.corners[ends[:, 0]]
+    length = np.linalg.norm(along, axis=1)
+    return along / length[:, None], length
+
+
+def brace_motion(structure: Structure) -> SparseArray:
+    """Return the motion of the second end of every brace less the first, (3 n_braces, n)."""
+    ends = brace_ends(structure.frame)
+    first, second = ((6 * ends[:, [k]] + np.arange(3)).ravel() for k in (0, 1))
+    transform = structure.kinematics.transform
+    return transform[second] - transform[first]
+
+
+def brace_rows(structure: Structure) -> SparseArray:
+    """Return the elongation of every brace from free dofs, (n_braces, n)."""
+    unit, _ = brace_lines(structure.frame)
+    count = len(unit)
+    place = (np.repeat(np.arange(count), 3), np.arange(3 * count))
+    return sp.csr_array((unit.ravel(), place), shape=(count, 3 * count)) @ brace_motion(structure)
+
+
+def brace_stiffness(structure: Structure) -> SparseArray:
+    """Return the stiffness of the braces, (n, n)."""
+    rows = brace_rows(structure)
+    return rows.T @ sp.diags_array(_stiffness(structure.frame.braces)) @ rows
+
+
+def _stiffness(braces: tuple[Brace, ...]) -> FloatArray:
+    return np.array([brace.stiffness for brace in braces], dtype=float)
+
+
+def oscillator_matrices(structure: Structure) -> tuple[SparseArray, SparseArray]:
+    """Return mass and stiffness of the oscillators, (n, n) each."""
+    moving, stretch, masses, stiffness = [], [], [], []
+    for node, item in zip(structure.mesh.oscillators, structure.frame.oscillators, strict=True):
+        motion, spring = _oscillator_rows(structure, int(node), item)
+        moving.append(motion)
+        stretch.append(spring)
+        masses += [item.mass] * motion.shape[0]
+        stiffness.append(item.mass * (2.0 * np.pi * item.frequency) ** 2)
+    rows, springs = sp.csr_array(sp.vstack(moving)), sp.csr_array(sp.vstack(stretch))
+    mass = rows.T @ sp.diags_array(np.array(masses)) @ rows
+    return mass, springs.T @ sp.diags_array(np.array(stiffness)) @ springs
+
+
+def _oscillator_rows(
+    structure: Structure, node: int, item: Oscillator
+) -> tuple[SparseArray, SparseArray]:
+    """Return the translations of an oscillator's mass and the stretch of its spring."""
+    transform = structure.kinematics.transform
+    point = point_rows(structure.frame, structure.mesh, structure.properties, item.at)
+    place = point[:3] @ transform
+    direction = DIRECTIONS.index(item.direction.lstrip("+-"))
+    own = transform[6 * node + direction : 6 * node + direction + 1]
+    active = np.flatnonzero(structure.active_local[:3])
+    others = place[active[active != direction]]
+    return sp.vstack([own, others]), own - place[direction : direction + 1]

@@ -1,0 +1,107 @@
+"""Element properties of a frame as it is described, before any parameter was changed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import fields
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from femubench.core.errors import ModelError
+from femubench.core.fem.beam import BeamProperties
+from femubench.core.fem.frame import Coupling, Eccentricity, Factor, Frame, Member
+from femubench.core.fem.mesh import Mesh
+from femubench.core.fem.parameters import QUANTITIES, Parameter, apply_values
+from femubench.core.typing import FloatArray
+
+if TYPE_CHECKING:
+    from femubench.core.fem.structure import Structure
+
+# Without shear or rotary inertia a beam is still one; without stiffness or mass it is none.
+MAY_VANISH = ("shear", "rotary")
+_Item = TypeVar("_Item", Coupling, Eccentricity)
+
+
+def nominal_properties(frame: Frame, mesh: Mesh) -> BeamProperties:
+    """Return what sections, materials and beam theory give, `frame.factors` left out.
+
+    Raises:
+        ModelError: for a Timoshenko beam without kappa, or an entry at no member.
+    """
+    arm = np.isfinite(mesh.arm_factor)
+    table = np.array([_constants(frame, member) for member in frame.members])[mesh.member]
+    factor = np.where(arm, mesh.arm_factor, 1.0)[:, None]
+    table[:, :4] *= factor
+    table[:, 4:6] /= factor
+    table[arm, 6:] = 0.0
+    length = np.linalg.norm(mesh.xyz[mesh.ends[:, 1]] - mesh.xyz[mesh.ends[:, 0]], axis=1)
+    shape = np.full(len(length), 1.0 if frame.bending_mass == "shear-consistent" else 0.0)
+    coupling = _of_members(frame, frame.couplings, lambda item: item.coefficient)
+    if np.any(np.abs(coupling) >= 1.0):
+        raise ModelError("a bending-torsion coupling coefficient is not between -1 and 1")
+    ecc_y = _of_members(frame, frame.eccentricities, lambda item: item.y)
+    ecc_z = _of_members(frame, frame.eccentricities, lambda item: item.z)
+    if frame.plane == "out-of-plane":
+        ecc_z[:] = 0.0  # as with an offset mass, nothing moves along x and y there
+    further = [np.where(arm, 0.0, c[mesh.member]) for c in (coupling, ecc_y, ecc_z)]
+    columns = (length, *table.T, *mesh.rigid.T, *mesh.rigid_mass.T, shape, *further)
+    names = [f.name for f in fields(BeamProperties)]
+    return BeamProperties(**dict(zip(names, (np.array(c) for c in columns), strict=True)))
+
+
+def _constants(frame: Frame, member: Member) -> tuple[float, ...]:
+    """Return EA to flex_z and rhoA to rhoIz of a member."""
+    s, m = member.section, member.material
+    shear = 1.0 if frame.beam == "timoshenko" else 0.0
+    if shear and s.kappa is None:
+        raise ModelError(
+            f"member {member.name!r}: a Timoshenko beam needs the shear coefficient kappa"
+        )
+    ky, kz = s.kappa(m.nu) if s.kappa is not None else (1.0, 1.0)
+    flex = shear / (m.G * s.A)
+    inertia = frame.rotary_share * m.rho
+    rigidities = (m.E * s.A, m.E * s.Iy, m.E * s.Iz, m.G * s.J, flex / ky, flex / kz)
+    return (*rigidities, m.rho * s.A, m.rho * s.Jp, inertia * s.Iy, inertia * s.Iz)
+
+
+def _of_members(
+    frame: Frame, items: Sequence[_Item], value: Callable[[_Item], float]
+) -> FloatArray:
+    """Return a number of every member; several entries at one member add up, (n_members,)."""
+    column = np.zeros(len(frame.members))
+    for item in items:
+        if item.member not in frame.member_index:
+            raise ModelError(f"there is no member {item.member!r}")
+        column[frame.member_index[item.member]] += value(item)
+    return column
+
+
+def factored_properties(structure: Structure) -> BeamProperties:
+    """Return the properties of a frame with its factors; massless arms of joints have none.
+
+    Raises:
+        ModelError: for a quantity that is no factor, a place that is not there, or a factor that
+            leaves neither stiffness nor mass.
+    """
+    factors = structure.frame.factors
+    parameters = [_parameter(structure, item) for item in factors]
+    return apply_values(structure, parameters, [item.factor for item in factors])[0]
+
+
+def _parameter(structure: Structure, item: Factor) -> Parameter:
+    name = f"factor on {item.quantity}"
+    if item.quantity not in QUANTITIES or not QUANTITIES[item.quantity]:
+        known = ", ".join(quantity for quantity, scaled in QUANTITIES.items() if scaled)
+        raise ModelError(f"there is no factor on {item.quantity!r}; there are {known}")
+    if not (item.factor > 0.0 or (item.factor == 0.0 and item.quantity in MAY_VANISH)):
+        raise ModelError(f"{name}: {item.factor:g} is not positive")
+    places: list[str] = []
+    for place in item.at:
+        if place == "all":
+            places += (label for label in structure.label_index if label)
+        elif place in structure.frame.member_index:
+            places += structure.member_labels[place]
+        else:
+            places.append(place)
+    return Parameter(name, item.quantity, tuple(places))

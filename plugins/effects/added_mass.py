@@ -1,0 +1,58 @@
+"""A mass at one point that the model does not know of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+from femubench import (
+    Change,
+    EffectParameter,
+    Frame,
+    FrameEffect,
+    Model,
+    PointMass,
+    free_translations,
+    mass_term,
+    point_in,
+    point_of,
+    point_places,
+    proportional,
+    total_mass,
+)
+
+_SHARE = 0.005  # of the structure's mass
+
+
+class AddedMass(FrameEffect):
+    """Put a point mass on a joint, on a member or on a node of a model that came as matrices."""
+
+    name: ClassVar[str] = "added-mass"
+    summary: ClassVar[str] = "a point carries a mass"
+
+    def places(self, model: Model) -> Sequence[str]:
+        """Return the points, or nodes, that can move."""
+        return [at for at in point_places(model) if free_translations(model, point_in(model, at))]
+
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+        """Return the mass."""
+        scale = _SHARE * total_mass(model)
+        return (EffectParameter("mass", "kg", scale, scaling="exponential", one_sided=True),)
+
+    def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
+        """Return the frame with the mass."""
+        if not values[0]:
+            return frame
+        mass = PointMass(point_of(frame, place), values[0])
+        return replace(frame, masses=(*frame.masses, mass))
+
+    def extend(self, model: Model, place: str, values: Sequence[float]) -> Model:
+        """Return the model with the mass in it; matrices will do."""
+        if model.structure is None:
+            return model.attach([PointMass(point_in(model, place), values[0])], [])
+        return super().extend(model, place, values)
+
+    def change(self, model: Model, place: str) -> Change:
+        """Return the mass matrix of 1 kg at the point."""
+        return proportional(mass_term(model, [point_in(model, place)]))

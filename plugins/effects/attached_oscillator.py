@@ -1,0 +1,91 @@
+"""Something that hangs on the structure and swings by itself: a panel, a cable, an instrument."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench import (
+    Change,
+    EffectParameter,
+    FloatArray,
+    Frame,
+    FrameEffect,
+    Model,
+    Oscillator,
+    RowOperator,
+    Term,
+    directed_places,
+    directed_point,
+    elastic_band,
+    free_translations,
+    total_mass,
+    translation_rows,
+    with_extra,
+)
+
+_SHARE = 0.005  # of the structure's mass
+
+
+class AttachedOscillator(FrameEffect):
+    """Let a mass ride on a place and swing on a spring in one direction, which adds a mode.
+
+    Without mass it is not there, whatever its frequency.
+    """
+
+    name: ClassVar[str] = "attached-oscillator"
+    summary: ClassVar[str] = "something attached resonates by itself"
+
+    def places(self, model: Model) -> Sequence[str]:
+        """Return joints and the middles of members in each direction that they can move in."""
+        if model.structure is None:
+            return ()
+        frame = model.structure.frame
+        middles = [f"{m.name}@{_middle(m.elements):g}" for m in frame.members]
+        return directed_places(model, [*frame.joint_index, *middles])
+
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+        """Return its mass, and its frequency around the middle of the lowest elastic ones."""
+        scale = _SHARE * total_mass(model)
+        centre = float(np.exp(np.log(elastic_band(model)).mean()))
+        return (
+            EffectParameter("mass", "kg", scale, scaling="exponential", one_sided=True),
+            EffectParameter("frequency", "Hz", 0.5 * centre, centre, 0.05 * centre, 5.0 * centre),
+        )
+
+    def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
+        """Return the frame with the oscillator."""
+        if not values[0]:
+            return frame
+        oscillator = Oscillator(*directed_point(frame, place), values[0], values[1])
+        return replace(frame, oscillators=(*frame.oscillators, oscillator))
+
+    def change(self, model: Model, place: str) -> Change:
+        """Return 1 kg on a dof of its own and the spring of 1 N/m that carries it."""
+        at, direction = directed_point(model, place)
+        others = [d for d in free_translations(model, at) if d != direction]
+        own = sp.csr_array(([1.0], [model.size], [0, 1]), shape=(1, model.size + 1))
+        spring = with_extra(-translation_rows(model, at, [direction]), [1.0])
+        terms = [
+            Term("stiffness", RowOperator(spring, np.eye(1))),
+            Term("mass", RowOperator(own, np.eye(1))),
+        ]
+        if others:
+            carried = with_extra(translation_rows(model, at, others), [0.0] * len(others))
+            terms.append(Term("mass", RowOperator(carried, np.eye(len(others)))))
+
+        def factors(values: FloatArray) -> FloatArray:
+            mass, frequency = values.T
+            stiffness = mass * (2.0 * np.pi * frequency) ** 2
+            return np.column_stack([stiffness, mass, mass][: len(terms)])
+
+        return Change(tuple(terms), factors, extra=1)
+
+
+def _middle(elements: int) -> float:
+    """Return the station of the mesh node nearest to the middle of a member."""
+    return (elements // 2) / elements if elements > 1 else 0.5

@@ -1,0 +1,73 @@
+"""A member that was fitted under stress and strains the frame around it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from femubench import (
+    Change,
+    EffectParameter,
+    Frame,
+    FrameEffect,
+    Model,
+    Preload,
+    member_length,
+    preload_stiffness,
+    proportional,
+    redundant_members,
+    sparse_term,
+)
+
+_SCALE, _BOUND = 0.15, 0.6  # of the Euler load
+_MOST = 60
+
+
+class AxialPreload(FrameEffect):
+    """Put the frame under the self-equilibrated stress that a member's lack of fit leaves.
+
+    The value is the largest normal force anywhere in the frame, with the sign of the force in the
+    member, tension positive.
+    """
+
+    name: ClassVar[str] = "axial-preload"
+    summary: ClassVar[str] = "a member was fitted under stress"
+
+    def places(self, model: Model) -> Sequence[str]:
+        """Return the members that the rest of the frame resists, the 60 first to buckle at most."""
+        if model.structure is None:
+            return ()
+        frame, members = model.structure.frame, redundant_members(model.structure)
+        slender = set(sorted(members, key=lambda name: euler_load(frame, name))[:_MOST])
+        return tuple(name for name in members if name in slender)
+
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+        """Return the force; its scale is a share of the member's Euler load."""
+        load = euler_load(model.frame_structure.frame, place)
+        bound = _BOUND * load
+        return (EffectParameter("force", "N", _SCALE * load, lower=-bound, upper=bound),)
+
+    def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
+        """Return the frame with the lack of fit."""
+        if not values[0]:
+            return frame
+        return replace(frame, preloads=(*frame.preloads, Preload(place, values[0])))
+
+    def change(self, model: Model, place: str) -> Change:
+        """Return the geometric stiffness of 1 N.
+
+        Raises:
+            ModelError: when the frame is not redundant there.
+        """
+        matrix = preload_stiffness(model.frame_structure, place, 1.0)
+        return proportional(sparse_term("stiffness", matrix))
+
+
+def euler_load(frame: Frame, name: str) -> float:
+    """Return pi^2 E I / L^2 of a member in N, with the smaller second moment."""
+    member = frame.members[frame.member_index[name]]
+    inertia = min(member.section.Iy, member.section.Iz)
+    return float(np.pi**2 * member.material.E * inertia / member_length(frame, name) ** 2)

@@ -1,0 +1,73 @@
+"""A strut, a cable or a stiff strap between two joints that no member joins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+from typing import ClassVar
+
+import numpy as np
+
+from femubench import (
+    Brace,
+    Change,
+    EffectParameter,
+    Frame,
+    FrameEffect,
+    Model,
+    RowOperator,
+    Term,
+    elongation_row,
+    member_length,
+    pair_of,
+    proportional,
+)
+
+_SHARE = 0.01  # of the mean EA / L of the members
+_MOST = 300
+
+
+class BraceSpring(FrameEffect):
+    """Tie two joints by a massless axial spring; out of plane it would act on nothing."""
+
+    name: ClassVar[str] = "brace-spring"
+    summary: ClassVar[str] = "a brace ties two joints"
+
+    def places(self, model: Model) -> Sequence[str]:
+        """Return the pairs of joints without a member between them, the nearest 300 at most."""
+        if model.structure is None or model.structure.frame.plane == "out-of-plane":
+            return ()
+        frame = model.structure.frame
+        joined = {frozenset(member.ends) for member in frame.members}
+        pairs = [p for p in combinations(frame.joint_index, 2) if frozenset(p) not in joined]
+        return [f"{first}-{last}" for first, last in _nearest(frame, pairs)]
+
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+        """Return the stiffness along the line of the joints."""
+        frame = model.frame_structure.frame
+        rigidity = [
+            m.material.E * m.section.A / member_length(frame, m.name) for m in frame.members
+        ]
+        scale = _SHARE * float(np.mean(rigidity))
+        return (EffectParameter("stiffness", "N/m", scale, scaling="exponential", one_sided=True),)
+
+    def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
+        """Return the frame with the brace."""
+        if not values[0]:
+            return frame
+        return replace(frame, braces=(*frame.braces, Brace(pair_of(frame, place), values[0])))
+
+    def change(self, model: Model, place: str) -> Change:
+        """Return the stiffness matrix of 1 N/m."""
+        row = elongation_row(model, pair_of(model.frame_structure.frame, place))
+        return proportional(Term("stiffness", RowOperator(row, np.eye(1))))
+
+
+def _nearest(frame: Frame, pairs: list[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Return the pairs that a brace could span, in their order."""
+    if len(pairs) <= _MOST:
+        return pairs
+    index = np.array([[frame.joint_index[name] for name in pair] for pair in pairs])
+    distance = np.linalg.norm(frame.corners[index[:, 1]] - frame.corners[index[:, 0]], axis=1)
+    return [pairs[i] for i in np.sort(np.argsort(distance, kind="stable")[:_MOST])]

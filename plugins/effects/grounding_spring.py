@@ -1,0 +1,68 @@
+"""A spring to ground: a suspension, a cable, a table that the structure touches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from femubench import (
+    Change,
+    EffectParameter,
+    Frame,
+    FrameEffect,
+    GroundSpring,
+    Model,
+    RowOperator,
+    Term,
+    directed_places,
+    directed_point,
+    elastic_band,
+    point_places,
+    proportional,
+    total_mass,
+    translation_rows,
+)
+
+_SHARE = 0.01  # of the squared lowest elastic frequency
+
+
+class GroundingSpring(FrameEffect):
+    """Hold a point in one global direction; out of plane there is but one, which goes unsaid.
+
+    A spring turns a rigid-body mode elastic and stiffens the others.
+    """
+
+    name: ClassVar[str] = "grounding-spring"
+    summary: ClassVar[str] = "a spring holds the structure to ground"
+
+    def places(self, model: Model) -> Sequence[str]:
+        """Return the points, or nodes, in each direction that they can move in."""
+        return directed_places(model, point_places(model))
+
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+        """Return the stiffness; at its scale the lowest frequency rises by about a percent."""
+        scale = _SHARE * total_mass(model) * (2.0 * np.pi * float(elastic_band(model)[0])) ** 2
+        return (EffectParameter("stiffness", "N/m", scale, scaling="exponential", one_sided=True),)
+
+    def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
+        """Return the frame with the spring."""
+        if not values[0]:
+            return frame
+        at, direction = directed_point(frame, place)
+        return replace(frame, springs=(*frame.springs, GroundSpring(at, direction, values[0])))
+
+    def extend(self, model: Model, place: str, values: Sequence[float]) -> Model:
+        """Return the model with the spring in it; matrices will do."""
+        if model.structure is None:
+            at, direction = directed_point(model, place)
+            return model.attach([], [GroundSpring(at, direction, values[0])])
+        return super().extend(model, place, values)
+
+    def change(self, model: Model, place: str) -> Change:
+        """Return the stiffness matrix of 1 N/m."""
+        at, direction = directed_point(model, place)
+        row = translation_rows(model, at, [direction])
+        return proportional(Term("stiffness", RowOperator(row, np.eye(1))))

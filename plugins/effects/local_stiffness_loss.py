@@ -1,0 +1,49 @@
+"""Damage: one element of a member has lost part of its stiffness."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+from femubench import (
+    Change,
+    EffectParameter,
+    ElementOperator,
+    Factor,
+    Frame,
+    FrameEffect,
+    Model,
+    Term,
+    element_labels,
+    elements_of,
+    proportional,
+    stiffness_matrices,
+)
+
+
+class LocalStiffnessLoss(FrameEffect):
+    """Take a fraction of EA, EI, GJ and GA from exactly one element."""
+
+    name: ClassVar[str] = "local-stiffness-loss"
+    summary: ClassVar[str] = "a member is damaged in one place"
+
+    def places(self, model: Model) -> Sequence[str]:
+        """Return every element."""
+        return () if model.structure is None else element_labels(model.structure.frame)
+
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+        """Return the fraction that is lost."""
+        return (EffectParameter("loss", "", 0.3, lower=0.0, upper=0.95, one_sided=True),)
+
+    def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
+        """Return the frame with the weaker element."""
+        loss = (Factor("E", (place,), 1.0 - values[0]),) if values[0] else ()
+        return replace(frame, factors=frame.factors + loss)
+
+    def change(self, model: Model, place: str) -> Change:
+        """Return the stiffness of the element with a minus sign."""
+        structure = model.frame_structure
+        rows = elements_of(structure, place)
+        blocks = -stiffness_matrices(structure.properties.take(rows))
+        return proportional(Term("stiffness", ElementOperator(structure, rows, blocks)))

@@ -1,0 +1,81 @@
+"""A member whose mass lies beside its axis: a rail, a cable tray, a thicker wall on one side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from femubench import (
+    Change,
+    Eccentricity,
+    EffectParameter,
+    ElementOperator,
+    Frame,
+    FrameEffect,
+    Model,
+    Section,
+    Term,
+    eccentric_mass_parts,
+    elements_of,
+)
+
+_SCALE, _BOUND = 0.15, 1.0  # of the size of the section
+
+
+class MassEccentricity(FrameEffect):
+    """Shift the line of the mass centres of a member: along local z in plane, else along y.
+
+    It couples bending with torsion out of plane, and with axial motion in plane.
+    """
+
+    name: ClassVar[str] = "mass-eccentricity"
+    summary: ClassVar[str] = "a member's mass lies beside its axis"
+
+    def places(self, model: Model) -> Sequence[str]:
+        """Return the members."""
+        return () if model.structure is None else tuple(model.structure.frame.member_index)
+
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+        """Return the offset, whose scale is a share of the section's size that way."""
+        frame = model.frame_structure.frame
+        size = section_size(frame.members[frame.member_index[place]].section, axis_of(frame))
+        bound = _BOUND * size
+        return (EffectParameter(axis_of(frame), "m", _SCALE * size, lower=-bound, upper=bound),)
+
+    def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
+        """Return the frame with the offset."""
+        if not values[0]:
+            return frame
+        offset = Eccentricity(place, **{axis_of(frame): values[0]})
+        return replace(frame, eccentricities=(*frame.eccentricities, offset))
+
+    def change(self, model: Model, place: str) -> Change:
+        """Return what is linear and what is quadratic in the offset, on top of a known one."""
+        structure = model.frame_structure
+        axis = axis_of(structure.frame)
+        elements = elements_of(structure, place)
+        properties = structure.properties.take(elements)
+        parts = eccentric_mass_parts(properties)
+        own, other = properties.ecc_y[:, None, None], properties.ecc_z[:, None, None]
+        own, other = (own, other) if axis == "y" else (other, own)
+        linear = parts[axis] + 2.0 * own * parts[2 * axis] + other * parts["yz"]
+        terms = tuple(
+            Term("mass", ElementOperator(structure, elements, blocks))
+            for blocks in (linear, parts[2 * axis])
+        )
+        return Change(terms, lambda values: np.column_stack([values[:, 0], values[:, 0] ** 2]))
+
+
+def axis_of(frame: Frame) -> Literal["y", "z"]:
+    """Return the local axis along which an offset can be seen."""
+    return "z" if frame.plane == "in-plane" else "y"
+
+
+def section_size(section: Section, axis: Literal["y", "z"]) -> float:
+    """Return the size of a section along an axis in m; of numbers, that of an equal rectangle."""
+    size = section.width if axis == "y" else section.height
+    inertia = section.Iz if axis == "y" else section.Iy
+    return float(np.sqrt(12.0 * inertia / section.A)) if size is None else size

@@ -1,0 +1,60 @@
+"""Rotary inertia of the cross sections, which Euler and Bernoulli left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from femubench import (
+    Change,
+    EffectParameter,
+    ElementOperator,
+    Frame,
+    FrameEffect,
+    Model,
+    Term,
+    elements_of,
+    mass_matrices,
+    proportional,
+)
+
+
+class RotaryInertia(FrameEffect):
+    """Let a multiple of rho I take part; 1 is the textbook's (Rayleigh 1877, art. 162)."""
+
+    name: ClassVar[str] = "rotary-inertia"
+    summary: ClassVar[str] = "the cross sections have rotary inertia"
+
+    def places(self, model: Model) -> Sequence[str]:
+        """Return the whole frame."""
+        return () if model.structure is None else ("all",)
+
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+        """Return the multiple of rho I."""
+        now = model.frame_structure.frame.rotary_share
+        lacks = now == 0.0
+        textbook = 1.0 if lacks else None
+        name = "multiple of rho I"
+        return (EffectParameter(name, "", 1.0, now, 0.0, one_sided=lacks, textbook=textbook),)
+
+    def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
+        """Return the frame with that share of rotary inertia."""
+        share = float(values[0])
+        if share == frame.rotary_share:
+            return frame
+        return replace(frame, rotary_inertia=share if share not in (0.0, 1.0) else share == 1.0)
+
+    def change(self, model: Model, place: str) -> Change:
+        """Return the mass matrix of the textbook's rotary inertia."""
+        structure = model.frame_structure
+        whole = structure.rebuilt(self.frame(structure.frame, place, (1.0,)))
+        rows = elements_of(whole, place)
+        own = whole.properties.take(rows)
+        none = np.zeros(len(own))
+        without = own.scaled("rhoIy", none).scaled("rhoIz", none)
+        blocks = mass_matrices(own) - mass_matrices(without)
+        term = Term("mass", ElementOperator(structure, rows, blocks))
+        return proportional(term, neutral=structure.frame.rotary_share)

@@ -1,0 +1,149 @@
+"""Shear deformation, which Euler and Bernoulli left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from femubench import (
+    BeamProperties,
+    Change,
+    EffectParameter,
+    ElementOperator,
+    Factor,
+    FloatArray,
+    Frame,
+    FrameEffect,
+    Model,
+    Term,
+    constant_kappa,
+    mass_matrices,
+    proportional,
+    rate_nodes,
+    stiffness_matrices,
+)
+
+_KAPPA = 5.0 / 6.0  # of a rectangle, for sections of unknown shape
+_AT_ALL = ("all",)
+_PLANES = (("EIy", "flex_z"), ("EIz", "flex_y"))
+
+
+class ShearDeformation(FrameEffect):
+    """Let a multiple of 1/(kappa G A) take part; 1 is the textbook's (Cowper 1966).
+
+    With phi = 12 EI / (kappa G A L^2) the stiffness of an element is affine in 1 / (1 + s phi),
+    and so, by its square, is a mass matrix that knows of the shear.
+    """
+
+    name: ClassVar[str] = "shear-deformation"
+    summary: ClassVar[str] = "the members deform in shear"
+
+    def places(self, model: Model) -> Sequence[str]:
+        """Return the whole frame."""
+        return () if model.structure is None else _AT_ALL
+
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+        """Return the multiple of 1/(kappa G A)."""
+        frame = model.frame_structure.frame
+        now = present_share(frame)
+        lacks, known = now == 0.0, all(m.section.kappa is not None for m in frame.members)
+        textbook = 1.0 if lacks and known else None
+        name = "multiple of 1/(kappa G A)"
+        return (EffectParameter(name, "", 1.0, now, 0.0, one_sided=lacks, textbook=textbook),)
+
+    def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
+        """Return the frame of Timoshenko beams; rotary inertia stays what it is."""
+        share = float(values[0])
+        if share == present_share(frame):
+            return frame
+        rotary = frame.rotary_share
+        rotary = rotary if rotary not in (0.0, 1.0) else rotary == 1.0
+        others = tuple(f for f in frame.factors if (f.quantity, f.at) != ("shear", _AT_ALL))
+        if share == 0.0:
+            return replace(frame, beam="euler-bernoulli", rotary_inertia=rotary, factors=others)
+        members = tuple(
+            m
+            if m.section.kappa is not None
+            else replace(m, section=replace(m.section, kappa=constant_kappa(_KAPPA)))
+            for m in frame.members
+        )
+        own = () if share == 1.0 else (Factor("shear", _AT_ALL, share),)
+        return replace(
+            frame, beam="timoshenko", rotary_inertia=rotary, members=members, factors=others + own
+        )
+
+    def change(self, model: Model, place: str) -> Change:
+        """Return one set of terms a plane of bending and a value of phi."""
+        structure = model.frame_structure
+        now = present_share(structure.frame)
+        whole = structure.rebuilt(self.frame(structure.frame, place, (1.0,))).properties
+        terms: list[Term] = []
+        rates: list[float] = []
+        powers: list[int] = []
+        for bending, shear in _PLANES if structure.frame.plane == "3d" else _PLANES[:1]:
+            phi = _ratio(whole, bending, shear)
+            rows = np.flatnonzero(phi)
+            if not len(rows):
+                continue
+            parts = _parts(whole.take(rows), bending, shear)
+            nodes, weights = rate_nodes(phi[rows])
+            for node, weight in zip(nodes, weights.T, strict=True):
+                used = np.flatnonzero(weight)
+                for kind, power, blocks in parts:
+                    own = weight[used, None, None] * blocks[used]
+                    if own.any():
+                        terms.append(Term(kind, ElementOperator(structure, rows[used], own)))
+                        rates.append(float(node))
+                        powers.append(power)
+        if not terms:
+            return proportional()
+        rate, power_of = np.array(rates), np.array(powers)
+
+        def coefficients(values: FloatArray) -> FloatArray:
+            return np.asarray(
+                _share(values[:, :1], rate) ** power_of - _share(now, rate) ** power_of
+            )
+
+        return Change(tuple(terms), coefficients)
+
+
+def present_share(frame: Frame) -> float:
+    """Return the multiple of 1/(kappa G A) that a frame has now, 0 for Euler-Bernoulli."""
+    own = [f.factor for f in frame.factors if (f.quantity, f.at) == ("shear", _AT_ALL)]
+    return float(np.prod(own)) if frame.beam == "timoshenko" else 0.0
+
+
+def _share(multiple: FloatArray | float, rate: FloatArray) -> FloatArray:
+    return np.asarray(1.0 / (1.0 + multiple * rate))
+
+
+def _ratio(p: BeamProperties, bending: str, shear: str) -> FloatArray:
+    """Return phi of every element, (n_elements,)."""
+    flexible = p.length - p.rigid_1 - p.rigid_2
+    return np.asarray(12.0 * getattr(p, bending) * getattr(p, shear) / flexible**2)
+
+
+def _parts(
+    p: BeamProperties, bending: str, shear: str
+) -> list[tuple[Literal["mass", "stiffness"], int, FloatArray]]:
+    """Return what comes with 1/(1 + phi) and its square, (k, 12, 12) each.
+
+    Three values of phi, 0, 1 and 3, give the coefficients of a polynomial of degree two.
+    """
+    phi = _ratio(p, bending, shear)
+    none = dict.fromkeys(("flex_y", "flex_z"), np.zeros(len(p)))
+    other = [
+        replace(p, **{**none, shear: value / phi * getattr(p, shear)}) for value in (0.0, 1.0, 3.0)
+    ]
+    stiff = [stiffness_matrices(own) for own in other]
+    heavy = [mass_matrices(own) for own in other]
+    first, second = heavy[0] - heavy[1], heavy[1] - heavy[2]
+    square = (first - 2.0 * second) / 0.375
+    return [
+        ("stiffness", 1, 2.0 * (stiff[0] - stiff[1])),
+        ("mass", 1, 2.0 * first - 1.5 * square),
+        ("mass", 2, square),
+    ]

@@ -1,0 +1,256 @@
+"""A diagnosis for the screen and in Markdown, from the data of ``bench diagnose --json``.
+
+The argument `data` of all functions is what `diagnosis_to_json` gives, fresh or read from a file
+through `diagnosis_from_json`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+from femubench.reports.blocks import Column, Items, Section, Table, to_markdown, to_terminal
+from femubench.reports.cells import NOTHING, fixed, plain
+from femubench.reports.figures import chance, estimate, figure, rms, signed
+from femubench.reports.markdown import escape
+
+Data = Mapping[str, Any]
+
+_MOST_RIVALS, _MOST_PLACES, _MOST_CHANGES, _MOST_ADVICE = 8, 5, 8, 5
+_LEAST = 0.005  # what two decimals show
+_CAUSES = {
+    "named": "What is missing",
+    "ambiguous": "Candidates, among which these data cannot decide",
+    "unknown": "Best guess, which does not explain the data",
+    "not-confirmed": "Best guess, which data held back do not confirm",
+}
+_GAINS = {
+    "used_percent": "used modes",
+    "held_out_percent": "held-out modes",
+    "modified_percent": "modified structure",
+    "cross_validated_percent": "each used mode left out in turn",
+}
+
+
+def diagnosis_text(data: Data) -> str:
+    """Return a diagnosis as plain text of 80 columns at most."""
+    return to_terminal(diagnosis_sections(data))
+
+
+def diagnosis_markdown(data: Data) -> str:
+    """Return a diagnosis in GitHub's Markdown."""
+    title = f"# Diagnosis of {escape(data['case'])}"
+    return f"{title}\n\n{to_markdown(diagnosis_sections(data))}"
+
+
+def summary_lines(data: Data) -> list[str]:
+    """Return the verdict and its causes, a line each, for a comment or a list."""
+    causes = (plain(f"{_at(cause)}: {_cause(cause)}") for cause in data["causes"])
+    return [line for line in (plain(data["sentence"]), *causes) if line]
+
+
+def diagnosis_sections(data: Data) -> list[Section]:
+    """Return what a diagnosis says, the verdict first, for a report of any form."""
+    parts = (
+        *(_verdict, _looks, _residuals, _causes, _rivals, _advice, _visible, _gain),
+        *(_locations, _notes, _written),
+    )
+    return [section for part in parts for section in part(data)]
+
+
+def _verdict(data: Data) -> Iterator[Section]:
+    said = [f"{data['case']}: {data['verdict']}"]
+    if data["nothing"] is not None:
+        said.append(f"that nothing is missing has probability {chance(data['nothing'])}")
+    if data["base"]:
+        said.append(f"taken at the textbook value: {', '.join(data['base'])}")
+    if data["sentence"]:
+        yield Section("", [data["sentence"]])
+    yield Section("", ["; ".join(said) + "."])
+
+
+def _looks(data: Data) -> Iterator[Section]:
+    if data["looks"]:
+        entries = [(look["where"], _look(look)) for look in data["looks"]]
+        yield Section("A plain look at the model, before any fit", [Items(entries)])
+
+
+def _look(look: Data) -> str:
+    known = [change for change in look["changes"] if change["percent"] is not None]
+    changes = [
+        f"mode {change['mode']} {signed(change['percent'], 2)} %"
+        for change in known[:_MOST_CHANGES]
+    ]
+    more = len(known) - len(changes)
+    by = f" ({look['effect']})" if look["effect"] else ""
+    tail = f" and {more} more" if more else ""
+    mended = f" Mended{by}: {', '.join(changes)}{tail}." if changes else by
+    return f"{look['what']}{mended}"
+
+
+def _residuals(data: Data) -> Iterator[Section]:
+    """Return the residuals, a mode a row, and how likely their sum is."""
+    rows = data["residuals"]
+    shapes = any(row["kind"] == "shape" for row in rows)
+    columns = [
+        Column("mode", 6),
+        Column("measured\nHz", 10),
+        Column("frequency\nbefore", 9),
+        Column("frequency\nafter", 9),
+    ]
+    if shapes:
+        columns += [
+            Column("shape\nsensors", 7),
+            Column("shape rms\nbefore", 9),
+            Column("shape rms\nafter", 9),
+        ]
+    modes = dict.fromkeys(row["mode"] for row in rows if row["mode"] is not None)
+    lines = [_mode_row(mode, rows, shapes)[: len(columns)] for mode in modes]
+    text = [
+        f"mass {figure(row['measured'])} kg: {signed(row['before'])} before, "
+        f"{signed(row['after'])} after"
+        for row in rows
+        if row["kind"] == "mass"
+    ]
+    blocks = [Table(columns, lines)] if lines else []
+    title = "Residuals in standard deviations, measured minus predicted"
+    yield Section(title, [*blocks, *text, _chi_square(data)])
+
+
+def _mode_row(mode: int, rows: Iterable[Data], shapes: bool) -> list[str]:
+    own = [row for row in rows if row["mode"] == mode]
+    frequency = next((row for row in own if row["kind"] == "frequency"), {})
+    shape = [row for row in own if row["kind"] == "shape"]
+    return [
+        str(mode),
+        figure(frequency.get("measured"), 6),
+        signed(frequency.get("before")),
+        signed(frequency.get("after")),
+        str(len(shape)),
+        figure(rms(row["before"] for row in shape), 3),
+        figure(rms(row["after"] for row in shape), 3),
+    ]
+
+
+def _chi_square(data: Data) -> str:
+    before, after = data["chi2"]
+    text = (
+        "Chi-square, ordinary scatter of the elements counted as noise: "
+        f"{figure(before)} before, {figure(after)} after, {data['data_count']} data"
+    )
+    if data["adequacy_p"] is None:
+        return f"{text}."
+    return f"{text}. Noise alone leaves as much with probability {data['adequacy_p']:.2g}."
+
+
+def _causes(data: Data) -> Iterator[Section]:
+    blocks: list[Items | str] = []
+    if data["causes"]:
+        blocks.append(Items([(_at(cause), _cause(cause)) for cause in data["causes"]]))
+    if data["reason"]:
+        blocks.append(data["reason"])
+    if blocks:
+        yield Section(_CAUSES.get(data["verdict"], "Causes"), blocks)
+
+
+def _cause(cause: Data) -> str:
+    parts = [f"probability {chance(cause['probability'])}"]
+    if cause["summary"]:
+        parts.append(cause["summary"])
+    return "; ".join([*parts, *(_parameter(item) for item in cause["parameters"])])
+
+
+def _parameter(item: Data) -> str:
+    unit = f" {item['unit']}" if item["unit"] else ""
+    source = " (textbook)" if item["textbook"] else ""
+    return f"{item['name']} {estimate(item['value'], item['std'])}{unit}{source}"
+
+
+def _at(item: Data) -> str:
+    if item["place"] == "all":
+        return f"{item['effect']}, everywhere"
+    return f"{item['effect']} at {item['place']}" if item["place"] else str(item["effect"])
+
+
+def _rivals(data: Data) -> Iterator[Section]:
+    entries = [(_pair_at(rival), _rival(rival)) for rival in data["rivals"][:_MOST_RIVALS]]
+    if entries:
+        yield Section("Rivals", [Items(entries), *_more(data["rivals"], entries)])
+
+
+def _pair_at(rival: Data) -> str:
+    """Return effects and places of a combination, each effect beside its place."""
+    effects, places = rival["effect"].split(" + "), rival["place"].split(" + ")
+    if len(effects) != len(places):
+        return _at(rival)
+    parts = [{"effect": e, "place": p} for e, p in zip(effects, places, strict=True)]
+    return " + ".join(map(_at, parts))
+
+
+def _rival(rival: Data) -> str:
+    text = (
+        f"probability {chance(rival['probability'])}, "
+        f"lowers chi-square by {figure(rival['delta_chi2'])}"
+    )
+    return text if rival["angle"] is None else f"{text}, {rival['angle']:.1f} degrees away"
+
+
+def _advice(data: Data) -> Iterator[Section]:
+    entries = [
+        ("", f"{item['measurement']} (separates by {figure(item['separation'], 3)} sigma squared)")
+        for item in data["advice"][:_MOST_ADVICE]
+    ]
+    if entries:
+        yield Section("What to measure next", [Items(entries), *_more(data["advice"], entries)])
+
+
+def _visible(data: Data) -> Iterator[Section]:
+    columns = [
+        *(Column("effect", 32, left=True), Column("at its best place", 22, left=True)),
+        *(Column("size", 10), Column("unit", 8, left=True)),
+    ]
+    rows = [
+        [item["effect"], item["place"], figure(item["size"], 3), item["unit"]]
+        for item in data["smallest_visible"]
+    ]
+    if rows:
+        yield Section("The smallest that these data would have shown", [Table(columns, rows)])
+
+
+def _gain(data: Data) -> Iterator[Section]:
+    gain = data["gain"]
+    found = [(title, gain[key]) for key, title in _GAINS.items() if gain[key] is not None]
+    columns = [Column("", 32, left=True), Column("before %", 9), Column("after %", 9)]
+    rows = [[title, *(fixed(value, 3, 7) for value in pair)] for title, pair in found]
+    title = "Gain: median frequency error before and after"
+    yield Section(title, [Table(columns, rows)])
+
+
+def _locations(data: Data) -> Iterator[Section]:
+    found: dict[str, list[Data]] = {}
+    for row in data["locations"]:
+        found.setdefault(row["indicator"], []).append(row)
+    entries = [(indicator, _top(rows)) for indicator, rows in found.items()]
+    if entries:
+        yield Section("Where the error sits, 1 at the largest", [Items(entries)])
+
+
+def _top(rows: Sequence[Data]) -> str:
+    known = [row for row in rows if (row["value"] or 0.0) >= _LEAST]
+    best = sorted(known, key=lambda row: -row["value"])[:_MOST_PLACES]
+    return ", ".join(f"{row['place']} {row['value']:.2f}" for row in best) or NOTHING
+
+
+def _notes(data: Data) -> Iterator[Section]:
+    if data["notes"]:
+        yield Section("Notes", [Items([("", note) for note in data["notes"]])])
+
+
+def _written(data: Data) -> Iterator[Section]:
+    if data.get("written"):
+        yield Section("", [f"The extended case is in {data['written']}"])
+
+
+def _more(all_: Sequence[Any], shown: Sequence[Any]) -> list[str]:
+    hidden = len(all_) - len(shown)
+    return [f"... and {hidden} more in the JSON"] if hidden else []

@@ -1,0 +1,160 @@
+"""What to measure next: which measurement wins, and by how much."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from femubench import (
+    Frame,
+    Model,
+)
+from femubench.core.diagnosis.advice import advise
+from femubench.core.diagnosis.data import Data, Noise
+from femubench.core.diagnosis.fit import fit
+from femubench.plugins.effects.density import Density
+from femubench.plugins.effects.joint_rotation import JointRotation
+from femubench.plugins.effects.shear_deformation import ShearDeformation
+from femubench.plugins.effects.temperature import Temperature
+from femubench.plugins.effects.youngs_modulus import YoungsModulus
+
+sys.path.insert(0, str(Path(__file__).parent))
+from advice_problems import STD, advised, every_option, fitted, one_outlook, posed
+
+FrameBuilder = Callable[..., Frame]
+
+
+@pytest.fixture(scope="module")
+def symmetric(ladder: FrameBuilder) -> Model:
+    """Return the ladder with its two mirror symmetries."""
+    return Model.of(ladder(polar=False, accelerometer=False))
+
+
+class TestWinners:
+    def test_weighing_tells_modulus_from_density(self, symmetric: Model) -> None:
+        truth = YoungsModulus().extend(symmetric, "all", [0.05])
+        problem = posed(symmetric, truth, [YoungsModulus(), Density()])
+        fits = [fitted(problem, YoungsModulus(), "all"), fitted(problem, Density(), "all")]
+        first, *rest = advised(symmetric, problem, fits)
+        assert first.measurement == "weigh the structure"
+        # A density 5 % lower weighs 1/1.05 - 1; the fit knows it to 2 STD / sqrt(6).
+        gap = 1.0 - 1.0 / 1.05
+        expected = gap**2 / (STD**2 + (2.0 * STD / 1.05) ** 2 / 6.0)
+        assert first.separation == pytest.approx(expected, rel=0.03)
+        assert all(advice.separation < 0.02 * first.separation for advice in rest)
+        assert all(a.measurement.startswith("attach") for a in rest)  # a known mass is a scale too
+        # Scatter of 28 elements makes the nominal mass less sure.
+        loose, *_ = advise(symmetric, [problem] * 2, fits, tolerance=0.02)
+        more = STD**2 + 0.02**2 / 28 + (2.0 * STD / 1.05) ** 2 / 6.0
+        assert loose.separation == pytest.approx(gap**2 / more, rel=0.03)
+
+    def test_a_weighed_structure_is_not_weighed_again(self, symmetric: Model) -> None:
+        truth = YoungsModulus().extend(symmetric, "all", [0.05])
+        plain = posed(symmetric, truth, [YoungsModulus(), Density()])
+        mass = plain.space.mass
+        measurement = replace(plain.data.measurement, total_mass=(mass, 0.02 * mass))
+        weighed = replace(
+            plain, data=Data(measurement, np.zeros(0)), noise=Noise.of(np.zeros((7, 0)), 0.0)
+        )
+        fits = [fitted(weighed, YoungsModulus(), "all"), fitted(weighed, Density(), "all")]
+        found = advised(symmetric, weighed, fits)
+        assert found
+        assert not any("weigh" in advice.measurement for advice in found)
+
+    def test_mirror_joints_need_a_place_off_the_symmetry(self, symmetric: Model) -> None:
+        truth = JointRotation().extend(symmetric, "A", [3000.0])
+        problem = posed(symmetric, truth, [JointRotation()])
+        fits = [fitted(problem, JointRotation(), place) for place in ("A", "F")]
+        assert abs(fits[0].state.chi2 - fits[1].state.chi2) < 1e-6
+        found = advised(symmetric, problem, fits)
+        best = next(a for a in found if "antiresonance" in a.measurement)
+        assert best.measurement == (
+            "measure the antiresonance near 524 Hz of the point receptance at AB@0.5, z"
+        )
+        assert best.separation > 50.0  # the first prototype's figure for such a point
+        assert any(a.measurement == "attach 0.024 kg at A and measure again" for a in found)
+        assert all(
+            "BE@0.5" not in a.measurement and "modes" not in a.measurement[:15] for a in found
+        )
+        options = every_option(symmetric, problem, fits)
+        middle = [o for text, o in options.items() if " at BE@0.5" in text]
+        assert len(middle) == 2
+        (modes,) = (o for text, o in options.items() if "2 more modes" in text)
+        assert max(*middle, modes) < 1e-6
+
+    def test_nothing_helps_between_twins_but_one_option_stays(self, symmetric: Model) -> None:
+        truth = YoungsModulus().extend(symmetric, "all", [0.05])
+        problem = posed(symmetric, truth, [YoungsModulus()])
+        found = fitted(problem, YoungsModulus(), "all")
+        (only,) = advised(symmetric, problem, [found, found])
+        assert only.separation < 1e-12
+        assert advised(symmetric, problem, [found]) == ()
+
+
+class TestGroups:
+    def test_of_three_says_which_are_told_apart(self, symmetric: Model) -> None:
+        effects = [YoungsModulus(), Density(), Temperature()]
+        truth = YoungsModulus().extend(symmetric, "all", [-0.015])
+        problem = posed(symmetric, truth, effects)
+        found = advised(symmetric, problem, [fitted(problem, e, "all") for e in effects])
+        texts = [advice.measurement for advice in found]
+        assert texts[:2] == [
+            "read the temperature (tells youngs-modulus from temperature only)",
+            "weigh the structure (tells youngs-modulus from density only)",
+        ]
+        # -1.5 % is 41.7 K of aluminium, known to 2 STD / sqrt(6) of E and a priori to 10 K.
+        per_kelvin = 3.6e-4
+        std = 2.0 * STD * 0.985 / np.sqrt(6.0) / per_kelvin
+        share = 1.0 / (1.0 + (std / 10.0) ** 2)
+        expected = (share * 0.015 / per_kelvin) ** 2 / (1.0 + share * std**2)
+        assert found[0].separation == pytest.approx(expected, rel=0.02)
+
+    def test_second_level_comes_last_and_only_for_what_is_softer(self, symmetric: Model) -> None:
+        effects = [YoungsModulus(), Density()]
+        for change, shown in ((-0.03, True), (0.03, False)):
+            truth = YoungsModulus().extend(symmetric, "all", [change])
+            problem = posed(symmetric, truth, effects)
+            found = advised(symmetric, problem, [fitted(problem, e, "all") for e in effects])
+            last = found[-1].measurement
+            assert ("twice the excitation level" in last) is shown
+            if shown:
+                # The fall of every frequency is ln sqrt(0.97), known to STD / sqrt(6).
+                fall = 1.0 / np.sqrt(1.0 + change) - 1.0
+                expected = fall**2 / (2.0 * STD**2 + STD**2) * 6.0
+                assert found[-1].separation == pytest.approx(expected, rel=0.05)
+
+    def test_textbook_effects_under_the_causes(self, symmetric: Model) -> None:
+        effects = [JointRotation()]
+        shear = ShearDeformation().extend(symmetric, "all", [1.0])
+        truth = JointRotation().extend(shear, "A", [3000.0])
+        plain, above = (posed(model, truth, effects) for model in (symmetric, shear))
+        fits = [fitted(above, JointRotation(), "A"), fitted(plain, JointRotation(), "F")]
+        assert fits[0].state.chi2 < 1e-2 < fits[1].state.chi2
+        for problem, found in zip((above, plain), fits, strict=True):
+            own, _ = one_outlook(problem, found)
+            used = own.state.partner
+            assert_allclose(own.state.frequencies[used], found.state.frequencies[used], rtol=1e-9)
+        advice = advise(symmetric, [above, plain], fits, tolerance=0.0)
+        assert advice[0].separation > 50.0
+        nothing = fit(above, (), np.zeros(0))
+        assert nothing is not None
+        bare = advise(symmetric, [above, plain], [nothing, fits[1]], tolerance=0.0)
+        assert bare[0].separation > 50.0
+
+    def test_quick_enough(self, symmetric: Model) -> None:
+        truth = JointRotation().extend(symmetric, "A", [3000.0])
+        problem = posed(symmetric, truth, [JointRotation()])
+        fits = [fitted(problem, JointRotation(), place) for place in ("A", "C", "D", "F")]
+        spent = []
+        for _ in range(3):
+            begin = time.perf_counter()
+            advised(symmetric, problem, fits)
+            spent.append(time.perf_counter() - begin)
+        assert min(spent) < 0.15

@@ -1,0 +1,231 @@
+"""What explanations predict for data not yet taken, against whole models meshed anew."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+from numpy.testing import assert_allclose
+from scipy.special import logsumexp
+
+from femubench import (
+    FloatArray,
+    Frame,
+    Model,
+    Place,
+    PointMass,
+    Support,
+    point_in,
+    solve_modes,
+    translation_rows,
+)
+from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.diagnosis import advice_points
+from femubench.core.diagnosis.advice_options import aligned
+from femubench.core.diagnosis.advice_outlook import (
+    Outlook,
+    Points,
+    Predicted,
+    distance,
+)
+from femubench.core.diagnosis.advice_points import (
+    antiresonances,
+    loaded_frequencies,
+)
+from femubench.core.diagnosis.fit import Fit, fit, state_at
+from femubench.core.model import Dofs
+from femubench.plugins.effects.added_mass import AddedMass
+from femubench.plugins.effects.attached_oscillator import AttachedOscillator
+from femubench.plugins.effects.grounding_spring import GroundingSpring
+from femubench.plugins.effects.joint_rotation import JointRotation
+from femubench.plugins.effects.youngs_modulus import YoungsModulus
+
+sys.path.insert(0, str(Path(__file__).parent))
+from advice_problems import STD, advised, every_option, fitted, one_outlook, part_of, posed
+
+FrameBuilder = Callable[..., Frame]
+
+
+@pytest.fixture(scope="module")
+def symmetric(ladder: FrameBuilder) -> Model:
+    """Return the ladder with its two mirror symmetries."""
+    return Model.of(ladder(polar=False, accelerometer=False))
+
+
+def seen_values(view: Outlook, points: Points, shapes: FloatArray) -> list[Predicted]:
+    """Return predictions of every kind, shapes at their best scale to given ones."""
+    return [
+        view.mass(),
+        view.frequencies(view.further(2)),
+        aligned(shapes, *view.shapes()),
+        view.flexibility(),
+        *loaded_frequencies(view, points, 0.03),
+        *antiresonances(view),
+    ]
+
+
+class TestPredictions:
+    """Small pencils against whole models that were meshed and solved anew."""
+
+    @pytest.mark.parametrize("name", ["ladder", "hframe", "portal"])
+    def test_loaded_and_held_structures(
+        self, name: str, ladder: FrameBuilder, hframe: FrameBuilder, portal: FrameBuilder
+    ) -> None:
+        builders = {"ladder": ladder, "hframe": lambda: hframe(mesh=(8, 4, 8))}
+        frame = builders.get(name, lambda: replace(portal(3), joint_springs=(), rigid_ends=()))()
+        model = Model.of(frame)
+        effect, size = AddedMass(), [0.05]
+        place = frame.joints[0].name
+        extended = effect.extend(model, place, size)
+        problem = posed(model, extended, [effect])
+        part = part_of(problem, effect, place)
+        x = np.array(
+            [p.coordinate(v) for p, v in zip(part.hypothesis.parameters, size, strict=True)]
+        )
+        view, points = one_outlook(problem, Fit(state_at(problem, (part,), x), 0.0))
+        loaded = loaded_frequencies(view, points, 0.04)
+        zeros = antiresonances(view)
+        rigid = problem.space.rigid
+        for i in range(0, len(points.labels), 3):
+            at = point_in(model, points.labels[i])
+            other = extended.attach([PointMass(at, 0.04)], [])
+            expected = solve_modes(other).natural_frequencies[rigid : rigid + 6]
+            assert_allclose(loaded[i].values, expected, rtol=2e-5)
+            sensor = sum(points.counts[:i])
+            row = np.asarray(translation_rows(extended, at, points.directions[i][:1]).toarray())
+            free = la.null_space(row)
+            inner = [free.T @ m.toarray() @ free for m in (extended.stiffness, extended.mass)]
+            top = problem.data.measurement.frequencies.max()
+            found = zeros[sensor].values[zeros[sensor].values < top]
+            eigenvalues = la.eigh(*inner, eigvals_only=True)
+            exact = np.sqrt(np.abs(eigenvalues)) / (2 * np.pi)
+            gap = np.abs(exact - found[:, None]).min(axis=1) / found
+            assert gap.max(initial=0.0) < 2e-4
+            poles = solve_modes(extended).natural_frequencies
+            near = np.abs(exact[:, None] - poles).min(axis=1) < 0.0101 * exact
+            low = exact > problem.space.zero
+            assert len(found) >= int((~near & low & (exact < 0.99 * top)).sum())
+
+    def test_spread_is_the_change_within_a_deviation(
+        self, ladder: FrameBuilder, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(advice_points, "_SPARE", 1000)  # all modes: the rule alone is at stake
+        frame = ladder(polar=False)
+        frame = replace(frame, supports=tuple(Support(Place(joint=j), ("z",)) for j in "ADF"))
+        model = Model.of(frame)
+        truth = JointRotation().extend(model, "L", [4e3, 3e3])
+        problem = posed(model, truth, [JointRotation()])
+        found = fitted(problem, JointRotation(), "L", 1.0)
+        middle, points = one_outlook(problem, found)
+        assert problem.space.rigid == 0
+        shapes, _ = middle.shapes()
+        centre = seen_values(middle, points, shapes)
+        root = np.linalg.cholesky(found.covariance)
+        for column in range(2):
+            ends = []
+            for sign in (-1.0, 1.0):
+                x = found.state.x + 1e-3 * sign * root[:, column]
+                moved = Fit(state_at(problem, found.parts, x), 0.0)
+                ends.append(seen_values(one_outlook(problem, moved)[0], points, shapes))
+            for own, low, high in zip(centre, *ends, strict=True):
+                slope = (high.values - low.values) / 2e-3
+                scale = np.abs(own.spread).max(initial=1e-12)
+                assert np.abs(own.spread[:, column] - slope).max(initial=0.0) < 1e-4 * scale
+
+    def test_deflection_of_a_held_frame(self, ladder: FrameBuilder) -> None:
+        frame = ladder(polar=False, accelerometer=False)
+        held = replace(frame, supports=(Support(Place(joint="A"), ("z", "rx", "ry")),))
+        model = Model.of(held)
+        effects = [GroundingSpring(), YoungsModulus()]
+        problem = posed(model, YoungsModulus().extend(model, "all", [0.1]), effects)
+        fits = [fitted(problem, YoungsModulus(), "all"), fitted(problem, GroundingSpring(), "F")]
+        options = every_option(model, problem, fits)
+        (text,) = (text for text in options if "static" in text)
+        assert text == "measure the static deflection under a known load at F, z"
+        view, _ = one_outlook(problem, fits[0])
+        row = translation_rows(model, Place(joint="F"), ["z"]).toarray()[0]
+        stiff = YoungsModulus().extend(model, "all", [0.1]).stiffness.toarray()
+        exact = float(row @ la.solve(stiff, row))
+        found = view.flexibility().values.max()
+        assert found == pytest.approx(exact, rel=1e-3)
+
+    def test_added_coordinates_and_matrices(self, symmetric: Model) -> None:
+        """An oscillator brings a mode of its own; a pair of matrices has nodes alone."""
+        effects = [AttachedOscillator(), AddedMass()]
+        problem = posed(symmetric, AddedMass().extend(symmetric, "A", [0.05]), effects)
+        part = part_of(problem, AttachedOscillator(), "A")
+        high = part.hypothesis.bounds[1][1]
+        heavy = fit(problem, (part,), np.array([0.3, high]))
+        assert heavy is not None
+        found = advised(symmetric, problem, [fitted(problem, AddedMass(), "A"), heavy])
+        assert found
+        assert all(np.isfinite(advice.separation) for advice in found)
+        names = tuple(f"n{i}" for i in range(int(symmetric.dofs.node.max()) + 1))
+        dofs = Dofs(symmetric.dofs.node, symmetric.dofs.direction, symmetric.dofs.xyz)
+        bare = Model(symmetric.mass, symmetric.stiffness, dofs, MatrixGeometry(names, dofs))
+        problem = posed(bare, AddedMass().extend(bare, "n0", [0.05]), [AddedMass()])
+        fits = [fitted(problem, AddedMass(), place) for place in ("n0", "n5")]
+        first = advised(bare, problem, fits)[0]
+        assert first.separation > 1.0
+        assert not any("weigh" in a.measurement for a in advised(bare, problem, fits))
+
+
+def test_distance_against_likelihood_ratios(symmetric: Model) -> None:
+    """Twice the mean log likelihood ratio of simulated data is the distance, coarsely.
+
+    Whole models with the mass on them, at coordinates drawn from each posterior, stand for what
+    the two explanations say; none of the linear rules takes part. The distance charges each side
+    with the spread of both, a likelihood with its own: they agree where measurement noise rules.
+    """
+    rng = np.random.default_rng(7)
+    mass = 0.1
+    problem = posed(symmetric, JointRotation().extend(symmetric, "A", [3e3]), [JointRotation()])
+    fits = [fitted(problem, JointRotation(), at) for at in ("A", "F")]
+    predicted = []
+    for found in fits:
+        view, points = one_outlook(problem, found)
+        predicted.append(loaded_frequencies(view, points, mass)[points.labels.index("A")])
+    tables = [_drawn(symmetric, found, "A", mass, rng) for found in fits]
+    std = 3.0 * STD * tables[0].mean(axis=0)
+    stated = distance(predicted[0], predicted[1], std)
+    ratios = []
+    for truth, sign in ((0, 1.0), (1, -1.0)):
+        drawn = tables[truth][rng.integers(len(tables[truth]), size=2000)]
+        data = drawn + std * rng.standard_normal(drawn.shape)
+        logs = [_log_likelihood(data, table, std) for table in tables]
+        ratios.append(2.0 * sign * float(np.mean(logs[0] - logs[1])))
+    assert stated > 5.0
+    assert np.mean(ratios) == pytest.approx(stated, rel=0.2)
+
+
+def _drawn(
+    model: Model, found: Fit, place: str, mass: float, rng: np.random.Generator
+) -> FloatArray:
+    """Return frequencies with the mass at draws from a posterior, (30, m)."""
+    hypothesis = found.parts[0].hypothesis
+    rows = []
+    for z in rng.standard_normal(30):
+        x = found.state.x + np.sqrt(found.covariance[0, 0]) * z
+        values = [float(v) for v in hypothesis.values(x[None])[0]]
+        extended = hypothesis.effect.extend(model, hypothesis.place, values)
+        loaded = extended.attach([PointMass(Place(joint=place), mass)], [])
+        rows.append(solve_modes(loaded).elastic.natural_frequencies[:6])
+    return np.array(rows)
+
+
+def _log_likelihood(data: FloatArray, table: FloatArray, std: FloatArray) -> FloatArray:
+    """Return ln p(data) averaged over the draws, (n_data,)."""
+    gap = (data[:, None, :] - table) / std
+    return np.asarray(logsumexp(-0.5 * np.square(gap).sum(axis=2), axis=1))
+
+
+def test_distance_counts_measurement_and_both_fits() -> None:
+    first = Predicted(np.array([1.0, 0.0]), np.array([[0.3], [0.0]]))
+    second = Predicted(np.array([0.0, 0.0]), np.array([[0.0], [0.4]]))
+    std = np.array([0.4, 0.2])
+    assert distance(first, second, std) == pytest.approx(1.0 / (0.16 + 0.09))

@@ -1,0 +1,184 @@
+"""The keys of case.toml that set a structure apart from its plain beams, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from femubench.core.case.reader import read_case
+from femubench.core.errors import InputError
+from femubench.core.fem.frame import (
+    Brace,
+    Coupling,
+    Eccentricity,
+    Factor,
+    Oscillator,
+    Place,
+    Preload,
+)
+
+CASES = Path(__file__).parent / "cases"
+LINES = """
+[[model.factors]]
+quantity = "E"
+at = ["{member}/1", "{member}"]
+factor = 0.7
+[[model.factors]]
+quantity = "shear"
+at = "all"
+factor = 0
+[[model.eccentricities]]
+member = "{member}"
+y = 0.004
+[[model.couplings]]
+member = "{member}"
+coefficient = 0.1
+[[model.braces]]
+ends = ["{a}", "{b}"]
+stiffness = 1.0e5
+[[model.oscillators]]
+at = "{member}@0.3"
+direction = "-z"
+mass = 0.05
+frequency = 300.0
+[[model.preloads]]
+member = "{member}"
+force = -12.0
+"""
+
+
+def case_with(folder: Path, text: str, case: str = "3d") -> Path:
+    """Write a case of the tests with further lines in it."""
+    folder.mkdir(parents=True)
+    for file in (CASES / case).iterdir():
+        (folder / file.name).write_bytes(file.read_bytes())
+    (folder / "case.toml").write_text((CASES / case / "case.toml").read_text() + text)
+    return folder
+
+
+RING = """
+[[model.joints]]
+name = "ring"
+xyz = [0.31, 0.17, -0.42]
+[[model.members]]
+name = "ring-1"
+ends = ["{a}", "ring"]
+section = "{section}"
+material = "{material}"
+[[model.members]]
+name = "ring-2"
+ends = ["ring", "{b}"]
+section = "{section}"
+material = "{material}"
+"""
+
+
+class TestReading:
+    @pytest.fixture
+    def names(self) -> dict[str, str]:
+        frame = read_case(CASES / "3d").model.frame_structure.frame
+        text = (CASES / "3d" / "case.toml").read_text()
+        found = dict.fromkeys(("section", "material"), "")
+        for key in found:
+            line = next(row for row in text.splitlines() if row.startswith(f"{key} ="))
+            found[key] = line.split('"')[1]
+        member = frame.members[0]
+        return found | {"member": member.name, "a": member.ends[0], "b": member.ends[1]}
+
+    def test_every_key_arrives(self, tmp_path: Path, names: dict[str, str]) -> None:
+        text = (RING + LINES).format(**names)
+        path = case_with(tmp_path / "case", text)
+        changed = (path / "case.toml").read_text()
+        changed = changed.replace('plane = "3d"', 'plane = "3d"\nrotary_inertia = 1.4')
+        (path / "case.toml").write_text(changed)
+        frame = read_case(path).model.frame_structure.frame
+        m = names["member"]
+        assert frame.rotary_inertia == 1.4
+        assert frame.factors == (Factor("E", (f"{m}/1", m), 0.7), Factor("shear", ("all",), 0.0))
+        assert frame.eccentricities == (Eccentricity(m, 0.004, 0.0),)
+        assert frame.couplings == (Coupling(m, 0.1),)
+        assert frame.braces == (Brace((names["a"], names["b"]), 1e5),)
+        assert frame.oscillators == (Oscillator(Place(member=m, s=0.3), "-z", 0.05, 300.0),)
+        assert frame.preloads == (Preload(m, -12.0),)
+
+    @pytest.mark.parametrize(
+        ("old", "new", "key", "what", "expected"),
+        [
+            ('"E"', '"G"', "factors[0].quantity", "'G'", "EA, EI"),
+            ('/1"', '/99"', "factors[0].at", "element '99'", "1 to"),
+            ('/1"', '/01"', "factors[0].at", "element '01'", "1 to"),
+            ('"all"', '"everything"', "factors[1].at", "no member 'everything'", "member/k"),
+            ('"all"', "3", "factors[1].at", "places", "member/k"),
+            ('"all"', "[]", "factors[1].at", "places", "member/k"),
+            ("factor = 0.7", "factor = 0.0", "factors[0].factor", "leaves no E", "> 0"),
+            ("factor = 0.7", "factor = -1", "factors[0].factor", "-1", "> 0"),
+            ("0.1\n", "1.0\n", "couplings[0].coefficient", "1.0", "< 1"),
+            ("0.1\n", "-1\n", "couplings[0].coefficient", "-1", "< 1"),
+            ('ends = ["{a}"', 'ends = ["Q"', "braces[0].ends[0]", "no joint 'Q'", "joint"),
+            ('"{b}"]', '"{a}"]', "braces[0].ends", "zero", "different"),
+            ("1.0e5", "-1.0e5", "braces[0].stiffness", "-1", ">= 0"),
+            ("@0.3", "@1.3", "oscillators[0].at", "0..1", "0.25"),
+            ('"{member}@0.3"', '"Q"', "oscillators[0].at", "'Q'", "joint"),
+            ('"-z"', '"rz"', "oscillators[0].direction", "rotation", "translation"),
+            ("mass = 0.05", "mass = 0", "oscillators[0].mass", "0", "> 0"),
+            ("300.0", "0.0", "oscillators[0].frequency", "0", "> 0"),
+            ("-12.0", "inf", "preloads[0].force", "inf", "N"),
+            ("y = 0.004", "x = 0.004", "eccentricities[0].x", "unknown", "y"),
+        ],
+    )
+    def test_what_is_wrong_is_one_line(
+        self, tmp_path: Path, names: dict[str, str],
+        old: str, new: str, key: str, what: str, expected: str,
+    ) -> None:  # fmt: skip
+        text = LINES.replace(old, new, 1)
+        assert text != LINES
+        path = case_with(tmp_path / "case", text.format(**names))
+        with pytest.raises(InputError) as caught:
+            read_case(path)
+        error = caught.value
+        assert "\n" not in str(error)
+        assert error.key == f"model.{key}"
+        assert what in str(error).split("expected")[0]
+        assert error.expected is not None
+        assert expected in error.expected
+        assert error.line is not None
+
+    @pytest.mark.parametrize("table", ["preloads", "eccentricities", "couplings"])
+    def test_unknown_members_are_named(self, tmp_path: Path, table: str) -> None:
+        rest = {"preloads": "force = 1.0", "eccentricities": "", "couplings": "coefficient = 0.1"}
+        text = f'\n[[model.{table}]]\nmember = "Q"\n{rest[table]}\n'
+        with pytest.raises(InputError, match="no member 'Q'") as caught:
+            read_case(case_with(tmp_path / "case", text))
+        assert caught.value.key == f"model.{table}[0].member"
+
+    @pytest.mark.parametrize(
+        ("case", "text", "key"),
+        [
+            ("out-of-plane", '[[model.braces]]\nends = ["A", "C"]\nstiffness = 1.0', "braces[0]"),
+            ("out-of-plane", '[[model.eccentricities]]\nmember = "long"\nz = 0.1',
+             "eccentricities[0].z"),
+            ("in-plane", '[[model.eccentricities]]\nmember = "left"\ny = 0.1',
+             "eccentricities[0].y"),
+            ("in-plane", '[[model.couplings]]\nmember = "left"\ncoefficient = 0.1', "couplings[0]"),
+            ("out-of-plane", '[[model.oscillators]]\nat = "A"\ndirection = "x"\nmass = 1.0\n'
+             "frequency = 1.0", "oscillators[0].direction"),
+            ("out-of-plane", '[[model.preloads]]\nmember = "long"\nforce = 1.0', "preloads[0]"),
+        ],
+    )  # fmt: skip
+    def test_what_the_plane_does_not_have_is_refused(
+        self, tmp_path: Path, case: str, text: str, key: str
+    ) -> None:
+        with pytest.raises(InputError) as caught:
+            read_case(case_with(tmp_path / "case", f"\n{text}\n", case))
+        assert caught.value.key == f"model.{key}"
+
+    @pytest.mark.parametrize("value", ["-0.5", "'yes'", "nan", "[1.0]"])
+    def test_the_rotary_inertia_is_no_such_thing(self, tmp_path: Path, value: str) -> None:
+        path = case_with(tmp_path / "case", "")
+        text = (path / "case.toml").read_text()
+        text = text.replace('plane = "3d"', f'plane = "3d"\nrotary_inertia = {value}')
+        (path / "case.toml").write_text(text)
+        with pytest.raises(InputError, match="rotary inertia") as caught:
+            read_case(path)
+        assert caught.value.key == "model.rotary_inertia"

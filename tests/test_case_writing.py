@@ -1,0 +1,836 @@
+"""A case folder that was written reads back to the same case, and writes the same bytes again."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tomllib
+from collections.abc import Iterator
+from dataclasses import MISSING, fields, replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.sparse as sp
+from hypothesis import given, settings, strategies as st
+
+from femubench import Case, InputError, Model, read_case
+from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.case.writing import write_case
+from femubench.core.fem.frame import (
+    Brace,
+    Coupling,
+    Eccentricity,
+    Factor,
+    Frame,
+    GroundSpring,
+    JointSpring,
+    Oscillator,
+    Place,
+    PointMass,
+    Preload,
+    RigidEnd,
+    Support,
+)
+from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.sections import Section, constant_kappa, rectangular_tube, round_tube
+from femubench.core.measurement import Measurement, Sensors
+from femubench.core.model import LowRank
+
+HERE = Path(__file__).parent
+CASES = HERE / "cases"
+FOLDERS = sorted(
+    file.parent
+    for above in (HERE.parent / "scenarios", CASES)
+    for file in above.glob("**/case.toml")
+)
+
+
+def frame_of(case: Case) -> Frame:
+    return case.model.frame_structure.frame
+
+
+def assert_same_section(one: Section, other: Section) -> None:
+    for f in fields(Section):
+        if f.name != "kappa":
+            assert getattr(one, f.name) == getattr(other, f.name), f.name
+    if one.kappa is None or other.kappa is None:
+        assert one.kappa is other.kappa
+    else:  # the wall of a tube is known but for the last digits
+        for nu in (0.0, 0.17, 0.3):
+            np.testing.assert_allclose(one.kappa(nu), other.kappa(nu), rtol=1e-13)
+
+
+def assert_same_frame(one: Frame, other: Frame) -> None:
+    for f in fields(Frame):
+        if f.name != "members":
+            assert getattr(one, f.name) == getattr(other, f.name), f.name
+    for first, second in zip(one.members, other.members, strict=True):
+        assert_same_section(first.section, second.section)
+        assert replace(first, section=second.section) == second
+
+
+def assert_same_matrix(one: Any, other: Any) -> None:
+    size = np.sqrt(np.abs(one.diagonal()))
+    apart = (one - other).tocoo()
+    assert np.all(np.abs(apart.data) <= 1e-12 * size[apart.row] * size[apart.col])
+
+
+def assert_same_measurement(one: Measurement, other: Measurement) -> None:
+    for f in fields(Measurement):
+        first, second = getattr(one, f.name), getattr(other, f.name)
+        if isinstance(first, np.ndarray):
+            np.testing.assert_array_equal(first, second)
+        elif f.name != "sensors":
+            assert first == second
+    assert one.sensors.labels == other.sensors.labels
+    assert one.sensors.directions == other.sensors.directions
+    np.testing.assert_array_equal(one.sensors.xyz, other.sensors.xyz)
+
+
+def assert_same_case(one: Case, other: Case) -> None:
+    for name in ("name", "title", "source", "used", "held_out", "band", "tolerance"):
+        assert getattr(one, name) == getattr(other, name)
+    assert_same_matrix(one.model.mass, other.model.mass)
+    assert_same_matrix(one.model.stiffness, other.model.stiffness)
+    assert one.model.dofs.direction == other.model.dofs.direction
+    np.testing.assert_array_equal(one.model.dofs.node, other.model.dofs.node)
+    np.testing.assert_array_equal(one.model.dofs.xyz, other.model.dofs.xyz)
+    assert_same_measurement(one.measurement, other.measurement)
+    for first, second in zip(one.modifications, other.modifications, strict=True):
+        assert (first.name, first.masses, first.springs) == (
+            second.name,
+            second.masses,
+            second.springs,
+        )
+        assert_same_measurement(first.measurement, second.measurement)
+
+
+def content(folder: Path) -> dict[Path, bytes]:
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder): path.read_bytes() for path in files}
+
+
+def round_trip(tmp_path: Path, case: Case, **how: Any) -> Case:
+    """Write a case, read it, write it again to the same bytes; return what was read."""
+    first, second = tmp_path / "first", tmp_path / "second"
+    write_case(first, case, **how)
+    back = read_case(first)
+    write_case(second, back, comment=how.get("comment", ()))
+    assert content(first) == content(second)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["first", "second"]
+    return back
+
+
+def with_frame(case: Case, frame: Frame) -> Case:
+    return replace(case, model=Model.of(frame))
+
+
+def model_keys(folder: Path) -> dict[str, Any]:
+    keys: dict[str, Any] = tomllib.loads((folder / "case.toml").read_text("utf-8"))["model"]
+    return keys
+
+
+@cache
+def case_at(folder: Path) -> Case:
+    return read_case(folder)
+
+
+@pytest.fixture
+def ladder() -> Case:
+    return case_at(HERE.parent / "scenarios" / "frame-beam")
+
+
+@pytest.fixture
+def portal() -> Case:
+    return case_at(CASES / "in-plane")
+
+
+@pytest.fixture
+def bracket() -> Case:
+    return case_at(CASES / "3d")
+
+
+def named(folder: Path) -> str:
+    return f"{folder.parent.name}/{folder.name}"
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=named)
+def test_every_case_reads_back(tmp_path: Path, folder: Path) -> None:
+    case = read_case(folder)
+    back = round_trip(tmp_path, case)
+    assert_same_case(case, back)
+    assert_same_frame(frame_of(case), frame_of(back))
+    old, new = (tomllib.loads((f / "case.toml").read_text()) for f in (folder, tmp_path / "first"))
+    for key in ("materials", "sections"):
+        assert set(new["model"][key]) <= set(old["model"][key])
+    assert new["model"]["materials"] == old["model"]["materials"]
+
+
+def full_frames(ladder: Case, portal: Case, bracket: Case) -> Iterator[tuple[str, Case, Frame]]:
+    """Yield frames that together differ from a default frame in every field."""
+    end, point = Place(joint="J3"), Place(member="back-left", s=0.3)
+    base = frame_of(ladder)
+    yield (
+        "out-of-plane",
+        ladder,
+        replace(
+            base,
+            beam="timoshenko",
+            bending_mass="shear-consistent",
+            rotary_inertia=1.4,
+            masses=(PointMass(point, 0.05, (0.0, 0.01, 0.0)),),
+            springs=(GroundSpring(end, "-ry", 1.2345678901234567),),
+            supports=(Support(Place(joint="J9"), ("rx",)),),
+            joint_springs=(JointSpring("J5", "front-left", {"ry": 3e4, "rx": 1 / 3}, 0.0127),),
+            rigid_ends=(RigidEnd("J1", "rung-right", 0.01, 0.005),),
+            factors=(
+                Factor("E", ("front-left/2", "rung-left"), 0.7),
+                Factor("shear", ("all",), 0.0),
+            ),
+            preloads=(Preload("front-left", 1500.0),),
+            eccentricities=(Eccentricity("front-left", y=0.004),),
+            couplings=(Coupling("front-left", -0.1),),
+            oscillators=(Oscillator(point, "z", 0.05, 300.0),),
+        ),
+    )
+    base = frame_of(portal)
+    yield (
+        "in-plane",
+        portal,
+        replace(
+            base,
+            rotary_inertia=True,
+            braces=(Brace(("A", "C"), 1e5),),
+            eccentricities=(Eccentricity("left", z=-0.004),),
+            oscillators=(Oscillator(Place(joint="B"), "x", 0.05, 30.0),),
+        ),
+    )
+    base = frame_of(bracket)
+    yield (
+        "3d",
+        bracket,
+        replace(
+            base,
+            rotary_inertia=0.5,
+            braces=(Brace(("foot", "tip"), 1e5),),
+            couplings=(Coupling("arm", 0.2), Coupling("arm", 0.1)),
+            eccentricities=(Eccentricity("arm", 1e-3, -2e-3),),
+            joint_springs=(JointSpring("knee", "arm", {"ry": 3e4, "rz": 2e4}, 0.01),),
+            oscillators=(Oscillator(Place(member="arm", s=0.5), "-y", 0.05, 300.0),),
+        ),
+    )
+
+
+def test_every_field_of_a_frame_reads_back(
+    tmp_path: Path, ladder: Case, portal: Case, bracket: Case
+) -> None:
+    seen = set()
+    for name, case, frame in full_frames(ladder, portal, bracket):
+        (tmp_path / name).mkdir()
+        changed = with_frame(case, frame)
+        back = round_trip(tmp_path / name, changed)
+        assert_same_case(changed, back)
+        assert_same_frame(frame, frame_of(back))
+        seen |= {f.name for f in fields(Frame) if getattr(frame, f.name) != f.default}
+    assert seen == {f.name for f in fields(Frame)}
+    assert all(f.default is not MISSING for f in fields(Frame)[4:])
+
+
+def test_a_model_given_beside_the_case_is_the_one_written(tmp_path: Path, ladder: Case) -> None:
+    frame = replace(frame_of(ladder), factors=(Factor("GJ", ("all",), 0.6),))
+    lines = [
+        "cause: torsion constant",
+        'with "quotes"\nand a second line',
+        "tab\tand \x07 bell",
+        "",
+    ]
+    back = round_trip(
+        tmp_path, ladder, model=Model.of(frame), comment=lines, name="ladder 2", title="a title"
+    )
+    assert_same_frame(frame, frame_of(back))
+    assert (back.name, back.title, back.source) == ("ladder 2", "a title", ladder.source)
+    assert_same_measurement(ladder.measurement, back.measurement)
+    top = (tmp_path / "first" / "case.toml").read_text().splitlines()[:6]
+    assert top == [
+        "# cause: torsion constant",
+        '# with "quotes"',
+        "# and a second line",
+        "# tab and   bell",
+        "#",
+        "",
+    ]
+    write_case(tmp_path / "text", ladder, comment="one\ntwo")
+    assert (tmp_path / "text" / "case.toml").read_text().startswith("# one\n# two\n\n[case]\n")
+
+
+def test_settings_read_back(tmp_path: Path, ladder: Case) -> None:
+    measurement = replace(ladder.measurement, total_mass=(1.0 / 3.0, 1e-7))
+    case = replace(
+        ladder, measurement=measurement, band=(0.0, 912.34), tolerance=0.0, held_out=(), source=""
+    )
+    assert_same_case(case, round_trip(tmp_path, case))
+
+
+# --- sections and materials -----------------------------------------------------------------------
+
+
+def with_sections(case: Case, sections: dict[str, Section]) -> Frame:
+    frame = frame_of(case)
+    members = (replace(m, section=sections.get(m.name, m.section)) for m in frame.members)
+    return replace(frame, members=tuple(members))
+
+
+def section_table(folder: Path, member: str) -> tuple[str, dict[str, Any]]:
+    keys = model_keys(folder)
+    name = next(m["section"] for m in keys["members"] if m["name"] == member)
+    return name, keys["sections"][name]
+
+
+def test_a_changed_section_keeps_its_shape(tmp_path: Path, ladder: Case) -> None:
+    tube = frame_of(ladder).members[0].section
+    frame = with_sections(ladder, {"front-left": replace(tube, J=2.5e-8)})
+    back = round_trip(tmp_path, with_frame(ladder, frame))
+    assert_same_frame(frame, frame_of(back))
+    shape = {"shape": "square-tube", "width": 0.0254, "wall": 0.00238}
+    name, table = section_table(tmp_path / "first", "front-left")
+    assert (name, table) == ("tube-front-left", {**shape, "J": 2.5e-8})
+    name, table = section_table(tmp_path / "first", "rung-left")
+    assert (name, table) == ("tube", {**shape, "J": 3.912476e-8})
+
+
+def test_a_section_that_all_members_share_keeps_its_name(tmp_path: Path, ladder: Case) -> None:
+    tube = replace(frame_of(ladder).members[0].section, kappa=constant_kappa(0.5))
+    frame = with_sections(ladder, {m.name: tube for m in frame_of(ladder).members})
+    assert_same_frame(frame, frame_of(round_trip(tmp_path, with_frame(ladder, frame))))
+    assert section_table(tmp_path / "first", "rung-left")[0] == "tube"
+    assert section_table(tmp_path / "first", "rung-left")[1]["kappa"] == 0.5
+
+
+@pytest.mark.parametrize(
+    ("section", "table"),
+    [
+        (
+            rectangular_tube(0.04, 0.06, 0.003),
+            {"shape": "rectangular-tube", "width": 0.04, "height": 0.06, "wall": 0.003},
+        ),
+        (round_tube(0.03, 0.0021), {"shape": "round-tube", "diameter": 0.03, "wall": 0.0021}),
+        (round_tube(0.03, 0.015), {"shape": "solid-circle", "diameter": 0.03}),
+        (
+            replace(rectangular_tube(0.04, 0.04, 0.0025), kappa=constant_kappa(0.4), J=1e-8),
+            {"shape": "square-tube", "width": 0.04, "wall": 0.0025, "J": 1e-8, "kappa": 0.4},
+        ),
+        (
+            Section(A=1e-4, Iy=1e-9, Iz=0.0, J=2e-9, Jp=3e-9),
+            {"A": 1e-4, "Iy": 1e-9, "J": 2e-9, "Jp": 3e-9},
+        ),
+    ],
+    ids=["box", "tube", "rod", "overridden", "numbers"],
+)
+def test_sections_whose_case_is_gone(
+    tmp_path: Path, ladder: Case, section: Section, table: dict[str, Any]
+) -> None:
+    frame = with_sections(ladder, {m.name: section for m in frame_of(ladder).members})
+    nowhere = replace(with_frame(ladder, frame), folder=tmp_path / "gone")
+    back = round_trip(tmp_path, nowhere)
+    assert_same_frame(frame, frame_of(back))
+    assert section_table(tmp_path / "first", "front-left") == ("section", table)
+    assert set(model_keys(tmp_path / "first")["materials"]) == {"material"}
+
+
+@given(
+    st.floats(0.01, 0.2),
+    st.floats(0.01, 0.2),
+    st.floats(0.01, 0.49),
+    st.sampled_from(["A", "Iy", "Iz", "J", "Jp", "kappa"]),
+)
+@settings(max_examples=12, deadline=None)
+def test_any_tube_reads_back(width: float, height: float, share: float, key: str) -> None:
+    tube = rectangular_tube(width, height, share * min(width, height))
+    value = constant_kappa(0.7) if key == "kappa" else 1.1 * getattr(tube, key)
+    changed: Section = replace(tube, **{key: value})
+    case = replace(case_at(HERE.parent / "scenarios" / "frame-beam"), modifications=())
+    case = with_frame(case, with_sections(case, {"front-left": tube, "rung-left": changed}))
+    with TemporaryDirectory() as folder:
+        back = round_trip(Path(folder), case)
+    assert_same_case(case, back)
+    assert_same_frame(frame_of(case), frame_of(back))
+
+
+def test_a_shear_coefficient_that_no_key_can_say(tmp_path: Path, bracket: Case) -> None:
+    odd = replace(frame_of(bracket).members[1].section, kappa=lambda nu: (0.5, 0.5 + nu))
+    with pytest.raises(InputError, match=r"model.sections: .*member 'arm': shear coefficients 0.5"):
+        write_case(tmp_path / "new", with_frame(bracket, with_sections(bracket, {"arm": odd})))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_names_of_materials(tmp_path: Path, ladder: Case) -> None:
+    frame = frame_of(ladder)
+    soft = replace(frame.members[0].material, E=5e10)
+    some = tuple(
+        replace(m, material=soft) if m.name in ("front-left", "rung-left") else m
+        for m in frame.members
+    )
+    changed = with_frame(ladder, replace(frame, members=some))
+    assert_same_frame(frame_of(changed), frame_of(round_trip(tmp_path, changed)))
+    keys = model_keys(tmp_path / "first")
+    assert list(keys["materials"]) == ["aluminium", "aluminium-front-left"]
+    used = {m["name"]: m["material"] for m in keys["members"]}
+    assert used["rung-left"] == "aluminium-front-left"
+    assert used["rung-right"] == "aluminium"
+
+
+# --- models that an update has changed ------------------------------------------------------------
+
+
+def test_parameters_become_keys(tmp_path: Path, portal: Case) -> None:
+    structure = portal.model.frame_structure
+    parameters = [
+        Parameter("all", "E", tuple(label for label in structure.label_index if label)),
+        Parameter("left", "E", tuple(f"left/{k}" for k in (1, 2, 3, 4))),
+        Parameter("one", "density", ("girder/2",)),
+        Parameter("none", "shear", ("right/1", "left/1")),
+        Parameter("spring", "spring", ("right@C:ry",), "N m/rad"),
+        Parameter("end", "rigid", ("girder@B", "left@A"), "m"),
+    ]
+    updated = structure.with_values(parameters, [0.9, 0.8, 1.1, 0.0, 1.5e5, 0.015])
+    updated = updated.with_values(parameters[:1], [1.05])
+    back = round_trip(tmp_path, replace(portal, model=Model.of(updated)))
+    frame = frame_of(back)
+    assert_same_matrix(Model.of(updated).stiffness, back.model.stiffness)
+    assert_same_matrix(Model.of(updated).mass, back.model.mass)
+    assert {(f.quantity, f.at): f.factor for f in frame.factors} == {
+        ("E", ("girder", "right")): pytest.approx(0.9 * 1.05),
+        ("E", ("left",)): pytest.approx(0.9 * 0.8 * 1.05),
+        ("density", ("girder/2",)): 1.1,
+        ("shear", ("left/1", "right/1")): 0.0,
+    }
+    assert frame.joint_springs[0].stiffness == {"ry": 1.5e5, "x": 4e8}
+    assert frame.rigid_ends == (RigidEnd("B", "girder", 0.015, 0.02), RigidEnd("A", "left", 0.015))
+
+
+def test_a_factor_on_all_leaves_the_arms_of_joints_alone(tmp_path: Path, portal: Case) -> None:
+    structure = portal.model.frame_structure
+    labels = tuple(label for label in structure.label_index if label)
+    updated = Model.of(structure.with_values([Parameter("all", "E", labels)], [0.9]))
+    back = round_trip(tmp_path, replace(portal, model=updated))
+    assert frame_of(back).factors == (Factor("E", ("all",), 0.9),)
+    assert_same_matrix(updated.stiffness, back.model.stiffness)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "place", "value"),
+    [
+        ("GJ", "front-left/1", -0.5),
+        ("EI", "front-left/1", 0.0),
+        ("E", "front-left/1", np.nan),
+    ],
+)
+def test_parameters_that_no_key_can_say(
+    tmp_path: Path, ladder: Case, quantity: str, place: str, value: float
+) -> None:
+    structure = ladder.model.frame_structure
+    changed = structure.with_values([Parameter("odd one", quantity, (place,))], [value])
+    with pytest.raises(InputError, match="model: cannot be written: odd one = "):
+        write_case(
+            tmp_path / "new", ladder, replace(ladder.model, structure=changed, **of(changed))
+        )
+    assert list(tmp_path.iterdir()) == []
+
+
+def of(structure: Any) -> dict[str, Any]:
+    mass, stiffness = structure.matrices()
+    return {"mass": mass, "stiffness": stiffness}
+
+
+def test_a_preload_that_the_new_factors_would_move(tmp_path: Path, ladder: Case) -> None:
+    frame = replace(frame_of(ladder), preloads=(Preload("front-left", 2e4),))
+    structure = Model.of(frame).frame_structure
+    half = Parameter("half", "E", tuple(f"back-left/{k}" for k in (1, 2, 3, 4)))
+    with pytest.raises(InputError, match="no keys of a frame give the matrices"):
+        write_case(tmp_path / "new", ladder, Model.of(structure.with_values([half], [0.5])))
+    assert list(tmp_path.iterdir()) == []
+
+
+def at_joints(case: Case) -> Case:
+    """Return the case without what lies between the nodes of its nominal mesh."""
+    spots = {joint.xyz for joint in frame_of(case).joints}
+    keep = [i for i, xyz in enumerate(case.measurement.sensors.xyz) if tuple(xyz) in spots]
+    m = case.measurement
+    sensors = Sensors(
+        tuple(m.sensors.labels[i] for i in keep),
+        m.sensors.xyz[keep],
+        tuple(m.sensors.directions[i] for i in keep),
+    )
+    measurement = replace(m, sensors=sensors, shapes=m.shapes[keep], shape_std=m.shape_std[keep])
+    return replace(case, measurement=measurement, modifications=())
+
+
+def test_changed_matrices_are_written_as_matrices(tmp_path: Path, ladder: Case) -> None:
+    rng = np.random.default_rng(3)
+    model = ladder.model
+    basis = rng.standard_normal((model.size, 2))
+    core = np.diag([1e3, 2e3])
+    low_rank = replace(model, stiffness_change=LowRank(basis, core))
+    edited = replace(model, mass=model.mass * 1.01)
+    for name, changed in (("low-rank", low_rank), ("edited", edited)):
+        (tmp_path / name).mkdir()
+        back = round_trip(tmp_path / name, ladder, model=changed)
+        assert model_keys(tmp_path / name / "first")["kind"] == "matrices"
+        vectors = rng.standard_normal((model.size, 3))
+        for product in ("stiffness_times", "mass_times"):
+            expected = getattr(changed, product)(vectors)
+            scale = np.abs(expected).max()
+            np.testing.assert_allclose(
+                getattr(back.model, product)(vectors), expected, atol=1e-12 * scale
+            )
+        read = back.model.observe(back.measurement.sensors)
+        np.testing.assert_array_equal(
+            read.toarray(), model.observe(ladder.measurement.sensors).toarray()
+        )
+        masses, springs = ladder.modifications[0].masses, ladder.modifications[0].springs
+        heavier = changed.attach(masses, springs)
+        new = back.model.attach(back.modifications[0].masses, back.modifications[0].springs)
+        np.testing.assert_allclose(
+            new.mass_times(vectors), heavier.mass_times(vectors), atol=1e-9 * scale
+        )
+
+
+def test_changed_matrices_need_sensors_at_nodes(tmp_path: Path, portal: Case) -> None:
+    frame = replace(frame_of(portal), joint_springs=())
+    model = Model.of(frame)
+    changed = replace(model, stiffness=1.1 * model.stiffness)
+    between = replace(portal.measurement.sensors, xyz=portal.measurement.sensors.xyz + 0.0)
+    between.xyz[1] = [0.0, 0.0, 0.1]
+    off = replace(portal, measurement=replace(portal.measurement, sensors=between))
+    with pytest.raises(InputError, match="there is no node at"):
+        write_case(tmp_path / "new", replace(off, modifications=()), changed)
+    assert list(tmp_path.iterdir()) == []
+
+
+# --- matrices -------------------------------------------------------------------------------------
+
+
+def as_matrices(folder: Path, case: Case, groups: str = "") -> Case:
+    """Return a case of kind matrices made of what lies in `matrices/` of a written frame."""
+    write_case(folder, case)
+    text = (folder / "case.toml").read_text()
+    tail = text[text.index("[measurement]") :]
+    files = "".join(
+        f'{key} = "matrices/{file}"\n'
+        for key, file in (
+            ("mass", "mass.mtx"),
+            ("stiffness", "stiffness.mtx"),
+            ("dofs", "dofs.csv"),
+        )
+    )
+    head = f'[case]\nname = "matrices"\n[model]\nkind = "matrices"\n{files}{groups}'
+    (folder / "case.toml").write_text(head + tail)
+    return read_case(folder)
+
+
+def test_the_folder_of_matrices_makes_a_case(tmp_path: Path, ladder: Case) -> None:
+    groups = 'groups = [{name = "a b", dofs = ["J1", 5, "J3:z"]}, {name = "ü", dofs = ["J5"]}]\n'
+    case = as_matrices(tmp_path / "from", at_joints(ladder), groups)
+    assert_same_matrix(case.model.mass, ladder.model.mass)
+    assert_same_matrix(case.model.stiffness, ladder.model.stiffness)
+    (tmp_path / "to").mkdir()
+    back = round_trip(tmp_path / "to", case)
+    assert_same_case(case, back)
+    assert isinstance(back.model.geometry, MatrixGeometry)
+    assert isinstance(case.model.geometry, MatrixGeometry)
+    assert back.model.geometry.names == case.model.geometry.names
+    assert set(back.model.groups) == {"a b", "ü"}
+    for name, part in case.model.groups.items():
+        assert abs(part - back.model.groups[name]).max() == 0.0
+
+
+def test_rows_in_any_order_and_odd_nodes(tmp_path: Path, ladder: Case) -> None:
+    folder = tmp_path / "from"
+    as_matrices(folder, at_joints(ladder))
+    dofs = folder / "matrices" / "dofs.csv"
+    header, *rows = dofs.read_text().splitlines()
+    cells = [row.split(",") for row in rows]
+    lines = [",".join([str(int(row[0]) - 1), f'"{row[1]}, ""x""\\ é"', *row[2:]]) for row in cells]
+    lines = lines[3::-1] + lines[:3:-1]
+    dofs.write_text("\n".join([header, *lines]), encoding="utf-8")
+    case = read_case(folder)
+    (tmp_path / "to").mkdir()
+    back = round_trip(tmp_path / "to", case)
+    assert_same_case(case, back)
+    assert isinstance(back.model.geometry, MatrixGeometry)
+    assert back.model.geometry.first_row == 0
+    assert 'J1, "x"\\ é' in back.model.geometry.names
+
+
+def test_matrices_and_further_files_do_not_count(tmp_path: Path, ladder: Case) -> None:
+    write_case(tmp_path / "new", ladder)
+    digest = read_case(tmp_path / "new").digest
+    shutil.rmtree(tmp_path / "new" / "matrices")
+    (tmp_path / "new" / "notes.txt").write_text("mine")
+    assert read_case(tmp_path / "new").digest == digest
+
+
+def test_matrices_of_a_frame_for_other_programs(tmp_path: Path, portal: Case) -> None:
+    write_case(tmp_path / "new", portal)
+    folder = tmp_path / "new" / "matrices"
+    for name in ("mass", "stiffness"):
+        matrix = sp.csc_array(scipy.io.mmread(folder / f"{name}.mtx", spmatrix=False))
+        own = getattr(portal.model, name)
+        assert abs(matrix - 0.5 * (own + own.T)).max() <= 1e-15 * abs(own).max()
+    axes = np.loadtxt(folder / "axes.csv", delimiter=",", skiprows=1)[:, 1:]
+    np.testing.assert_array_equal(axes, portal.model.dofs.axes)
+    nodes = [line.split(",")[1] for line in (folder / "dofs.csv").read_text().splitlines()]
+    assert "girder 0.166667" in nodes
+    assert "right 0.983333 arm" in nodes
+
+
+# --- measurements ---------------------------------------------------------------------------------
+
+
+def test_deviations_that_are_no_share(tmp_path: Path, ladder: Case) -> None:
+    m = ladder.measurement
+    std = 0.0123 * np.max(np.abs(np.nan_to_num(m.shapes)), axis=0) * np.ones(m.shapes.shape)
+    std[2, 1] = 0.5
+    shapes = m.shapes.copy()
+    shapes[0, 0] = np.nan
+    shapes[:, 3] = np.nan
+    std[:, 3] = np.nan
+    case = replace(ladder, measurement=replace(m, shapes=shapes, shape_std=std), modifications=())
+    assert_same_case(case, round_trip(tmp_path, case))
+    header = (tmp_path / "first" / "modes.csv").read_text().splitlines()[0].split(",")
+    assert [name for name in header if name.endswith("_std")] == [
+        "frequency_std",
+        f"{m.sensors.labels[2]}_std",
+    ]
+    written = tomllib.loads((tmp_path / "first" / "case.toml").read_text())
+    assert written["measurement"]["shape_std"] == 0.0123
+
+
+def test_frequencies_alone(tmp_path: Path, ladder: Case) -> None:
+    m = ladder.measurement
+    none = np.zeros((0, len(m)))
+    sensors = Sensors((), np.zeros((0, 3)), ())
+    alone = replace(m, sensors=sensors, shapes=none, shape_std=none)
+    case = replace(ladder, measurement=alone, modifications=())
+    assert_same_case(case, round_trip(tmp_path, case))
+    assert not (tmp_path / "first" / "sensors.csv").exists()
+
+
+def test_a_measurement_that_cannot_read_back(tmp_path: Path, ladder: Case) -> None:
+    m = ladder.measurement
+    std = m.shape_std.copy()
+    std[0, 0] = np.nan
+    with pytest.raises(InputError, match="the shape std of a measurement does not read back"):
+        write_case(tmp_path / "new", replace(ladder, measurement=replace(m, shape_std=std)))
+    frequencies = m.frequencies.copy()
+    frequencies[0] = np.inf
+    with pytest.raises(InputError, match="is not a finite number") as caught:
+        write_case(
+            tmp_path / "new", replace(ladder, measurement=replace(m, frequencies=frequencies))
+        )
+    assert caught.value.file == tmp_path / "new"
+    assert list(tmp_path.iterdir()) == []
+
+
+# --- names and numbers ----------------------------------------------------------------------------
+
+
+def renamed(case: Case, joints: dict[str, str], members: dict[str, str]) -> Case:
+    """Return the case with other names of joints and members."""
+    frame = frame_of(case)
+
+    def moved(place: Place) -> Place:
+        if place.joint is not None:
+            return Place(joint=joints[place.joint])
+        return Place(member=members[str(place.member)], s=place.s)
+
+    new = replace(
+        frame,
+        joints=tuple(replace(j, name=joints[j.name], type=j.type) for j in frame.joints),
+        members=tuple(
+            replace(m, name=members[m.name], ends=(joints[m.ends[0]], joints[m.ends[1]]))
+            for m in frame.members
+        ),
+    )
+    modifications = tuple(
+        replace(
+            item,
+            masses=tuple(replace(mass, at=moved(mass.at)) for mass in item.masses),
+            springs=tuple(replace(spring, at=moved(spring.at)) for spring in item.springs),
+        )
+        for item in case.modifications
+    )
+    return replace(case, model=Model.of(new), modifications=modifications)
+
+
+def names(case: Case, make: Any) -> Case:
+    frame = frame_of(case)
+    joints = {j.name: make("joint", i) for i, j in enumerate(frame.joints)}
+    members = {m.name: make("member", i) for i, m in enumerate(frame.members)}
+    return renamed(case, joints, members)
+
+
+@pytest.mark.parametrize(
+    "odd",
+    ['"', "'", "\\", "\\u0041", "ü", "梁", "a#b", "[x]", "=", ",", "'''", '"""', "1", "\u2028"],
+)
+def test_odd_names(tmp_path: Path, ladder: Case, odd: str) -> None:
+    edge = "x" if odd.isspace() else ""
+    case = names(ladder, lambda kind, i: f"{edge}{odd}{kind[0]}{i}{odd}{edge}")
+    m = case.measurement
+    labels = m.sensors.labels
+    if odd.isprintable():
+        labels = tuple(f"{label}{odd}" for label in labels)
+    (change,) = case.modifications
+    case = replace(
+        case,
+        name=f"a {odd} case",
+        title=f"{odd} title {odd}",
+        source=odd,
+        measurement=replace(m, sensors=replace(m.sensors, labels=labels)),
+        modifications=(
+            replace(
+                change,
+                name=f"{odd} change",
+                measurement=replace(
+                    change.measurement,
+                    sensors=replace(change.measurement.sensors, labels=labels),
+                ),
+            ),
+        ),
+    )
+    back = round_trip(tmp_path, case, comment=[odd])
+    assert_same_case(case, back)
+    assert_same_frame(frame_of(case), frame_of(back))
+
+
+NAMES = st.text(
+    st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Z"), exclude_characters="@/:"),
+    min_size=1,
+    max_size=30,
+)
+LABELS = NAMES.filter(str.isprintable).map(lambda name: f"{name}~")  # none is reserved
+NUMBERS = st.floats(1e-9, 1e9)
+
+
+@given(
+    names=st.lists(NAMES, min_size=4, max_size=4, unique=True),
+    labels=st.lists(LABELS, min_size=4, max_size=4, unique=True),
+    numbers=st.lists(NUMBERS, min_size=9, max_size=9),
+    station=st.floats(0.0, 1.0),
+    cells=st.lists(st.one_of(st.floats(1e-29, 1e29), st.just(np.nan)), min_size=6, max_size=6),
+    offset=st.floats(-1e6, 1e6),
+)
+@settings(max_examples=15, deadline=None)
+def test_any_names_and_numbers(
+    names: list[str],
+    labels: list[str],
+    numbers: list[float],
+    station: float,
+    cells: list[float],
+    offset: float,
+) -> None:
+    base = case_at(CASES / "in-plane")
+    joints = dict(zip("ABCD", names, strict=True))
+    frame = frame_of(base)
+    first, girder, last = (
+        replace(m, name=name, ends=(joints[m.ends[0]], joints[m.ends[1]]))
+        for m, name in zip(frame.members, names[1:], strict=True)
+    )
+    frame = Frame(
+        "in-plane",
+        "euler-bernoulli",
+        tuple(replace(joint, name=joints[joint.name]) for joint in frame.joints),
+        (replace(first, material=replace(first.material, E=numbers[0])), girder, last),
+        masses=(PointMass(Place(joint=names[1]), numbers[1], (offset, 0.0, -offset / 3)),),
+        springs=(GroundSpring(Place(member=girder.name, s=station), "x", numbers[2]),),
+        joint_springs=(JointSpring(names[2], last.name, {"ry": numbers[3]}),),
+        supports=(Support(Place(joint=names[0]), ("x", "z")),),
+        factors=(Factor("EI", (f"{girder.name}/2", last.name), numbers[4]),),
+    )
+    shapes = np.array([numbers[5:7], *np.array(cells).reshape(3, 2)])
+    frequencies = np.array(numbers[7:])
+    measurement = Measurement(
+        replace(base.measurement.sensors, labels=tuple(labels)),
+        (3, 1),
+        frequencies,
+        frequencies / 7.0,
+        np.array([np.nan, 1.0 / (1.0 + numbers[0])]),
+        shapes,
+        np.abs(shapes) / 3.0,
+    )
+    case = replace(
+        base,
+        model=Model.of(frame),
+        measurement=measurement,
+        modifications=(),
+        used=(1,),
+        held_out=(3,),
+        name=names[0],
+        title=names[1],
+        source=names[2],
+    )
+    with TemporaryDirectory() as folder:
+        back = round_trip(Path(folder), case)
+    assert_same_frame(frame, frame_of(back))
+    # A deviation of what was not measured means nothing.
+    std = np.where(np.isnan(shapes), back.measurement.shape_std, measurement.shape_std)
+    assert_same_measurement(replace(measurement, shape_std=std), back.measurement)
+    assert (back.name, back.title, back.source) == tuple(names[:3])
+
+
+# --- folders --------------------------------------------------------------------------------------
+
+
+def test_a_folder_with_something_in_it_is_left_alone(tmp_path: Path, ladder: Case) -> None:
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old" / "mine.txt").write_text("mine")
+    (tmp_path / "file").write_text("mine")
+    for name, what in (("old", "is not empty"), ("file", "is no folder")):
+        with pytest.raises(InputError, match=f"{name}: {what}"):
+            write_case(tmp_path / name, ladder)
+    assert {str(p) for p in content(tmp_path)} == {"file", "old/mine.txt"}
+
+
+def test_new_and_empty_folders(tmp_path: Path, ladder: Case) -> None:
+    (tmp_path / "empty").mkdir()
+    for name in ("empty", "a/b/c"):
+        write_case(tmp_path / name, ladder)
+        assert_same_case(ladder, read_case(tmp_path / name))
+    mode = (tmp_path / "a" / "b").stat().st_mode
+    assert (tmp_path / "a" / "b" / "c").stat().st_mode == mode
+
+
+def test_a_place_that_cannot_be_written(tmp_path: Path, ladder: Case) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot be written: ") as caught:
+        write_case(tmp_path / "file" / "new", ladder)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_parent_that_is_read_only(tmp_path: Path, ladder: Case) -> None:
+    tmp_path.chmod(0o555)
+    user = os.geteuid()
+    if user == 0:  # who may write everywhere
+        os.seteuid(65534)
+    try:
+        with pytest.raises(InputError, match=r"cannot be written: Permission denied \(expected"):
+            write_case(tmp_path / "new", ladder)
+    finally:
+        os.seteuid(user)
+        tmp_path.chmod(0o700)
+
+
+def test_what_cannot_be_read_leaves_nothing_behind(tmp_path: Path, ladder: Case) -> None:
+    bad = names(ladder, lambda kind, i: f"{kind}@{i}")
+    with pytest.raises(InputError, match=r"new: model.joints\[0\].name: cannot be written: "):
+        write_case(tmp_path / "a" / "new", bad)
+    surrogate = names(ladder, lambda kind, i: f"{kind}\ud800{i}")
+    with pytest.raises(InputError, match="is not a text"):
+        write_case(tmp_path / "a" / "new", surrogate)
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,357 @@
+"""The verb `diagnose`: what it asks of the search, prints, writes and returns."""
+
+from __future__ import annotations
+
+import json
+import statistics
+import sys
+import types
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+from femubench.core.case.case import TOLERANCE, Case
+from femubench.core.case.example import write_example
+from femubench.core.case.reader import read_case
+from femubench.core.cli.cases import read_cases
+from femubench.core.cli.main import bench
+from femubench.core.diagnosis.result import Diagnosis
+from femubench.core.diagnosis.serial import diagnosis_from_json
+from femubench.core.errors import InputError, NotApplicable
+from femubench.core.harness.scoring import frequency_error, score_model
+from femubench.core.modal.eigen import solve_modes
+from femubench.core.plugin.loader import load_plugins
+from femubench.reports.diagnosis import diagnosis_markdown, diagnosis_text
+
+sys.path.insert(0, str(Path(__file__).parent / "toys"))
+import diagnosis_toys as toys
+
+Invoke = Callable[..., Result]
+Told = tuple[str, Result, dict[str, Any], Path]
+SEARCH, WRITING = "femubench.core.diagnosis.diagnose", "femubench.core.case.writing"
+
+EFFECTS = """
+from femubench import hookimpl
+
+class Rust:
+    name = "test-rust"
+    def places(self, model):
+        return []
+    def parameters(self, model, place):
+        return []
+    def extend(self, model, place, values):
+        return model
+
+class Moss(Rust):
+    name = "test-moss"
+
+@hookimpl
+def femubench_effects():
+    return [Rust, Moss]
+"""
+
+
+class Search:
+    """Stands for the search: notes how it was called, gives what it is told to."""
+
+    def __init__(self) -> None:
+        self.found: Diagnosis | Exception = toys.made()
+        self.calls: list[tuple[Case, list[str], bool]] = []
+        self.written: list[tuple[Path, Case, object, list[str], str]] = []
+        self.fault: Exception | None = None
+
+    def diagnose(self, case: Case, *, effects: Any, pairs: bool) -> Diagnosis:
+        self.calls.append((case, [effect.name for effect in effects], pairs))
+        if isinstance(self.found, Exception):
+            raise self.found
+        return self.found
+
+    def write_case(
+        self, folder: Path, case: Case, model: object, *, comment: list[str], name: str
+    ) -> None:
+        if self.fault is not None:
+            raise self.fault
+        self.written.append((folder, case, model, comment, name))
+        folder.mkdir(exist_ok=True)
+        (folder / "case.toml").write_text("x = 1\n")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Install a plugin with two effects."""
+    folder = tmp_path_factory.mktemp("site")
+    name = "femubench_diagnose_tests"
+    (folder / f"{name}.py").write_text(EFFECTS, encoding="utf-8")
+    info = folder / f"{name}-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(f"[femubench]\n{name} = {name}\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(folder)
+        yield folder
+    sys.modules.pop(name, None)
+
+
+@pytest.fixture
+def search(monkeypatch: pytest.MonkeyPatch) -> Search:
+    """Put a stand-in where the search and the writer of cases are imported from."""
+    stand_in = Search()
+    for module, name in ((SEARCH, "diagnose"), (WRITING, "write_case")):
+        made = types.ModuleType(module)
+        setattr(made, name, getattr(stand_in, name))
+        monkeypatch.setitem(sys.modules, module, made)
+    return stand_in
+
+
+@pytest.fixture
+def invoke(site: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Invoke:
+    """Call `bench diagnose` in this process, in a folder with one case."""
+    monkeypatch.chdir(tmp_path)
+    write_example(tmp_path / "case")
+    return lambda *words: CliRunner().invoke(bench, ["diagnose", *map(str, words)])
+
+
+def screen(found: Diagnosis, written: Path | None = None) -> str:
+    from femubench.core.diagnosis.serial import diagnosis_to_json
+
+    return diagnosis_text(diagnosis_to_json(found, written=written)) + "\n"
+
+
+class TestAsking:
+    def test_everything_by_default(self, invoke: Invoke, search: Search) -> None:
+        assert invoke("case").exit_code == 0
+        ((case, effects, pairs),) = search.calls
+        assert (case.folder, case.tolerance, pairs) == (Path("case"), TOLERANCE, True)
+        assert effects == list(load_plugins().effects)
+        assert {"test-rust", "test-moss"} <= set(effects)
+
+    def test_options_reach_the_search(self, invoke: Invoke, search: Search) -> None:
+        words = ("--effects", "test-moss, test-rust,test-moss", "--no-pairs", "--tolerance", "0.02")
+        assert invoke("case", *words).exit_code == 0
+        ((case, effects, pairs),) = search.calls
+        assert (case.tolerance, effects, pairs) == (0.02, ["test-moss", "test-rust"], False)
+
+    def test_built_in_case_and_no_tolerance(self, invoke: Invoke, search: Search) -> None:
+        assert invoke("hframe", "--tolerance", "0").exit_code == 0
+        assert (search.calls[0][0].name, search.calls[0][0].tolerance) == ("hframe", 0.0)
+
+    def test_tolerance_of_the_case(self, invoke: Invoke, search: Search, tmp_path: Path) -> None:
+        with (tmp_path / "case" / "case.toml").open("a") as stream:
+            stream.write("\n[diagnosis]\ntolerance = 0.01\n")
+        assert invoke("case").exit_code == 0
+        assert search.calls[0][0].tolerance == 0.01
+
+
+class TestWrongInput:
+    @pytest.mark.parametrize(
+        ("words", "expected"),
+        [
+            (["cas"], "no case 'cas'"),
+            (["some/where"], "some/where: folder does not exist"),
+            (["design-change"], "'design-change' stands for"),
+            (["case", "--effects", "test-mos"], "no effect 'test-mos'; did you mean 'test-moss'"),
+            (["case", "--effects", ""], "no effect ''"),
+            (["case", "--tolerance", "0.3"], "0.3 is no number >= 0 and <= 0.2"),
+            (["case", "--tolerance", "nan"], "nan is no number >= 0 and <= 0.2"),
+            (["case", "--tolerance=-1e-9"], "is no number >= 0 and <= 0.2"),
+            (["case", "--json", "no/such.json"], "no: folder does not exist"),
+            (["case", "--json", "case"], "is a directory"),
+            (
+                ["case", "--output", "case"],
+                "case: is not empty (expected a new or an empty folder)",
+            ),
+            (["case", "--output", "case/case.toml"], "is a file"),
+            (["case", "--output", "case/case.toml/x"], "case/case.toml: cannot be written to"),
+            (["case", "--format", "html"], "'html' is not one of"),
+            ([], "Missing argument 'CASE'"),
+            (["case", "case"], "unexpected extra argument"),
+        ],
+    )
+    def test_is_one_line_and_asks_nothing(
+        self, invoke: Invoke, search: Search, tmp_path: Path, words: list[str], expected: str
+    ) -> None:
+        before = sorted(tmp_path.rglob("*"))
+        result = invoke(*words)
+        assert (result.exit_code, result.stdout, search.calls) == (2, "", [])
+        (line,) = result.stderr.splitlines()
+        assert expected in line
+        assert sorted(tmp_path.rglob("*")) == before
+
+    def test_case_that_cannot_be_diagnosed(self, invoke: Invoke, search: Search) -> None:
+        search.found = NotApplicable("no measured mode\nhas a partner")
+        result = invoke("case", "--json", "x.json", "--output", "out")
+        assert (result.exit_code, result.stdout) == (2, "")
+        expected = "bench: case: cannot be diagnosed: no measured mode has a partner\n"
+        assert result.stderr == expected
+        assert not Path("x.json").exists()
+        assert not Path("out").exists()
+
+    @pytest.mark.parametrize(
+        ("text", "key"),
+        [
+            ("tolerance = -0.001", "diagnosis.tolerance"),
+            ("tolerance = 0.21", "diagnosis.tolerance"),
+            ("tolerance = true", "diagnosis.tolerance"),
+            ("tolerance = nan", "diagnosis.tolerance"),
+            ('tolerance = "1"', "diagnosis.tolerance"),
+            ("tolerence = 0.1", "diagnosis.tolerence"),
+        ],
+    )
+    def test_tolerance_in_the_case(self, tmp_path: Path, text: str, key: str) -> None:
+        write_example(tmp_path / "case")
+        file = tmp_path / "case" / "case.toml"
+        file.write_text(f"{file.read_text()}\n[diagnosis]\n{text}\n")
+        with pytest.raises(InputError) as caught:
+            read_case(tmp_path / "case")
+        assert caught.value.key == key
+        assert caught.value.line == len(file.read_text().splitlines())
+
+
+class TestTelling:
+    def test_text(self, invoke: Invoke, search: Search) -> None:
+        result = invoke("case")
+        assert (result.exit_code, result.stderr) == (0, "")
+        assert result.stdout == screen(toys.made())
+
+    def test_markdown(self, invoke: Invoke, search: Search) -> None:
+        from femubench.core.diagnosis.serial import diagnosis_to_json
+
+        text = diagnosis_markdown(diagnosis_to_json(toys.made()))
+        assert invoke("case", "--format", "markdown").stdout == f"{text}\n"
+
+    def test_json_file(self, invoke: Invoke, search: Search) -> None:
+        result = invoke("case", "--json", "found.json")
+        assert result.stdout == screen(toys.made())
+        data = json.loads(Path("found.json").read_text(), parse_constant=pytest.fail)
+        assert diagnosis_from_json(data) == data
+        assert data["verdict"] == "named"
+
+    def test_json_on_the_screen_is_alone_there(self, invoke: Invoke, search: Search) -> None:
+        for words in ((), ("--quiet",)):
+            result = invoke("case", "--json", "-", *words)
+            data = json.loads(result.stdout, parse_constant=pytest.fail)
+            assert data["case"] == "toy"
+        assert not Path("-").exists()
+
+    def test_quiet(self, invoke: Invoke, search: Search) -> None:
+        result = invoke("case", "-q", "--json", "found.json")
+        assert result.output == ""
+        assert Path("found.json").exists()
+
+
+class TestExtending:
+    @pytest.mark.parametrize("verdict", ["named", "ambiguous", "not-confirmed"])
+    def test_writes_the_extended_case(self, invoke: Invoke, search: Search, verdict: Any) -> None:
+        search.found = toys.made(verdict)
+        result = invoke("case", "-o", "new/out", "--json", "found.json", "--tolerance", "0.01")
+        assert (result.exit_code, result.stderr) == (0, "")
+        ((folder, case, model, comment, name),) = search.written
+        assert name == f"{case.name}-extended"
+        assert (folder, case.folder, case.tolerance) == (Path("new/out"), Path("case"), 0.01)
+        assert model is search.found.extended
+        assert comment[0] == search.found.sentence
+        assert "bending 31000 ± 1200 N m/rad" in comment[1]
+        assert result.stdout == screen(search.found, Path("new/out"))
+        assert json.loads(Path("found.json").read_text())["written"] == "new/out"
+
+    @pytest.mark.parametrize("verdict", ["none", "unknown"])
+    def test_writes_nothing_without_a_cause(
+        self, invoke: Invoke, search: Search, verdict: Any
+    ) -> None:
+        search.found = toys.made(verdict)
+        result = invoke("case", "--output", "out", "--json", "found.json")
+        assert result.exit_code == 0
+        assert result.stderr == f"bench: the verdict is {verdict!r}: nothing was written to out\n"
+        assert search.written == []
+        assert not Path("out").exists()
+        assert json.loads(Path("found.json").read_text())["written"] is None
+
+    def test_empty_folder_will_do(self, invoke: Invoke, search: Search) -> None:
+        Path("out").mkdir()
+        assert invoke("case", "--output", "out").exit_code == 0
+        assert invoke("case", "--output", "out").exit_code == 2
+
+    @pytest.mark.parametrize(
+        ("fault", "code"), [(InputError("a name that TOML lacks"), 2), (OSError("disk full"), 1)]
+    )
+    def test_diagnosis_outlives_a_failed_write(
+        self, invoke: Invoke, search: Search, fault: Exception, code: int
+    ) -> None:
+        search.fault = fault
+        result = invoke("case", "--output", "out", "--json", "found.json")
+        assert result.exit_code == code
+        assert result.stdout == screen(toys.made())
+        assert result.stderr == f"bench: {fault}\n"
+        assert json.loads(Path("found.json").read_text())["written"] is None
+
+
+@pytest.fixture(scope="module", params=["frame", "hframe"])
+def told(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Told:
+    folder = tmp_path_factory.mktemp(request.param)
+    words = [request.param, "--json", folder / "found.json", "--output", folder / "out"]
+    result = CliRunner().invoke(bench, ["diagnose", *map(str, words)])
+    assert result.exit_code == 0, result.output
+    data = json.loads((folder / "found.json").read_text(), parse_constant=pytest.fail)
+    return request.param, result, data, folder / "out"
+
+
+class TestBuiltInCases:
+    """The real search on measured structures, from the command line to the extended case."""
+
+    def test_screen_and_json_agree(self, told: Told) -> None:
+        name, result, data, _ = told
+        assert data["case"] == name
+        assert diagnosis_from_json(data) == data
+        assert result.stdout == f"{diagnosis_text(data)}\n"
+        lines = diagnosis_text({**data, "written": None}).splitlines()
+        assert max(map(len, lines)) <= 80
+        assert "".join(data["sentence"].split()) in "".join(result.stdout.split())
+
+    def test_finds_what_these_models_are_known_to_lack(self, told: Told) -> None:
+        """Both nominal models are Euler-Bernoulli beams; the ladder's has J = Jp for a tube."""
+        name, _, data, _ = told
+        found = {cause["effect"] for cause in data["causes"]}
+        assert "shear-deformation" in found
+        assert data["nothing"] < 0.01
+        assert data["chi2"][1] < 0.25 * data["chi2"][0]
+        before, after = data["gain"]["held_out_percent"]
+        assert after < 0.5 * before
+        looked = {look["effect"] for look in data["looks"]}
+        assert ("torsion-constant" in looked) == (name == "frame")
+        assert ("torsion-constant" in found) == (name == "frame")
+
+    def test_residuals_are_those_of_the_nominal_model(self, told: Told) -> None:
+        """By hand: the frequencies of the model as drawn, mode by mode in their order."""
+        name, _, data, _ = told
+        (case,) = read_cases([name], load_plugins())
+        modes = solve_modes(case.model)
+        predicted = modes.natural_frequencies[~modes.rigid]
+        measured = case.measurement.select(case.used)
+        rows = [row for row in data["residuals"] if row["kind"] == "frequency"]
+        for k, row in enumerate(rows):
+            sigma = (measured.frequencies[k] - predicted[k]) / measured.frequency_std[k]
+            assert row["measured"] == measured.frequencies[k]
+            assert row["before"] == pytest.approx(sigma, abs=0.5)
+
+    def test_extended_case_is_what_was_found(self, told: Told) -> None:
+        """The folder read again predicts the held-out modes as the diagnosis says."""
+        _, result, data, out = told
+        if data["verdict"] in ("none", "unknown"):
+            assert not out.exists()
+            assert data["written"] is None
+            assert "nothing was written" in result.stderr
+            return
+        assert data["written"] == str(out)
+        case = read_case(out)
+        assert data["sentence"] in " ".join(
+            (out / "case.toml").read_text().replace("#", " ").split()
+        )
+        errors = [
+            100.0 * frequency_error(mode) for mode in score_model(case, case.model)["higher"].modes
+        ]
+        assert statistics.median(errors) == pytest.approx(
+            data["gain"]["held_out_percent"][1], rel=1e-6
+        )

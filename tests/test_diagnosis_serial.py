@@ -1,0 +1,325 @@
+"""A diagnosis as JSON and as a report, on one that was put together by hand."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import re
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import femubench
+from femubench.core.diagnosis.result import Diagnosis, Gain, Rival
+from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
+from femubench.core.errors import InputError
+from femubench.reports.diagnosis import diagnosis_markdown, diagnosis_text, summary_lines
+from femubench.reports.figures import chance
+
+sys.path.insert(0, str(Path(__file__).parent / "toys"))
+import diagnosis_toys as toys
+
+VERDICTS = ("named", "none", "unknown", "ambiguous", "not-confirmed")
+
+
+def data_of(found: Diagnosis) -> dict[str, Any]:
+    return diagnosis_to_json(found)
+
+
+def leaves(data: object) -> Iterator[object]:
+    """Return everything in plain data that is neither a list nor a mapping."""
+    if isinstance(data, dict):
+        for value in data.values():
+            yield from leaves(value)
+    elif isinstance(data, list):
+        for value in data:
+            yield from leaves(value)
+    else:
+        yield data
+
+
+class TestJson:
+    def test_contract(self) -> None:
+        """Every key and form that the contract names, with the figures of the diagnosis."""
+        data = data_of(toys.made())
+        assert data["verdict"] == "named"
+        assert data["causes"][0]["parameters"][0] == {
+            "name": "bending",
+            "value": 31000.0,
+            "std": 1200.0,
+            "unit": "N m/rad",
+            "textbook": False,
+        }
+        assert data["causes"][0]["parameters"][1]["std"] is None
+        assert (data["causes"][0]["effect"], data["causes"][0]["place"]) == (
+            "joint-rotation",
+            "type:T",
+        )
+        assert data["causes"][0]["probability"] == 0.9421
+        assert data["rivals"][0]["delta_chi2"] == 812.5
+        assert data["rivals"][1]["angle"] is None
+        assert data["advice"][0] == {"measurement": "weigh the structure", "separation": 140.25}
+        assert data["smallest_visible"] == [
+            {"effect": "added-mass", "place": "J3", "size": 0.0123, "unit": "kg"}
+        ]
+        assert data["gain"] == {
+            "used_percent": [4.25, 0.125],
+            "held_out_percent": [3.4, 0.75],
+            "modified_percent": None,
+            "cross_validated_percent": None,
+        }
+        assert data["adequacy_p"] == 0.614
+        assert data["looks"][0]["changes"] == [
+            {"mode": 1, "percent": -3.25},
+            {"mode": 2, "percent": None},
+        ]
+        assert len(data["residuals"]) == 6
+        assert data["version"] == femubench.__version__
+        assert data["written"] is None
+        assert "extended" not in data
+
+    @pytest.mark.parametrize("verdict", VERDICTS)
+    def test_round_trip(self, verdict: Any) -> None:
+        data = diagnosis_to_json(toys.made(verdict), written=Path("some/where"))
+        text = json.dumps(data, allow_nan=False)
+        assert diagnosis_from_json(json.loads(text)) == data
+        assert data["written"] == "some/where"
+
+    def test_what_is_no_finite_number_is_null(self) -> None:
+        """Whatever the engine hands over: nan, infinities, numbers of numpy."""
+        found = toys.made(
+            gain=Gain((math.nan, math.inf), (np.float64(1.0), np.float32(0.5))),  # type: ignore[arg-type]
+            chi2=(np.float64(math.inf), 3),
+            data_count=np.int64(61),
+            adequacy_p=math.nan,
+            nothing=-math.inf,
+        )
+        data = json.loads(json.dumps(data_of(found), allow_nan=False))
+        assert data["gain"]["used_percent"] == [None, None]
+        assert data["gain"]["held_out_percent"] == [1.0, 0.5]
+        assert (data["chi2"], data["data_count"]) == ([None, 3], 61)
+        assert (data["adequacy_p"], data["nothing"]) == (None, None)
+        assert all(math.isfinite(leaf) for leaf in leaves(data) if isinstance(leaf, float))
+        assert diagnosis_from_json(data)["chi2"] == [None, 3.0]
+
+    def test_unknown_keys_are_left_out(self) -> None:
+        data = data_of(toys.made())
+        assert diagnosis_from_json({**data, "later": 1}) == data
+
+    @pytest.mark.parametrize(
+        ("path", "value", "key"),
+        [
+            (("verdict",), "sure", "verdict"),
+            (("causes", 0, "probability"), "high", "causes[0].probability"),
+            (("residuals", 5, "mode"), 1.5, "residuals[5].mode"),
+            (("gain", "used_percent"), [1.0], "gain.used_percent"),
+            (("gain", "held_out_percent"), [1.0, math.nan], "gain.held_out_percent[1]"),
+            (("rivals",), None, "rivals"),
+        ],
+    )
+    def test_what_is_wrong_is_named(
+        self, path: tuple[str | int, ...], value: object, key: str
+    ) -> None:
+        data: Any = copy.deepcopy(data_of(toys.made()))
+        inner = data
+        for step in path[:-1]:
+            inner = inner[step]
+        inner[path[-1]] = value
+        with pytest.raises(InputError) as caught:
+            diagnosis_from_json(data, file="found.json")
+        assert (caught.value.key, caught.value.file) == (key, "found.json")
+
+    @pytest.mark.parametrize("data", [None, [], "x", {}])
+    def test_what_is_no_diagnosis(self, data: object) -> None:
+        with pytest.raises(InputError, match=r"found\.json"):
+            diagnosis_from_json(data, file="found.json")
+
+
+def words(found: Diagnosis) -> str:
+    """Return the terminal's text on one line, without its wrapping."""
+    return " ".join(diagnosis_text(data_of(found)).split())
+
+
+class TestTerminal:
+    def test_sentence_comes_first(self) -> None:
+        assert diagnosis_text(data_of(toys.made())).startswith(
+            "The T joints rotate, 94.2 % sure.\n"
+        )
+
+    @pytest.mark.parametrize("verdict", VERDICTS)
+    def test_fits_on_the_screen(self, verdict: Any) -> None:
+        lines = diagnosis_text(data_of(toys.made(verdict))).splitlines()
+        assert max(map(len, lines)) <= 80
+        assert not any(line != line.rstrip() for line in lines)
+
+    def test_order_and_content(self) -> None:
+        text = words(toys.made())
+        parts = [
+            "toy: named; that nothing is missing has probability < 0.1 %; "
+            "taken at the textbook value: shear-deformation, rotary-inertia.",
+            "tube: J equals Jp and tube is no circle.",
+            "Mended (torsion-constant): mode 1 -3.25 %.",
+            "4 226.8 +12.3 -0.2 3 3.54 1",
+            "7 275.2 – +0.5 0 – –",
+            "mass 2.125 kg: +0.3 before, +0.3 after",
+            "9201 before, 55.25 after, 61 data. Noise alone leaves as much with probability 0.61.",
+            "joint-rotation at type:T: probability 94.2 %; the joints rotate; "
+            "bending 31000 ± 1200 N m/rad; torsion 20500 N m/rad",
+            "joint-offset at type:T: probability 3.1 %, lowers chi-square by 812.5, "
+            "10.4 degrees away",
+            "torsion-constant, everywhere + added-mass at J3: probability 0.2 %",
+            "weigh the structure (separates by 140 sigma squared)",
+            "added-mass J3 0.0123 kg",
+            "used modes 4.250 0.125 held-out modes 3.400 0.750",
+            "evidence: J1 1.00, J3 0.50 ecomac: p2 1.00",
+            "Mode 9 found no partner.",
+        ]
+        found = [text.find(part) for part in parts]
+        assert -1 not in found, parts[found.index(-1)]
+        assert found == sorted(found)
+
+    def test_headings_tell_findings_from_guesses(self) -> None:
+        assert "What is missing" in words(toys.made("named"))
+        for verdict in ("unknown", "not-confirmed"):
+            text = words(toys.made(verdict))
+            assert "Best guess" in text
+            assert "What is missing" not in text
+        group = words(toys.made("ambiguous"))
+        assert "these data cannot decide" in group
+        assert "shear-deformation, everywhere: probability 97.0 %; multiple 1 (textbook)" in group
+        assert "their sensitivities are 1.8 degrees apart" in group
+        assert "joint-rotation" not in words(toys.made("none"))
+
+    def test_cross_validation_is_said(self) -> None:
+        told = "each used mode left out in turn"
+        cross = Gain((4.0, 0.5), cross_validated_percent=(5.0, 1.5))
+        assert told not in words(toys.made())
+        assert f"{told} 5.000 1.500" in words(toys.made(gain=cross))
+        assert "held-out" not in words(toys.made(gain=cross))
+
+    def test_where_it_was_written(self) -> None:
+        data = diagnosis_to_json(toys.made(), written=Path("out"))
+        assert diagnosis_text(data).endswith("The extended case is in out")
+
+    def test_lengthy_tables_end_with_a_count(self) -> None:
+        text = words(toys.made(rivals=toys.RIVALS * 10))
+        assert text.count("joint-offset") == 4
+        assert "... and 12 more in the JSON" in text
+
+    def test_nothing_to_tell(self) -> None:
+        """Empty tables leave no headings behind."""
+        empty: dict[str, Any] = dict.fromkeys(
+            ("rivals", "advice", "smallest_visible", "residuals", "looks", "locations", "notes"), ()
+        )
+        text = words(toys.made("none", **empty))
+        for heading in ("Rivals", "next", "smallest", "plain look", "Where", "Notes"):
+            assert heading not in text
+        assert "Chi-square" in text
+
+    def test_hostile_names(self) -> None:
+        text = diagnosis_text(data_of(toys.nasty()))
+        lines = text.splitlines()
+        assert max(map(len, lines)) <= 80
+        assert all(character.isprintable() for line in lines for character in line)
+        assert "alert(1)" in text
+
+
+class TestMarkdown:
+    @pytest.mark.parametrize("verdict", VERDICTS)
+    def test_tables_are_whole(self, verdict: Any) -> None:
+        text = diagnosis_markdown(data_of(toys.made(verdict)))
+        assert text.startswith("# Diagnosis of toy\n\nThe T joints rotate, 94.2 % sure.\n\n")
+        rows_are_even(text)
+
+    def test_shows_what_the_screen_shows(self) -> None:
+        text = diagnosis_markdown(data_of(toys.made()))
+        assert "| 4 | 226.8 | +12.3 | -0.2 | 3 | 3.54 | 1 |" in text
+        assert "- **joint-rotation at type:T**: probability 94.2 %; the joints rotate;" in text
+        assert "- **torsion-constant, everywhere + added-mass at J3**: probability 0.2 %" in text
+
+    def test_hostile_names(self) -> None:
+        """Nothing of a name is obeyed: no tag, no link, no emphasis, no new row or heading."""
+        text = diagnosis_markdown(data_of(toys.nasty()))
+        rows_are_even(text)
+        assert "<" not in text
+        assert "\x1b" not in text
+        assert "\u202e" not in text
+        unescaped = re.sub(r"\\.", "", text)
+        assert "alert(1)" in unescaped
+        assert "[" not in unescaped
+        assert "`" not in unescaped
+        bold = re.compile(r"^- \*\*[^*]+\*\*: [^*]*$|^[^*]*$")
+        assert all(bold.match(line) for line in unescaped.splitlines())
+        assert len(re.findall(r"^# ", text, re.MULTILINE)) == 1
+
+    @pytest.mark.parametrize(
+        "start", ["# heading", "- item", "+ item", "1. first", "1) first", "==="]
+    )
+    def test_sentence_is_no_structure(self, start: str) -> None:
+        text = diagnosis_markdown(data_of(toys.made(sentence=start)))
+        assert text.split("\n\n")[1].replace("\\", "") == start
+        assert not re.match(r"[#+=-]|\d+[.)]", text.split("\n\n")[1])
+
+
+def rows_are_even(text: str) -> None:
+    """Every row of a Markdown table has as many cells as its header."""
+    blocks = [block for block in text.split("\n\n") if block.startswith("|")]
+    assert len(blocks) >= 2
+    for block in blocks:
+        counts = {len(re.findall(r"(?<!\\)\|", line)) for line in block.splitlines()}
+        assert len(counts) == 1
+
+
+def test_summary_names_sizes() -> None:
+    lines = summary_lines(data_of(toys.made()))
+    assert lines[0] == "The T joints rotate, 94.2 % sure."
+    assert "bending 31000 ± 1200 N m/rad" in lines[1]
+    assert all(line.isprintable() for line in summary_lines(data_of(toys.nasty())))
+
+
+@pytest.mark.parametrize(
+    ("probability", "text"),
+    [(None, "–"), (1.0, "> 99.9 %"), (0.9985, "99.9 %"), (0.5, "50.0 %"), (0.0, "< 0.1 %")],
+)
+def test_no_certainty_is_claimed(probability: float | None, text: str) -> None:
+    assert chance(probability) == text
+
+
+def test_shapes_take_no_columns_where_there_are_none() -> None:
+    bare = tuple(row for row in toys.residuals() if row.kind == "frequency")
+    text = diagnosis_text(data_of(replace(toys.made(), residuals=bare)))
+    assert "shape" not in text
+    assert "mass" not in text.partition("Chi-square")[0].partition("Residuals")[2]
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "text"),
+    [
+        (104183.0, 51234.0, "104000 ± 51000"),
+        (0.0039021, 0.00068, "0.00390 ± 0.00068"),
+        (-0.14, 0.0061, "-0.1400 ± 0.0061"),
+        (2.5, None, "2.5"),
+        (2.5, 0.0, "2.5"),
+        (1e12, 3e10, "1e+12 ± 3e+10"),
+        (1e-12, 3e-14, "1e-12 ± 3e-14"),
+        (math.nan, 1.0, "–"),
+    ],
+)
+def test_digits_follow_the_deviation(value: float, std: float | None, text: str) -> None:
+    parameter = replace(toys.SOFT.parameters[0], name="k", value=value, std=std, unit="")
+    cause = replace(toys.SOFT, parameters=(parameter,))
+    assert f"; k {text}" in summary_lines(data_of(toys.made(causes=(cause,))))[1]
+    assert summary_lines(data_of(toys.made(causes=(cause,))))[1].endswith(text)
+
+
+def test_places_that_do_not_belong_to_effects_one_by_one() -> None:
+    rival = Rival("joint-offset + added-mass", "a + b + c", 3.0, 0.2)
+    assert "joint-offset + added-mass at a + b + c: probability 20.0 %" in words(
+        toys.made(rivals=(rival,))
+    )

@@ -1,0 +1,417 @@
+"""Effects that hang on a structure or act on it as a whole: model and change agree; physics."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+
+from femubench import (
+    FloatArray,
+    Frame,
+    FrameEffect,
+    GroundSpring,
+    Model,
+    ModelError,
+    NotApplicable,
+    Place,
+    Sensors,
+    Support,
+    directed_point,
+    elastic_band,
+    rigid_body_vectors,
+    solve_modes,
+    total_mass,
+    translation_rows,
+)
+from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.modal.eigen import counted_evaluations, solve_dense
+from femubench.core.model import Dofs
+from femubench.plugins.effects.added_mass import AddedMass
+from femubench.plugins.effects.amplitude_dependent_stiffness import AmplitudeDependentStiffness
+from femubench.plugins.effects.attached_oscillator import AttachedOscillator
+from femubench.plugins.effects.axial_preload import AxialPreload, euler_load
+from femubench.plugins.effects.bending_torsion_coupling import BendingTorsionCoupling
+from femubench.plugins.effects.brace_spring import BraceSpring
+from femubench.plugins.effects.grounding_spring import GroundingSpring
+from femubench.plugins.effects.joint_mass import JointMass
+from femubench.plugins.effects.mass_eccentricity import MassEccentricity
+from femubench.plugins.effects.temperature import Temperature
+
+sys.path.insert(0, str(Path(__file__).parent))
+from effect_checks import changed_matrices
+
+FrameBuilder = Callable[..., Frame]
+EXACT = 1e-9
+
+
+@pytest.fixture(scope="module")
+def models(ladder: FrameBuilder, hframe: FrameBuilder, portal: FrameBuilder) -> dict[str, Model]:
+    """Return a frame of each plane."""
+    frames = {"ladder": ladder(), "hframe": hframe(mesh=(4, 2, 4)), "portal": portal(3)}
+    typed = tuple(
+        replace(j, type="knee" if j.name in ("J1", "J2") else "") for j in frames["portal"].joints
+    )
+    frames["portal"] = replace(frames["portal"], joints=typed)
+    return {name: Model.of(frame) for name, frame in frames.items()}
+
+
+def sensors_of(frame: Frame) -> Sensors:
+    """Return a sensor at every joint and at a third of every member, in the plane's first way."""
+    ends = frame.corners[frame.member_ends]
+    xyz = np.vstack([frame.corners, ends[:, 0] + (ends[:, 1] - ends[:, 0]) / 3.0])
+    labels = tuple(f"s{i}" for i in range(len(xyz)))
+    return Sensors(labels, xyz, ("x" if frame.plane == "3d" else "z",) * len(xyz))
+
+
+def readings(mass: FloatArray, stiffness: FloatArray, rows: FloatArray, hertz: float) -> FloatArray:
+    """Return what sensors read of a unit force at each of them, at one frequency."""
+    omega = 2.0 * np.pi * hertz
+    return np.asarray(rows @ la.solve(stiffness - omega**2 * mass, rows.T))
+
+
+def assert_agree(effect: Any, model: Model, place: str, values: Sequence[float]) -> Model:
+    """Compare the extended model with the nominal one and its change; return the former."""
+    extended = effect.extend(model, place, values)
+    mass, stiffness = changed_matrices(model, effect.change(model, place), values)
+    assert extended.size == len(mass)
+    exact = (extended.mass.toarray(), extended.stiffness.toarray())
+    # The massless dofs of flexible joints have no eigenvalues of their own.
+    own, other = (solve_dense(m, k)[0] for m, k in ((mass, stiffness), exact))
+    count = 6 + int(np.sum(own < 1.0))
+    scale = own[count - 1]
+    np.testing.assert_allclose(own[:count], other[:count], rtol=EXACT, atol=1e-10 * scale)
+    sensors = sensors_of(model.frame_structure.frame)
+    rows = model.observe(sensors).toarray()
+    rows = np.hstack([rows, np.zeros((len(rows), len(mass) - model.size))])
+    for hertz in np.sqrt(scale) / (2.0 * np.pi) * np.array([0.11, 0.63]):
+        expected = readings(*exact, extended.observe(sensors).toarray(), hertz)
+        seen = readings(mass, stiffness, rows, hertz)
+        np.testing.assert_allclose(seen, expected, atol=100.0 * EXACT * np.abs(expected).max())
+    return extended
+
+
+def sizes(effect: Any, model: Model, place: str, x: float = 1.3) -> list[float]:
+    """Return the parameters at some coordinate."""
+    return [float(p.value(np.array(x))) for p in effect.parameters(model, place)]
+
+
+CASES = [
+    (JointMass, "ladder", "L"),
+    (JointMass, "hframe", "T"),
+    (JointMass, "portal", "knee"),
+    (AddedMass, "ladder", "B"),
+    (AddedMass, "ladder", "BE@0.25"),
+    (AddedMass, "hframe", "U1"),
+    (AddedMass, "portal", "m4@0.5"),
+    (GroundingSpring, "ladder", "AB@0.5"),
+    (GroundingSpring, "hframe", "L2:x"),
+    (GroundingSpring, "portal", "J3:y"),
+    (BraceSpring, "hframe", "L1-U2"),
+    (BraceSpring, "portal", "J0-J6"),
+    (AttachedOscillator, "ladder", "F"),
+    (AttachedOscillator, "hframe", "horizontal@0.5:x"),
+    (AttachedOscillator, "portal", "J2:y"),
+    (AxialPreload, "ladder", "AB"),
+    (AxialPreload, "portal", "m6"),
+    (MassEccentricity, "ladder", "BE"),
+    (MassEccentricity, "hframe", "upper1"),
+    (MassEccentricity, "portal", "m2"),
+    (BendingTorsionCoupling, "ladder", "CF"),
+    (BendingTorsionCoupling, "portal", "m8"),
+    (Temperature, "ladder", "all"),
+    (Temperature, "hframe", "all"),
+    (Temperature, "portal", "all"),
+]
+
+
+@pytest.mark.parametrize(("effect", "name", "place"), CASES)
+def test_model_and_change_agree(
+    models: dict[str, Model],
+    effect: type[FrameEffect],
+    name: str,
+    place: str,
+) -> None:
+    made, model = effect(), models[name]
+    assert place in made.places(model)
+    for x in (0.4, 2.0):
+        values = sizes(made, model, place, x)
+        extended = assert_agree(made, model, place, values)
+        assert extended.structure is not None
+    parameters = made.parameters(model, place)
+    neutral = [float(p.value(np.array(0.0))) for p in parameters]
+    mass, stiffness = changed_matrices(model, made.change(model, place), neutral)
+    size = model.size
+    np.testing.assert_array_equal(mass[:size, :size], model.mass.toarray())
+    np.testing.assert_array_equal(stiffness[:size, :size], model.stiffness.toarray())
+    assert made.frame(model.frame_structure.frame, place, neutral) == model.frame_structure.frame
+
+
+@pytest.mark.parametrize(
+    ("effect", "place"),
+    [
+        (AddedMass, "m8@0.5"),
+        (GroundingSpring, "J5:z"),
+        (AxialPreload, "m0"),
+        (MassEccentricity, "m5"),
+        (MassEccentricity, "m4"),
+        (BendingTorsionCoupling, "m5"),
+        (BraceSpring, "J1-J6"),
+        (AttachedOscillator, "J6:x"),
+        (Temperature, "all"),
+    ],
+)
+def test_flexible_joints_and_rigid_ends_do_no_harm(
+    fitted_portal: FrameBuilder, effect: type[FrameEffect], place: str
+) -> None:
+    made, model = effect(), Model.of(fitted_portal(4))
+    assert place in made.places(model)
+    assert_agree(made, model, place, sizes(made, model, place))
+
+
+def hertz(model: Model, count: int = 12) -> FloatArray:
+    return solve_modes(model, count).natural_frequencies
+
+
+def test_places(models: dict[str, Model]) -> None:
+    ladder, hframe, portal = (models[name] for name in ("ladder", "hframe", "portal"))
+    assert JointMass().places(ladder) == ("L", "T")
+    assert len(AddedMass().places(ladder)) == len(GroundingSpring().places(ladder)) == 6 + 7 * 3
+    grounded = GroundingSpring().places(hframe)
+    assert {place.rpartition(":")[2] for place in grounded} == {"x", "z"}
+    assert len(grounded) == 2 * len(AddedMass().places(hframe))
+    assert len(GroundingSpring().places(portal)) == 3 * (7 + 9)
+    assert BraceSpring().places(ladder) == ()
+    assert len(BraceSpring().places(hframe)) == 15 - 5
+    assert "J0-J1" not in BraceSpring().places(portal)
+    assert len(AttachedOscillator().places(ladder)) == 6 + 7
+    assert len(AttachedOscillator().places(portal)) == 3 * (7 + 9)
+    assert BendingTorsionCoupling().places(hframe) == ()
+    assert AxialPreload().places(ladder) == ("AB", "BC", "DE", "EF", "AD", "BE", "CF")
+    assert AxialPreload().places(hframe) == ()
+    assert AxialPreload().places(portal) == tuple(f"m{k}" for k in range(9))
+    assert AmplitudeDependentStiffness().places(ladder) == ()
+    for effect in (GroundingSpring(), AttachedOscillator()):
+        with pytest.raises(ModelError, match="names no direction"):
+            effect.change(hframe, "T1")
+
+
+def test_what_is_held_carries_nothing(ladder: FrameBuilder) -> None:
+    supports = (Support(Place(joint="A"), ("z", "rx", "ry")),)
+    model = Model.of(replace(ladder(accelerometer=False), supports=supports))
+    for effect in (AddedMass(), GroundingSpring(), AttachedOscillator()):
+        places = effect.places(model)
+        assert "A" not in places
+        assert "B" in places
+
+
+def test_masses_are_where_they_belong(models: dict[str, Model]) -> None:
+    for name, model in models.items():
+        kind = JointMass().places(model)[0]
+        joints = {"ladder": 4, "hframe": 2, "portal": 2}[name]
+        heavier = total_mass(JointMass().extend(model, kind, [0.1])) - total_mass(model)
+        np.testing.assert_allclose(heavier, 0.1 * joints, rtol=1e-9)
+        place = AddedMass().places(model)[-1]
+        heavier = total_mass(AddedMass().extend(model, place, [0.1])) - total_mass(model)
+        np.testing.assert_allclose(heavier, 0.1, rtol=1e-9)
+
+
+def test_mass_between_nodes_is_interpolated(ladder: FrameBuilder) -> None:
+    """The model splits the element, the change does not: on a fine mesh they agree."""
+    model = Model.of(ladder(elements=16))
+    extended = AddedMass().extend(model, "AB@0.29", [0.02])
+    assert extended.size > model.size
+    mass, stiffness = changed_matrices(model, AddedMass().change(model, "AB@0.29"), [0.02])
+    own = la.eigh(stiffness, mass, eigvals_only=True, subset_by_index=[3, 8])
+    exact = solve_modes(extended, 9).eigenvalues[3:]
+    np.testing.assert_allclose(own, exact, rtol=1e-6)
+    assert np.abs(own / solve_modes(model, 9).eigenvalues[3:] - 1.0).max() > 1e-2
+
+
+def test_grounding_takes_a_rigid_mode_away(models: dict[str, Model]) -> None:
+    for model in models.values():
+        effect = GroundingSpring()
+        place = effect.places(model)[0]
+        (parameter,) = effect.parameters(model, place)
+        extended = effect.extend(model, place, [parameter.scale])
+        assert solve_modes(extended).rigid.sum() == solve_modes(model).rigid.sum() - 1
+
+
+def test_spring_at_the_scale_shifts_the_lowest_frequency_a_little(models: dict[str, Model]) -> None:
+    model, effect = models["ladder"], GroundingSpring()
+    shifts = []
+    for place in effect.places(model):
+        (parameter,) = effect.parameters(model, place)
+        after = solve_modes(effect.extend(model, place, [parameter.scale])).elastic
+        first = elastic_band(model)[0]
+        shifts.append(min(abs(after.natural_frequencies[1:4] / first - 1.0)))
+    assert 1e-3 < max(shifts) < 5e-2
+
+
+def test_brace_leaves_rigid_motions_free_and_stiffens(models: dict[str, Model]) -> None:
+    for name in ("hframe", "portal"):
+        model, effect = models[name], BraceSpring()
+        rigid = rigid_body_vectors(model.dofs)
+        for place in effect.places(model):
+            (term,) = effect.change(model, place).terms
+            assert np.abs(term.operator.project(rigid)).max() < 1e-20
+        place = {"hframe": "L1-U2", "portal": "J0-J6"}[name]
+        after = solve_modes(effect.extend(model, place, [1e7]), 15)
+        before = solve_modes(model, 15)
+        assert after.rigid.sum() == before.rigid.sum()
+        change = after.eigenvalues / np.maximum(before.eigenvalues, 1.0)
+        assert (change[after.rigid.sum() :] > 1.0 - 1e-9).all()
+        assert change.max() > 1.01
+
+
+def test_oscillator_adds_one_mode_near_its_frequency(models: dict[str, Model]) -> None:
+    for model in models.values():
+        effect = AttachedOscillator()
+        place = effect.places(model)[0]
+        before = hertz(model, 16)
+        band = elastic_band(model)
+        between = float(np.sqrt(band[1] * band[2]))
+        extended = effect.extend(model, place, [1e-5 * total_mass(model), between])
+        after = hertz(extended, 17)
+        assert extended.size == model.size + 1
+        added = np.abs(after - between).argmin()
+        np.testing.assert_allclose(after[added], between, rtol=1e-3)
+        np.testing.assert_allclose(np.delete(after, added)[6:], before[6:], rtol=1e-3)
+
+
+def test_stiff_oscillator_is_a_mass_and_a_soft_one_rides_along(models: dict[str, Model]) -> None:
+    """In its own direction the mass counts only where the spring is stiff, across it always."""
+    model, effect = models["hframe"], AttachedOscillator()
+    stiff = effect.extend(model, "T1:x", [0.5, 1e6])
+    mass = AddedMass().extend(model, "T1", [0.5])
+    np.testing.assert_allclose(hertz(stiff)[3:], hertz(mass)[3:], rtol=1e-6)
+    soft = effect.extend(model, "T1:x", [0.5, 1e-3])
+    at, _ = directed_point(model, "T1:x")
+    across = translation_rows(model, at, ["z"])
+    carried = replace(model, mass=model.mass + 0.5 * (across.T @ across))
+    # Three rigid modes and the mass that hangs on next to nothing.
+    np.testing.assert_allclose(hertz(soft, 13)[4:], hertz(carried)[3:], rtol=1e-6)
+
+
+def test_preload_keeps_rigid_modes(models: dict[str, Model]) -> None:
+    for name, place in (("ladder", "AB"), ("portal", "m6")):
+        model, effect = models[name], AxialPreload()
+        (parameter,) = effect.parameters(model, place)
+        frame = model.frame_structure.frame
+        assert parameter.upper == -parameter.lower == 0.6 * euler_load(frame, place)
+        before = solve_modes(model)
+        after = solve_modes(effect.extend(model, place, [0.5 * parameter.lower]))
+        rigid = int(before.rigid.sum())
+        assert int(after.rigid.sum()) == rigid
+        assert np.abs(after.eigenvalues[:rigid]).max() < 1e-9 * after.eigenvalues[rigid]
+        share = after.natural_frequencies[rigid : rigid + 6] / elastic_band(model) - 1.0
+        assert np.abs(share).max() > 1e-3
+    with pytest.raises(ModelError, match="redundan"):
+        AxialPreload().change(models["hframe"], "horizontal")
+
+
+def test_eccentric_mass_moves_the_centre_of_mass(ladder: FrameBuilder) -> None:
+    model, offset = Model.of(ladder(accelerometer=False)), 0.003
+    extended = MassEccentricity().extend(model, "BE", [offset])
+    # BE runs along y, so its local y is minus the global x: the centre moves against x.
+    lift = np.array([d == "z" for d in model.dofs.direction], dtype=float)
+    turn = np.where(lift, -model.dofs.xyz[:, 0], 0.0)
+    turn += np.array([d == "ry" for d in model.dofs.direction], dtype=float)
+    member = model.frame_structure.frame.members[5]
+    own = 0.2794 * member.section.A * member.material.rho
+    moment = lift @ ((extended.mass - model.mass) @ turn)
+    np.testing.assert_allclose(moment, own * offset, rtol=1e-9)
+    np.testing.assert_allclose(total_mass(extended), total_mass(model), rtol=1e-12)
+
+
+def test_known_eccentricity_is_gone_on_from(models: dict[str, Model]) -> None:
+    effect = MassEccentricity()
+    for name, place in (("ladder", "BE"), ("portal", "m2")):
+        known = effect.extend(models[name], place, [0.002])
+        assert_agree(effect, known, place, [0.003])
+
+
+def test_coupling_turns_its_sign_in_the_mirror(ladder: FrameBuilder) -> None:
+    model, effect = Model.of(ladder(accelerometer=False)), BendingTorsionCoupling()
+    one, other = effect.extend(model, "AB", [0.3]), effect.extend(model, "DE", [-0.3])
+    np.testing.assert_allclose(hertz(one)[3:], hertz(other)[3:], rtol=1e-9)
+    assert np.abs(hertz(one)[3:9] / hertz(model)[3:9] - 1.0).max() > 1e-4
+
+
+def test_temperature_is_a_modulus(models: dict[str, Model]) -> None:
+    for name, slope in (("ladder", -3.6e-4), ("hframe", -2.4e-4)):
+        warm = Temperature().extend(models[name], "all", [25.0])
+        before, after = solve_modes(models[name]).elastic, solve_modes(warm).elastic
+        ratio = after.eigenvalues[:8] / before.eigenvalues[:8]
+        np.testing.assert_allclose(ratio, 1.0 + 25.0 * slope, rtol=1e-8)
+
+
+def test_amplitude_needs_levels(models: dict[str, Model]) -> None:
+    effect, model = AmplitudeDependentStiffness(), models["ladder"]
+    (parameter,) = effect.parameters(model, "all")
+    assert effect.needs == "levels"
+    assert parameter.one_sided
+    soft = solve_modes(effect.extend(model, "all", [0.04])).elastic
+    ratio = soft.eigenvalues[:6] / solve_modes(model).elastic.eigenvalues[:6]
+    np.testing.assert_allclose(ratio, 0.96, rtol=1e-8)
+
+
+def as_matrices(model: Model) -> Model:
+    """Return the model as it would come from files, without its frame."""
+    joints = len(model.frame_structure.frame.joints)
+    names = tuple(f"n{i}" for i in range(int(model.dofs.node.max()) + 1))
+    assert joints <= len(names)
+    dofs = Dofs(model.dofs.node, model.dofs.direction, model.dofs.xyz)
+    return Model(model.mass, model.stiffness, dofs, MatrixGeometry(names, dofs))
+
+
+def test_models_from_matrices(models: dict[str, Model]) -> None:
+    """What hangs on nodes goes without a frame; all else says that it does not apply."""
+    frame, model = models["hframe"], as_matrices(models["hframe"])
+    np.testing.assert_allclose(elastic_band(model), elastic_band(frame), rtol=1e-9)
+    np.testing.assert_allclose(total_mass(model), total_mass(frame), rtol=1e-9)
+    for effect, suffix in ((AddedMass(), ""), (GroundingSpring(), ":x")):
+        place = f"n2{suffix}"
+        assert place in effect.places(model)
+        values = sizes(effect, model, place)
+        mass, stiffness = changed_matrices(model, effect.change(model, place), values)
+        extended = effect.extend(model, place, values)
+        np.testing.assert_allclose(mass, extended.mass.toarray(), rtol=1e-12)
+        np.testing.assert_allclose(stiffness, extended.stiffness.toarray(), rtol=1e-12)
+        name = frame.frame_structure.frame.joints[2].name
+        other = effect.extend(frame, name + suffix, values)
+        np.testing.assert_allclose(extended.mass.toarray(), other.mass.toarray(), atol=1e-15)
+    with pytest.raises(ModelError, match="no node"):
+        AddedMass().change(model, "nowhere")
+    for other_effect in (JointMass, BraceSpring, AttachedOscillator, AxialPreload, Temperature):
+        assert not other_effect().places(model)
+    with pytest.raises(NotApplicable):
+        Temperature().extend(model, "all", [1.0])
+
+
+def test_scales_are_worked_out_once_and_belong_to_their_model(ladder: FrameBuilder) -> None:
+    model = Model.of(ladder())
+    with counted_evaluations() as counter:
+        for place in GroundingSpring().places(model):
+            GroundingSpring().parameters(model, place)
+            AttachedOscillator().parameters(model, place)
+    assert counter.count == 1
+    warm = Temperature().extend(model, "all", [100.0])
+    np.testing.assert_allclose(
+        elastic_band(warm) / elastic_band(model), np.sqrt(1 - 0.036), rtol=1e-8
+    )
+
+
+def test_suspension_does_not_set_the_scale(ladder: FrameBuilder) -> None:
+    """Modes on a soft suspension are no elastic modes of the structure."""
+    frame = ladder()
+    springs = tuple(GroundSpring(Place(joint=name), "z", 500.0) for name in "ACDF")
+    hung = Model.of(replace(frame, springs=springs))
+    assert not solve_modes(hung).rigid.any()
+    np.testing.assert_allclose(elastic_band(hung), elastic_band(Model.of(frame)), rtol=1e-2)

@@ -1,0 +1,126 @@
+"""docs/effects.md: its tables agree with the effects, and its example works as printed."""
+
+from __future__ import annotations
+
+import re
+import sys
+import tomllib
+from collections.abc import Callable, Iterator
+from dataclasses import fields
+from importlib.metadata import distributions
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from femubench import Frame, Model, member_length, solve_modes
+from femubench.core.diagnosis.hypothesis import hypotheses_of
+from femubench.core.plugin.loader import load_plugins
+from femubench.plugins.effects import femubench_effects
+
+TEXT = (Path(__file__).parents[1] / "docs" / "effects.md").read_text(encoding="utf-8")
+THERE, WRITES = "## What there is", "### What each writes and what it is confused with"
+EFFECTS: dict[str, Any] = {effect.name: effect() for effect in femubench_effects()}
+RATIOS = ("ratio", "multiple")
+
+FrameBuilder = Callable[..., Frame]
+
+
+def rows_of(heading: str) -> dict[str, list[str]]:
+    """Return the cells of the table below a heading by the effect's name."""
+    part = TEXT.split(f"\n{heading}\n")[1].split("\n#")[0]
+    rows = re.findall(r"^\| `([a-z-]+)` \| (.*) \|$", part, re.MULTILINE)
+    return {name: cells.split(" | ") for name, cells in rows}
+
+
+@pytest.fixture(scope="module")
+def models(ladder: FrameBuilder, hframe: FrameBuilder, portal: FrameBuilder) -> list[Model]:
+    """Return a frame of each plane, none with shear deformation."""
+    frames = (ladder(), hframe(mesh=(4, 2, 4)), portal(3, "euler-bernoulli"))
+    return [Model.of(frame) for frame in frames]
+
+
+def changed_keys(frame: Frame, other: Frame) -> set[str]:
+    """Return what differs between two frames, in the words of a case."""
+    names = {f.name for f in fields(frame)} - {"members"}
+    keys = {name for name in names if getattr(frame, name) != getattr(other, name)}
+    for own, new in zip(frame.members, other.members, strict=True):
+        keys |= {"materials"} if own.material != new.material else set()
+        keys |= {"sections"} if own.section != new.section else set()
+    return keys
+
+
+def test_every_effect_is_in_both_tables() -> None:
+    assert len(EFFECTS) == 20
+    assert list(rows_of(THERE)) == list(rows_of(WRITES))
+    assert set(rows_of(THERE)) == set(EFFECTS)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_units_priors_and_keys_are_those_of_the_effect(name: str, models: list[Model]) -> None:
+    effect = EFFECTS[name]
+    _, where, unit, prior = rows_of(THERE)[name]
+    scalings = set(re.findall(r"linear|exponential|compliance", prior))
+    written: set[str] = set()
+    for model in models:
+        frame = model.frame_structure.frame
+        places = ("all",) if where == "none" else effect.places(model)
+        assert where != "none" or not effect.places(model)
+        for place in places[:1]:
+            parameters = effect.parameters(model, place)
+            units = unit.split(", ") * len(parameters)
+            assert [p.unit or unit for p in parameters] == units[: len(parameters)]
+            assert all(p.unit for p in parameters) == (unit not in RATIOS)
+            assert {p.scaling for p in parameters} == scalings
+            assert any(p.one_sided for p in parameters) == ("+" in prior)
+            values = [float(p.value(np.array(0.3))) for p in parameters]
+            written |= changed_keys(frame, effect.frame(frame, place, values))
+    assert written == set(re.findall(r"`([a-z_]+)`", rows_of(WRITES)[name][0]))
+
+
+@pytest.fixture
+def bedding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    """Install the package of the docs, as printed, and load it as `bench` would."""
+    (project,) = re.findall(r"```toml\n# pyproject\.toml\n(.*?)```", TEXT, re.DOTALL)
+    (source,) = re.findall(r"```python\n# my_bedding\.py\n(.*?)```", TEXT, re.DOTALL)
+    table = tomllib.loads(project)["project"]
+    (tmp_path / "my_bedding.py").write_text(source, encoding="utf-8")
+    info = tmp_path / f"my_bedding-{table['version']}.dist-info"
+    info.mkdir()
+    head = f"Metadata-Version: 2.1\nName: {table['name']}\nVersion: {table['version']}\n"
+    (info / "METADATA").write_text(head, encoding="utf-8")
+    points = [f"{name} = {module}" for name, module in table["entry-points"]["femubench"].items()]
+    (info / "entry_points.txt").write_text("\n".join(["[femubench]", *points]), encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    (found,) = distributions(path=[str(tmp_path)])
+    plugins = load_plugins(list(found.entry_points))
+    assert plugins.broken == ()
+    yield plugins.effects["elastic-bedding"]
+    del sys.modules["my_bedding"]
+
+
+def test_example_holds_what_lies_on_it(bedding: Any, ladder: FrameBuilder) -> None:
+    """Lifted as a body, the frame is held by the bedding's stiffness times the member's length."""
+    model = Model.of(ladder())
+    frame = model.frame_structure.frame
+    assert bedding.places(model) == tuple(member.name for member in frame.members)
+    assert bedding.frame(frame, "BE", [0.0]) == frame
+    extended = bedding.extend(model, "BE", [2e4])
+    assert extended.size == model.size
+    lift = np.array([direction == "z" for direction in model.dofs.direction], dtype=float)
+    held = lift @ (extended.stiffness @ lift)
+    np.testing.assert_allclose(held, 2e4 * member_length(frame, "BE"), rtol=1e-9)
+    assert solve_modes(extended).rigid.sum() == 1  # the turn about the member
+
+
+def test_example_is_a_hypothesis_like_any_other(bedding: Any, ladder: FrameBuilder) -> None:
+    model = Model.of(ladder())
+    hypotheses = hypotheses_of(model, [bedding])
+    assert [h.place for h in hypotheses] == list(bedding.places(model))
+    one, x = hypotheses[5], np.array([[0.7]])
+    change = np.zeros((model.size, model.size))
+    for factor, term in zip(one.factors(x)[0], one.change.terms, strict=True):
+        change += factor * term.operator.apply(np.eye(model.size))
+    exact = bedding.extend(model, one.place, one.values(x)[0]).stiffness - model.stiffness
+    np.testing.assert_allclose(change, exact.toarray(), atol=1e-9 * np.abs(change).max())

@@ -1,0 +1,506 @@
+"""Factors, eccentric mass, coupling, braces and oscillators against exact and edited frames."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from femubench.core.errors import ModelError
+from femubench.core.fem.beam import (
+    BeamProperties,
+    coupling_matrices,
+    eccentric_mass_parts,
+    mass_matrices,
+    shape_functions,
+    stiffness_matrices,
+)
+from femubench.core.fem.frame import (
+    Brace,
+    Coupling,
+    Eccentricity,
+    Factor,
+    Frame,
+    GroundSpring,
+    Joint,
+    JointSpring,
+    Material,
+    Member,
+    Oscillator,
+    Place,
+    PointMass,
+    Preload,
+    Support,
+)
+from femubench.core.fem.parameters import QUANTITIES, Parameter
+from femubench.core.fem.sections import Section, constant_kappa
+from femubench.core.fem.structure import Structure
+from femubench.core.modal.eigen import solve_modes
+from femubench.core.modal.sensitivity import eigenvalue_sensitivities
+from femubench.core.model import LowRank, Model
+from femubench.core.typing import FloatArray
+from femubench.core.update.residuals import total_mass
+
+STEEL = Material(210e9, 0.3, 7850.0)
+SECTION = Section(4e-4, 3e-9, 5e-8, 2e-9, 5.3e-8, constant_kappa(0.8))
+LENGTH = 1.3
+EI, GJ, RHO_A = STEEL.E * SECTION.Iy, STEEL.G * SECTION.J, STEEL.rho * SECTION.A
+MIDDLE = Place(member="m", s=0.5)
+CLAMP = (Support(Place(joint="A"), ("z", "rx", "ry")),)
+
+
+def beam(plane: str, elements: int, supports: tuple[Support, ...] = (), **parts: Any) -> Frame:
+    material = parts.pop("material", STEEL)
+    section = parts.pop("section", SECTION)
+    return Frame(
+        plane,  # type: ignore[arg-type]
+        "euler-bernoulli",
+        (Joint("A", (0.0, 0.0, 0.0)), Joint("B", (LENGTH, 0.0, 0.0))),
+        (Member("m", ("A", "B"), elements, section, material),),
+        supports=supports,
+        **parts,
+    )
+
+
+def matrices(frame: Frame) -> tuple[FloatArray, FloatArray]:
+    mass, stiffness = Structure.build(frame).matrices()
+    return mass.toarray(), stiffness.toarray()
+
+
+def same(first: Frame, second: Frame) -> None:
+    for one, two in zip(matrices(first), matrices(second), strict=True):
+        assert np.abs(one - two).max() < 1e-13 * np.abs(two).max()
+
+
+def frequencies(frame: Frame, count: int | None = None) -> FloatArray:
+    return np.asarray(solve_modes(Model.of(frame)).elastic.natural_frequencies[:count])
+
+
+def edited(frame: Frame, *, material: Any = None, section: Any = None) -> Frame:
+    """Return the frame with all materials and sections replaced by functions of them."""
+    members = tuple(
+        replace(
+            member,
+            material=member.material if material is None else material(member.material),
+            section=member.section if section is None else section(member.section),
+        )
+        for member in frame.members
+    )
+    return replace(frame, members=members)
+
+
+class TestFactors:
+    @pytest.mark.parametrize("plane", ["in-plane", "out-of-plane", "3d"])
+    @pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
+    def test_factors_are_edited_materials_and_sections(self, plane: str, theory: Any) -> None:
+        plain = replace(beam(plane, 3), beam=theory)
+        stiff = replace(plain, factors=(Factor("E", ("all",), 0.7),))
+        same(stiff, edited(plain, material=lambda m: replace(m, E=0.7 * m.E)))
+        heavy = replace(plain, factors=(Factor("density", ("m",), 1.2),))
+        same(heavy, edited(plain, material=lambda m: replace(m, rho=1.2 * m.rho)))
+        wiry = replace(plain, factors=(Factor("GJ", ("m", "m/2"), 1.5),))
+        same(wiry, edited(plain, section=lambda s: replace(s, J=1.5 * s.J)))
+        soft = replace(plain, factors=(Factor("shear", ("all",), 4.0),))
+        same(soft, edited(plain, section=lambda s: replace(s, kappa=constant_kappa(0.2))))
+        rigid = replace(plain, factors=(Factor("shear", ("all",), 0.0),))
+        same(rigid, replace(plain, beam="euler-bernoulli", rotary_inertia=theory == "timoshenko"))
+
+    def test_a_factor_on_an_element_is_a_parameter_there(self, fitted_portal: Any) -> None:
+        plain = fitted_portal(2)
+        for quantity in (name for name, scaled in QUANTITIES.items() if scaled):
+            factors = (Factor(quantity, ("m2/1",), 2.0), Factor(quantity, ("m2/1", "m8"), 0.3))
+            given = Structure.build(replace(plain, factors=factors))
+            here, there = Parameter("a", quantity, ("m2/1",)), Parameter("b", quantity, ("m8/1",))
+            rest = Parameter("c", quantity, ("m8/2",))
+            wanted = Structure.build(plain).with_values([here, there, rest], [0.6, 0.3, 0.3])
+            for one, two in zip(given.matrices(), wanted.matrices(), strict=True):
+                assert abs(one - two).max() < 1e-13 * abs(two).max()
+
+    def test_updating_starts_from_the_factors(self) -> None:
+        frame = beam("3d", 4, factors=(Factor("E", ("m/2",), 0.5),))
+        parameter = Parameter("E", "E", ("m/2",))
+        updated = Structure.build(frame).with_values([parameter], [2.0])
+        plain = Structure.build(beam("3d", 4))
+        assert abs(updated.matrices()[1] - plain.matrices()[1]).max() < 1e-3
+        again = updated.rebuilt(replace(frame, masses=(PointMass(MIDDLE, 0.1),)))
+        assert pytest.approx(plain.properties.EA, rel=1e-15) == again.properties.EA
+
+    @pytest.mark.parametrize(
+        ("factor", "words"),
+        [
+            (Factor("G", ("all",), 2.0), "no factor on 'G'"),
+            (Factor("spring", ("all",), 2.0), "no factor on 'spring'"),
+            (Factor("E", ("n",), 2.0), "no place 'n'"),
+            (Factor("E", ("m/5",), 2.0), "no place 'm/5'"),
+            (Factor("E", ("m",), 0.0), "not positive"),
+            (Factor("shear", ("m",), -1.0), "not positive"),
+            (Factor("E", ("m",), float("nan")), "not positive"),
+        ],
+    )
+    def test_what_is_no_factor_is_refused(self, factor: Factor, words: str) -> None:
+        with pytest.raises(ModelError, match=words):
+            Structure.build(beam("3d", 4, factors=(factor,)))
+
+    @pytest.mark.parametrize("plane", ["in-plane", "out-of-plane", "3d"])
+    def test_a_multiple_of_the_rotary_inertia_is_a_factor_on_it(self, plane: str) -> None:
+        plain = replace(beam(plane, 3), beam="timoshenko")
+        more = replace(plain, rotary_inertia=1.4)
+        same(more, replace(plain, factors=(Factor("rotary", ("all",), 1.4),)))
+        same(replace(plain, rotary_inertia=0.0), replace(plain, rotary_inertia=False))
+        same(replace(plain, rotary_inertia=1.0), plain)
+        assert frequencies(more)[-1] < frequencies(plain)[-1]
+
+
+def properties(**changes: float) -> BeamProperties:
+    values = {
+        "length": 0.7, "EA": 7.4e7, "EIy": 1.7e4, "EIz": 0.9e4, "GJ": 1.1e4,
+        "flex_y": 5e-8, "flex_z": 3e-7, "rhoA": 2.8, "rhoJp": 1.3e-3, "rhoIy": 0.02, "rhoIz": 0.03,
+        "rigid_1": 0.0, "rigid_2": 0.0, "rigid_mass_1": 0.0, "rigid_mass_2": 0.0,
+        "shear_shape": 0.0, "coupling": 0.0, "ecc_y": 0.0, "ecc_z": 0.0,
+    }  # fmt: skip
+    return BeamProperties(**{k: np.array([v, v]) for k, v in (values | changes).items()})
+
+
+class TestEccentricMass:
+    @pytest.mark.parametrize("shape", [0.0, 0.4, 1.0])
+    @pytest.mark.parametrize("rigid", [0.0, 0.06])
+    def test_it_is_the_inertia_of_the_line_of_mass_centres(
+        self, shape: float, rigid: float
+    ) -> None:
+        y, z = 0.02, -0.03
+        ends = dict.fromkeys(("rigid_1", "rigid_mass_1"), rigid)
+        ends |= dict.fromkeys(("rigid_2", "rigid_mass_2"), 0.5 * rigid)
+        p = properties(shear_shape=shape, **ends)
+        length = 0.7 - 1.5 * rigid
+        arm = np.array([[0.0, z, -y], [-z, 0.0, 0.0], [y, 0.0, 0.0]])
+        expected = np.zeros((12, 12))
+        for x, weight in zip(*np.polynomial.legendre.leggauss(5), strict=True):
+            at = rigid + length * (0.5 + 0.5 * x)
+            rows = shape_functions(p, 0, at / 0.7)
+            moved = rows[:3] + arm @ rows[3:]
+            change = moved.T @ moved - rows[:3].T @ rows[:3]
+            expected += 0.5 * weight * length * 2.8 * change
+        shifted = replace(p, ecc_y=np.full(2, y), ecc_z=np.full(2, z))
+        change = mass_matrices(shifted) - mass_matrices(p)
+        assert change[1] == pytest.approx(expected, rel=1e-11, abs=1e-12)
+        parts = eccentric_mass_parts(p)
+        total = y * parts["y"] + z * parts["z"] + y * y * parts["yy"] + z * z * parts["zz"]
+        assert total + y * z * parts["yz"] == pytest.approx(change, abs=1e-15)
+
+    def test_complex_steps_go_through(self) -> None:
+        p = properties(shear_shape=1.0, ecc_y=0.02, ecc_z=-0.03)
+        for name in ("rhoA", "ecc_y", "ecc_z", "EIy", "rigid_mass_1"):
+            value = getattr(p, name)
+            slope = mass_matrices(replace(p, **{name: value + 1e-30j})).imag / 1e-30
+            step = 1e-6 * max(1.0, float(value[0]))
+            ends = [mass_matrices(replace(p, **{name: value + s})) for s in (-step, step)]
+            numeric = (ends[1] - ends[0]) / (2.0 * step)
+            assert np.abs(slope - numeric).max() <= 1e-6 * np.abs(slope).max() + 1e-9
+
+    @pytest.mark.parametrize(
+        ("plane", "offset", "fixed"),
+        [
+            ("out-of-plane", (0.0, 0.03, 0.0), ("z", "rx", "ry")),
+            ("in-plane", (0.0, 0.0, 0.03), ("x", "z", "ry")),
+            ("3d", (0.0, 0.03, -0.02), ("x", "y", "z", "rx", "ry", "rz")),
+        ],
+    )
+    def test_many_offset_masses_converge_to_it(
+        self, plane: str, offset: Any, fixed: tuple[str, ...]
+    ) -> None:
+        supports = (Support(Place(joint="A"), fixed),)
+        section = replace(SECTION, Jp=1e-12)
+        place = Eccentricity("m", offset[1], offset[2])
+        exact = frequencies(beam(plane, 100, supports, section=section, eccentricities=(place,)), 5)
+
+        def lumped(count: int) -> FloatArray:
+            stations = (np.arange(count) + 0.5) / count
+            masses = tuple(
+                PointMass(Place(member="m", s=float(s)), RHO_A * LENGTH / count, offset)
+                for s in stations
+            )
+            light = replace(STEEL, rho=STEEL.rho * 1e-8)
+            return frequencies(
+                beam(plane, 1, supports, section=section, material=light, masses=masses), 5
+            )
+
+        errors = [np.abs(lumped(count) / exact - 1.0) for count in (16, 32)]
+        assert errors[1].max() < 4e-3
+        assert errors[0].max() / errors[1].max() == pytest.approx(4.0, rel=0.15)
+        centred = frequencies(beam(plane, 100, supports, section=section), 5)
+        assert np.abs(exact / centred - 1.0).max() > 5e-3
+
+    def test_the_mass_stays_and_the_moment_of_inertia_grows_by_steiner(self) -> None:
+        frame = beam("3d", 3, eccentricities=(Eccentricity("m", 0.02, 0.01),))
+        model = Model.of(frame)
+        rigid = np.zeros((model.size, 2))
+        rigid[[d == "y" for d in model.dofs.direction], 0] = 1.0
+        rigid[[d == "rx" for d in model.dofs.direction], 1] = 1.0
+        inertia = rigid.T @ model.mass @ rigid
+        assert inertia[0, 0] == pytest.approx(RHO_A * LENGTH, rel=1e-12)
+        steiner = STEEL.rho * SECTION.Jp + RHO_A * (0.02**2 + 0.01**2)
+        assert inertia[1, 1] == pytest.approx(steiner * LENGTH, rel=1e-12)
+        assert inertia[0, 1] == pytest.approx(-0.01 * RHO_A * LENGTH, rel=1e-12)
+
+    def test_an_offset_that_the_plane_does_not_see_changes_nothing(self) -> None:
+        shifted = (Eccentricity("m", z=0.01),)
+        same(beam("out-of-plane", 2, eccentricities=shifted), beam("out-of-plane", 2))
+        shifted = (Eccentricity("m", y=0.01),)
+        same(beam("in-plane", 2, eccentricities=shifted), beam("in-plane", 2))
+
+
+class TestCoupling:
+    def tip(self, coefficient: float, elements: int) -> dict[str, float]:
+        """Return the motion of the tip of a cantilever under a unit force there."""
+        frame = beam("out-of-plane", elements, CLAMP, couplings=(Coupling("m", coefficient),))
+        model = Model.of(frame)
+        tip = {d: i for i, d in enumerate(model.dofs.direction) if model.dofs.node[i] == 1}
+        force = np.eye(model.size)[tip["z"]]
+        motion = np.linalg.solve(model.stiffness.toarray(), force)
+        return {d: float(motion[i]) for d, i in tip.items()}
+
+    @pytest.mark.parametrize("c", [-0.6, 0.2, 0.9])
+    def test_a_tip_force_twists_a_cantilever(self, c: float) -> None:
+        """By hand: no torque, so that t = -c sqrt(EI/GJ) k and EI (1 - c^2) k = moment."""
+        twist = c * LENGTH**2 / (2.0 * np.sqrt(EI * GJ) * (1.0 - c**2))
+        deflection = LENGTH**3 / (3.0 * EI * (1.0 - c**2))
+        tips = [self.tip(c, n) for n in (1, 4, 8)]
+        for tip in tips:
+            assert tip["rx"] == pytest.approx(twist, rel=1e-9)
+        errors = [1.0 - tip["z"] / deflection for tip in tips]
+        assert errors[0] == pytest.approx(c**2 / 4.0, rel=1e-9)
+        assert errors[1] / errors[2] == pytest.approx(4.0, rel=1e-6)
+
+    def test_it_follows_the_rigidities(self) -> None:
+        frame = beam("3d", 3, couplings=(Coupling("m", 0.4),))
+        places = ("m/1", "m/2", "m/3")
+        structure = Structure.build(frame)
+        stiffer = structure.with_values([Parameter("E", "E", places)], [1.7]).matrices()[1]
+        assert abs(stiffer - 1.7 * structure.matrices()[1]).max() < 1e-13 * abs(stiffer).max()
+        p = properties(coupling=0.4)
+        change = stiffness_matrices(p) - stiffness_matrices(replace(p, coupling=np.zeros(2)))
+        assert change == pytest.approx(0.4 * coupling_matrices(p), abs=1e-6)
+
+    @pytest.mark.parametrize("c", [-0.99, 0.99])
+    def test_a_free_beam_keeps_six_rigid_modes_and_a_positive_energy(self, c: float) -> None:
+        modes = solve_modes(Model.of(beam("3d", 4, couplings=(Coupling("m", c),))))
+        assert list(np.flatnonzero(modes.rigid)) == list(range(6))
+        assert (modes.eigenvalues[6:] > 0.0).all()
+
+    @pytest.mark.parametrize("quantity", ["E", "EI", "GJ", "rhoA", "density"])
+    def test_sensitivities_know_of_coupling_and_eccentricity(self, quantity: str) -> None:
+        extra = {
+            "couplings": (Coupling("m", 0.3),),
+            "eccentricities": (Eccentricity("m", 0.01),),
+            "oscillators": (Oscillator(MIDDLE, "z", 0.1, 50.0),),
+        }
+        structure = Structure.build(beam("out-of-plane", 5, CLAMP, **extra))
+        model = Model.of(structure)
+        modes = solve_modes(model, 6)
+        parameter = Parameter("p", quantity, ("m/2", "m/3"))
+        slope = eigenvalue_sensitivities(model, modes, [parameter])[:, 0]
+        ends = [
+            solve_modes(Model.of(structure.with_values([parameter], [1.0 + s]))).eigenvalues[:6]
+            for s in (-1e-5, 1e-5)
+        ]
+        numeric = (ends[1] - ends[0]) / 2e-5
+        assert slope == pytest.approx(numeric, rel=1e-5, abs=1e-6 * np.abs(slope).max())
+
+    def test_too_strong_a_coupling_is_refused(self) -> None:
+        both = (Coupling("m", 0.6), Coupling("m", 0.4))
+        with pytest.raises(ModelError, match="not between -1 and 1"):
+            Structure.build(beam("3d", 2, couplings=both))
+        with pytest.raises(ModelError, match="no member 'n'"):
+            Structure.build(beam("3d", 2, couplings=(Coupling("n", 0.1),)))
+
+
+class TestBraces:
+    def test_a_bracket_is_a_truss_of_two(self) -> None:
+        """By hand: the cantilever gives EA/L along and 3 EI/L^3 across, the brace k n n'."""
+        high, k = 0.9, 3e6
+        frame = beam("in-plane", 1, (Support(Place(joint="A"), ("x", "z", "ry")),))
+        frame = replace(
+            frame,
+            joints=(*frame.joints, Joint("C", (0.0, 0.0, high))),
+            supports=(*frame.supports, Support(Place(joint="C"), ("x", "z", "ry"))),
+            braces=(Brace(("B", "C"), k),),
+        )
+        model = Model.of(frame)
+        unit = np.array([LENGTH, -high]) / np.hypot(LENGTH, high)
+        alone = np.diag([STEEL.E * SECTION.A / LENGTH, 3.0 * EI / LENGTH**3])
+        expected = np.linalg.inv(alone + k * np.outer(unit, unit))
+        assert model.dofs.direction == ("x", "z", "ry")
+        flexibility = np.linalg.inv(model.stiffness.toarray())[:2, :2]
+        assert flexibility == pytest.approx(expected, rel=1e-9)
+
+    def test_it_sees_nothing_but_the_distance_of_its_joints(self, portal: Any) -> None:
+        plain, braced = Model.of(portal(4)), Model.of(portal(4, braces=(Brace(("J0", "J6"), 2e5),)))
+        rng = np.random.default_rng(1)
+        motion = rng.normal(size=plain.size)
+        points = {joint.name: np.array(joint.xyz) for joint in portal(4).joints}
+        line = points["J6"] - points["J0"]
+        ends = [motion[plain.dofs.node == node][:3] for node in (0, 6)]
+        stretch = (ends[1] - ends[0]) @ line / np.linalg.norm(line)
+        energy = motion @ ((braced.stiffness - plain.stiffness) @ motion)
+        assert energy == pytest.approx(2e5 * stretch**2, rel=1e-6)
+        assert int(solve_modes(braced).rigid.sum()) == 6
+
+    @pytest.mark.parametrize("ends", [("A", "A"), ("A", "Z")])
+    def test_what_is_no_brace_is_refused(self, ends: Any) -> None:
+        with pytest.raises(ModelError, match="two joints"):
+            Structure.build(beam("3d", 2, braces=(Brace(ends, 1.0),)))
+        with pytest.raises(ModelError, match="out of plane"):
+            Structure.build(beam("out-of-plane", 2, braces=(Brace(("A", "B"), 1.0),)))
+
+
+PINS = tuple(Support(Place(joint=j), ("x", "z")) for j in "AB")
+
+
+def tuned(mass: float, frequency: float) -> FloatArray:
+    """Return the natural frequencies of a pinned beam with an oscillator in its middle below 4 f1.
+
+    With q = b L / 2 the receptance in the middle is (tan q - tanh q) / (4 EI b^3), and the
+    oscillator pulls with m w^2 / (1 - (w/w0)^2) times the deflection.
+    """
+
+    def gap(f: float) -> float:
+        omega = 2.0 * np.pi * f
+        b = (RHO_A * omega**2 / EI) ** 0.25
+        receptance = (np.tan(b * LENGTH / 2) - np.tanh(b * LENGTH / 2)) / (4.0 * EI * b**3)
+        return float(receptance * mass * omega**2 - 1.0 + (f / frequency) ** 2)
+
+    first = np.pi / (2.0 * LENGTH**2) * np.sqrt(EI / RHO_A)  # Hz, where the receptance has a pole
+    low = brentq(gap, 1e-3 * first, first * (1.0 - 1e-9))
+    high = brentq(gap, first * (1.0 + 1e-9), 8.9 * first)
+    return np.array([low, high])
+
+
+class TestOscillators:
+    @pytest.mark.parametrize(("share", "tuning"), [(0.05, 1.0), (0.3, 0.6), (0.02, 2.2)])
+    @pytest.mark.parametrize("elements", [19, 20])
+    def test_a_tuned_mass_has_the_exact_frequencies(
+        self, share: float, tuning: float, elements: int
+    ) -> None:
+        first = np.pi / (2.0 * LENGTH**2) * np.sqrt(EI / RHO_A)
+        mass, frequency = share * RHO_A * LENGTH, tuning * first
+        hung = (Oscillator(MIDDLE, "-z", mass, frequency),)
+        found = frequencies(beam("in-plane", elements, PINS, oscillators=hung), 3)
+        even = 4.0 * first  # the second mode has its node there
+        expected = np.sort([*tuned(mass, frequency), even])
+        assert found == pytest.approx(expected, rel=4e-5)
+        count = Model.of(beam("in-plane", 20, PINS)).size
+        hung_too = Model.of(beam("in-plane", 20, PINS, oscillators=hung))
+        assert hung_too.size == count + 1
+
+    def test_two_masses_on_a_rigid_bar(self) -> None:
+        """By hand: a body on a ground spring with two oscillators on it, all in z."""
+        body, m, f, k = 4.0, (0.3, 0.5), (9.0, 14.0), 2e4
+        stiff = Material(1e14, 0.3, 1e-3)
+        place = Place(joint="A")
+        supports = (Support(place, ("x", "ry")),)
+        frame = beam(
+            "in-plane",
+            1,
+            supports,
+            material=stiff,
+            masses=(PointMass(place, body),),
+            springs=(GroundSpring(place, "z", k),),
+            oscillators=tuple(Oscillator(place, "z", *pair) for pair in zip(m, f, strict=True)),
+        )
+        springs = [a * (2 * np.pi * b) ** 2 for a, b in zip(m, f, strict=True)]
+        stiffness = np.diag([k + sum(springs), *springs])
+        stiffness[0, 1:] = stiffness[1:, 0] = [-s for s in springs]
+        root = np.sqrt([body, *m])
+        exact = np.linalg.eigvalsh(stiffness / np.outer(root, root))
+        found = solve_modes(Model.of(frame)).eigenvalues[:3]
+        assert found == pytest.approx(exact, rel=1e-5)
+
+    def test_it_rides_rigidly_in_the_other_directions(self) -> None:
+        fixed = (Support(Place(joint="A"), ("x", "y", "z", "rx", "ry", "rz")),)
+        tip = Place(joint="B")
+        soft = beam("3d", 4, fixed, oscillators=(Oscillator(tip, "y", 0.7, 0.01),))
+        found = frequencies(soft)
+        assert found[0] == pytest.approx(0.01, rel=1e-4)
+        # What moves in x and z does not know that the mass is loose in y.
+        across = (Support(Place(joint="A"), ("x", "z", "ry")),)
+        planar = frequencies(beam("in-plane", 4, across, masses=(PointMass(tip, 0.7),)), 6)
+        nearest = [np.abs(found / frequency - 1.0).min() for frequency in planar]
+        assert max(nearest) < 1e-9
+
+    @pytest.mark.parametrize("plane", ["in-plane", "out-of-plane", "3d"])
+    def test_a_stiff_one_is_a_mass(self, plane: str) -> None:
+        place = Place(member="m", s=0.37)
+        hung = beam(plane, 4, oscillators=(Oscillator(place, "z", 0.5, 3e5),))
+        lumped = beam(plane, 4, masses=(PointMass(place, 0.5),))
+        assert frequencies(hung, 4) == pytest.approx(frequencies(lumped, 4), rel=1e-5)
+
+    def test_free_frames_keep_their_rigid_modes(self, fitted_portal: Any, ladder: Any) -> None:
+        hung = (
+            Oscillator(Place(joint="A"), "z", 0.1, 90.0),
+            Oscillator(Place(joint="A"), "z", 0.2, 40.0),
+            Oscillator(Place(member="BE", s=0.3), "z", 0.1, 300.0),
+        )
+        modes = solve_modes(Model.of(replace(ladder(), oscillators=hung)))
+        assert list(np.flatnonzero(modes.rigid)) == [0, 1, 2]
+        plain = Structure.build(ladder())
+        assert len(modes) == plain.kinematics.transform.shape[1] + 3 + 3  # a split adds a node
+        for direction in "xyz":
+            places = (Place(joint="J1"), Place(member="m2", s=0.6), Place(member="m1", s=0.005))
+            many = tuple(Oscillator(place, direction, 0.2, 30.0) for place in places)
+            spatial = solve_modes(Model.of(replace(fitted_portal(1), oscillators=many)))
+            assert list(np.flatnonzero(spatial.rigid)) == list(range(6))
+            largest = np.abs(spatial.eigenvalues[:6]).max()
+            assert largest < 1e-8 * spatial.eigenvalues[6]
+
+    def test_they_may_hang_where_nothing_can_be_split(self, ladder: Any) -> None:
+        arm = JointSpring("B", "BE", {"rx": 1e3, "ry": 1e3}, 0.01)
+        for s in (0.01, 1.0 / 4 + 1e-6):
+            place = Place(member="BE", s=s)
+            frame = replace(ladder(accelerometer=False), joint_springs=(arm,))
+            nodes = len(Structure.build(frame).mesh.xyz)
+            hung = replace(frame, oscillators=(Oscillator(place, "z", 0.1, 1e5),))
+            lumped = replace(frame, masses=(PointMass(place, 0.1),))
+            assert len(Structure.build(hung).mesh.xyz) == nodes + 1
+            assert frequencies(hung, 5) == pytest.approx(frequencies(lumped, 5), rel=1e-4)
+
+    def test_attachments_find_the_dofs_again(self, ladder: Any) -> None:
+        hung = (Oscillator(Place(member="AB", s=0.4), "z", 0.1, 90.0),)
+        frame = replace(ladder(), oscillators=hung, preloads=(Preload("BE", 500.0),))
+        more = (PointMass(Place(member="BE", s=0.6), 0.2),)
+        parameter = Parameter("E", "E", ("AB/1", "CF/2"))
+        model = Model.of(Structure.build(frame).with_values([parameter], [0.8]))
+        attached = model.attach(more, ())
+        wanted = Structure.build(frame.with_attachments(more, ())).with_values([parameter], [0.8])
+        for one, two in zip((attached.mass, attached.stiffness), wanted.matrices(), strict=True):
+            assert abs(one - two).max() < 1e-9 * abs(two).max()
+        spring = np.zeros((model.size, 1))
+        spring[-1] = 1.0  # the last dof is the oscillator's
+        changed = replace(model, stiffness_change=LowRank(spring, np.array([[1e5]])))
+        change = changed.attach(more, ()).stiffness_change
+        assert change is not None
+        assert list(np.flatnonzero(change.basis)) == [attached.size - 1]
+        assert attached.dofs.direction[-1] == "z"
+
+    def test_their_mass_is_weighed(self, ladder: Any) -> None:
+        hung = replace(ladder(), oscillators=(Oscillator(Place(joint="A"), "z", 0.1, 90.0),))
+        more = total_mass(Structure.build(hung)) - total_mass(Structure.build(ladder()))
+        assert more == pytest.approx(0.1, rel=1e-9)
+
+    @pytest.mark.parametrize(
+        ("change", "words"),
+        [
+            ({"direction": "x"}, "one of z"),
+            ({"direction": "rx"}, "one of z"),
+            ({"mass": 0.0}, "above 0"),
+            ({"frequency": 0.0}, "above 0"),
+            ({"at": Place(joint="Z")}, "no joint 'Z'"),
+            ({"at": Place(member="n", s=0.5)}, "no member 'n'"),
+        ],
+    )
+    def test_what_is_no_oscillator_is_refused(self, change: dict[str, Any], words: str) -> None:
+        item = replace(Oscillator(MIDDLE, "z", 0.1, 10.0), **change)
+        with pytest.raises(ModelError, match=words):
+            Structure.build(beam("out-of-plane", 2, oscillators=(item,)))

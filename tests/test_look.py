@@ -1,0 +1,251 @@
+"""The plain look: every warning where it belongs, and its changes against full solutions."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femubench.core.diagnosis.attachment_rows import total_mass
+from femubench.core.diagnosis.look import look, mesh_bias
+from femubench.core.diagnosis.look_modes import elastic_modes
+from femubench.core.diagnosis.look_sections import estimated_torsion_constant, is_round
+from femubench.core.diagnosis.result import LookWarning
+from femubench.core.fem.frame import Frame, Material
+from femubench.core.fem.sections import (
+    Section,
+    constant_kappa,
+    rectangular_tube,
+    round_tube,
+    solid_rectangle,
+)
+from femubench.core.measurement import Sensors
+from femubench.core.model import Model
+from femubench.core.typing import FloatArray
+
+sys.path.insert(0, str(Path(__file__).parent))
+from look_checks import measured, texts
+
+FrameBuilder = Callable[..., Frame]
+
+
+def frequencies(frame: Frame, count: int) -> FloatArray:
+    return np.asarray(elastic_modes(Model.of(frame), count).natural_frequencies[:count])
+
+
+def with_section(frame: Frame, section: Section) -> Frame:
+    return replace(frame, members=tuple(replace(m, section=section) for m in frame.members))
+
+
+def of_effect(warnings: tuple[LookWarning, ...], effect: str) -> LookWarning:
+    (found,) = [warning for warning in warnings if warning.effect == effect]
+    return found
+
+
+@pytest.fixture
+def clean(ladder: FrameBuilder) -> Frame:
+    """Return a slender ladder with nothing to complain of: shear, rotary inertia, Bredt's J."""
+    frame = ladder("timoshenko", polar=False, elements=8)
+    return replace(frame, bending_mass="shear-consistent")
+
+
+def test_nothing_is_found_in_a_good_model(clean: Frame) -> None:
+    model = Model.of(clean)
+    assert look(model, replace(measured(model), total_mass=(total_mass(model), 0.001))) == ()
+
+
+def test_a_polar_moment_for_a_torsion_constant_is_found(ladder: FrameBuilder) -> None:
+    frame = ladder()
+    model = Model.of(frame)
+    warning = of_effect(look(model, measured(model)), "torsion-constant")
+    assert warning.where == "all"
+    tube = rectangular_tube(0.0254, 0.0254, 0.00238)
+    mended = frequencies(with_section(frame, tube), 5) / frequencies(frame, 5) - 1.0
+    assert [mode for mode, _ in warning.changes] == [1, 2, 3, 4, 5]
+    np.testing.assert_allclose([p for _, p in warning.changes], 100.0 * mended, rtol=1e-9)
+    assert min(mended) < -0.1  # 0.113 at the first mode
+
+
+def test_one_wrong_section_among_others_is_named_by_its_members(ladder: FrameBuilder) -> None:
+    frame = ladder(polar=False)
+    wrong = replace(frame.members[0].section, J=frame.members[0].section.Jp)
+    members = (replace(frame.members[0], section=wrong), *frame.members[1:])
+    model = Model.of(replace(frame, members=members))
+    assert of_effect(look(model, measured(model)), "torsion-constant").where == "AB"
+
+
+@pytest.mark.parametrize(
+    "section",
+    [round_tube(0.03, 0.002), round_tube(0.03, 0.015), rectangular_tube(0.03, 0.02, 0.002)],
+)
+def test_sections_with_their_own_constant_raise_no_warning(
+    ladder: FrameBuilder, section: Section
+) -> None:
+    model = Model.of(with_section(ladder(), section))
+    assert not texts(look(model, measured(model)), "torsion")
+
+
+def test_the_torsion_constant_is_not_looked_at_in_plane(hframe: FrameBuilder) -> None:
+    tube = rectangular_tube(0.04, 0.04, 0.0025)
+    model = Model.of(with_section(hframe(mesh=(4, 4, 4)), replace(tube, J=tube.Jp)))
+    assert not texts(look(model, measured(model, 3, Sensors((), np.zeros((0, 3)), ()))), "torsion")
+
+
+def numbers(section: Section, J: float) -> Section:
+    return Section(A=section.A, Iy=section.Iy, Iz=section.Iz, J=J, Jp=section.Iy + section.Iz)
+
+
+@pytest.mark.parametrize(
+    ("section", "accuracy"),
+    [
+        (rectangular_tube(0.0254, 0.0254, 0.00238), 1e-9),
+        (rectangular_tube(0.06, 0.03, 0.001), 0.02),
+        (solid_rectangle(0.02, 0.02), 0.10),
+        (solid_rectangle(0.04, 0.02), 0.10),
+    ],
+)
+def test_numbers_alone_give_nearly_the_constant_of_the_shape(
+    section: Section, accuracy: float
+) -> None:
+    estimate = estimated_torsion_constant(numbers(section, section.Jp))
+    assert estimate is not None
+    assert estimate[0] == pytest.approx(section.J, rel=accuracy)
+
+
+def test_numbers_alone_tell_circles_as_far_as_they_can() -> None:
+    full, hollow = round_tube(0.03, 0.015), round_tube(0.03, 0.002)
+    assert is_round(numbers(full, full.J)) is True
+    assert is_round(numbers(hollow, hollow.J)) is None  # a square tube has the same A, Iy, Iz
+    assert is_round(numbers(solid_rectangle(0.02, 0.02), 1.0)) is False
+    assert is_round(numbers(rectangular_tube(0.06, 0.03, 0.001), 1.0)) is False
+
+
+@pytest.mark.parametrize(("factor", "word"), [(5.0, "exceeds"), (0.2, "times that of its shape")])
+def test_impossible_and_far_off_constants_are_found(
+    ladder: FrameBuilder, factor: float, word: str
+) -> None:
+    tube = rectangular_tube(0.0254, 0.0254, 0.00238)
+    model = Model.of(with_section(ladder(), replace(tube, J=factor * tube.J)))
+    assert texts(look(model, measured(model)), word)
+
+
+def test_the_weighed_mass_is_compared(clean: Frame) -> None:
+    model = Model.of(clean)
+    mass = total_mass(model)
+    for weighed, expected in ((mass + 0.029, 0), (mass + 0.1, 1), (mass - 0.1, 1)):
+        data = replace(measured(model), total_mass=(weighed, 0.01))
+        assert len(texts(look(model, data), "on the scales")) == expected
+
+
+def test_the_mass_warning_scales_members_and_not_lumps(clean: Frame) -> None:
+    model = Model.of(clean)
+    lump = sum(item.mass for item in clean.masses)
+    data = replace(measured(model), total_mass=(1.1 * total_mass(model), 0.01))
+    warning = of_effect(look(model, data), "density")
+    factor = (data.total_mass[0] - lump) / (total_mass(model) - lump)  # type: ignore[index]
+    material = replace(clean.members[0].material, rho=factor * clean.members[0].material.rho)
+    heavier = replace(clean, members=tuple(replace(m, material=material) for m in clean.members))
+    expected = frequencies(heavier, 5) / frequencies(clean, 5) - 1.0
+    np.testing.assert_allclose([p for _, p in warning.changes], 100.0 * expected, rtol=1e-6)
+
+
+def test_shear_and_rotary_inertia_against_full_solutions(ladder: FrameBuilder) -> None:
+    frame = ladder(polar=False, accelerometer=False)
+    model = Model.of(frame)
+    found = look(model, measured(model))
+    plain = frequencies(frame, 5)
+    shear = replace(frame, beam="timoshenko", rotary_inertia=False)
+    rotary = replace(frame, rotary_inertia=True)
+    for effect, other in (("shear-deformation", shear), ("rotary-inertia", rotary)):
+        expected = 100.0 * (frequencies(other, 5) / plain - 1.0)
+        np.testing.assert_allclose(
+            [p for _, p in of_effect(found, effect).changes], expected, rtol=1e-9
+        )
+    assert "5/6" not in of_effect(found, "shear-deformation").what
+
+
+def test_an_assumed_shear_coefficient_is_said(hframe: FrameBuilder) -> None:
+    frame = hframe(mesh=(8, 4, 6), accelerometers=False)
+    model = Model.of(frame)
+    warning = of_effect(look(model, measured(model, 5)), "shear-deformation")
+    assert "kappa = 5/6" in warning.what
+    section = replace(frame.members[0].section, kappa=constant_kappa(5.0 / 6.0))
+    whole = replace(with_section(frame, section), beam="timoshenko", rotary_inertia=False)
+    expected = 100.0 * (frequencies(whole, 5) / frequencies(frame, 5) - 1.0)
+    got = [p for _, p in warning.changes]
+    np.testing.assert_allclose(got, expected[: len(got)], rtol=1e-9)
+
+
+@pytest.mark.parametrize("elements", [4, 12])
+def test_large_models_are_not_solved_anew(
+    ladder: FrameBuilder, monkeypatch: pytest.MonkeyPatch, elements: int
+) -> None:
+    model = Model.of(ladder(elements=elements))
+    exact = look(model, measured(model))
+    for module in ("look_modes", "look_theory", "look_mesh"):
+        monkeypatch.setattr(f"femubench.core.diagnosis.{module}.SOLVED_LIMIT", 0)
+    quick = look(model, measured(model))
+    for effect, accuracy in (
+        ("shear-deformation", 0.02),
+        ("rotary-inertia", 0.03),
+        ("torsion-constant", 0.06),
+    ):
+        expected = np.array([p for _, p in of_effect(exact, effect).changes])
+        got = np.array([p for _, p in of_effect(quick, effect).changes])
+        np.testing.assert_allclose(got, expected, rtol=accuracy, atol=0.02)
+
+
+def test_slender_members_raise_no_warning_of_theory(ladder: FrameBuilder) -> None:
+    thin = with_section(ladder(accelerometer=False), solid_rectangle(0.004, 0.004))
+    model = Model.of(thin)
+    found = look(model, measured(model, 2))
+    assert not {w.effect for w in found} & {"shear-deformation", "rotary-inertia"}
+    assert not texts(found, "shorter than")
+
+
+def test_stubby_members_are_named(hframe: FrameBuilder) -> None:
+    section = rectangular_tube(0.05, 0.05, 0.003)
+    model = Model.of(with_section(hframe(mesh=(6, 3, 5), accelerometers=False), section))
+    (warning,) = texts(look(model, measured(model, 3)), "times their height")
+    assert warning.where == "lower1, lower2"
+
+
+@pytest.mark.parametrize(
+    ("material", "word"),
+    [
+        (Material(68.0, 0.33, 2700.0), "E / rho"),
+        (Material(68e9, 0.33, 2.7), "E / rho"),
+        (Material(68e9, 0.5, 2700.0), "Poisson"),
+    ],
+)
+def test_materials_that_do_not_exist(clean: Frame, material: Material, word: str) -> None:
+    members = tuple(replace(m, material=material) for m in clean.members)
+    model = Model.of(replace(clean, members=members))
+    assert [w.where for w in texts(look(model, measured(model)), word)] == ["all"]
+
+
+def test_a_shear_coefficient_above_one(clean: Frame) -> None:
+    section = replace(clean.members[0].section, kappa=constant_kappa(1.3))
+    model = Model.of(with_section(clean, section))
+    assert len(texts(look(model, measured(model)), "shear coefficient")) == len(clean.members)
+
+
+def test_a_pair_of_matrices_is_weighed_and_nothing_else(clean: Frame) -> None:
+    frame = Model.of(clean)
+    model = replace(frame, structure=None)
+    mass = total_mass(frame)
+    data = replace(measured(frame), total_mass=(1.21 * mass, 0.01))
+    (warning,) = look(model, data)
+    assert warning.effect == "density"
+    np.testing.assert_allclose([p for _, p in warning.changes], 100.0 * (1.0 / 1.1 - 1.0))
+    assert mesh_bias(model, 5) is None
+
+
+def test_frequencies_alone_are_looked_at_too(clean: Frame) -> None:
+    model = Model.of(clean)
+    data = measured(model, 5, Sensors((), np.zeros((0, 3)), ()))
+    assert look(model, data) == ()

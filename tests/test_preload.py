@@ -1,0 +1,295 @@
+"""Geometric stiffness: buckling loads, beams under tension, rigid motions, what it follows from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.linalg as la
+
+from femubench.core.errors import ModelError
+from femubench.core.fem.frame import (
+    Brace,
+    Frame,
+    GroundSpring,
+    Joint,
+    JointSpring,
+    Material,
+    Member,
+    Oscillator,
+    Place,
+    Preload,
+    RigidEnd,
+    Support,
+)
+from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.preload import geometric_matrices, preload_stiffness, redundant_members
+from femubench.core.fem.sections import Section, rectangular_tube
+from femubench.core.fem.statics import StressState, statics_of
+from femubench.core.fem.structure import Structure
+from femubench.core.modal.eigen import solve_modes
+from femubench.core.modal.rigid import rigid_modes_of
+from femubench.core.modal.sensitivity import eigenvalue_sensitivities
+from femubench.core.model import Model
+
+STEEL = Material(210e9, 0.3, 7850.0)
+SECTION = Section(A=4e-4, Iy=3e-9, Iz=5e-8, J=2e-9, Jp=5.3e-8)
+LENGTH = 1.3
+EI = STEEL.E * SECTION.Iy
+EULER = np.pi**2 * EI / LENGTH**2
+PINNED = (("x", "z"), ("x", "z"))
+CLAMPED = (("x", "z", "ry"), ("x", "z", "ry"))
+CLAMPED_OUT = (("z", "rx", "ry"), ("z", "rx", "ry"))
+
+
+def beam(
+    plane: str,
+    fixed: tuple[tuple[str, ...], tuple[str, ...]],
+    force: float = 0.0,
+    elements: int = 12,
+    **parts: Any,
+) -> Frame:
+    joints = (Joint("A", (0.1, 0.2, 0.0)), Joint("B", (0.1 + LENGTH, 0.2, 0.0)))
+    supports = tuple(Support(Place(joint=j), f) for j, f in zip("AB", fixed, strict=True) if f)
+    return Frame(
+        plane,  # type: ignore[arg-type]
+        "euler-bernoulli",
+        joints,
+        (Member("m", ("A", "B"), elements, SECTION, STEEL),),
+        supports=supports,
+        preloads=(Preload("m", force),) if force else (),
+        **parts,
+    )
+
+
+def in_plane_ladder(ladder: Any, **parts: Any) -> Frame:
+    frame = ladder(plane="in-plane")
+    joints = tuple(replace(j, xyz=(j.xyz[0], 0.0, j.xyz[1])) for j in frame.joints)
+    changed: Frame = replace(frame, joints=joints, **parts)
+    return changed
+
+
+@pytest.mark.parametrize("share", [-0.8, -0.3, 0.5, 3.0])
+def test_a_pinned_beam_under_tension_has_the_exact_frequencies(share: float) -> None:
+    frames = [beam("in-plane", PINNED, force, elements=24) for force in (0.0, share * EULER)]
+    plain, loaded = (solve_modes(Model.of(frame)).natural_frequencies[:3] for frame in frames)
+    n = np.arange(1, 4)
+    base = (n * np.pi / LENGTH) ** 2 * np.sqrt(EI / (STEEL.rho * SECTION.A)) / (2 * np.pi)
+    assert plain == pytest.approx(base, rel=3e-5)
+    assert loaded == pytest.approx(base * np.sqrt(1.0 + share / n**2), rel=3e-5)
+
+
+@pytest.mark.parametrize(
+    ("plane", "fixed", "multiple"),
+    [("in-plane", PINNED, 1.0), ("in-plane", CLAMPED, 4.0), ("out-of-plane", CLAMPED_OUT, 4.0)],
+)
+def test_a_beam_buckles_at_its_euler_load(plane: str, fixed: Any, multiple: float) -> None:
+    def critical(elements: int) -> float:
+        structure = Structure.build(beam(plane, fixed, elements=elements))
+        stiffness = structure.matrices()[1].toarray()
+        tension = preload_stiffness(structure, "m", 1.0).toarray()
+        return float(1.0 / la.eigh(tension, stiffness, eigvals_only=True)[-1])
+
+    errors = np.array([critical(n) / (multiple * EULER) - 1.0 for n in (4, 8)])
+    assert abs(errors[1]) < 1e-3
+    assert errors[0] / errors[1] == pytest.approx(16.0, rel=0.2)  # h^4
+    load = critical(8)
+    for factor, sign in ((0.999, 1.0), (1.001, -1.0)):
+        model = Model.of(beam(plane, fixed, -factor * load, elements=8))
+        assert np.sign(solve_modes(model).eigenvalues[0]) == sign
+
+
+def stress(structure: Structure, force: Any, moment: Any) -> StressState:
+    """Return a state of stress that no lack of fit gives."""
+    count = len(structure.mesh.ends)
+    none = np.zeros((0, 3))
+    rows = [np.broadcast_to(v, (count, 3)) for v in (force, moment)]
+    return StressState(rows[0], rows[1], none, none, np.zeros(0))
+
+
+def buckling(structure: Structure, state: StressState) -> float:
+    stiffness = structure.matrices()[1].toarray()
+    geometric = structure.plan.assemble(geometric_matrices(structure, state)).toarray()
+    return float(1.0 / la.eigh(geometric, stiffness, eigvals_only=True)[-1])
+
+
+def test_a_beam_under_a_uniform_moment_buckles_sideways() -> None:
+    """Timoshenko & Gere (1961), art. 6.3: M = pi/L sqrt(EI GJ) with free warping."""
+    structure = Structure.build(beam("out-of-plane", (("z", "rx"), ("z", "rx")), elements=24))
+    state = stress(structure, np.zeros(3), [0.0, 0.0, 1.0])
+    exact = np.pi / LENGTH * np.sqrt(EI * STEEL.G * SECTION.J)
+    assert buckling(structure, state) == pytest.approx(exact, rel=1e-3)
+
+
+def test_a_cantilever_under_a_tip_force_buckles_sideways() -> None:
+    """Timoshenko & Gere (1961), art. 6.4: P = 4.0126 sqrt(EI GJ) / L^2 at the centroid."""
+    structure = Structure.build(beam("out-of-plane", (("z", "rx", "ry"), ()), elements=40))
+    along = LENGTH * structure.mesh.stations[:, 1]
+    moment = np.zeros((len(along), 3))
+    moment[:, 2] = LENGTH - along
+    state = stress(structure, [0.0, 1.0, 0.0], moment)
+    exact = 4.0126 * np.sqrt(EI * STEEL.G * SECTION.J) / LENGTH**2
+    assert buckling(structure, state) == pytest.approx(exact, rel=1e-3)
+
+
+def free_frames(ladder: Any, asymmetric: Any, portal: Any, fitted: Any) -> dict[str, Frame]:
+    springs = (
+        JointSpring("F", "EF", {"x": 1e6, "z": 2e6, "ry": 1e4}, 0.0127),
+        JointSpring("A", "AD", {"x": 1e6, "ry": 1e4}, 0.0127, 5.0),
+    )
+    return {
+        "ladder": ladder(),
+        "timoshenko": ladder("timoshenko", polar=False),
+        "asymmetric": asymmetric(),
+        "in-plane": in_plane_ladder(
+            ladder,
+            joint_springs=springs,
+            rigid_ends=(RigidEnd("B", "AB", 0.02, 0.01), RigidEnd("B", "BC", -0.02)),
+            braces=(Brace(("A", "F"), 1e6),),
+            oscillators=(Oscillator(Place(member="AB", s=0.3), "z", 0.1, 100.0),),
+        ),
+        "portal": portal(3),
+        "fitted": replace(fitted(5), braces=(Brace(("J0", "J2"), 1e5),)),
+    }
+
+
+@pytest.mark.parametrize(
+    "name", ["ladder", "timoshenko", "asymmetric", "in-plane", "portal", "fitted"]
+)
+def test_rigid_motions_cost_nothing(
+    name: str, ladder: Any, asymmetric_ladder: Any, portal: Any, fitted_portal: Any
+) -> None:
+    frame = free_frames(ladder, asymmetric_ladder, portal, fitted_portal)[name]
+    structure = Structure.build(frame)
+    rigid = rigid_modes_of(Model.of(structure))
+    assert rigid.shape[1] == (6 if frame.plane == "3d" else 3)
+    members = redundant_members(structure)
+    assert members == tuple(member.name for member in frame.members)
+    for member in members:
+        matrix = preload_stiffness(structure, member, 1.0)
+        assert abs(matrix - matrix.T).max() < 1e-13 * abs(matrix).max()
+        scale = (abs(matrix) @ np.abs(rigid)).max()
+        assert np.abs(matrix @ rigid).max() < 2e-12 * scale
+        assert np.abs(rigid.T @ matrix @ rigid).max() < 1e-12 * scale * np.abs(rigid).max()
+
+
+def test_the_normal_force_alone_would_stiffen_rotations(asymmetric_ladder: Any) -> None:
+    structure = Structure.build(replace(asymmetric_ladder(), joint_springs=()))
+    state = statics_of(structure).state("BE")
+    rigid = rigid_modes_of(Model.of(structure))
+    tension = replace(state, force=state.force * [1.0, 0.0, 0.0], moment=0.0 * state.moment)
+    alone = structure.plan.assemble(geometric_matrices(structure, tension))
+    whole = structure.plan.assemble(geometric_matrices(structure, state))
+    energies = [np.abs(rigid.T @ matrix @ rigid).max() for matrix in (alone, whole)]
+    assert energies[1] < 1e-10 * energies[0]
+
+
+@pytest.mark.parametrize("force", [900.0, -900.0])
+def test_a_loaded_free_frame_keeps_its_rigid_modes(ladder: Any, force: float) -> None:
+    plain = solve_modes(Model.of(ladder()))
+    modes = solve_modes(Model.of(replace(ladder(), preloads=(Preload("BE", force),))))
+    assert list(np.flatnonzero(modes.rigid)) == [0, 1, 2]
+    assert np.abs(modes.eigenvalues[:3]).max() < 1e-9 * modes.eigenvalues[3]
+    change = modes.eigenvalues[3:8] / plain.eigenvalues[3:8] - 1.0
+    assert np.abs(change).max() > 1e-3
+
+
+def test_the_state_is_balanced_and_its_largest_force_is_the_given_one(ladder: Any) -> None:
+    structure = Structure.build(in_plane_ladder(ladder, braces=(Brace(("A", "F"), 1e7),)))
+    for m, member in enumerate(structure.frame.members):
+        state = statics_of(structure).state(member.name)
+        assert state.largest == pytest.approx(1.0, rel=1e-12)
+        assert (state.force[structure.mesh.member == m, 0] > 0.0).all()
+        # The load is not part of the ends' forces: what is left balances at every joint.
+        axes, ends = structure.mesh.axes, structure.mesh.ends
+        pull = np.einsum("eij,ei->ej", axes, state.force)
+        total = np.zeros((len(structure.mesh.xyz), 3))
+        np.add.at(total, ends[:, 0], pull)
+        np.add.at(total, ends[:, 1], -pull)
+        joints = structure.frame.joint_index
+        line = structure.frame.corners[joints["F"]] - structure.frame.corners[joints["A"]]
+        thrust = state.brace_force[0] * line / np.linalg.norm(line)
+        total[joints["A"]] += thrust
+        total[joints["F"]] -= thrust
+        assert np.abs(total).max() < 1e-10
+
+
+def test_a_bar_and_the_brace_beside_it_carry_opposite_forces() -> None:
+    frame = beam("in-plane", ((), ()), braces=(Brace(("A", "B"), 3e7),))
+    state = statics_of(Structure.build(frame)).state("m")
+    assert state.force[:, 0] == pytest.approx(np.ones(12))
+    assert state.brace_force == pytest.approx([-1.0])
+
+
+def test_the_force_is_linear_and_the_mesh_does_not_matter(ladder: Any) -> None:
+    structure = Structure.build(ladder())
+    once, back = (preload_stiffness(structure, "AD", f).toarray() for f in (1.0, -250.0))
+    assert back == pytest.approx(-250.0 * once, rel=1e-14)
+    both = replace(ladder(), preloads=(Preload("AD", 300.0), Preload("BC", -200.0)))
+    added = Structure.build(both).matrices()[1] - structure.matrices()[1]
+    parts = 300.0 * once + preload_stiffness(structure, "BC", -200.0).toarray()
+    assert np.abs(added.toarray() - parts).max() < 1e-6 * np.abs(parts).max()
+    loaded = [replace(ladder(elements=n), preloads=(Preload("AD", 3e3),)) for n in (4, 8)]
+    shift = [
+        solve_modes(Model.of(frame)).natural_frequencies[3:7]
+        / solve_modes(Model.of(replace(frame, preloads=()))).natural_frequencies[3:7]
+        - 1.0
+        for frame in loaded
+    ]
+    assert shift[0] == pytest.approx(shift[1], rel=2e-2)
+
+
+def test_changed_parameters_leave_the_stress_alone(asymmetric_ladder: Any) -> None:
+    frame = replace(asymmetric_ladder(), preloads=(Preload("BE", 2e3),))
+    structure = Structure.build(frame)
+    soft = Parameter("E", "E", ("AB/1", "EF/2"))
+    changed = structure.with_values([soft], [0.5])
+    direct = preload_stiffness(changed, "BE", 2e3)
+    assert abs(direct - preload_stiffness(structure, "BE", 2e3)).max() == 0.0
+    model = Model.of(structure)
+    modes = solve_modes(model, 9).elastic
+    slope = eigenvalue_sensitivities(model, modes, [soft])[:, 0]
+    step = 1e-5
+    ends = [
+        solve_modes(Model.of(structure.with_values([soft], [1.0 + s]))).elastic.eigenvalues[:6]
+        for s in (-step, step)
+    ]
+    assert slope == pytest.approx((ends[1] - ends[0]) / (2 * step), rel=1e-5)
+
+
+def test_a_clamp_out_of_plane_holds_the_frame_in_its_plane_and_a_ground_spring_its_own() -> None:
+    assert redundant_members(Structure.build(beam("out-of-plane", CLAMPED_OUT))) == ("m",)
+    pinned = beam("out-of-plane", (("z", "rx"), ("z", "rx")))
+    assert redundant_members(Structure.build(pinned)) == ()
+    spring = (GroundSpring(Place(joint="B"), "x", 1e6),)
+    sprung = beam("in-plane", (("x", "z"), ("z",)), springs=spring)
+    assert redundant_members(Structure.build(sprung)) == ("m",)
+    assert redundant_members(Structure.build(replace(sprung, springs=()))) == ()
+
+
+def test_a_dangling_member_is_told_from_the_ring(ladder: Any) -> None:
+    plain = ladder("timoshenko", polar=False)
+    tails = tuple(replace(plain.members[0], name=n, ends=(n[0], n[1])) for n in ("FX", "XY"))
+    corners = (Joint("X", (0.9, 0.5, 0.0)), Joint("Y", (1.2, 0.4, 0.0)))
+    frame = replace(plain, joints=(*plain.joints, *corners), members=(*tails, *plain.members))
+    structure = Structure.build(frame)
+    assert redundant_members(structure) == tuple(member.name for member in plain.members)
+    with pytest.raises(ModelError, match="'XY'"):
+        preload_stiffness(structure, "XY", 1.0)
+
+
+def test_what_cannot_be_stressed_is_refused(hframe: Any, ladder: Any) -> None:
+    structure = Structure.build(hframe())
+    with pytest.raises(ModelError, match=r"'lower1'.* not redundant"):
+        preload_stiffness(structure, "lower1", 1.0)
+    assert redundant_members(structure) == ()
+    with pytest.raises(ModelError, match="no member 'XY'"):
+        preload_stiffness(Structure.build(ladder()), "XY", 1.0)
+    with pytest.raises(ModelError, match="not redundant"):
+        Model.of(replace(hframe(), preloads=(Preload("horizontal", 1.0),)))
+    flat = replace(rectangular_tube(0.0254, 0.0254, 0.00238), Iz=0.0)
+    members = tuple(replace(member, section=flat) for member in ladder().members)
+    with pytest.raises(ModelError, match="needs Iz"):
+        Model.of(replace(ladder(), members=members, preloads=(Preload("BE", 1.0),)))
