@@ -1,4 +1,4 @@
-"""Diagnose some 860 blind cases and write the figures of docs/diagnosis-sweep.md.
+"""Diagnose some 680 blind cases and write the figures of docs/diagnosis-sweep.md.
 
     python benchmarks/diagnosis_sweep.py run --jobs 2          # appends, goes on where it stopped
     python benchmarks/diagnosis_sweep.py tables                # table, confusion, calibration

@@ -440,7 +440,8 @@ def test_an_end_at_a_joint_of_two_members_is_the_joint() -> None:
             True,
             2,
         ),
-        (answer("ambiguous", SPRING, MASS), (40.0, 40.0), False, 2),
+        (answer("ambiguous", SPRING, MASS), (40.0, 40.0), True, 2),
+        (answer("ambiguous", SPRING, ("joint-mass", "L")), (40.0, 40.0), False, 1),
     ],
 )
 def test_two_hidden_effects(

@@ -35,5 +35,12 @@ def test_with_noise_few_parameters_beat_many(noisy: Run) -> None:
     for few in ("bayesian", "local"):
         for many in ("baruch", "berman", "generic-ls", "physical"):
             assert board["skill_high"][few] < board["skill_low"][many]
-    for kept in ("baruch", "berman", "physical", "generic-ls", "generic-adjusted"):
+    for kept in ("baruch", "berman", "physical", "generic-ls", "generic-adjusted", "diagnosed"):
         assert not board["unphysical"][kept]
+
+
+def test_with_noise_who_finds_the_cause_stays_first(noisy: Run) -> None:
+    board = leaderboard(noisy).set_index("strategy")
+    others = board.drop("diagnosed")
+    assert board["skill_high"]["diagnosed"] < others["skill_low"].min()
+    assert board["skill_unseen"]["diagnosed"] < 0.5 * others["skill_unseen"].min()

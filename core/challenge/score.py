@@ -96,6 +96,11 @@ def _judge_causes(
     every = frozenset(cause.effect for cause in truth.causes)
     candidates = _candidates(answer)
     named = [parts for parts in candidates if parts and visible <= _effects(parts) <= every]
+    if answer.verdict == "ambiguous":
+        # The group as one: each visible cause is an entry of what these data cannot tell apart.
+        whole = tuple(part for parts in candidates if len(parts) == 1 for part in parts)
+        among = tuple(part for part in whole if part[0] in every)
+        named += [among] if among and visible <= _effects(among) else []
     fits = [parts for parts in named if _places_fit(frame, parts, truth.causes)]
     found = len(every & frozenset(effect for parts in candidates for effect, _ in parts))
     too_small = not visible

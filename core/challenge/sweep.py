@@ -47,17 +47,17 @@ class Group:
 
 
 GROUPS = (
-    Group("A, ladders", 220, "one", "A", LADDERS),
-    Group("A, other structures", 80, "one", "A", OTHERS),
-    Group("B", 80, "one", "B"),
-    Group("C", 100, "one", "C"),
+    Group("A, ladders", 160, "one", "A", LADDERS),
+    Group("A, other structures", 60, "one", "A", OTHERS),
+    Group("B", 50, "one", "B"),
+    Group("C", 60, "one", "C"),
     Group("A with scatter", 60, "one", "A", scatter=0.005),
     Group("clean A", 50, "none", "A"),
     Group("clean B", 50, "none", "B"),
     Group("clean C", 50, "none", "C"),
     Group("clean A with scatter", 50, "none", "A", scatter=0.005),
-    Group("pairs", 60, "pair", "A"),
-    Group("outside", 60, "outside", "A"),
+    Group("pairs", 50, "pair", "A"),
+    Group("outside", 40, "outside", "A"),
 )
 
 

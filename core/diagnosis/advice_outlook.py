@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from femubench.core.diagnosis.attachment_rows import point_in, translation_rows
 from femubench.core.diagnosis.fit import Fit, Problem, State, signed_hz, state_at
 from femubench.core.diagnosis.hypothesis import Hypothesis
+from femubench.core.diagnosis.large import LargeProblem
 from femubench.core.diagnosis.space import nominal_space
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.model import Model
@@ -218,13 +219,14 @@ def outlook_of(problem: Problem, found: Fit, points: Points) -> Outlook:
         found: an explanation.
         points: of this or any like model.
     """
-    model = problem.model
-    modes = solve_modes(model, len(problem.space))
-    modes = modes.take(np.argsort(~modes.rigid, kind="stable"))
-    sensors = problem.data.measurement.sensors
     # In coordinates of our own: those of the problem are not kept as motions of the dofs.
     hypotheses = [part.hypothesis for part in found.parts]
-    space = nominal_space(model, modes, sensors, hypotheses)
+    if isinstance(problem, LargeProblem):
+        space, shapes = problem.common.enriched(problem.space, found.parts)
+    else:
+        modes = solve_modes(problem.model)
+        shapes = modes.shapes[:, np.argsort(~modes.rigid, kind="stable")]
+        space = nominal_space(problem.model, modes, problem.data.measurement.sensors, hypotheses)
     state = state_at(replace(problem, space=space), space.projections, found.state.x)
     root = la.cholesky(found.covariance, lower=True) if hypotheses else np.zeros((0, 0))
-    return Outlook(state, np.asarray(root), points.rows(model) @ modes.shapes)
+    return Outlook(state, np.asarray(root), points.rows(problem.model) @ shapes)

@@ -21,7 +21,8 @@ from femubench.core.typing import FloatArray
 
 _SINGLE = (0.12, 0.5, 1.3, 2.6)
 _DOUBLE = (0.03, 0.2, 0.7, 1.8)
-_OSCILLATOR = (0.4, 1.5)
+_STIFF = 0.01
+_OSCILLATOR = (0.4, 1.2, 2.2)
 _RESPONSES = 6
 _FAR = 1e18
 _REFERENCE = 0.6
@@ -61,6 +62,9 @@ def grid_of(hypothesis: Hypothesis) -> FloatArray:
 
 def _points(parameter: EffectParameter, sizes: Sequence[float]) -> list[float]:
     low, high = parameter.range
+    if parameter.scaling == "compliance":
+        # Its arm stays rigid however stiff the spring: x = 0 is no model without the effect.
+        sizes = (_STIFF, *sizes)
     wanted = list(sizes) if parameter.one_sided else [-s for s in reversed(sizes)] + list(sizes)
     inside = [x for x in wanted if low <= x <= high]
     return inside or [0.5 * (low + high)]
@@ -202,10 +206,9 @@ def _interpolated(
 ) -> Screened:
     """Return the best point: on the chords between neighbours, or the best point of a grid."""
     if grid.shape[1] > 1:
-        cost = np.square(residuals).sum(axis=1) + np.square(grid).sum(axis=1)
-        best = int(cost.argmin())
-        evidence = -0.5 * cost[best] - 0.5 * _spread(residuals, grid)
-        return Screened(projection, grid, residuals, grid[best], float(cost[best]), float(evidence))
+        point, least = _in_cells(grid, residuals)
+        evidence = -0.5 * least - 0.5 * _spread(residuals, grid)
+        return Screened(projection, grid, residuals, point, least, float(evidence))
     x, rows = grid[:, 0], residuals
     if np.all(np.abs(projection.hypothesis.factors(np.zeros((1, 1)))) < 1e-12):
         order = np.argsort(np.append(x, 0.0))

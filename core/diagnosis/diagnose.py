@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.advice import advise
-from femubench.core.diagnosis.exact import extended
+from femubench.core.diagnosis.confirm import another_stands, extended_by, stands, unseen_of
+from femubench.core.diagnosis.exact import departure
 from femubench.core.diagnosis.examine import Examination, examine
 from femubench.core.diagnosis.explanation import Explanation
-from femubench.core.diagnosis.gain import Unseen, gain_of, held_out, left_out, modified
+from femubench.core.diagnosis.gain import Unseen, gain_of, left_out
+from femubench.core.diagnosis.large import LargeProblem
 from femubench.core.diagnosis.localisation import locate
 from femubench.core.diagnosis.look import look
 from femubench.core.diagnosis.result import Advice, Cause, Diagnosis, Gain
@@ -70,7 +72,12 @@ def diagnose(
     best = examination.best
     model = extended_by(case.model, best)
     proof = _proof(case, examination, best, model)
-    decision = decide(examination.posterior, examination.adequacy, confirmed=proof.unseen.confirms)
+    if proof.crossed:
+        confirmed = all(part.confirms(len(best.parts)) for part in proof.unseen)
+    else:
+        confirmed = stands(case, examination, best, model, proof.unseen)
+        confirmed = confirmed or another_stands(case, examination)
+    decision = decide(examination.posterior, examination.adequacy, confirmed=confirmed)
     return _written(case, examination, decision, model, proof, begin)
 
 
@@ -83,23 +90,15 @@ def registered(effects: Iterable[Effect] | None) -> tuple[Effect, ...]:
     return tuple(load_plugins().effects.values())
 
 
-def extended_by(model: Model, explanation: Explanation) -> Model:
-    """Return the model with textbook effects and causes in it."""
-    base = extended(model, explanation.base.parts, explanation.base.x)
-    return extended(base, explanation.parts, explanation.fit.state.x)
-
-
 def _proof(case: Case, examination: Examination, best: Explanation, model: Model) -> _Proof:
-    problem = examination.problem_of(best)
-    bias = examination.problem.data.bias
-    unseen = (
-        held_out(case, examination.problem, problem, best.fit, examination.scatter),
-        modified(case, model, bias, examination.scatter),
-    )
+    unseen = unseen_of(case, examination, best, model)
     crossed = None
     if not any(len(part.before) for part in unseen):
         nominal, slopes = examination.problem, examination.slopes
-        crossed = left_out(nominal, problem, best.fit, slopes, examination.tolerance)
+        problem = examination.problem_of(best)
+        crossed = left_out(
+            nominal, problem, best.fit, slopes, examination.tolerance, examination.scatter
+        )
     gain = gain_of(score_model(case, case.model), score_model(case, model), crossed)
     return _Proof(unseen if crossed is None else (crossed,), gain, crossed is not None)
 
@@ -115,11 +114,7 @@ def _written(
     best, posterior = examination.best, examination.posterior
     group = causes_of(posterior, decision.group)
     shown = group if decision.verdict == "ambiguous" else group[:1]
-    causes = [
-        cause
-        for explanation, share in shown
-        for cause in _causes(examination, explanation, share, decision.verdict == "ambiguous")
-    ]
+    causes = _group_causes(examination, shown)
     top = posterior.names[decision.group[0]] if decision.group else decision.nothing
     named = bool(decision.group)
     after = best.fit.state if named else examination.nominal
@@ -127,7 +122,7 @@ def _written(
     return Diagnosis(
         case=case.name,
         verdict=decision.verdict,
-        sentence=sentence_of(decision.verdict, causes, decision.nothing, top, proof.gain),
+        sentence=sentence_of(decision, causes, _options(examination, shown), top, proof.gain),
         causes=tuple(causes),
         rivals=rivals_of(examination, best if named else None),
         reason=_reason(decision),
@@ -148,35 +143,34 @@ def _written(
     )
 
 
-def _causes(
-    examination: Examination, explanation: Explanation, share: float, together: bool
+def _group_causes(
+    examination: Examination, group: Sequence[tuple[Explanation, float]]
 ) -> list[Cause]:
-    """Return the causes of an explanation, as one entry where it is a member of a group.
+    """Return every effect of a group once, with the probability that it is part of the name.
 
     Arguments:
-        examination: what it was weighed in.
-        explanation: base and causes.
-        share: probability of its places, given its name.
-        together: whether it is one of several in a group.
+        examination: what the group was weighed in.
+        group: explanations with the probability of their places, most probable first.
     """
     posterior = examination.posterior
-    probability = share * posterior.names[posterior.key(explanation)]
-    causes = causes_in(explanation, probability, posterior.earned)
-    if not together or len(causes) == 1:
-        return causes
-    return [
-        Cause(
-            " + ".join(cause.effect for cause in causes),
-            " + ".join(cause.place for cause in causes),
-            tuple(p for cause in causes for p in cause.parameters),
-            probability,
-            " and ".join(cause.summary for cause in causes if cause.summary),
-        )
-    ]
+    found: dict[str, Cause] = {}
+    for explanation, share in group:
+        for cause in causes_in(explanation, share, posterior.earned):
+            likely = share * posterior.inclusion(cause.effect)
+            found.setdefault(cause.effect, replace(cause, probability=likely))
+    return sorted(found.values(), key=lambda cause: -cause.probability)
+
+
+def _options(
+    examination: Examination, group: Sequence[tuple[Explanation, float]]
+) -> list[list[Cause]]:
+    """Return the causes of every explanation of a group."""
+    earned = examination.posterior.earned
+    return [causes_in(explanation, share, earned) for explanation, share in group]
 
 
 def _reason(decision: Decision) -> str:
-    if decision.verdict != "ambiguous":
+    if len(decision.group) < 2:
         return ""
     parts = [
         f"{' + '.join(key)} ({angle:.1f} degrees)"
@@ -215,6 +209,11 @@ def _notes(examination: Examination, proof: _Proof, best: Explanation) -> tuple[
         notes.append(
             "A stiffness that falls with the amplitude looks like youngs-modulus until a second "
             "excitation level is measured."
+        )
+    if isinstance(examination.problem, LargeProblem) and best.parts:
+        notes.append(
+            "The causes were sought in modal coordinates: the extended model, solved anew, is "
+            f"{departure(best.fit):.1g} standard deviations of all data together from the fit."
         )
     return tuple(notes)
 

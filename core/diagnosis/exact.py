@@ -44,7 +44,8 @@ def raw_residual(problem: Problem, model: Model) -> FloatArray:
     seen = np.asarray(model.observe(data.measurement.sensors) @ modes.shapes[:, order])[None]
     partner = data.pair(hertz, seen)[0]
     mass = total_mass(model.structure) if model.structure is not None else 0.0
-    return data.residual(hertz[:, partner], seen[:, :, partner], np.array([mass]))[0]
+    residual = data.residual(hertz[:, partner], seen[:, :, partner], np.array([mass]))
+    return np.asarray(residual[0])
 
 
 def agreed(found: Fit) -> Fit:
@@ -72,3 +73,14 @@ def agreed(found: Fit) -> Fit:
             break
         best = again
     return best
+
+
+def departure(found: Fit) -> float:
+    """Return how far a fit is from what its own model gives, in deviations of the data in all.
+
+    Raises:
+        FemubenchError: when that model cannot be built or solved.
+    """
+    state = found.state
+    exact = raw_residual(state.problem, extended(state.problem.model, state.parts, state.x))
+    return float(np.linalg.norm(state.problem.noise.whiten(exact - state.raw)))

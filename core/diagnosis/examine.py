@@ -11,16 +11,18 @@ from threadpoolctl import threadpool_limits
 
 from femubench.core.diagnosis.adequacy import adequacy
 from femubench.core.diagnosis.data import Data, Noise
-from femubench.core.diagnosis.explanation import Explanation, Posterior
+from femubench.core.diagnosis.explanation import LIKELY_NOTHING, Explanation, Posterior
 from femubench.core.diagnosis.fit import Problem, State, state_at
 from femubench.core.diagnosis.hypothesis import Hypothesis, hypotheses_of
+from femubench.core.diagnosis.large import Basis, placed
 from femubench.core.diagnosis.look import mesh_bias
 from femubench.core.diagnosis.search import Found, Search
-from femubench.core.diagnosis.space import Space, nominal_space, scatter_terms
+from femubench.core.diagnosis.shortlist import with_shortlist
+from femubench.core.diagnosis.space import Space, scatter_terms
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.structure import Structure
 from femubench.core.measurement import Measurement
-from femubench.core.modal.eigen import Modes, solve_modes
+from femubench.core.modal.eigen import Modes
 from femubench.core.model import Model
 from femubench.core.plugin.roles import Effect
 from femubench.core.typing import FloatArray
@@ -53,8 +55,11 @@ class Examination:
 
     @property
     def best(self) -> Explanation:
-        """Return the most probable explanation of the most probable name."""
-        return self.posterior.best(next(iter(self.posterior.names)))
+        """Return the best explanation: nothing where that is as likely as not, else a name's."""
+        names = self.posterior.names
+        if names.get((), 0.0) >= LIKELY_NOTHING:
+            return self.posterior.best(())
+        return self.posterior.best(next(key for key in names if key))
 
     @cached_property
     def adequacy(self) -> float:
@@ -74,8 +79,8 @@ class Examination:
 
     def problem_of(self, explanation: Explanation) -> Problem:
         """Return the data in the coordinates of an explanation's textbook effects."""
-        names = explanation.base.names
-        return next(item.problem for item in self.found if item.base.names == names)
+        # Of a large model every explanation has coordinates of its own.
+        return replace(explanation.fit.state.problem, offset=0.0)
 
 
 def examine(
@@ -116,15 +121,14 @@ def posed(
     """Return data, noise and modal coordinates, and the sensitivities behind the noise."""
     if len(measurement) == 0:
         raise NotApplicable("there is no used mode")
-    modes = solve_modes(model)
+    basis = Basis.of(model, measurement)
     bias = mesh_bias(model, 2 * len(measurement) + 8)
     data = Data(measurement, np.zeros(0) if bias is None else bias)
-    space = nominal_space(model, modes, measurement.sensors, tuple(hypotheses))
-    plain = Problem(model, space, data, Noise.of(np.zeros((len(data), 0)), 0.0))
+    plain = placed(basis, data, Noise.of(np.zeros((len(data), 0)), 0.0), tuple(hypotheses))
     slopes = np.zeros((len(data), 0))
     if model.structure is not None and tolerance > 0.0:
-        slopes = _scatter_slopes(plain, model.structure, modes)
-    return replace(plain, noise=Noise.of(slopes, tolerance)), slopes
+        slopes = _scatter_slopes(plain, model.structure, basis.modes)
+    return with_shortlist(replace(plain, noise=Noise.of(slopes, tolerance))), slopes
 
 
 def _scatter_slopes(problem: Problem, structure: Structure, modes: Modes) -> FloatArray:

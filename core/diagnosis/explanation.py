@@ -14,6 +14,8 @@ from scipy.special import logsumexp
 from femubench.core.diagnosis.fit import Fit
 from femubench.core.diagnosis.space import Projection
 
+# From this probability on the verdict is that nothing is missing.
+LIKELY_NOTHING = 0.5
 # How many causes a model lacks besides textbook physics, before any datum is seen.
 PRIOR_OF_COUNT = (0.5, 0.4, 0.08, 0.015, 0.005)
 # The same where the textbook already mends something.
@@ -21,8 +23,10 @@ PRIOR_BEYOND_TEXTBOOK = (0.6, 0.3, 0.08, 0.015, 0.005)
 # Physics that every beam has need not earn its place: a model that lacks it most likely lacks all
 # of it. Some textbook effects without the others share the rest.
 _AS_DRAWN, _ALL_TEXTBOOK = 0.1, 0.8
+# By how much likelier a model is to be complete as drawn than these numbers say.
+_COMPLETE = 2.4
 # A textbook effect is part of a name only where it is likely, and the data made it so.
-_EARNED, _FACTOR = 0.6, 3.0
+_EARNED, _FACTOR = 0.6, 20.0
 
 Key = tuple[str, ...]
 
@@ -95,7 +99,8 @@ class Explanation:
         """Return ln of prior times evidence."""
         counts = PRIOR_BEYOND_TEXTBOOK if self.base.parts else PRIOR_OF_COUNT
         prior = log_prior(self.parts, self.names, counts)
-        return self.base.log_prior + prior + self.fit.log_evidence
+        complete = log(_COMPLETE) if not (self.parts or self.base.parts) else 0.0
+        return self.base.log_prior + prior + complete + self.fit.log_evidence
 
     @property
     def searched(self) -> Key:

@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2 as chi_square
 
-from femubench.core.case.case import Case
+from femubench.core.case.case import Case, Modification
 from femubench.core.diagnosis.data import Data, Noise
+from femubench.core.diagnosis.exact import raw_residual
 from femubench.core.diagnosis.fit import Fit, Problem, fit, state_at
 from femubench.core.diagnosis.result import Gain
 from femubench.core.harness.results import Block, PairedMode
 from femubench.core.harness.scoring import frequency_error, predict_block
+from femubench.core.measurement import Measurement
 from femubench.core.model import Model
 from femubench.core.typing import FloatArray
 
 # Below this many squared deviations unseen data cannot tell with the cause from without.
 _BLIND = 9.0
 _HALF_WAY = 0.5
+_IDEAL = 0.05
 _INADEQUATE, _GOOD = 2e-3, 0.05
-# What unseen chi-square must fall by where it stays inadequate: a real structure is no beam model.
+# What unseen errors must fall by where they stay more than noise: no real structure is a beam.
 # Physics from the textbook need not be all that is missing; a fitted cause must carry further.
-_HALVED, _FOURFOLD = 4.0, 16.0
+_HALVED, _FOURFOLD = 2.0, 4.0
 _FEW = 2
 
 
@@ -55,8 +58,11 @@ class Unseen:
 
     @property
     def probability(self) -> float:
-        """Return the probability of errors as large as those left, were they noise."""
-        rest = self.after / self.std
+        """Return the probability of errors as large as those left, were they noise.
+
+        A cause is an idealisation: of what it changes, one part in twenty is its own error.
+        """
+        rest = self.after / np.hypot(self.std, _IDEAL * (self.before - self.after))
         return float(chi_square.sf(rest @ rest, len(rest))) if len(rest) else 1.0
 
     def confirms(self, fitted: int) -> bool:
@@ -76,56 +82,101 @@ class Unseen:
             return self.probability > _GOOD
         if self.probability > _INADEQUATE:
             return True
-        ratio = np.square(self.before / self.std).sum() / np.square(self.after / self.std).sum()
-        return bool(ratio >= (_FOURFOLD if fitted else _HALVED))
+        before, after = (np.median(np.abs(e / self.std)) for e in (self.before, self.after))
+        return bool(before >= (_FOURFOLD if fitted else _HALVED) * after)
 
 
-def held_out(case: Case, nominal: Problem, best: Problem, found: Fit, scatter: float) -> Unseen:
+def held_out(
+    case: Case, nominal: Problem, best: Problem, found: Fit, extended: Model, scatter: float
+) -> Unseen:
     """Return the errors of the held-out modes.
 
     Arguments:
         case: with its held-out modes.
         nominal, best: data and modal coordinates without and with textbook effects.
         found: the causes, in the coordinates of `best`.
+        extended: the model with the causes.
         scatter: relative standard deviation of a frequency by ordinary tolerances.
     """
     used, hidden = len(case.used), len(case.held_out)
     if hidden == 0:
         return Unseen(np.zeros(0), np.zeros(0), np.zeros(0))
     everything = case.measurement.select([*case.used, *case.held_out])
+    std = _relative_std(everything) * everything.frequencies
+    everything = replace(everything, frequency_std=std)
     data = Data(everything, nominal.data.bias)
     noise = Noise.of(np.zeros((len(data), 0)), 0.0)
     rows = slice(used, used + hidden)
     before = state_at(Problem(nominal.model, nominal.space, data, noise), (), np.zeros(0))
-    after = state_at(Problem(best.model, best.space, data, noise), found.parts, found.state.x)
+    whole = Problem(best.model, best.space, data, noise)
+    after = state_at(whole, found.parts, found.state.x)
+    exact = raw_residual(whole, extended)
     relative = everything.frequency_std[rows] / everything.frequencies[rows]
     spread = after.jacobian[rows]
     own = np.einsum("ik,kl,il->i", spread, found.covariance, spread) if spread.shape[1] else 0.0
     std = np.sqrt(np.square(relative) * (1.0 + own) + scatter**2)
-    return Unseen(before.raw[rows] * relative, after.raw[rows] * relative, std)
+    return Unseen(before.raw[rows] * relative, exact[rows] * relative, std)
 
 
-def modified(case: Case, extended: Model, bias: FloatArray, scatter: float) -> Unseen:
-    """Return the errors of the modified structures, all modes in one list."""
+def modified(
+    case: Case,
+    extended: Model,
+    bias: FloatArray,
+    scatter: float,
+    neighbours: Sequence[Model] = (),
+) -> Unseen:
+    """Return the errors of the modified structures, all modes in one list.
+
+    Arguments:
+        case: with its modifications.
+        extended: the model with the causes.
+        bias: relative corrections of predicted frequencies for the mesh, by elastic mode.
+        scatter: relative standard deviation of a frequency by ordinary tolerances.
+        neighbours: the model with the causes off by one deviation in independent directions.
+    """
     before, after, std = [], [], []
     for change in case.modifications:
-        pairs = []
-        for model in (case.model, extended):
-            changed = model.attach(change.masses, change.springs)
-            pairs.append(predict_block(changed, change.measurement, change.name))
         m = change.measurement
-        relative = m.frequency_std / m.frequencies
-        for i, (first, second) in enumerate(zip(*pairs, strict=True)):
-            if first.predicted_hz and second.predicted_hz:
-                correct = 1.0 + (bias[min(i, len(bias) - 1)] if len(bias) else 0.0)
-                before.append(first.measured_hz / (first.predicted_hz * correct) - 1.0)
-                after.append(second.measured_hz / (second.predicted_hz * correct) - 1.0)
-                std.append(float(np.hypot(relative[i], scatter)))
-    return Unseen(np.array(before), np.array(after), np.array(std))
+        predicted = np.array(
+            [
+                [mode.predicted_hz or np.nan for mode in _predicted(model, change)]
+                for model in (case.model, extended, *neighbours)
+            ]
+        )
+        count = len(m)
+        correct = np.ones(count)
+        correct[: len(bias)] += bias[:count]
+        errors = m.frequencies / (predicted * correct) - 1.0
+        spread = np.square(predicted[2:] / predicted[1] - 1.0).sum(axis=0)
+        deviation = np.sqrt(np.square(_relative_std(m)) + scatter**2 + spread)
+        paired = np.isfinite(errors[:2]).all(axis=0) & np.isfinite(deviation)
+        before.append(errors[0, paired])
+        after.append(errors[1, paired])
+        std.append(deviation[paired])
+    empty = np.zeros(0)
+    return Unseen(*(np.concatenate([*rows, empty]) for rows in (before, after, std)))
+
+
+def _predicted(model: Model, change: Modification) -> Sequence[PairedMode]:
+    changed = model.attach(change.masses, change.springs)
+    return predict_block(changed, change.measurement, change.name)
+
+
+def _relative_std(measurement: Measurement) -> FloatArray:
+    """Return the relative deviations of frequencies; the median where one has none."""
+    std = measurement.frequency_std / measurement.frequencies
+    known = np.isfinite(std) & (std > 0.0)
+    typical = float(np.median(std[known])) if known.any() else float("nan")
+    return np.where(known, std, typical)
 
 
 def left_out(
-    nominal: Problem, problem: Problem, found: Fit, slopes: FloatArray, tolerance: float
+    nominal: Problem,
+    problem: Problem,
+    found: Fit,
+    slopes: FloatArray,
+    tolerance: float,
+    scatter: float,
 ) -> Unseen:
     """Return the errors of every used mode, predicted by a fit to the others.
 
@@ -135,6 +186,7 @@ def left_out(
         found: its causes.
         slopes: sensitivities of the data to scatter, (n_data, n_scatter).
         tolerance: standard deviation of the scatter.
+        scatter: that of a frequency, relative.
     """
     data = problem.data
     numbers = data.measurement.numbers
@@ -156,7 +208,7 @@ def left_out(
         relative = data.measurement.frequency_std[j] / data.measurement.frequencies[j]
         before.append(nothing.raw[j] * relative)
         after.append(point.raw[j] * relative)
-        std.append(relative)
+        std.append(float(np.hypot(relative, scatter)))
     return Unseen(np.array(before), np.array(after), np.array(std))
 
 

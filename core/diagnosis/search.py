@@ -19,8 +19,9 @@ from femubench.core.diagnosis.explanation import (
 )
 from femubench.core.diagnosis.fit import Fit, Problem, fit, state_at
 from femubench.core.diagnosis.hypothesis import hypotheses_of
-from femubench.core.diagnosis.space import Projection, nominal_space
-from femubench.core.modal.eigen import solve_modes
+from femubench.core.diagnosis.large import Basis, LargeProblem, enriched, placed
+from femubench.core.diagnosis.shortlist import beside, screened, with_shortlist
+from femubench.core.diagnosis.space import Projection
 from femubench.core.plugin.roles import Effect
 from femubench.core.typing import FloatArray
 
@@ -66,9 +67,9 @@ class Search:
 
     def __init__(self, problem: Problem, effects: Sequence[Effect], *, pairs: bool = True) -> None:
         self.problem, self.effects, self.pairs = problem, effects, pairs
-        projections = problem.space.projections
-        self.names = len({p.hypothesis.name for p in projections})
-        self.places = len(projections) / max(self.names, 1)
+        places = {p.hypothesis.name: p.hypothesis.places for p in problem.space.projections}
+        self.names = len(places)
+        self.places = sum(places.values()) / max(self.names, 1)
 
     def run(self) -> tuple[Posterior, list[Found]]:
         """Return all explanations and the atlas of every base that was searched."""
@@ -78,14 +79,24 @@ class Search:
         explanations = [e for item in found for e in item.explanations]
         if self.pairs and self.names:
             explanations += self.combined(found)
+        if isinstance(self.problem, LargeProblem):
+            explanations = self.borne_out(explanations)
         return Posterior.of(explanations), found
+
+    def borne_out(self, explanations: list[Explanation]) -> list[Explanation]:
+        """Return explanations, the best cause fitted until its own model agrees with it."""
+        best = max(explanations, key=lambda e: e.log_weight)
+        if not best.parts:
+            return explanations
+        others = [e for e in explanations if e is not best]
+        return [*others, replace(best, fit=agreed(best.fit))]
 
     def promising(self, bases: Sequence[Base], plain: Found) -> list[Base]:
         """Return the textbook sets that come nearer to the data than the model as drawn."""
         nothing = plain.explanations[0].chi2
         scored = []
         for base in bases:
-            chi2 = state_at(self.problem, base.parts, base.x).chi2
+            chi2 = state_at(*enriched(self.problem, base.parts), base.x).chi2
             scored.append((chi2 - 2.0 * base.log_prior, chi2, base))
         scored.sort(key=lambda item: item[0])
         better = [base for _, chi2, base in scored if chi2 < nothing - 6.0]
@@ -101,10 +112,10 @@ class Search:
         problem = self.grounded(base) if base.parts else self.problem
         start = fit(problem, (), np.zeros(0))
         assert start is not None
-        screened = screen(problem, start.state, problem.space.projections)
-        fits = self.refined(problem, start, screened)
+        atlas = screened(problem, start.state, problem.space.projections)
+        fits = self.refined(problem, start, atlas)
         explanations = [Explanation(base, item, self.names) for item in (start, *fits)]
-        return Found(base, problem, tuple(explanations), tuple(screened))
+        return Found(base, problem, tuple(explanations), tuple(atlas))
 
     def grounded(self, base: Base) -> Problem:
         """Return the data in the modal coordinates of the model with textbook effects in it.
@@ -114,9 +125,8 @@ class Search:
         """
         model = extended(self.problem.model, base.parts, base.x)
         known = hypotheses_of(model, self.effects)
-        sensors = self.problem.data.measurement.sensors
-        space = nominal_space(model, solve_modes(model), sensors, known)
-        return replace(self.problem, model=model, space=space)
+        basis = Basis.of(model, self.problem.data.measurement)
+        return with_shortlist(placed(basis, self.problem.data, self.problem.noise, known))
 
     def refined(self, problem: Problem, start: Fit, screened: Sequence[Screened]) -> list[Fit]:
         """Return exact fits of the hypotheses that the atlas does not rule out."""
@@ -130,7 +140,8 @@ class Search:
         fits: list[Fit] = []
         best = start.state.cost
         for item in near[:_REFINED]:
-            result = fit(problem, (item.projection,), item.x, give_up=best + _LOST)
+            own, parts = enriched(problem, (item.projection,))
+            result = fit(own, parts, item.x, give_up=best + _LOST)
             if result is not None:
                 fits.append(result)
                 best = min(best, result.state.cost)
@@ -168,8 +179,7 @@ class Search:
     ) -> list[Explanation]:
         """Return an explanation with one cause more, for every partner that is worth it."""
         problem, state = found.problem, seed.fit.state
-        space = problem.space.rebased(seed.parts, state.x)
-        above = replace(problem, space=space, offset=state.problem.offset)
+        above = beside(problem, seed.fit)
         start = fit(above, (), np.zeros(0))
         assert start is not None
         originals = {id(p.hypothesis): p for p in problem.space.projections}
@@ -181,7 +191,7 @@ class Search:
         for item in ranked[:_PARTNERS]:
             if start.state.chi2 - item.cost < floor:
                 break
-            partner = originals[id(item.projection.hypothesis)]
+            partner = originals.get(id(item.projection.hypothesis), item.projection)
             joint = self.joint(problem, (*seed.parts, partner), state.x, item.x, tried)
             if joint is not None:
                 result.append(Explanation(found.base, joint, self.names))
@@ -201,8 +211,10 @@ class Search:
         if key in tried:
             return None
         tried.add(key)
-        found = fit(problem, parts, np.concatenate([first, last]))
-        return None if found is None else agreed(found)
+        own, parts = enriched(problem, parts)
+        found = fit(own, parts, np.concatenate([first, last]))
+        # A large model is solved anew for the best explanation alone.
+        return found if found is None or isinstance(own, LargeProblem) else agreed(found)
 
     def swapped(
         self, found: Found, pair: Explanation, tried: set[tuple[object, ...]]
@@ -213,7 +225,8 @@ class Search:
             counts = [len(p.hypothesis.parameters) for p in pair.parts]
             first = sum(counts[:i])
             x = pair.fit.state.x[first : first + counts[i]]
-            alone = fit(found.problem, (part,), x, steps=0)
+            own, parts = enriched(found.problem, (part,))
+            alone = fit(own, parts, x, steps=0)
             if alone is not None:
                 seed = Explanation(found.base, alone, self.names)
                 result += self.grown(found, seed, tried)

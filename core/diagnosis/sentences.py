@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
-from femubench.core.diagnosis.result import Cause, Gain, Verdict
+from femubench.core.diagnosis.result import Cause, Gain
+from femubench.core.diagnosis.verdict import Decision
 
 
 def percent(probability: float) -> str:
@@ -17,43 +18,57 @@ def percent(probability: float) -> str:
 
 
 def named(cause: Cause) -> str:
-    """Return a cause, or several as one, with places."""
-    pairs = zip(cause.effect.split(" + "), cause.place.split(" + "), strict=True)
-    return " with ".join(f"{e} at {p}" if p != "all" else e for e, p in pairs)
+    """Return a cause with its place."""
+    return f"{cause.effect} at {cause.place}" if cause.place != "all" else cause.effect
 
 
-def listed(names: Sequence[str], last: str = "and") -> str:
+def listed(names: Iterable[str], last: str = "and") -> str:
     """Return names as in a sentence."""
-    names = tuple(dict.fromkeys(names))
-    if len(names) < 2:
-        return "".join(names)
-    return f"{', '.join(names[:-1])} {last} {names[-1]}"
+    unique = tuple(dict.fromkeys(names))
+    if len(unique) < 2:
+        return "".join(unique)
+    return f"{', '.join(unique[:-1])} {last} {unique[-1]}"
 
 
 def sentence_of(
-    verdict: Verdict, causes: Sequence[Cause], nothing: float, probability: float, gain: Gain
+    decision: Decision,
+    causes: Sequence[Cause],
+    options: Sequence[Sequence[Cause]],
+    probability: float,
+    gain: Gain,
 ) -> str:
     """Return the verdict in one sentence.
 
     Arguments:
-        verdict: what was decided.
+        decision: what was decided.
         causes: named, or best guess.
-        nothing: probability that nothing is missing.
-        probability: of the name.
+        options: the causes of every explanation that stands.
+        probability: of the first name.
         gain: before and after.
     """
-    names = listed([named(cause) for cause in causes])
-    if verdict == "none":
-        return f"The data show nothing that the model lacks (probability {percent(nothing)})."
-    if verdict == "named":
+    names = listed(named(cause) for cause in causes)
+    if decision.verdict == "none":
+        sure = percent(decision.nothing)
+        return f"The data show nothing that the model lacks (probability {sure})."
+    if decision.verdict == "named":
         return f"The model lacks {names} (probability {percent(probability)}){_gain(gain)}."
-    if verdict == "ambiguous":
-        options = listed([named(cause) for cause in causes], "or")
-        return f"The model lacks something, and these data cannot tell which: {options}."
+    if decision.verdict == "ambiguous":
+        return _either(options)
     guess = f"; the nearest is {names}" if causes else ""
-    if verdict == "unknown":
+    if decision.verdict == "unknown":
         return f"No known effect explains what the model gets wrong{guess}."
     return f"What fits the used data best does not hold on data that it has not seen{guess}."
+
+
+def _either(options: Sequence[Sequence[Cause]]) -> str:
+    """Return what all options share, and what they leave open."""
+    sets = [dict.fromkeys(named(cause) for cause in option) for option in options]
+    common = [name for name in sets[0] if all(name in other for other in sets)]
+    rest = [" with ".join(n for n in names if n not in common) for names in sets]
+    open_ = listed((words or "nothing more" for words in rest), "or")
+    if common:
+        return f"The model lacks {listed(common)}, and these data cannot tell what else: {open_}."
+    return f"The model lacks something, and these data cannot tell which: {open_}."
 
 
 def _gain(gain: Gain) -> str:

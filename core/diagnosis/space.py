@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.diagnosis.change import ElementOperator, Operator, Term
+from femubench.core.diagnosis.change import Change, ElementOperator, Operator, Term
 from femubench.core.diagnosis.hypothesis import Hypothesis
 from femubench.core.errors import ModelError
 from femubench.core.fem.beam import mass_matrices, stiffness_matrices
@@ -189,7 +189,8 @@ class Projector:
         """Return a hypothesis in the coordinates of the basis."""
         change = hypothesis.change
         terms = [self._term(term, change.extra) for term in change.terms]
-        weights = [self._weight(term, change.extra) for term in change.terms]
+        shift = self._shifted(change)
+        weights = [self._weight(term, shift) for term in change.terms]
         is_mass = np.array([term.matrix == "mass" for term in change.terms])
         return Projection(hypothesis, np.array(terms), is_mass, np.array(weights))
 
@@ -210,15 +211,28 @@ class Projector:
         grown[n:, m:] = np.eye(extra)
         return grown
 
-    def _weight(self, term: Term, extra: int) -> float:
+    def _weight(self, term: Term, motion: FloatArray) -> float:
         if term.matrix == "stiffness" or self.structure is None:
             return 0.0
         operator: Operator = term.operator
         if isinstance(operator, ElementOperator) and self.shift is not None:
-            motion = self.shift[operator.elements]
-            return float(np.einsum("ei,eij,ej->", motion, operator.blocks, motion))
-        motion = np.concatenate([_unit_motion(self.structure), np.ones(extra)])
+            local = self.shift[operator.elements]
+            return float(np.einsum("ei,eij,ej->", local, operator.blocks, local))
         return float(operator.project(motion[:, None])[0, 0])
+
+    def _shifted(self, change: Change) -> FloatArray:
+        """Return all dofs in a unit translation; those that a change adds follow statically."""
+        if self.structure is None:
+            return np.zeros(0)
+        own = _unit_motion(self.structure)
+        motion = np.concatenate([own, np.zeros(change.extra)])
+        if change.extra:
+            both = np.column_stack([motion, np.eye(len(motion))[:, len(own) :]])
+            springs = [term for term in change.terms if term.matrix == "stiffness"]
+            pulled = np.sum([term.operator.apply(both) for term in springs], axis=0)
+            force, inner = pulled[len(own) :, 0], pulled[len(own) :, 1:]
+            motion[len(own) :] = -np.linalg.solve(inner, force)
+        return motion
 
 
 def _direction(structure: Structure) -> int:

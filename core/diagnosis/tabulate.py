@@ -21,7 +21,7 @@ from femubench.core.diagnosis.effect import EffectParameter
 from femubench.core.errors import ModelError
 from femubench.core.model import Model, common_dofs
 from femubench.core.plugin.roles import Effect
-from femubench.core.typing import FloatArray, SparseArray
+from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 _NODES = {1: 9, 2: 4}
 _WIDEST = 3.0  # deviations to either side that a table covers
@@ -106,7 +106,7 @@ def _difference(model: Model, extended: Model) -> tuple[SparseArray, SparseArray
 
 
 def _condensed(
-    mass: SparseArray, stiffness: SparseArray, keep: FloatArray
+    mass: SparseArray, stiffness: SparseArray, keep: IntArray
 ) -> tuple[SparseArray, SparseArray]:
     """Return both matrices on some dofs, the others following statically (Guyan 1965)."""
     rest = np.setdiff1d(np.arange(mass.shape[0]), keep)

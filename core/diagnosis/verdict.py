@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.diagnosis.explanation import Explanation, Key, Posterior
+from femubench.core.diagnosis.explanation import LIKELY_NOTHING, Explanation, Key, Posterior
 from femubench.core.diagnosis.result import Verdict
 
 # Rivals at least this probable, or nearly parallel and not yet excluded, stay in the group.
 _RIVAL, _PARALLEL_RIVAL = 0.05, 0.005
 _PARALLEL = 10.0  # degrees
 _SURE = 0.98
-# A cause in all that is left, as probable as this and behind so much of what is explained, is
-# named, whatever little cannot be told apart beside it.
-_COMMON, _MOST = 0.95, 0.8
+# A name as probable as this, its like counted, whose common part is behind so much of what is
+# explained, is named, whatever little cannot be told apart beside it.
+_COMMON, _MOST = 0.92, 0.8
 _NOISE = 1e-3
 _LARGEST_GROUP = 6
 
@@ -61,7 +61,7 @@ def decide(posterior: Posterior, adequate: float, *, confirmed: bool) -> Decisio
         confirmed: whether unseen data bear the best explanation out.
     """
     nothing = posterior.names.get((), 0.0)
-    if nothing >= 0.5:
+    if nothing >= LIKELY_NOTHING:
         verdict: Verdict = "none" if adequate > _NOISE else "unknown"
         return Decision(verdict, (), nothing, ())
     group, angles = inseparable(posterior)
@@ -75,17 +75,35 @@ def decide(posterior: Posterior, adequate: float, *, confirmed: bool) -> Decisio
 
 
 def mostly_common(posterior: Posterior, group: Sequence[Key]) -> bool:
-    """Tell whether the names of a group share what matters and differ in the rest."""
+    """Tell whether the first name of a group stands, but for what hardly matters.
+
+    What all names of the group share must rest on textbook physics and carry most of what is
+    explained, and all but few of them must be the first name with more beside it, or with one
+    cause for another that acts alike: what is left of a real structure then goes by any name.
+    """
     common = set(group[0]).intersection(*group[1:])
     best = posterior.best(group[0])
-    share = sum(p for key, p in posterior.names.items() if common <= set(key))
-    if not common or share < _COMMON:
+    if not common.intersection(best.base.names):
+        return False
+    share = sum(
+        p for key, p in posterior.names.items() if _says_as_much(posterior, best, group[0], key)
+    )
+    if share < _COMMON:
         return False
     nothing = next(e for e in posterior.explanations if not e.parts and not e.base.parts)
     core = [e.chi2 for e in posterior.explanations if set(posterior.key(e)) == common]
-    if not core:
+    explained = nothing.chi2 - min(core, default=np.inf)
+    return bool(explained >= _MOST * (nothing.chi2 - best.chi2))
+
+
+def _says_as_much(posterior: Posterior, best: Explanation, first: Key, key: Key) -> bool:
+    """Tell whether a name holds another one, or swaps one cause of it for its like."""
+    if set(first) <= set(key):
+        return True
+    swapped = len(key) == len(first) and len(set(first) - set(key)) == 1
+    if not swapped or posterior.names[key] < _PARALLEL_RIVAL:
         return False
-    return nothing.chi2 - min(core) >= _MOST * (nothing.chi2 - best.chi2)
+    return angle_between(best, posterior.best(key)) < _PARALLEL
 
 
 def inseparable(posterior: Posterior) -> tuple[tuple[Key, ...], tuple[float, ...]]:

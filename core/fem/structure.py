@@ -12,11 +12,7 @@ import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.assembly import AssemblyPlan, plan_assembly, prune
-from femubench.core.fem.attachments import (
-    brace_stiffness,
-    check_attachments,
-    oscillator_matrices,
-)
+from femubench.core.fem.attachments import brace_stiffness, check_attachments, oscillator_matrices
 from femubench.core.fem.beam import BeamProperties, mass_matrices, stiffness_matrices
 from femubench.core.fem.frame import Frame, GroundSpring, PointMass
 from femubench.core.fem.kinematics import (
@@ -66,6 +62,10 @@ class Structure:
         for rigid in (p.rigid_1 + p.rigid_2, p.rigid_mass_1 + p.rigid_mass_2):
             if np.any(rigid >= p.length):
                 raise ModelError("a rigid end is longer than its element")
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Kept factorisations cannot be pickled; they are made again where they are wanted.
+        return {name: value for name, value in vars(self).items() if name != "kept"}
 
     @classmethod
     def build(cls, frame: Frame) -> Structure:

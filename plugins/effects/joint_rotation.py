@@ -96,7 +96,9 @@ def _parts(frame: Frame, place: str) -> tuple[tuple[str, ...], ...]:
     """Return the local directions that belong to every parameter."""
     active = ACTIVE[frame.plane]
     bending, torsion = (tuple(d for d in group if d in active) for group in (_BENDING, _TORSION))
-    apart = torsion and (len(joints_of(frame, place)) > 1 or place in branch_places(frame))
+    # The word first: to list the places takes a look at every joint.
+    branch = place.endswith(":branch") and place in branch_places(frame)
+    apart = torsion and (len(joints_of(frame, place)) > 1 or branch)
     return (bending, torsion) if apart else ((*torsion, *bending),)
 
 

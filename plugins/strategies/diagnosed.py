@@ -74,7 +74,9 @@ class Diagnosed(Strategy):
         result = self._extended(model, measurement)
         if not self.meet_frequencies:
             return result
-        return replace(result, model=with_measured_frequencies(result.model, measurement))
+        model = with_measured_frequencies(result.model, measurement)
+        rank = 0 if model.stiffness_change is None else len(model.stiffness_change.core)
+        return replace(result, model=model, diagnostics={**result.diagnostics, "rank": float(rank)})
 
     def _extended(self, model: Model, measurement: Measurement) -> UpdateResult:
         """Return the model with the causes in it, or as it was where nothing can be weighed."""

@@ -1,0 +1,176 @@
+"""The atlas: how near its interpolation comes to the exact fits that it spares."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femubench import Model
+from femubench.core.challenge.structures import structure_named
+from femubench.core.diagnosis.atlas import Screened, grid_of, screen
+from femubench.core.diagnosis.fit import Fit, Problem, fit, state_at
+
+sys.path.insert(0, str(Path(__file__).parent))
+from diagnosis_problems import (
+    catalogue,
+    coordinates,
+    effects_named,
+    measured,
+    part_at,
+    problem_of,
+)
+
+NOTHING = np.zeros(0)
+# Of chi-square, beside a share of what is explained.
+SINGLE, DOUBLE, SHARE = 1.0, 16.0, 0.05
+
+
+def screened(problem: Problem) -> list[Screened]:
+    return screen(problem, state_at(problem, (), NOTHING), problem.space.projections)
+
+
+def refitted(problem: Problem, item: Screened) -> Fit:
+    found = fit(problem, (item.projection,), item.x)
+    assert found is not None
+    return found
+
+
+def hidden(
+    structure: str, name: str, place: str, values: tuple[float, ...], seed: int = 2
+) -> Problem:
+    """Return noisy data of a structure with one effect, and all single hypotheses."""
+    frame = structure_named(structure).frame
+    model, (effect,) = Model.of(frame), effects_named(name)
+    true = effect.extend(model, place, values)
+    test = measured(true, frame, rng=np.random.default_rng(seed))
+    return problem_of(model, test, catalogue().values(), 0.005)
+
+
+@pytest.fixture(scope="module")
+def clean() -> Problem:
+    frame = structure_named("ladder").frame
+    model = Model.of(frame)
+    test = measured(model, frame, rng=np.random.default_rng(4))
+    return problem_of(model, test, catalogue().values(), 0.005)
+
+
+def test_on_clean_data_every_hypothesis_is_within_a_unit_of_its_fit(clean: Problem) -> None:
+    """One parameter: cost within 1, evidence within 1 nat; two: cost at most 16 too high."""
+    items = screened(clean)
+    assert len(items) == len(clean.space.projections) > 150
+    lowest = min(s.cost for s in items)
+    near = [s for s in items if s.cost < lowest + 30.0]
+    chosen = near[::5] + [s for s in near if len(s.x) == 2]
+    assert {len(s.x) for s in chosen} == {1, 2}
+    for item in chosen:
+        found = refitted(clean, item)
+        label = item.projection.hypothesis.name, item.projection.hypothesis.place
+        if len(item.x) == 1:
+            assert item.cost == pytest.approx(found.state.cost, abs=SINGLE), label
+            assert item.log_evidence == pytest.approx(found.log_evidence, abs=1.0), label
+        else:
+            excess = item.cost - found.state.cost
+            assert -1.0 < excess < DOUBLE, label
+
+
+@pytest.mark.parametrize(
+    ("structure", "name", "place", "values"),
+    [
+        ("ladder", "member-stiffness", "rung-middle", (-0.2,)),
+        ("ladder", "torsion-constant", "all", (0.3,)),
+        ("ladder", "local-stiffness-loss", "front-left/1", (0.5,)),
+        ("ladder", "joint-rotation", "J9", (2e4,)),
+        ("hframe", "added-mass", "upper-end-1", (0.2,)),
+        ("hframe", "brace-spring", "T1-upper-end-2", (4e5,)),
+    ],
+)
+def test_a_size_is_near_its_exact_fit_and_its_rivals_are_behind(
+    structure: str, name: str, place: str, values: tuple[float, ...]
+) -> None:
+    """Cost within 5 % of what is explained, x within 0.25, no rival below it by more."""
+    problem = hidden(structure, name, place, values)
+    nothing = state_at(problem, (), NOTHING)
+    items = screened(problem)
+    part = part_at(problem, name, place)
+    item = next(s for s in items if s.projection is part)
+    found = refitted(problem, item)
+    explained = nothing.cost - found.state.cost
+    assert explained > 100.0
+    assert abs(item.cost - found.state.cost) < SINGLE + SHARE * explained
+    assert abs(item.x - found.state.x)[0] < 0.25
+    assert item.cost < min(s.cost for s in items) + SINGLE + SHARE * explained
+
+
+@pytest.mark.parametrize(
+    ("structure", "name", "place", "values"),
+    [
+        ("ladder", "joint-rotation", "L", (3e4, 9e3)),
+        ("ladder", "joint-rotation", "T:branch", (5e5, 3e3)),
+        ("ladder", "attached-oscillator", "rung-right@0.5", (0.012, 1250.0)),
+        ("hframe", "attached-oscillator", "lower-2@0.5:x", (0.25, 675.0)),
+        ("ladder", "attached-oscillator", "rung-right@0.5", (0.05, 1362.0)),
+        ("ladder", "attached-oscillator", "J3", (0.054, 1539.0)),
+        ("hframe", "attached-oscillator", "upper-2@0.5:z", (0.1763, 910.0)),
+    ],
+)
+def test_two_parameters_are_found_from_the_grid(
+    structure: str, name: str, place: str, values: tuple[float, ...]
+) -> None:
+    """The best point leads to the exact fit, and is not so dear that it would not be tried."""
+    problem = hidden(structure, name, place, values)
+    nothing = state_at(problem, (), NOTHING)
+    items = screened(problem)
+    part = part_at(problem, name, place)
+    item = next(s for s in items if s.projection is part)
+    found = refitted(problem, item)
+    true = fit(problem, (part,), coordinates(part, values))
+    assert true is not None
+    assert found.state.cost < true.state.cost + 1.0
+    explained = nothing.cost - true.state.cost
+    assert explained > 100.0
+    cost, lowest = item.cost, min(s.cost for s in items)
+    limit = lowest + DOUBLE + SHARE * (nothing.cost - lowest)
+    assert cost < limit
+
+
+def test_grids_stay_within_bounds_and_hold_no_effect_out(clean: Problem) -> None:
+    for part in clean.space.projections:
+        h, grid = part.hypothesis, grid_of(part.hypothesis)
+        low, high = h.bounds
+        assert len(grid) > 0
+        assert (grid >= low - 1e-12).all()
+        assert (grid <= high + 1e-12).all()
+        assert np.isfinite(h.factors(grid)).all()
+
+
+def test_what_a_hypothesis_does_on_the_atlas_is_what_it_does(clean: Problem) -> None:
+    """Residuals at grid points against those in all modes, in deviations."""
+    items = screened(clean)
+    worst = []
+    for item in items[::4]:
+        k = len(item.grid) // 3
+        exact = state_at(clean, (item.projection,), item.grid[k]).residual
+        size = np.linalg.norm(exact - state_at(clean, (), NOTHING).residual)
+        worst.append(np.linalg.norm(item.residuals[k] - exact) / max(float(size), 1.0))
+    assert np.median(worst) < 0.01
+    assert max(worst) < 0.1
+
+
+def test_causes_that_are_there_make_room(clean: Problem) -> None:
+    """What lies along a cause that may still move costs next to nothing."""
+    part = part_at(clean, "youngs-modulus", "all")
+    twin = part_at(clean, "temperature", "all")
+    start = state_at(clean, (), NOTHING)
+    slope = state_at(clean, (part,), np.zeros(1)).jacobian
+    (plain,) = screen(clean, start, (twin,))
+    (eased,) = screen(clean, start, (twin,), slope)
+    # Beside E the temperature explains nothing more, and costs as much less as E may give way.
+    before, after = (
+        np.square(s.residuals).sum(axis=1) - np.square(s.residuals).sum(axis=1).min()
+        for s in (plain, eased)
+    )
+    assert before.max() > 20.0
+    assert after.max() < 0.1 * before.max()

@@ -1,0 +1,168 @@
+"""Blind cases: an effect is hidden in a finer model and has to be found; some hide nothing.
+
+A fast subset of the sweep: every effect, every kind of place, data and structure at least once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import pytest
+
+from femubench import diagnose
+from femubench.core.challenge.answer import Answer
+from femubench.core.challenge.draw import BlindCase, draw_case, registered_effects
+from femubench.core.challenge.score import Judgement, judge_answer
+from femubench.core.challenge.structures import STRUCTURES, structure_named
+from femubench.core.challenge.truth import DataKind, Hidden
+from femubench.core.challenge.visibility import delta_chi2
+
+CLEAR = 30.0  # of chi-square: what lowers it by more is no matter of luck
+
+
+@dataclass(frozen=True)
+class Blind:
+    """What is drawn."""
+
+    seed: int
+    effect: str | None = None
+    kind: DataKind = "A"
+    structure: str = "ladder"
+    hidden: Hidden = "one"
+    scatter: float = 0.0
+
+    def __str__(self) -> str:
+        return f"{self.effect or self.hidden}-{self.kind}-{self.structure}-{self.seed}"
+
+    def draw(self) -> BlindCase:
+        return _drawn(self)
+
+
+@cache
+def _drawn(blind: Blind) -> BlindCase:
+    return draw_case(
+        blind.seed,
+        blind.kind,
+        structure=blind.structure,
+        hidden=blind.hidden,
+        effect=blind.effect,
+        scatter=blind.scatter,
+    )
+
+
+SINGLES = (
+    Blind(1, "youngs-modulus"),
+    Blind(1, "density"),
+    Blind(1, "torsion-constant", kind="C"),
+    Blind(1, "shear-deformation"),
+    Blind(2, "rotary-inertia"),
+    Blind(0, "joint-rotation"),
+    Blind(1, "joint-rotation"),
+    Blind(1, "joint-offset"),
+    Blind(0, "joint-mass"),
+    Blind(0, "added-mass"),
+    Blind(1, "grounding-spring"),
+    Blind(1, "member-stiffness"),
+    Blind(1, "member-mass", kind="B"),
+    Blind(1, "local-stiffness-loss"),
+    Blind(1, "axial-preload"),
+    Blind(1, "mass-eccentricity"),
+    Blind(1, "bending-torsion-coupling"),
+    Blind(1, "brace-spring", structure="hframe"),
+    Blind(1, "attached-oscillator"),
+    Blind(2, "temperature"),
+    Blind(4, "member-mass", scatter=0.005),
+    Blind(0, "joint-mass", structure="portal"),
+)
+# Stress by a lack of fit in one side of a cell is that in the other side.
+ALIKE = {"axial-preload"}
+
+
+def judged(blind: Blind) -> tuple[Judgement, Answer, tuple[float, ...]]:
+    drawn = blind.draw()
+    delta = delta_chi2(drawn.case, drawn.truth, registered_effects())
+    answer = Answer.of(diagnose(drawn.case))
+    return judge_answer(drawn.truth, answer, delta), answer, delta
+
+
+@pytest.mark.parametrize("blind", SINGLES, ids=str)
+def test_a_hidden_effect_is_found_at_its_place(blind: Blind) -> None:
+    verdict, answer, (delta,) = judged(blind)
+    assert delta > CLEAR
+    assert verdict.right, verdict.reason
+    assert answer.verdict in ("named", "ambiguous")
+    if blind.effect not in ALIKE:
+        assert verdict.places, verdict.reason
+        for size in verdict.sizes:
+            if answer.verdict == "named" and size.deviations is not None:
+                assert abs(size.deviations) < 4.5, size
+
+
+def test_singles_hide_every_effect_that_can_be_hidden() -> None:
+    fit = {
+        name
+        for name, effect in registered_effects().items()
+        if any(effect.places(structure_named(s).model) for s in STRUCTURES)
+    }
+    assert {blind.effect for blind in SINGLES} == fit
+
+
+def place_kind(structure: str, place: str) -> str:
+    frame = structure_named(structure).frame
+    head, _, station = place.partition("@")
+    if place == "all":
+        return "all"
+    if station:
+        return "member end" if station in frame.joint_index else "point"
+    if "/" in head:
+        return "element"
+    if head in frame.member_index:
+        return "member"
+    if head in frame.joint_index:
+        return "joint"
+    return "pair of joints" if "-" in head else "type"
+
+
+def test_singles_hide_something_at_every_kind_of_place() -> None:
+    kinds = {place_kind(b.structure, b.draw().truth.causes[0].place) for b in SINGLES}
+    wanted = {"all", "type", "joint", "member end", "member", "element", "point", "pair of joints"}
+    assert kinds == wanted
+    assert {b.kind for b in SINGLES} == {"A", "B", "C"}
+
+
+@pytest.mark.parametrize("structure", [s for s in STRUCTURES if s != "table"])
+def test_a_structure_without_fault_lacks_nothing(structure: str) -> None:
+    verdict, answer, _ = judged(Blind(1, structure=structure, hidden="none"))
+    assert verdict.right, verdict.reason
+    assert not verdict.false_alarm
+    assert answer.causes == ()
+
+
+@pytest.mark.parametrize("seed", [3, 5])
+def test_two_hidden_effects_are_both_found(seed: int) -> None:
+    verdict, _, delta = judged(Blind(seed, hidden="pair"))
+    assert min(delta) > CLEAR
+    assert verdict.found == 2
+    assert verdict.right, verdict.reason
+
+
+@pytest.mark.parametrize(
+    ("blind", "few"),
+    [
+        (Blind(1, structure="ladder", hidden="outside"), False),
+        (Blind(4, structure="ladder", hidden="outside"), True),
+        (Blind(3, structure="ladder", hidden="outside"), True),
+    ],
+    ids=str,
+)
+def test_a_cause_outside_the_catalogue_is_no_name(blind: Blind, few: bool) -> None:
+    """Two of them with a part of the catalogue and one at a time, which explains still less."""
+    drawn = blind.draw()
+    names = ("member-stiffness", "member-mass", "added-mass", "torsion-constant", "density")
+    effects = [registered_effects()[name] for name in names] if few else None
+    found = diagnose(drawn.case, effects, pairs=not few)
+    assert drawn.truth.excess > CLEAR
+    assert found.verdict in ("unknown", "not-confirmed")
+    verdict = judge_answer(drawn.truth, Answer.of(found), (drawn.truth.excess,))
+    assert verdict.right

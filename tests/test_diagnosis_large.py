@@ -1,0 +1,277 @@
+"""Large models: few modes and the response to each hypothesis do what all modes would do."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from numpy.testing import assert_allclose
+
+from femubench import Effect, Frame, Measurement, Model, Sensors, solve_modes
+from femubench.core.case.case import Case
+from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.diagnosis.data import Data, Noise
+from femubench.core.diagnosis.diagnose import diagnose
+from femubench.core.diagnosis.exact import departure, extended, raw_residual
+from femubench.core.diagnosis.examine import Examination, examine
+from femubench.core.diagnosis.fit import Problem, state_at
+from femubench.core.diagnosis.hypothesis import Hypothesis, hypotheses_of
+from femubench.core.diagnosis.large import Basis, LargeProblem, enriched, placed
+from femubench.core.diagnosis.shortlist import with_shortlist
+from femubench.core.diagnosis.space import Projection, Projector
+from femubench.core.fem.frame import GroundSpring, Joint, Material, Member, Place, Support
+from femubench.core.fem.sections import rectangular_tube
+from femubench.core.model import Dofs
+from femubench.plugins.effects.added_mass import AddedMass
+from femubench.plugins.effects.attached_oscillator import AttachedOscillator
+from femubench.plugins.effects.grounding_spring import GroundingSpring
+from femubench.plugins.effects.joint_offset import JointOffset
+from femubench.plugins.effects.joint_rotation import JointRotation
+from femubench.plugins.effects.local_stiffness_loss import LocalStiffnessLoss
+from femubench.plugins.effects.member_mass import MemberMass
+from femubench.plugins.effects.member_stiffness import MemberStiffness
+from femubench.plugins.effects.youngs_modulus import YoungsModulus
+
+FrameBuilder = Callable[..., Frame]
+KNOWN: tuple[Effect, ...] = (AddedMass(), JointRotation(), MemberStiffness(), YoungsModulus())
+USED, HELD_OUT = 6, 3
+ALUMINIUM = Material(70e9, 0.33, 2700.0)
+
+
+@pytest.fixture(scope="module")
+def model(ladder: FrameBuilder) -> Model:
+    """Return the ladder with 40 elements a member, 837 dofs."""
+    frame = ladder("timoshenko", elements=40, polar=False, accelerometer=False)
+    return Model.of(replace(frame, rotary_inertia=True))
+
+
+def sensors_on(frame: Frame) -> Sensors:
+    points = [joint.xyz for joint in frame.joints]
+    for member in frame.members:
+        first, last = (np.array(frame.joint(end).xyz) for end in member.ends)
+        points.append(tuple(0.5 * (first + last)))
+    labels = tuple(f"s{i}" for i in range(len(points)))
+    return Sensors(labels, np.array(points), ("z",) * len(points))
+
+
+def measured(
+    truth: Model, sensors: Sensors, count: int, rng: np.random.Generator | None = None
+) -> Measurement:
+    """Return a test of a model, exact without a generator, with the deviations of a good test."""
+    modes = solve_modes(truth, count + 10).elastic
+    frequencies = modes.natural_frequencies[:count]
+    shapes = np.asarray(truth.observe(sensors) @ modes.shapes[:, :count])
+    shapes = shapes / np.abs(shapes).max(axis=0)
+    std = 0.002 * frequencies
+    if rng is not None:
+        frequencies = frequencies + std * rng.standard_normal(count)
+        shapes = shapes + 0.015 * rng.standard_normal(shapes.shape)
+    numbers, unknown = tuple(range(1, count + 1)), np.full(count, np.nan)
+    spread = np.full(shapes.shape, 0.015)
+    return Measurement(sensors, numbers, frequencies, std, unknown, shapes, spread)
+
+
+def posed_on(model: Model, hypotheses: tuple[Hypothesis, ...]) -> Problem:
+    measurement = measured(model, sensors_on(model.frame_structure.frame), USED)
+    data = Data(measurement, np.zeros(0))
+    noise = Noise.of(np.zeros((len(data), 0)), 0.0)
+    return placed(Basis.of(model, measurement), data, noise, hypotheses)
+
+
+def projected(problem: Problem, hypothesis: Hypothesis) -> Projection:
+    assert isinstance(problem, LargeProblem)
+    return Projector(problem.model, problem.common.modes.shapes)(hypothesis)
+
+
+def one(model: Model, effect: Effect, place: str) -> Hypothesis:
+    (found,) = (h for h in hypotheses_of(model, [effect]) if h.place == place)
+    return found
+
+
+class TestCoordinates:
+    @pytest.mark.parametrize(
+        ("effect", "place", "x"),
+        [
+            (JointRotation(), "E", [2.3]),
+            (JointOffset(), "L", [0.5]),
+            (LocalStiffnessLoss(), "AB/13", [2.0]),
+            (MemberStiffness(), "BE", [-1.5]),
+            (MemberMass(), "EF", [1.5]),
+            (AddedMass(), "BC@0.25", [2.5]),
+            (GroundingSpring(), "F", [2.0]),
+            (AttachedOscillator(), "BE@0.5", [1.0, -0.4]),
+        ],
+    )
+    def test_the_spectrum_is_that_of_the_extended_model(
+        self, model: Model, effect: Effect, place: str, x: list[float]
+    ) -> None:
+        hypothesis = one(model, effect, place)
+        problem = posed_on(model, ())
+        own, parts = enriched(problem, (projected(problem, hypothesis),))
+        state = state_at(own, parts, np.array(x))
+        exact = np.sort(solve_modes(extended(model, parts, np.array(x)), 24).eigenvalues)
+        assert_allclose(state.eigenvalues[3:12], exact[3:12], rtol=1e-6)
+        raw = raw_residual(own, extended(model, parts, np.array(x)))
+        assert_allclose(state.raw, raw, atol=1e-3)
+
+    def test_modes_alone_would_not_do(self, model: Model) -> None:
+        problem = posed_on(model, ())
+        part = projected(problem, one(model, JointRotation(), "E"))
+        state = state_at(problem, (part,), np.array([2.3]))
+        exact = np.sort(solve_modes(extended(model, (part,), state.x), 24).eigenvalues)
+        assert np.abs(state.eigenvalues[3:12] / exact[3:12] - 1.0).max() > 0.02
+
+    def test_two_causes_share_coordinates(self, model: Model) -> None:
+        problem = posed_on(model, ())
+        chosen = one(model, JointRotation(), "E"), one(model, AddedMass(), "A")
+        parts = tuple(projected(problem, hypothesis) for hypothesis in chosen)
+        own, parts = enriched(problem, parts)
+        x = np.array([1.0, 1.5])
+        exact = np.sort(solve_modes(extended(model, parts, x), 24).eigenvalues)
+        assert_allclose(state_at(own, parts, x).eigenvalues[3:12], exact[3:12], rtol=1e-6)
+
+    def test_one_basis_has_the_slopes_of_all(self, model: Model) -> None:
+        """Forces at the sensors in the basis make readings right to first order."""
+        problem = posed_on(model, ())
+        step = np.array([1e-3])
+        for effect, place in ((LocalStiffnessLoss(), "AB/13"), (AddedMass(), "BC@0.25")):
+            part = projected(problem, one(model, effect, place))
+            first, second = (
+                raw_residual(problem, extended(model, (part,), k * step)) for k in (1.0, 2.0)
+            )
+            slope = state_at(problem, (part,), 1.5 * step).jacobian[:, 0]
+            assert_allclose(slope, (first - second) / step, atol=2e-3 * np.abs(slope).max())
+
+    def test_complete_coordinates_stay_as_they_are(self, ladder: FrameBuilder) -> None:
+        small = Model.of(ladder())
+        known = hypotheses_of(small, [MemberStiffness()])
+        problem = posed_on(small, known)
+        assert not isinstance(problem, LargeProblem)
+        parts = problem.space.projections
+        assert len(problem.space) == small.size
+        assert enriched(problem, parts) == (problem, parts)
+        assert with_shortlist(problem) is problem
+
+
+@pytest.fixture(scope="module")
+def found(model: Model) -> Callable[..., Examination]:
+    """Return what exact data of the ladder with an effect in it are found to show."""
+
+    def run(effect: Effect, place: str, value: float, *others: Effect) -> Examination:
+        truth = effect.extend(model, place, [value])
+        measurement = measured(truth, sensors_on(model.frame_structure.frame), USED)
+        return examine(model, measurement, [*KNOWN, *others], tolerance=0.0, pairs=False)
+
+    return run
+
+
+class TestNaming:
+    @pytest.mark.parametrize(
+        ("effect", "place", "value"),
+        [(JointRotation(), "E", 2000.0), (AddedMass(), "AB@0.25", 0.05)],
+    )
+    def test_what_is_hidden_is_found(
+        self,
+        found: Callable[..., Examination],
+        effect: Effect,
+        place: str,
+        value: float,
+    ) -> None:
+        best = found(effect, place, value).best
+        (part,) = best.parts
+        assert (part.hypothesis.name, part.hypothesis.place) == (effect.name, place)
+        assert part.hypothesis.values(best.fit.state.x[None])[0, 0] == pytest.approx(
+            value, rel=1e-2
+        )
+        # The prior pulls a little; the modes of a truncated space would leave thousands.
+        assert best.chi2 < 0.1
+        assert departure(best.fit) < 1e-2
+
+    def test_damage_over_many_elements_is_told_from_that_of_one(
+        self, model: Model, found: Callable[..., Examination]
+    ) -> None:
+        examination = found(MemberStiffness(), "AB", -0.3, LocalStiffnessLoss())
+        best = examination.best
+        assert (best.searched, best.place) == (("member-stiffness",), "AB")
+        shortlist = [p.hypothesis for p in examination.problem.space.projections]
+        assert len(shortlist) < sum({h.name: h.places for h in shortlist}.values())
+        assert {h.name for h in shortlist} > {effect.name for effect in KNOWN}
+
+    def test_a_model_of_matrices(self, model: Model) -> None:
+        """Groups of a stiffness matrix, no elements, no tolerances."""
+        n = model.size
+        xyz = np.column_stack([np.arange(n, dtype=float), np.zeros((n, 2))])
+        dofs = Dofs(np.arange(n), ("z",) * n, xyz)
+        geometry = MatrixGeometry(tuple(f"n{i}" for i in range(n)), dofs)
+        feet = zip("ACDF", (1e5, 2e5, 4e5, 7e5), strict=True)
+        springs = [GroundSpring(Place(joint=joint), "z", value) for joint, value in feet]
+        whole = model.attach((), springs).stiffness
+        weaker = MemberStiffness().extend(model, "BE", [-0.5]).stiffness
+        rung = sp.csc_array(2.0 * (model.stiffness - weaker))
+        held = sp.csc_array(whole - rung)
+        bare = Model(model.mass, held + rung, dofs, geometry, groups={"frame": held, "rung": rung})
+        truth = MemberStiffness().extend(bare, "rung", [0.6])
+        rows = np.arange(10, n, 47)
+        labels = tuple(f"s{i}" for i in rows)
+        sensors = Sensors(labels, xyz[rows], ("z",) * len(rows))
+        rng = np.random.default_rng(3)
+        measurement = measured(truth, sensors, USED + HELD_OUT, rng)
+        used, held_out = tuple(range(1, USED + 1)), tuple(range(USED + 1, USED + HELD_OUT + 1))
+        case = Case("case", "", "", Path(), bare, measurement, used, held_out)
+        diagnosis = diagnose(case, [MemberStiffness(), YoungsModulus()], pairs=False)
+        assert [(c.effect, c.place) for c in diagnosis.causes] == [("member-stiffness", "rung")]
+        assert diagnosis.causes[0].parameters[0].value == pytest.approx(0.6, rel=0.2)
+
+
+def lattice(count: int, elements: int) -> Frame:
+    """Return a building of count x count x count bays, clamped at its feet."""
+    rng = np.random.default_rng(0)
+    section = rectangular_tube(0.06, 0.03, 0.003)
+    grid = [(i, j, k) for i in range(count + 1) for j in range(count + 1) for k in range(count + 1)]
+    joints = tuple(
+        Joint(
+            "J{}.{}.{}".format(*at),
+            tuple(np.array(at) * (1.0, 0.8, 0.9) + 0.03 * rng.standard_normal(3)),
+        )
+        for at in grid
+    )
+    members = []
+    for at in grid:
+        for along in ((1, 0, 0), (0, 1, 0), (0, 0, 1)):
+            to = tuple(a + b for a, b in zip(at, along, strict=True))
+            if max(to) <= count and (along[2] or at[2]):
+                ends = "J{}.{}.{}".format(*at), "J{}.{}.{}".format(*to)
+                name = f"m{len(members) + 1}"
+                members.append(Member(name, ends, elements, section, ALUMINIUM))
+    feet = (joint.name for joint in joints if joint.name.endswith(".0"))
+    held = ("x", "y", "z", "rx", "ry", "rz")
+    supports = tuple(Support(Place(joint=foot), held) for foot in feet)
+    return Frame("3d", "timoshenko", joints, tuple(members), supports=supports, rotary_inertia=True)
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize(("elements", "size"), [(10, 2000), (118, 29000)])
+def test_a_lattice_is_diagnosed_in_minutes(elements: int, size: int) -> None:
+    frame = lattice(2, elements)
+    model = Model.of(frame)
+    assert model.size > size
+    free = [joint for joint in frame.joints if not joint.name.endswith(".0")][:15]
+    points = [(joint, direction) for joint in free for direction in "xy"]
+    sensors = Sensors(
+        tuple(f"{joint.name}:{d}" for joint, d in points),
+        np.array([joint.xyz for joint, _ in points]),
+        tuple(d for _, d in points),
+    )
+    truth = MemberStiffness().extend(model, "m15", [-0.3])
+    measurement = measured(truth, sensors, 12, np.random.default_rng(3))
+    case = Case("lattice", "", "", Path(), model, measurement, tuple(range(1, 9)), (9, 10, 11, 12))
+    start = time.process_time()
+    diagnosis = diagnose(case)
+    assert time.process_time() - start < 240.0
+    assert diagnosis.verdict == "named"
+    assert (diagnosis.causes[0].effect, diagnosis.causes[0].place) == ("member-stiffness", "m15")

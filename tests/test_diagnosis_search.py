@@ -1,0 +1,225 @@
+"""Explanations and their weights: priors, evidence, names, the textbook; what a search finds."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import combinations
+from math import comb, exp, factorial, log
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+from femubench import EffectParameter, Frame, FrameEffect, Model, PointMass
+from femubench.core.challenge.structures import structure_named
+from femubench.core.diagnosis.exact import agreed, extended, raw_residual
+from femubench.core.diagnosis.examine import examine
+from femubench.core.diagnosis.explanation import (
+    PRIOR_BEYOND_TEXTBOOK,
+    PRIOR_OF_COUNT,
+    Posterior,
+    log_prior,
+    textbook_bases,
+)
+from femubench.core.diagnosis.fit import fit, state_at
+from femubench.core.diagnosis.hypothesis import hypotheses_of
+from femubench.core.fem.frame import Place
+
+sys.path.insert(0, str(Path(__file__).parent))
+from diagnosis_problems import catalogue, effects_named, measured, part_at, problem_of
+
+FRAME = structure_named("ladder").frame
+MODEL = Model.of(FRAME)
+NOTHING = np.zeros(0)
+
+
+def test_priors_of_counts_are_probabilities_and_fewer_causes_are_likelier() -> None:
+    for counts in (PRIOR_OF_COUNT, PRIOR_BEYOND_TEXTBOOK):
+        assert sum(counts) == pytest.approx(1.0)
+        assert list(counts) == sorted(counts, reverse=True)
+    assert PRIOR_OF_COUNT[0] == 0.5
+
+
+def test_the_prior_of_all_explanations_with_so_many_causes_sums_to_that_of_their_count() -> None:
+    """Over names and places; two causes in either order are one explanation."""
+    problem = problem_of(MODEL, measured(MODEL, FRAME), effects_named("density", "joint-mass"))
+    parts, names = problem.space.projections, 2
+    single = sum(exp(log_prior((part,), names, PRIOR_OF_COUNT)) for part in parts)
+    assert single == pytest.approx(PRIOR_OF_COUNT[1])
+    double = sum(exp(log_prior(pair, names, PRIOR_OF_COUNT)) for pair in combinations(parts, 2))
+    # All but the pairs of a hypothesis with itself.
+    assert 0.4 * PRIOR_OF_COUNT[2] < double < PRIOR_OF_COUNT[2]
+    assert log_prior((), names, PRIOR_OF_COUNT) == log(PRIOR_OF_COUNT[0])
+    assert factorial(2) * comb(2, 2) == 2
+
+
+def test_textbook_sets_are_all_subsets_with_probabilities_that_sum_to_one() -> None:
+    known = effects_named("shear-deformation", "rotary-inertia", "density")
+    problem = problem_of(MODEL, measured(MODEL, FRAME), known)
+    bases = textbook_bases(problem.space.projections)
+    assert [base.names for base in bases] == [
+        (),
+        ("shear-deformation",),
+        ("rotary-inertia",),
+        ("shear-deformation", "rotary-inertia"),
+    ]
+    assert sum(exp(base.log_prior) for base in bases) == pytest.approx(1.0)
+    assert bases[-1].x.tolist() == [1.0, 1.0]
+    (alone,) = textbook_bases([part_at(problem, "density", "all")])
+    assert (alone.names, alone.log_prior) == ((), 0.0)
+
+
+@pytest.fixture(scope="module")
+def stiffer() -> Posterior:
+    (effect,) = effects_named("member-stiffness")
+    truth = effect.extend(MODEL, "rung-middle", (0.2,))
+    test = measured(truth, FRAME, rng=np.random.default_rng(3))
+    effects = effects_named("member-stiffness", "member-mass", "density", "added-mass")
+    return examine(MODEL, test, effects, tolerance=0.005).posterior
+
+
+def test_probabilities_sum_to_one_by_explanation_and_by_name(stiffer: Posterior) -> None:
+    assert sum(stiffer.probabilities) == pytest.approx(1.0)
+    assert sum(stiffer.names.values()) == pytest.approx(1.0)
+    assert list(stiffer.names.values()) == sorted(stiffer.names.values(), reverse=True)
+    weights = [e.log_weight for e in stiffer.explanations]
+    assert weights == sorted(weights, reverse=True)
+    ratio = stiffer.probabilities[0] / stiffer.probabilities[1]
+    assert log(ratio) == pytest.approx(weights[0] - weights[1])
+
+
+def test_the_hidden_cause_is_the_best_and_its_members_hold_all_of_its_places(
+    stiffer: Posterior,
+) -> None:
+    key = next(iter(stiffer.names))
+    assert key == ("member-stiffness",)
+    assert stiffer.best(key).place == "rung-middle"
+    assert sum(p for _, p in stiffer.members(key)) == pytest.approx(stiffer.names[key])
+
+
+def test_data_decide_what_a_prior_leaves_open() -> None:
+    """The better the data, the more certain the name; the nothing of no data keeps its prior."""
+    (effect,) = effects_named("member-mass")
+    truth = effect.extend(MODEL, "rung-left", (0.04,))
+    test = measured(truth, FRAME, weighed=False)
+    found = []
+    for share in (30.0, 1.0, 0.25):
+        blurred = replace(
+            test, frequency_std=share * test.frequency_std, shape_std=share * test.shape_std
+        )
+        posterior = examine(MODEL, blurred, (effect,), tolerance=0.0).posterior
+        found.append(posterior.names.get((), 0.0))
+    assert found[0] > 0.5 > found[2]
+    assert found == sorted(found, reverse=True)
+
+
+def test_two_causes_are_found_together_and_one_is_not_split_in_two() -> None:
+    stiff, mass = effects_named("member-stiffness", "added-mass")
+    effects = effects_named("member-stiffness", "added-mass", "member-mass", "density")
+    one = stiff.extend(MODEL, "rung-middle", (-0.2,))
+    two = mass.extend(one, "J1", (0.05,))
+    for truth, expected in (
+        (one, ("member-stiffness",)),
+        (two, ("added-mass", "member-stiffness")),
+    ):
+        test = measured(truth, FRAME, rng=np.random.default_rng(8))
+        posterior = examine(MODEL, test, effects, tolerance=0.005).posterior
+        assert next(iter(posterior.names)) == expected
+        assert posterior.names[expected] > 0.9
+    assert posterior.best(expected).place == "J1 + rung-middle"
+    alone = examine(MODEL, test, effects, tolerance=0.005, pairs=False).posterior
+    assert max(len(e.parts) for e in alone.explanations) == 1
+
+
+def test_several_causes_agree_with_the_model_that_they_make() -> None:
+    """A spring at the end of a stiffer member: the two changes do not add up."""
+    rotation, stiffness = effects_named("joint-rotation", "member-stiffness")
+    truth = stiffness.extend(rotation.extend(MODEL, "J5", (2e4,)), "rung-middle", (0.4,))
+    problem = problem_of(MODEL, measured(truth, FRAME), (rotation, stiffness))
+    parts = (
+        part_at(problem, "joint-rotation", "J5"),
+        part_at(problem, "member-stiffness", "rung-middle"),
+    )
+    plain = fit(problem, parts, np.array([0.5, 0.5]))
+    assert plain is not None
+    better = agreed(plain)
+    gaps = []
+    for found in (plain, better):
+        exact = raw_residual(problem, extended(MODEL, parts, found.state.x))
+        gaps.append(float(np.linalg.norm(exact - found.state.raw)))
+    assert gaps[1] < 0.3
+    assert gaps[1] <= gaps[0]
+    exact = raw_residual(problem, extended(MODEL, parts, better.state.x))
+    assert float(exact @ exact) < 1.0
+
+
+class Ballast(FrameEffect):
+    """A third party's effect: the same mass at both ends of a rung; states no change."""
+
+    name: ClassVar[str] = "ballast"
+    summary: ClassVar[str] = "a rung carries ballast at its ends"
+
+    def places(self, model: Model) -> Sequence[str]:
+        return tuple(m.name for m in model.frame_structure.frame.members if "rung" in m.name)
+
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+        return (EffectParameter("mass", "kg", 0.02, lower=0.0, one_sided=True),)
+
+    def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
+        ends = frame.members[frame.member_index[place]].ends
+        more = tuple(PointMass(Place(joint=end), values[0]) for end in ends)
+        return replace(frame, masses=(*frame.masses, *more))
+
+
+class Softening(Ballast):
+    """Another one, whose value acts through its square."""
+
+    name: ClassVar[str] = "softening"
+
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+        return (EffectParameter("depth", "", 0.2, lower=0.0, upper=0.8, one_sided=True),)
+
+    def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
+        softer = 1.0 - values[0] ** 2
+        members = tuple(
+            replace(m, material=replace(m.material, E=softer * m.material.E))
+            if m.name == place
+            else m
+            for m in frame.members
+        )
+        return replace(frame, members=members)
+
+
+@pytest.mark.parametrize(("toy", "value"), [(Ballast(), 0.04), (Softening(), 0.45)])
+def test_an_effect_that_states_no_change_is_tabulated_and_found(
+    toy: FrameEffect, value: float
+) -> None:
+    assert not hasattr(toy, "change")
+    truth = toy.extend(MODEL, "rung-middle", (value,))
+    test = measured(truth, FRAME, rng=np.random.default_rng(1))
+    rivals = effects_named("density", "torsion-constant", "joint-mass", "joint-rotation")
+    examination = examine(MODEL, test, (toy, *rivals), tolerance=0.005)
+    best = examination.best
+    assert best.searched == (toy.name,)
+    assert best.place == "rung-middle"
+    (part,) = best.parts
+    found = float(part.hypothesis.values(best.fit.state.x[None])[0, 0])
+    assert found == pytest.approx(value, rel=0.15)
+    extended_model = extended(MODEL, best.parts, best.fit.state.x)
+    exact = raw_residual(best.fit.state.problem, extended_model)
+    assert np.abs(exact - best.fit.state.raw).max() < 0.02
+
+
+def test_every_effect_at_every_place_is_a_hypothesis() -> None:
+    found = hypotheses_of(MODEL, catalogue().values())
+    labels = [(h.name, h.place) for h in found]
+    assert len(set(labels)) == len(labels)
+    for effect in catalogue().values():
+        places = [h.place for h in found if h.name == effect.name]
+        assert places == list(dict.fromkeys(effect.places(MODEL)))
+        assert {h.places for h in found if h.name == effect.name} <= {len(places)}
+    state = state_at(problem_of(MODEL, measured(MODEL, FRAME), ()), (), NOTHING)
+    assert state.chi2 < 1e-8

@@ -1,0 +1,434 @@
+"""Verdicts: adequacy as a probability, groups, the order of the verdicts; which data they need."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from femubench import (
+    Case,
+    Diagnosis,
+    Effect,
+    Frame,
+    Measurement,
+    Model,
+    NotApplicable,
+    diagnose,
+)
+from femubench.core.case.modes import NO_SENSORS
+from femubench.core.challenge.structures import structure_named
+from femubench.core.diagnosis.adequacy import adequacy
+from femubench.core.diagnosis.data import Data
+from femubench.core.diagnosis.explanation import Posterior
+from femubench.core.diagnosis.verdict import (
+    angle_between,
+    causes_of,
+    decide,
+    inseparable,
+    mostly_common,
+)
+
+sys.path.insert(0, str(Path(__file__).parent))
+from diagnosis_problems import case_of, catalogue, effects_named, measured
+
+FrameBuilder = Callable[..., Frame]
+FRAME = structure_named("ladder").frame
+MODEL = Model.of(FRAME)
+Names = tuple[str, ...]
+
+
+# --- adequacy ---------------------------------------------------------------------------------
+
+
+def left(residual: np.ndarray[Any, Any], data: Data) -> Any:
+    """Return a state that leaves these residuals."""
+    problem = SimpleNamespace(data=data)
+    count = len(data.measurement)
+    return SimpleNamespace(problem=problem, residual=residual, partner=np.arange(count))
+
+
+@pytest.fixture(scope="module")
+def data() -> Data:
+    return Data(measured(MODEL, FRAME), np.zeros(0))
+
+
+def noise(data: Data, rng: np.random.Generator) -> np.ndarray[Any, Any]:
+    """Return residuals of pure noise; every shape has lost its scale."""
+    residual = rng.standard_normal(len(data))
+    mode, sensor = data.shape_rows
+    for j in np.unique(mode):
+        rows = len(data.measurement) + np.flatnonzero(mode == j)
+        seen = data.shapes[sensor[mode == j], j]
+        residual[rows] -= seen * (seen @ residual[rows]) / (seen @ seen)
+    return residual
+
+
+def test_noise_is_adequate_as_often_as_the_probability_says(data: Data) -> None:
+    """Small probabilities are no more frequent than they say, large deviations aside."""
+    rng = np.random.default_rng(0)
+    found = np.array([adequacy(left(noise(data, rng), data), 0) for _ in range(500)])
+    assert found.min() >= 0.0
+    assert found.max() <= 1.0
+    for level in (0.2, 0.05, 0.01):
+        share = np.mean(found < level)
+        assert share < 2.0 * level + 3.0 * np.sqrt(level / len(found))
+    assert np.mean(found < 0.2) > 0.05
+
+
+@pytest.mark.parametrize("fault", ["all", "frequency", "mode", "sensor"])
+def test_what_is_off_alone_is_seen_among_many_good_data(data: Data, fault: str) -> None:
+    rng = np.random.default_rng(1)
+    mode, sensor = data.shape_rows
+    count = len(data.measurement)
+    residual = noise(data, rng)
+    if fault == "all":
+        residual *= 1.6
+    elif fault == "frequency":
+        residual[2] += 6.0
+    else:
+        rows = mode == 3 if fault == "mode" else sensor == 4
+        residual[count + np.flatnonzero(rows)] += 6.0 / np.sqrt(rows.sum()) * 1.5
+    assert adequacy(left(noise(data, rng), data), 0) > 0.01
+    assert adequacy(left(residual, data), 0) < 1e-3
+
+
+def test_fitted_values_count_as_spent(data: Data) -> None:
+    residual = np.sqrt((len(data) - data.scale_count) / len(data)) * np.ones(len(data))
+    few, many = (adequacy(left(residual, data), unknowns) for unknowns in (0, 20))
+    assert many < few
+
+
+# --- decisions --------------------------------------------------------------------------------
+
+
+def explained(
+    names: Names,
+    probability: float,
+    *,
+    chi2: float = 60.0,
+    direction: Sequence[float] = (1.0, 0.0, 0.0),
+    place: str = "all",
+    book: Names = (),
+) -> Any:
+    """Return an explanation as far as a verdict looks at it."""
+    columns = np.array(direction, dtype=float)[:, None] if names else np.zeros((3, 0))
+    return SimpleNamespace(
+        base=SimpleNamespace(names=book, parts=book),
+        parts=names,
+        searched=names,
+        place=place,
+        chi2=chi2,
+        log_weight=float(np.log(probability)),
+        fit=SimpleNamespace(state=SimpleNamespace(jacobian=columns)),
+    )
+
+
+def posterior(*explanations: Any) -> Posterior:
+    return Posterior.of(explanations)
+
+
+ACROSS, ALONG = (0.0, 1.0, 0.0), (1.0, 0.1, 0.0)
+
+
+def test_nothing_is_said_where_nothing_is_likelier_than_not() -> None:
+    found = posterior(explained((), 0.6), explained(("a",), 0.4))
+    assert decide(found, 0.5, confirmed=True).verdict == "none"
+    assert decide(found, 0.5, confirmed=False).verdict == "none"
+    assert decide(found, 1e-5, confirmed=True).verdict == "unknown"
+    assert decide(found, 0.5, confirmed=True).nothing == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize(
+    ("adequate", "confirmed", "expected"),
+    [
+        (0.5, True, "named"),
+        (0.5, False, "not-confirmed"),
+        (1e-6, True, "unknown"),
+        (1e-6, False, "unknown"),
+    ],
+)
+def test_a_name_needs_an_adequate_fit_and_a_gain_on_unseen_data(
+    adequate: float, confirmed: bool, expected: str
+) -> None:
+    found = posterior(explained(("a",), 0.99), explained((), 0.01, chi2=200.0))
+    decision = decide(found, adequate, confirmed=confirmed)
+    assert (decision.verdict, decision.group) == (expected, (("a",),))
+
+
+def test_rivals_that_the_data_do_not_exclude_are_one_group() -> None:
+    close = posterior(
+        explained(("a",), 0.7), explained(("b",), 0.29, direction=ACROSS), explained((), 0.01)
+    )
+    decision = decide(close, 0.5, confirmed=True)
+    assert decision.verdict == "ambiguous"
+    assert decision.group == (("a",), ("b",))
+    assert decision.angles[1] == pytest.approx(90.0)
+
+
+def test_a_rival_of_little_probability_stays_only_where_it_is_nearly_parallel() -> None:
+    for direction, expected in ((ALONG, "ambiguous"), (ACROSS, "named")):
+        found = posterior(
+            explained(("a",), 0.985),
+            explained(("b",), 0.014, direction=direction),
+            explained((), 0.001),
+        )
+        assert decide(found, 0.5, confirmed=True).verdict == expected
+    gone = posterior(explained(("a",), 0.999), explained(("b",), 0.001, direction=ALONG))
+    assert decide(gone, 0.5, confirmed=True).verdict == "named"
+
+
+def test_groups_are_probable_first_and_not_endless() -> None:
+    many = posterior(*(explained((name,), 0.1) for name in "abcdefghij"))
+    group, angles = inseparable(many)
+    assert len(group) == len(angles) == 6
+    assert angles[0] == 0.0
+
+
+def test_textbook_physics_in_all_that_is_left_is_named_whatever_is_beside_it() -> None:
+    nothing = explained((), 1e-6, chi2=1000.0)
+    core = explained(("a",), 0.6, chi2=80.0, book=("a",))
+    with_b = explained(("a", "b"), 0.2, chi2=70.0, book=("a",))
+    with_c = explained(("a", "c"), 0.2, chi2=71.0, book=("a",))
+    found = posterior(nothing, core, with_b, with_c)
+    group, _ = inseparable(found)
+    assert len(group) == 3
+    assert mostly_common(found, group)
+    decision = decide(found, 0.5, confirmed=True)
+    assert (decision.verdict, decision.group[0]) == ("named", ("a",))
+
+
+def test_a_cause_that_some_names_lack_is_not_named_for_sure() -> None:
+    """Neither where they share nothing, nor where what they share is the smaller part."""
+    nothing = explained((), 1e-6, chi2=1000.0)
+    apart = posterior(nothing, explained(("b",), 0.5), explained(("c",), 0.5, direction=ACROSS))
+    weak = posterior(
+        nothing,
+        explained(("a",), 0.01, chi2=900.0),
+        explained(("a", "b"), 0.5, chi2=60.0),
+        explained(("a", "c"), 0.5, chi2=61.0, direction=ACROSS),
+    )
+    more = posterior(
+        nothing, explained(("a",), 0.3, chi2=80.0), explained(("a", "b"), 0.7, chi2=70.0)
+    )
+    for found in (apart, weak, more):
+        assert not mostly_common(found, inseparable(found)[0])
+        assert decide(found, 0.5, confirmed=True).verdict == "ambiguous"
+
+
+def test_an_angle_is_between_subspaces_and_takes_no_units() -> None:
+    one, two = explained(("a",), 0.5), explained(("b",), 0.5, direction=(7.0, 7.0, 0.0))
+    assert angle_between(one, two) == pytest.approx(45.0)
+    assert np.isnan(angle_between(one, explained((), 0.5)))
+    still = explained(("c",), 0.5, direction=(0.0, 0.0, 0.0))
+    assert np.isnan(angle_between(one, still))
+
+
+def test_places_of_a_name_share_its_probability() -> None:
+    found = posterior(
+        explained(("a",), 0.5, place="x"),
+        explained(("a",), 0.25, place="y"),
+        explained(("a",), 0.25, place="x"),
+    )
+    ((best, share),) = causes_of(found, (("a",),))
+    assert best.place == "x"
+    assert share == pytest.approx(0.75)
+
+
+# --- whole diagnoses --------------------------------------------------------------------------
+
+FEW = (
+    "youngs-modulus",
+    "density",
+    "torsion-constant",
+    "joint-mass",
+    "member-stiffness",
+    "member-mass",
+    "added-mass",
+    "local-stiffness-loss",
+)
+
+
+def trial(effect: str, place: str, *values: float, **options: Any) -> Case:
+    """Return a case of a ladder with an effect; three modes are held out."""
+    truth = catalogue()[effect].extend(MODEL, place, values)
+    test = measured(truth, FRAME, count=9, rng=np.random.default_rng(6), **options)
+    return case_of(MODEL, test, 6)
+
+
+def diagnosed(case: Case, *, names: Sequence[str] = FEW, **options: Any) -> Diagnosis:
+    return diagnose(case, effects_named(*names), **options)
+
+
+def test_stiffness_and_density_part_when_the_structure_is_weighed() -> None:
+    heavy = ("density", "all", 0.08)
+    blind = diagnosed(trial(*heavy, weighed=False))
+    assert blind.verdict == "ambiguous"
+    assert {cause.effect for cause in blind.causes} == {"youngs-modulus", "density"}
+    assert "angle" in blind.reason
+    assert "eigh" in blind.advice[0].measurement
+    assert blind.advice[0].separation > 100.0
+    weighed = diagnosed(trial(*heavy))
+    assert weighed.verdict == "named"
+    (cause,) = weighed.causes
+    (size,) = cause.parameters
+    assert cause.effect == "density"
+    assert size.std is not None
+    assert abs(size.value - 0.08) < 4.0 * size.std
+
+
+def test_without_a_tolerance_the_same_data_count_for_more() -> None:
+    case = trial("member-stiffness", "rung-middle", 0.15)
+    loose = diagnosed(case, pairs=False)
+    strict = diagnosed(case, tolerance=0.0, pairs=False)
+    assert loose.causes[0].effect == strict.causes[0].effect == "member-stiffness"
+    assert strict.chi2[0] > loose.chi2[0]
+    (one,), (two,) = loose.causes[0].parameters, strict.causes[0].parameters
+    assert one.std is not None
+    assert two.std is not None
+    assert two.std < one.std
+    given = diagnosed(replace(case, tolerance=0.0), pairs=False)
+    assert given.chi2 == strict.chi2
+
+
+@pytest.mark.parametrize("size", [0.01, 0.03, 0.05])
+def test_what_is_said_to_be_missing_is_in_the_extended_model(size: float) -> None:
+    """Also where nothing is the likeliest single answer, and something likelier than nothing."""
+    truth = catalogue()["member-mass"].extend(MODEL, "rung-middle", (size,))
+    test = measured(truth, FRAME, count=9, rng=np.random.default_rng(0))
+    found = diagnosed(case_of(MODEL, test, 6))
+    same = found.extended is MODEL
+    assert (found.verdict == "none") == (found.causes == ()) == same
+    assert (found.chi2[1] < found.chi2[0]) == (not same)
+
+
+@pytest.fixture(scope="module")
+def clean() -> Diagnosis:
+    test = measured(MODEL, FRAME, count=9, rng=np.random.default_rng(16))
+    return diagnose(case_of(MODEL, test, 6))
+
+
+def test_a_clean_model_lacks_nothing_and_says_what_it_would_have_seen(clean: Diagnosis) -> None:
+    assert clean.verdict == "none"
+    assert clean.causes == ()
+    assert clean.extended is not None
+    assert clean.gain.used_percent[0] == clean.gain.used_percent[1]
+    applicable = {name for name, effect in catalogue().items() if effect.places(MODEL)}
+    assert {row.effect for row in clean.smallest_visible} == applicable
+    assert all(row.size > 0.0 for row in clean.smallest_visible)
+
+
+@pytest.mark.parametrize(
+    "effect", ["torsion-constant", "added-mass", "joint-rotation", "member-mass"]
+)
+def test_three_times_the_smallest_visible_size_is_found(clean: Diagnosis, effect: str) -> None:
+    """For a spring a third of the stiffness; at the place where it would show best."""
+    row = next(row for row in clean.smallest_visible if row.effect == effect)
+    parameters = catalogue()[effect].parameters(MODEL, row.place)
+    softer = parameters[0].scaling == "compliance"
+    size = row.size / 3.0 if softer else 3.0 * row.size
+    values = [size] * len(parameters)
+    truth = catalogue()[effect].extend(MODEL, row.place, values)
+    test = measured(truth, FRAME, count=9, rng=np.random.default_rng(16))
+    found = diagnosed(case_of(MODEL, test, 6), names=(*FEW, "joint-rotation"), pairs=False)
+    assert found.verdict in ("named", "ambiguous")
+    assert effect in {cause.effect for cause in found.causes}
+
+
+# --- what cannot be diagnosed, and what can all the same --------------------------------------
+
+
+def bare(measurement: Measurement) -> Measurement:
+    """Return the frequencies alone."""
+    empty = np.zeros((0, len(measurement)))
+    return replace(measurement, sensors=NO_SENSORS, shapes=empty, shape_std=empty, total_mass=None)
+
+
+def test_a_used_frequency_needs_a_deviation() -> None:
+    case = trial("density", "all", 0.08)
+    std = case.measurement.frequency_std.copy()
+    std[2] = np.nan
+    spoiled = replace(case, measurement=replace(case.measurement, frequency_std=std))
+    with pytest.raises(NotApplicable, match="no standard deviation"):
+        diagnosed(spoiled)
+
+
+def test_a_held_out_frequency_needs_none() -> None:
+    case = trial("member-mass", "rung-middle", 0.2)
+    std = case.measurement.frequency_std.copy()
+    std[7] = np.nan
+    found = diagnosed(replace(case, measurement=replace(case.measurement, frequency_std=std)))
+    assert found.causes[0].effect == "member-mass"
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_one_used_mode_is_diagnosed_as_far_as_it_goes(count: int) -> None:
+    case = trial("member-mass", "rung-middle", 0.2)
+    found = diagnosed(replace(case, used=case.used[:count]))
+    assert found.data_count > 0
+    assert found.verdict in ("none", "ambiguous", "named", "unknown", "not-confirmed")
+    lonely = replace(case, used=case.used[:count], held_out=(), modifications=())
+    alone = diagnosed(replace(lonely, measurement=bare(case.measurement)))
+    assert np.isfinite(alone.chi2).all()
+
+
+def test_frequencies_alone_will_do() -> None:
+    case = trial("torsion-constant", "all", 0.3)
+    found = diagnosed(replace(case, measurement=bare(case.measurement)))
+    assert found.verdict in ("named", "ambiguous")
+    assert "torsion-constant" in {cause.effect for cause in found.causes}
+    assert found.data_count == 6
+    assert {row.kind for row in found.residuals} == {"frequency"}
+
+
+def test_data_of_another_structure_are_no_reason_to_name_anything() -> None:
+    case = trial("density", "all", 0.01)
+    rng = np.random.default_rng(2)
+    test = case.measurement
+    strange = replace(
+        test,
+        frequencies=4.7 * test.frequencies[::-1],
+        frequency_std=4.7 * test.frequency_std[::-1],
+        shapes=rng.standard_normal(test.shapes.shape),
+        total_mass=None,
+    )
+    found = diagnosed(replace(case, measurement=strange), pairs=False)
+    assert found.verdict == "unknown"
+    assert found.adequacy_p < 1e-3
+
+
+def test_matrices_are_diagnosed_by_what_applies_to_them() -> None:
+    from femubench.core.case.nodes import MatrixGeometry
+
+    structure = MODEL.frame_structure
+    names = tuple(f"n{i}" for i in range(len(structure.mesh.xyz)))
+    geometry = MatrixGeometry(names, MODEL.dofs)
+    model = Model(MODEL.mass, MODEL.stiffness, MODEL.dofs, geometry)
+    case = trial("youngs-modulus", "all", 0.08, weighed=False)
+    found = diagnose(replace(case, model=model))
+    assert found.verdict in ("named", "ambiguous")
+    assert "youngs-modulus" in {cause.effect for cause in found.causes}
+    assert found.extended.size == MODEL.size
+
+
+@pytest.mark.parametrize("effects", [(), effects_named("amplitude-dependent-stiffness")])
+def test_without_effects_there_is_nothing_to_name(effects: tuple[Effect, ...]) -> None:
+    wrong = diagnose(trial("youngs-modulus", "all", 0.2), effects)
+    assert wrong.verdict == "unknown"
+    assert wrong.causes == ()
+    test = measured(MODEL, FRAME, count=9, rng=np.random.default_rng(16))
+    right = diagnose(case_of(MODEL, test, 6), effects)
+    assert right.verdict == "none"
+    assert right.smallest_visible == ()
+
+
+def test_there_must_be_a_used_mode() -> None:
+    case = trial("density", "all", 0.08)
+    with pytest.raises(NotApplicable, match="no used mode"):
+        diagnosed(replace(case, used=()))
