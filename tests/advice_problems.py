@@ -25,8 +25,9 @@ from femubench.core.diagnosis.advice_points import (
 from femubench.core.diagnosis.data import Data, Noise
 from femubench.core.diagnosis.fit import Fit, Problem, fit
 from femubench.core.diagnosis.hypothesis import hypotheses_of
+from femubench.core.diagnosis.projection import Projection
 from femubench.core.diagnosis.result import Advice
-from femubench.core.diagnosis.space import Projection, nominal_space
+from femubench.core.diagnosis.space import nominal_space
 from femubench.core.plugin.roles import Effect
 
 STD = 0.002

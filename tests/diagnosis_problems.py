@@ -15,7 +15,8 @@ from femubench.core.diagnosis.data import Data, Noise
 from femubench.core.diagnosis.examine import posed
 from femubench.core.diagnosis.fit import Problem
 from femubench.core.diagnosis.hypothesis import hypotheses_of
-from femubench.core.diagnosis.space import Projection, nominal_space
+from femubench.core.diagnosis.projection import Projection
+from femubench.core.diagnosis.space import nominal_space
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.roles import Effect

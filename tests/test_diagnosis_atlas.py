@@ -10,7 +10,7 @@ import pytest
 
 from femubench import Model
 from femubench.core.challenge.structures import structure_named
-from femubench.core.diagnosis.atlas import Screened, grid_of, screen
+from femubench.core.diagnosis.atlas import Screened, screen
 from femubench.core.diagnosis.fit import Fit, Problem, fit, state_at
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -138,7 +138,7 @@ def test_two_parameters_are_found_from_the_grid(
 
 def test_grids_stay_within_bounds_and_hold_no_effect_out(clean: Problem) -> None:
     for part in clean.space.projections:
-        h, grid = part.hypothesis, grid_of(part.hypothesis)
+        h, grid = part.hypothesis, part.hypothesis.grid
         low, high = h.bounds
         assert len(grid) > 0
         assert (grid >= low - 1e-12).all()

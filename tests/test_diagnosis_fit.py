@@ -23,7 +23,8 @@ from femubench.core.diagnosis.fit import (
     log_evidence,
     state_at,
 )
-from femubench.core.diagnosis.space import Projection, solve_pencil
+from femubench.core.diagnosis.projection import Projection
+from femubench.core.diagnosis.space import solve_pencil
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.modal.eigen import solve_dense
 

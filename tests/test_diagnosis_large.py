@@ -22,8 +22,8 @@ from femubench.core.diagnosis.examine import Examination, examine
 from femubench.core.diagnosis.fit import Problem, state_at
 from femubench.core.diagnosis.hypothesis import Hypothesis, hypotheses_of
 from femubench.core.diagnosis.large import Basis, LargeProblem, enriched, placed
+from femubench.core.diagnosis.projection import Projection, Projector
 from femubench.core.diagnosis.shortlist import with_shortlist
-from femubench.core.diagnosis.space import Projection, Projector
 from femubench.core.fem.frame import GroundSpring, Joint, Material, Member, Place, Support
 from femubench.core.fem.sections import rectangular_tube
 from femubench.core.model import Dofs

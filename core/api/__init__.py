@@ -48,7 +48,7 @@ _NAMES = {
         "Material Member Oscillator Place PointMass Preload RigidEnd Support"
     ),
     "fem.parameters": "Parameter",
-    "fem.preload": "preload_stiffness redundant_members",
+    "fem.preload": "preload_stiffness preload_stiffnesses redundant_members",
     "fem.sections": "Section constant_kappa rectangular_tube round_tube solid_rectangle",
     "fem.structure": "Structure",
     "harness.frames": "modes_frame results_frame run_from_json run_to_json",
@@ -155,7 +155,8 @@ if TYPE_CHECKING:
     )
     from femubench.core.fem.parameters import Parameter as Parameter
     from femubench.core.fem.preload import (
-        preload_stiffness as preload_stiffness, redundant_members as redundant_members,
+        preload_stiffness as preload_stiffness, preload_stiffnesses as preload_stiffnesses,
+        redundant_members as redundant_members,
     )
     from femubench.core.fem.sections import (
         Section as Section, constant_kappa as constant_kappa, rectangular_tube as rectangular_tube,

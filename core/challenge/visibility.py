@@ -13,8 +13,8 @@ from femubench.core.diagnosis.exact import agreed
 from femubench.core.diagnosis.examine import posed
 from femubench.core.diagnosis.fit import Problem, fit
 from femubench.core.diagnosis.hypothesis import hypotheses_of
+from femubench.core.diagnosis.projection import Projection
 from femubench.core.diagnosis.search import Search
-from femubench.core.diagnosis.space import Projection
 from femubench.core.errors import ModelError
 from femubench.core.measurement import Measurement
 from femubench.core.model import Model

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import weakref
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,7 +16,7 @@ from femubench.core.fem.frame import ACTIVE, Frame, Place
 from femubench.core.fem.kinematics import node_at, point_rows
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.measurement import DIRECTIONS
-from femubench.core.modal.eigen import solve_modes
+from femubench.core.modal.kept import modes_of, once_for as once_for
 from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.model import Model
 from femubench.core.typing import FloatArray, SparseArray
@@ -28,27 +26,6 @@ _BAND = 6
 _RIGID = 6
 _SUSPENDED = 0.95
 _HELD = 1e-9
-_Kept = TypeVar("_Kept")
-# Models are compared by what they are, not by what they hold: equality of arrays is no key.
-_kept: dict[int, tuple[weakref.ref[Model], dict[Hashable, Any]]] = {}
-
-
-def once_for(model: Model, key: Hashable, make: Callable[[], _Kept]) -> _Kept:
-    """Return what was made before for this very model, or make it and keep it as long.
-
-    Arguments:
-        key: what it is, among all that is kept of a model.
-        make: called where it was not made before.
-    """
-    entry = _kept.get(id(model))
-    if entry is None or entry[0]() is not model:
-        number = id(model)
-        entry = (weakref.ref(model, lambda _: _kept.pop(number, None)), {})
-        _kept[number] = entry
-    if key not in entry[1]:
-        entry[1][key] = make()
-    value: _Kept = entry[1][key]
-    return value
 
 
 def point_in(model: Model, place: str) -> Place:
@@ -229,7 +206,7 @@ def elastic_band(model: Model) -> FloatArray:
 
 
 def _elastic_band(model: Model) -> FloatArray:
-    modes = solve_modes(model, _BAND + _RIGID).elastic
+    modes = modes_of(model, _BAND + _RIGID).elastic
     frequencies = modes.natural_frequencies
     # On a soft suspension the structure still moves as a rigid body: no scale to go by.
     bodily = _rigid_share(model, modes.shapes) > _SUSPENDED

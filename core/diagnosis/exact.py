@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from femubench.core.diagnosis.fit import Fit, Problem, fit, signed_hz
-from femubench.core.diagnosis.space import Projection
+from femubench.core.diagnosis.projection import Projection
 from femubench.core.errors import FemubenchError
 from femubench.core.modal.eigen import enough_modes, solve_modes
 from femubench.core.model import Model

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from femubench.core.diagnosis.fit import Fit
-from femubench.core.diagnosis.space import Projection
+from femubench.core.diagnosis.projection import Projection
 
 # From this probability on the verdict is that nothing is missing.
 LIKELY_NOTHING = 0.5
@@ -23,8 +23,6 @@ PRIOR_BEYOND_TEXTBOOK = (0.6, 0.3, 0.08, 0.015, 0.005)
 # Physics that every beam has need not earn its place: a model that lacks it most likely lacks all
 # of it. Some textbook effects without the others share the rest.
 _AS_DRAWN, _ALL_TEXTBOOK = 0.1, 0.8
-# By how much likelier a model is to be complete as drawn than these numbers say.
-_COMPLETE = 2.4
 # A textbook effect is part of a name only where it is likely, and the data made it so.
 _EARNED, _FACTOR = 0.6, 20.0
 
@@ -99,13 +97,17 @@ class Explanation:
         """Return ln of prior times evidence."""
         counts = PRIOR_BEYOND_TEXTBOOK if self.base.parts else PRIOR_OF_COUNT
         prior = log_prior(self.parts, self.names, counts)
-        complete = log(_COMPLETE) if not (self.parts or self.base.parts) else 0.0
-        return self.base.log_prior + prior + complete + self.fit.log_evidence
+        return self.base.log_prior + prior + self.fit.log_evidence
 
     @property
     def searched(self) -> Key:
         """Return the slugs of the causes, sorted."""
         return tuple(sorted(part.hypothesis.name for part in self.parts))
+
+    @property
+    def effects(self) -> frozenset[str]:
+        """Return the slugs of all that is in the model, textbook or fitted."""
+        return frozenset({*self.base.names, *self.searched})
 
     @property
     def place(self) -> str:
@@ -176,11 +178,10 @@ class Posterior:
         if total < _EARNED:
             return False
         best = next(e for e in self.explanations if name in e.base.names)
-        rest = set(best.base.names) - {name}
+        rest = best.effects - {name}
         for other in self.explanations:
-            if set(other.base.names) == rest and other.searched == best.searched:
-                gain = best.fit.log_evidence - other.fit.log_evidence
-                return gain > log(_FACTOR)
+            if other.effects == rest:
+                return best.fit.log_evidence - other.fit.log_evidence > log(_FACTOR)
         return True
 
     def key(self, explanation: Explanation) -> Key:

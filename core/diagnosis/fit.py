@@ -11,7 +11,8 @@ import scipy.linalg as la
 from scipy.special import log_ndtr
 
 from femubench.core.diagnosis.data import Data, Noise
-from femubench.core.diagnosis.space import Projection, Space, solve_pencil
+from femubench.core.diagnosis.projection import Projection
+from femubench.core.diagnosis.space import Space, solve_pencil
 from femubench.core.errors import ModelError
 from femubench.core.model import Model
 from femubench.core.typing import FloatArray, IntArray
@@ -96,13 +97,10 @@ class State:
     @cached_property
     def jacobian(self) -> FloatArray:
         """Return d prediction / d x in units of the noise, (n_data, k)."""
-        slopes = self.problem.space.slopes(self.parts, self.x)
-        if not slopes:
+        if not self.parts:
             return np.zeros((len(self.raw), 0))
-        near = self.vectors[:, self.partner]
-        values = self.eigenvalues[self.partner]
-        forces = np.stack([k @ near - (m @ near) * values for k, m, _ in slopes], axis=2)
-        masses = np.array([weight for *_, weight in slopes])
+        near, values = self.vectors[:, self.partner], self.eigenvalues[self.partner]
+        forces, masses = self.problem.space.forces(self.parts, self.x, near, values)
         return self.problem.noise.whiten(self.rows(forces, masses).T).T
 
     def rows(self, forces: FloatArray, masses: FloatArray) -> FloatArray:
@@ -112,7 +110,7 @@ class State:
             forces: (dK - lambda_j dM) phi_j in the coordinates of the space, (N, m, p).
             masses: d mass / d x in kg, (p,).
         """
-        share = np.einsum("nk,njp->kjp", self.vectors, forces)
+        share = np.tensordot(self.vectors, forces, axes=(0, 0))
         values = self.eigenvalues[self.partner]
         gap = values - self.eigenvalues[:, None]
         least = _CLOSE * np.abs(values)
@@ -123,7 +121,7 @@ class State:
         slope = share[self.partner, np.arange(len(values))]
         turn = share / gap[:, :, None]
         seen = self.problem.space.padded_readings(len(self.vectors)) @ self.vectors
-        change = np.einsum("sk,kjp->sjp", seen, turn)
+        change = np.tensordot(seen, turn, axes=1)
         moving = np.where(still[self.partner], np.inf, np.abs(signed_hz(values)))
         hertz = slope / (8.0 * np.pi**2 * moving)[:, None]
         return self.problem.data.slope(hertz, self.readings, change, masses)

@@ -31,6 +31,8 @@ from femubench.core.model import Model
 from femubench.core.typing import FloatArray, IntArray
 from femubench.core.update.joints import available_length, half_depth
 
+_Key = tuple[int, float, float]
+_Parts = tuple[FloatArray, FloatArray, FloatArray]
 _EMPTY = 1e-12
 _ALIKE = 1e-9
 
@@ -79,8 +81,8 @@ def flexible_ends_change(
         element, side = structure.element_ends[end]
         length = once_for(model, ("arm", end), partial(end_arm, structure, end))
         arms[np.searchsorted(rows, element), side] = length
-    elements = _Elements.of(structure, rows, arms)
-    terms, rates, powers, where = elements.arm_terms(structure), [], [], []
+    elements = _Elements.of(model, rows, arms)
+    terms, rates, powers, where = elements.arm_terms(model), [], [], []
     fixed = len(terms)
     for column, directions in enumerate(parts):
         items = elements.items(_slots(structure, ends, directions))
@@ -140,22 +142,26 @@ class _Elements:
     motion: FloatArray
 
     @classmethod
-    def of(cls, structure: Structure, rows: IntArray, arms: FloatArray) -> _Elements:
-        p = structure.properties.take(rows)
-        p = replace(p, length=p.length - arms.sum(axis=1))
-        motion = np.tile(np.eye(12), (len(rows), 1, 1))
-        for side, sign in ((0, 1.0), (1, -1.0)):
-            own = slice(6 * side, 6 * side + 6)
-            motion[:, own, own] = [rigid_arm(np.array([sign * a, 0.0, 0.0])) for a in arms[:, side]]
-        return cls(rows, arms, stiffness_matrices(p), mass_matrices(p), motion)
+    def of(cls, model: Model, rows: IntArray, arms: FloatArray) -> _Elements:
+        """Return elements of a model, each with given arms made once for all who ask."""
+        keys = [(int(row), float(a), float(b)) for row, (a, b) in zip(rows, arms, strict=True)]
+        known: dict[_Key, _Parts] = once_for(model, "elements behind arms", dict)
+        fresh = [i for i, key in enumerate(keys) if key not in known]
+        if fresh:
+            made = _behind_arms(model.frame_structure, rows[fresh], arms[fresh])
+            known.update((keys[i], parts) for i, parts in zip(fresh, made, strict=True))
+        return cls(rows, arms, *map(np.array, zip(*(known[key] for key in keys), strict=True)))
 
-    def arm_terms(self, structure: Structure) -> list[Term]:
+    def arm_terms(self, model: Model) -> list[Term]:
         """Return the terms of the arms alone, whatever the springs are."""
         if not self.arms.any():
             return []
-        turned, p = np.swapaxes(self.motion, 1, 2), structure.properties.take(self.rows)
-        stiffness = turned @ self.stiffness @ self.motion - stiffness_matrices(p)
-        mass = turned @ self.mass @ self.motion - mass_matrices(p)
+        structure, turned = model.frame_structure, np.swapaxes(self.motion, 1, 2)
+        p = structure.properties
+        plain_k = once_for(model, "element stiffness", lambda: stiffness_matrices(p))
+        plain_m = once_for(model, "element mass", lambda: mass_matrices(p))
+        stiffness = turned @ self.stiffness @ self.motion - plain_k[self.rows]
+        mass = turned @ self.mass @ self.motion - plain_m[self.rows]
         return [
             Term("stiffness", ElementOperator(structure, self.rows, stiffness)),
             Term("mass", ElementOperator(structure, self.rows, mass)),
@@ -170,6 +176,17 @@ class _Elements:
                 matrices = self.stiffness[i], self.mass[i], self.motion[i]
                 items += _element_items(int(row), *matrices, own)
         return items
+
+
+def _behind_arms(structure: Structure, rows: IntArray, arms: FloatArray) -> list[_Parts]:
+    """Return stiffness, mass and motion of every element behind its arms."""
+    p = structure.properties.take(rows)
+    p = replace(p, length=p.length - arms.sum(axis=1))
+    motion = np.tile(np.eye(12), (len(rows), 1, 1))
+    for side, sign in ((0, 1.0), (1, -1.0)):
+        own = slice(6 * side, 6 * side + 6)
+        motion[:, own, own] = [rigid_arm(np.array([sign * a, 0.0, 0.0])) for a in arms[:, side]]
+    return list(zip(stiffness_matrices(p), mass_matrices(p), motion, strict=True))
 
 
 def _element_items(

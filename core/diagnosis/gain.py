@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2 as chi_square
 
-from femubench.core.case.case import Case, Modification
+from femubench.core.case.case import Case
 from femubench.core.diagnosis.data import Data, Noise
 from femubench.core.diagnosis.exact import raw_residual
 from femubench.core.diagnosis.fit import Fit, Problem, fit, state_at
 from femubench.core.diagnosis.result import Gain
 from femubench.core.harness.results import Block, PairedMode
-from femubench.core.harness.scoring import frequency_error, predict_block
+from femubench.core.harness.scoring import frequency_error, modified_modes
 from femubench.core.measurement import Measurement
 from femubench.core.model import Model
 from femubench.core.typing import FloatArray
@@ -139,7 +139,7 @@ def modified(
         m = change.measurement
         predicted = np.array(
             [
-                [mode.predicted_hz or np.nan for mode in _predicted(model, change)]
+                [mode.predicted_hz or np.nan for mode in modified_modes(model, change)]
                 for model in (case.model, extended, *neighbours)
             ]
         )
@@ -155,11 +155,6 @@ def modified(
         std.append(deviation[paired])
     empty = np.zeros(0)
     return Unseen(*(np.concatenate([*rows, empty]) for rows in (before, after, std)))
-
-
-def _predicted(model: Model, change: Modification) -> Sequence[PairedMode]:
-    changed = model.attach(change.masses, change.springs)
-    return predict_block(changed, change.measurement, change.name)
 
 
 def _relative_std(measurement: Measurement) -> FloatArray:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
 
 import numpy as np
 
@@ -15,6 +17,12 @@ from femubench.core.plugin.roles import Effect
 from femubench.core.typing import FloatArray
 
 _SLOPE_STEP = 1e-5
+_SINGLE = (0.12, 0.5, 1.3, 2.6)
+_DOUBLE = (0.03, 0.2, 0.7, 1.8)
+_OSCILLATOR = (0.4, 1.2, 2.2)
+_STIFF = 0.01
+_TYPICAL = 0.6
+_NOTHING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -49,16 +57,43 @@ class Hypothesis:
         pairs = zip(self.parameters, values, strict=True)
         return np.array([p.coordinate(v) for p, v in pairs if v is not None])
 
-    @property
+    @cached_property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Return the lowest and the highest coordinates, (k,) each."""
         low, high = np.array([p.range for p in self.parameters]).T
         return low, high
 
-    @property
+    @cached_property
     def one_sided(self) -> FloatArray:
         """Tell which coordinates cannot be negative, as 0 or 1, (k,)."""
         return np.array([p.one_sided for p in self.parameters], dtype=float)
+
+    @cached_property
+    def still(self) -> bool:
+        """Tell whether the model is as it is at x = 0; rigid joints still have their arms."""
+        return bool(np.all(np.abs(self.factors(np.zeros((1, len(self.parameters))))) < _NOTHING))
+
+    @cached_property
+    def grid(self) -> FloatArray:
+        """Return the coordinates at which it is tried first, (g, k)."""
+        parameters = self.parameters
+        if self.change.extra and len(parameters) == 2:
+            first = [v for v in _OSCILLATOR if v <= parameters[0].range[1]]
+            second = np.linspace(*parameters[1].range, 14)[1:]
+            return np.array(list(product(first, second)))
+        sizes = _SINGLE if len(parameters) == 1 else _DOUBLE
+        return np.array(list(product(*(_points(parameter, sizes) for parameter in parameters))))
+
+    @cached_property
+    def grid_factors(self) -> FloatArray:
+        """Return the factors of the terms on the grid, (g, n_terms)."""
+        return self.factors(self.grid)
+
+    @cached_property
+    def typical_factors(self) -> FloatArray:
+        """Return the factors of the terms at a typical magnitude, (n_terms,)."""
+        low, high = self.bounds
+        return np.asarray(self.factors(np.clip(np.full(len(low), _TYPICAL), low, high)[None])[0])
 
     def values(self, x: FloatArray) -> FloatArray:
         """Return parameter values of coordinates, (g, k) both."""
@@ -76,6 +111,16 @@ class Hypothesis:
         up, down = np.minimum(x + step, high), np.maximum(x - step, low)
         width = (up - down).diagonal()
         return np.asarray((self.factors(up) - self.factors(down)) / width[:, None])
+
+
+def _points(parameter: EffectParameter, sizes: Sequence[float]) -> list[float]:
+    low, high = parameter.range
+    if parameter.scaling == "compliance":
+        # Its arm stays rigid however stiff the spring: x = 0 is no model without the effect.
+        sizes = (_STIFF, *sizes)
+    wanted = list(sizes) if parameter.one_sided else [-s for s in reversed(sizes)] + list(sizes)
+    inside = [x for x in wanted if low <= x <= high]
+    return inside or [0.5 * (low + high)]
 
 
 def hypotheses_of(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ...]:

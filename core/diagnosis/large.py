@@ -23,9 +23,11 @@ from femubench.core.diagnosis.change import RowOperator, Term
 from femubench.core.diagnosis.data import Data, Noise
 from femubench.core.diagnosis.fit import Problem
 from femubench.core.diagnosis.hypothesis import Hypothesis
-from femubench.core.diagnosis.space import Projection, Projector, Space, nominal_space
+from femubench.core.diagnosis.projection import Projection, Projector
+from femubench.core.diagnosis.space import Space, nominal_space
 from femubench.core.measurement import Measurement
-from femubench.core.modal.eigen import DENSE_LIMIT, Modes, solve_modes
+from femubench.core.modal.eigen import DENSE_LIMIT, Modes
+from femubench.core.modal.kept import modes_of
 from femubench.core.modal.sparse_eigen import ShiftedModel
 from femubench.core.model import Model
 from femubench.core.typing import FloatArray, SparseArray
@@ -67,7 +69,7 @@ class Basis:
             ModelError: when the model has no modes.
         """
         count = _RIGID + _A_MODE * len(measurement) + _SPARE
-        modes = solve_modes(model, count if model.size > DENSE_LIMIT else None)
+        modes = modes_of(model, count if model.size > DENSE_LIMIT else None)
         modes = modes.take(np.argsort(~modes.rigid, kind="stable"))
         first = float(np.abs(modes.eigenvalues[~modes.rigid]).min(initial=np.inf))
         shift = min(-_SHIFT * first, 2.0 * float(modes.eigenvalues.min()))

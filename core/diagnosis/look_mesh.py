@@ -18,6 +18,7 @@ from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame, Place, Support
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import Modes
+from femubench.core.modal.kept import once_for
 from femubench.core.model import Model, common_dofs
 from femubench.core.typing import FloatArray
 
@@ -47,6 +48,11 @@ def refined(structure: Structure) -> Frame:
     return replace(frame, supports=(*frame.supports, *cuts))
 
 
+def _fine(model: Model) -> Model:
+    structure = model.frame_structure
+    return Model.of(structure.rebuilt(refined(structure)))
+
+
 def mesh_bias(model: Model, count: int, modes: Modes | None = None) -> FloatArray | None:
     """Return f_fine / f - 1 of the first elastic modes on a mesh twice as fine, (k,), k <= count.
 
@@ -62,7 +68,7 @@ def mesh_bias(model: Model, count: int, modes: Modes | None = None) -> FloatArra
         return None
     try:
         coarse = elastic_modes(model, count + _MARGIN) if modes is None else modes
-        fine = Model.of(model.structure.rebuilt(refined(model.structure)))
+        fine = once_for(model, "fine", lambda: _fine(model))
         keep = common_dofs(model.structure, fine.frame_structure)
         return frequency_changes(model, coarse, fine, count, lambda shapes: shapes[keep])
     except ModelError:

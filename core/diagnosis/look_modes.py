@@ -13,7 +13,8 @@ from scipy.optimize import linear_sum_assignment
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame
 from femubench.core.measurement import Measurement
-from femubench.core.modal.eigen import Modes, solve_modes, zero_tolerance
+from femubench.core.modal.eigen import Modes, zero_tolerance
+from femubench.core.modal.kept import modes_of
 from femubench.core.modal.pairing import Pairing, pair_modes
 from femubench.core.model import Model
 from femubench.core.typing import FloatArray, IntArray
@@ -111,7 +112,7 @@ def percent(changes: FloatArray) -> Changes:
 
 def elastic_modes(model: Model, count: int) -> Modes:
     """Return at least `count` elastic modes with a frequency above zero, if there are so many."""
-    modes = solve_modes(model, min(count + _RIGID, model.size - 1))
+    modes = modes_of(model, min(count + _RIGID, model.size - 1))
     alive = ~modes.rigid & (modes.eigenvalues > zero_tolerance(modes))
     return modes.take(alive)
 

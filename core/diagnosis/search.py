@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femubench.core.diagnosis.adequacy import adequacy
-from femubench.core.diagnosis.atlas import Screened, screen
+from femubench.core.diagnosis.atlas import Screened, likely, screen
 from femubench.core.diagnosis.exact import agreed, extended
 from femubench.core.diagnosis.explanation import (
     Base,
@@ -20,8 +20,8 @@ from femubench.core.diagnosis.explanation import (
 from femubench.core.diagnosis.fit import Fit, Problem, fit, state_at
 from femubench.core.diagnosis.hypothesis import hypotheses_of
 from femubench.core.diagnosis.large import Basis, LargeProblem, enriched, placed
+from femubench.core.diagnosis.projection import Projection
 from femubench.core.diagnosis.shortlist import beside, screened, with_shortlist
-from femubench.core.diagnosis.space import Projection
 from femubench.core.plugin.roles import Effect
 from femubench.core.typing import FloatArray
 
@@ -30,6 +30,7 @@ _NEAR = 16.0  # of the cost, below which the interpolation may have ranked wrong
 _CURVED = 0.05  # share of the explained chi-square that the interpolation may miss
 _LOST = 20.0  # behind the best by so much, a fit is not brought to its end
 _SINGLES_FOR_PAIRS, _PARTNERS = 6, 8
+_PROMISE = 0.3  # of the chi-square that a partner must explain, were effects to add up
 _MOST_CAUSES = 4
 _ADEQUATE = 0.05
 
@@ -77,11 +78,19 @@ class Search:
         found = [self.on(bases[0])]
         found += [self.on(base) for base in self.promising(bases[1:], found[0])]
         explanations = [e for item in found for e in item.explanations]
+        searched = {item.base.names for item in found}
+        explanations += [self.bare(base) for base in bases if base.names not in searched]
         if self.pairs and self.names:
             explanations += self.combined(found)
         if isinstance(self.problem, LargeProblem):
             explanations = self.borne_out(explanations)
         return Posterior.of(explanations), found
+
+    def bare(self, base: Base) -> Explanation:
+        """Return a textbook set with nothing on top, in the coordinates of the model as drawn."""
+        state = state_at(*enriched(self.problem, base.parts), base.x)
+        alone = replace(state, parts=(), x=np.zeros(0))
+        return Explanation(base, Fit(alone, -0.5 * state.chi2), self.names)
 
     def borne_out(self, explanations: list[Explanation]) -> list[Explanation]:
         """Return explanations, the best cause fitted until its own model agrees with it."""
@@ -179,13 +188,13 @@ class Search:
     ) -> list[Explanation]:
         """Return an explanation with one cause more, for every partner that is worth it."""
         problem, state = found.problem, seed.fit.state
-        above = beside(problem, seed.fit)
+        floor = 0.5 * selection_cost(self.names, self.places)
+        above = beside(worthwhile(found, seed, _PROMISE * floor), seed.fit)
         start = fit(above, (), np.zeros(0))
         assert start is not None
         originals = {id(p.hypothesis): p for p in problem.space.projections}
         taken = {id(part.hypothesis) for part in seed.parts}
         free = [p for p in above.space.projections if id(p.hypothesis) not in taken]
-        floor = 0.5 * selection_cost(self.names, self.places)
         ranked = sorted(screen(above, start.state, free, state.jacobian), key=lambda s: s.cost)
         result = []
         for item in ranked[:_PARTNERS]:
@@ -231,3 +240,21 @@ class Search:
                 seed = Explanation(found.base, alone, self.names)
                 result += self.grown(found, seed, tried)
         return result
+
+
+def worthwhile(found: Found, seed: Explanation, least: float) -> Problem:
+    """Return the data with those hypotheses alone that may be worth something beside a seed.
+
+    Arguments:
+        found: the atlas without the seed.
+        seed: causes.
+        least: what chi-square must promise to fall by.
+    """
+    problem = found.problem
+    if isinstance(problem, LargeProblem):
+        return problem
+    taken = {id(part.hypothesis) for part in seed.parts}
+    others = [item for item in found.screened if id(item.projection.hypothesis) not in taken]
+    still = found.explanations[0].fit.state.residual
+    chosen = likely(others, still, seed.fit.state, least)
+    return replace(problem, space=replace(problem.space, projections=tuple(chosen)))

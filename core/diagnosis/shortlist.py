@@ -16,7 +16,7 @@ from femubench.core.diagnosis.change import ElementOperator, RowOperator, Term
 from femubench.core.diagnosis.fit import Fit, Problem, State, fit, state_at
 from femubench.core.diagnosis.hypothesis import Hypothesis
 from femubench.core.diagnosis.large import LargeProblem, enriched, magnitudes
-from femubench.core.diagnosis.space import Projection, Projector
+from femubench.core.diagnosis.projection import Projection, Projector
 from femubench.core.errors import ModelError
 from femubench.core.model import Model
 from femubench.core.typing import FloatArray

@@ -13,38 +13,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.diagnosis.change import Change, ElementOperator, Operator, Term
 from femubench.core.diagnosis.hypothesis import Hypothesis
+from femubench.core.diagnosis.projection import Projection, Projector
 from femubench.core.errors import ModelError
 from femubench.core.fem.beam import mass_matrices, stiffness_matrices
 from femubench.core.fem.structure import Structure
 from femubench.core.measurement import Sensors
 from femubench.core.modal.eigen import Modes
 from femubench.core.model import Model
-from femubench.core.typing import BoolArray, FloatArray
+from femubench.core.typing import BoolArray, FloatArray, IntArray
 from femubench.core.update.residuals import total_mass
-
-
-@dataclass(frozen=True)
-class Projection:
-    """A hypothesis in modal coordinates.
-
-    Arguments:
-        hypothesis: what is projected.
-        terms: its fixed matrices, (t, N + extra, N + extra).
-        is_mass: which of them belong to the mass, (t,).
-        weights: by how much each mass term makes the structure heavier in kg, (t,).
-    """
-
-    hypothesis: Hypothesis
-    terms: FloatArray
-    is_mass: BoolArray
-    weights: FloatArray
-
-    @property
-    def extra(self) -> int:
-        """Return the number of coordinates that the hypothesis adds."""
-        return self.hypothesis.change.extra
 
 
 @dataclass(frozen=True)
@@ -94,10 +72,11 @@ class Space:
         weight = self.mass
         for part, index, columns in _placed(len(self), parts):
             factors = part.hypothesis.factors(x[None, columns])[0]
-            block = np.ix_(index, index)
-            stiffness[block] += _combined(part, factors, mass=False)
-            mass[block] += _combined(part, factors, mass=True)
             weight += float(factors @ part.weights)
+            for matrix, kind in ((stiffness, False), (mass, True)):
+                change = part.matrix(factors, mass=kind)
+                if change is not None:
+                    matrix[np.ix_(index, index)] += change
         return stiffness, mass, weight
 
     def slopes(
@@ -107,40 +86,65 @@ class Space:
         size = len(self) + sum(part.extra for part in parts)
         result = []
         for part, index, columns in _placed(len(self), parts):
-            block = np.ix_(index, index)
             for slope in part.hypothesis.slopes(x[columns]):
-                stiffness, mass = np.zeros((size, size)), np.zeros((size, size))
-                stiffness[block] = _combined(part, slope, mass=False)
-                mass[block] = _combined(part, slope, mass=True)
-                result.append((stiffness, mass, float(slope @ part.weights)))
+                pair = np.zeros((2, size, size))
+                for matrix, kind in zip(pair, (False, True), strict=True):
+                    change = part.matrix(slope, mass=kind)
+                    if change is not None:
+                        matrix[np.ix_(index, index)] = change
+                result.append((pair[0], pair[1], float(slope @ part.weights)))
         return result
+
+    def forces(
+        self, parts: Sequence[Projection], x: FloatArray, near: FloatArray, values: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return (dK - lambda_j dM) v_j and the derivative of the mass by every coordinate.
+
+        Arguments:
+            parts, x: as in `assembled`.
+            near: vectors, (N + extra, m).
+            values: an eigenvalue for each of them, (m,).
+
+        Returns:
+            forces (N + extra, m, p) and masses in kg (p,).
+        """
+        forces, masses = np.zeros((len(x), *near.shape)), np.zeros(len(x))
+        for part, index, columns in _placed(len(self), parts):
+            slopes = part.hypothesis.slopes(x[columns])
+            masses[columns] = slopes @ part.weights
+            seen = part.rows @ near[index]
+            for kind, scale in ((False, np.ones(len(values))), (True, -values)):
+                core = part.core(slopes, mass=kind)
+                if core is not None:
+                    forces[columns, index] += part.rows.T @ (core @ (seen * scale))
+        return np.moveaxis(forces, 0, 2), masses
 
     def padded_readings(self, size: int) -> FloatArray:
         """Return the readings with zeros for added coordinates, (n_sensors, size)."""
         more = size - self.readings.shape[1]
-        return np.pad(self.readings, ((0, 0), (0, more)))
+        return np.pad(self.readings, ((0, 0), (0, more))) if more else self.readings
 
     def rebased(self, parts: Sequence[Projection], x: FloatArray) -> Space:
         """Return the modal coordinates of the model with some hypotheses in it."""
         stiffness, mass, weight = self.assembled(parts, x)
         values, turn = solve_pencil(stiffness, mass)
         readings = self.padded_readings(len(stiffness)) @ turn
-        projections = []
+        # All rows at once: one product of large matrices is faster than hundreds of small ones.
+        known = [part.rows for part in self.projections]
+        n = len(self)
+        together = np.concatenate([rows[:, :n] for rows in known] or [np.zeros((0, n))]) @ turn[:n]
+        projections, last = [], 0
         for part in self.projections:
-            extra = part.extra
-            index = np.concatenate([np.arange(len(self)), len(turn) + np.arange(extra)])
-            grown = np.zeros((len(turn) + extra, turn.shape[1] + extra))
-            grown[: len(turn), : turn.shape[1]] = turn
-            grown[len(turn) :, turn.shape[1] :] = np.eye(extra)
-            rows = grown[index]
-            terms = rows.T @ part.terms @ rows
-            projections.append(replace(part, terms=terms))
+            first, last = last, last + len(part.rows)
+            rows = together[first:last]
+            rows = np.hstack([rows, part.rows[:, n:]]) if part.extra else rows
+            projections.append(replace(part, rows=rows))
         small = float(np.abs(values[self.rigid : self.rigid + 1]).sum()) * 1e-8
         rigid = int((np.abs(values[: self.rigid]) <= small).sum())
         return Space(values, readings, tuple(projections), weight, rigid)
 
 
-def _placed(size: int, parts: Sequence[Projection]) -> list[tuple[Projection, FloatArray, slice]]:
+def _placed(size: int, parts: Sequence[Projection]) -> list[tuple[Projection, IntArray, slice]]:
     """Return every part with its rows in the joint matrices and its columns of x."""
     result, row, column = [], size, 0
     for part in parts:
@@ -151,11 +155,6 @@ def _placed(size: int, parts: Sequence[Projection]) -> list[tuple[Projection, Fl
     return result
 
 
-def _combined(part: Projection, factors: FloatArray, *, mass: bool) -> FloatArray:
-    chosen = part.is_mass if mass else ~part.is_mass
-    return np.asarray(np.tensordot(factors[chosen], part.terms[chosen], axes=1))
-
-
 def solve_pencil(stiffness: FloatArray, mass: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return eigenvalues, ascending, and mass-normalised vectors of a small dense pencil.
 
@@ -163,94 +162,13 @@ def solve_pencil(stiffness: FloatArray, mass: FloatArray) -> tuple[FloatArray, F
         ModelError: when the mass is not positive definite.
     """
     try:
-        values, vectors = la.eigh(stiffness, mass, driver="gvd", check_finite=False)
+        if np.array_equal(mass, np.eye(len(mass))):  # half the work, and most causes add no mass
+            values, vectors = la.eigh(stiffness, driver="evd", check_finite=False)
+        else:
+            values, vectors = la.eigh(stiffness, mass, driver="gvd", check_finite=False)
     except la.LinAlgError as error:
         raise ModelError("a hypothesis makes the mass indefinite") from error
     return values, vectors
-
-
-class Projector:
-    """Projects changes on given vectors; element matrices take a short cut.
-
-    Arguments:
-        model: the nominal model.
-        vectors: basis on its dofs, (n, N).
-    """
-
-    def __init__(self, model: Model, vectors: FloatArray) -> None:
-        self.vectors, self.structure = vectors, model.structure
-        self.local: FloatArray | None = None
-        self.shift: FloatArray | None = None
-        if self.structure is not None:
-            self.local = (self.structure.gather @ vectors).reshape(-1, 12, vectors.shape[1])
-            self.shift = _translation(self.structure)
-
-    def __call__(self, hypothesis: Hypothesis) -> Projection:
-        """Return a hypothesis in the coordinates of the basis."""
-        change = hypothesis.change
-        terms = [self._term(term, change.extra) for term in change.terms]
-        shift = self._shifted(change)
-        weights = [self._weight(term, shift) for term in change.terms]
-        is_mass = np.array([term.matrix == "mass" for term in change.terms])
-        return Projection(hypothesis, np.array(terms), is_mass, np.array(weights))
-
-    def _term(self, term: Term, extra: int) -> FloatArray:
-        operator = term.operator
-        if isinstance(operator, ElementOperator) and self.local is not None:
-            local = self.local[operator.elements]
-            product = np.tensordot(local, operator.blocks @ local, axes=([0, 1], [0, 1]))
-            return np.pad(product, (0, extra)) if extra else product
-        return operator.project(self._grown(extra))
-
-    def _grown(self, extra: int) -> FloatArray:
-        n, m = self.vectors.shape
-        if not extra:
-            return self.vectors
-        grown = np.zeros((n + extra, m + extra))
-        grown[:n, :m] = self.vectors
-        grown[n:, m:] = np.eye(extra)
-        return grown
-
-    def _weight(self, term: Term, motion: FloatArray) -> float:
-        if term.matrix == "stiffness" or self.structure is None:
-            return 0.0
-        operator: Operator = term.operator
-        if isinstance(operator, ElementOperator) and self.shift is not None:
-            local = self.shift[operator.elements]
-            return float(np.einsum("ei,eij,ej->", local, operator.blocks, local))
-        return float(operator.project(motion[:, None])[0, 0])
-
-    def _shifted(self, change: Change) -> FloatArray:
-        """Return all dofs in a unit translation; those that a change adds follow statically."""
-        if self.structure is None:
-            return np.zeros(0)
-        own = _unit_motion(self.structure)
-        motion = np.concatenate([own, np.zeros(change.extra)])
-        if change.extra:
-            both = np.column_stack([motion, np.eye(len(motion))[:, len(own) :]])
-            springs = [term for term in change.terms if term.matrix == "stiffness"]
-            pulled = np.sum([term.operator.apply(both) for term in springs], axis=0)
-            force, inner = pulled[len(own) :, 0], pulled[len(own) :, 1:]
-            motion[len(own) :] = -np.linalg.solve(inner, force)
-        return motion
-
-
-def _direction(structure: Structure) -> int:
-    """Return the axis along which the structure is moved to weigh it."""
-    return 0 if structure.frame.plane == "in-plane" else 2
-
-
-def _translation(structure: Structure) -> FloatArray:
-    """Return the local displacements of all elements in a unit translation, (n_elements, 12)."""
-    axis = structure.mesh.axes[:, :, _direction(structure)]
-    motion = np.zeros((len(axis), 12))
-    motion[:, 0:3] = motion[:, 6:9] = axis
-    return motion
-
-
-def _unit_motion(structure: Structure) -> FloatArray:
-    """Return the free dofs in a unit translation, (n,)."""
-    return np.asarray(structure.kinematics.axes[:, _direction(structure)])
 
 
 def nominal_space(

@@ -14,6 +14,8 @@ Source: strains and rotations of Simo & Vu-Quoc (1986).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,12 +47,42 @@ def preload_stiffness(structure: Structure, member: str, force: float) -> Sparse
     Raises:
         ModelError: when the member is unknown or the frame is not redundant there.
     """
-    state = statics_of(structure).state(member)
-    total = structure.plan.assemble(geometric_matrices(structure, state))
-    for rows, blocks in (_connections(structure, state), _braces(structure, state)):
-        if len(blocks):
-            total = total + plan_assembly(rows, blocks.shape[1]).assemble(blocks)
-    return force * total
+    return force * preload_stiffnesses(structure, [member])[0]
+
+
+def preload_stiffnesses(structure: Structure, members: Sequence[str]) -> tuple[SparseArray, ...]:
+    """Return the geometric stiffness of a preload of 1 N in each of some members.
+
+    Arguments:
+        structure: a meshed frame.
+        members: as for `preload_stiffness`; all at once take little more time than one.
+
+    Raises:
+        ModelError: when a member is unknown or the frame is not redundant there.
+    """
+    states = [statics_of(structure).state(member) for member in members]
+    count = len(structure.mesh.ends)
+    found = []
+    for state, blocks in zip(states, _geometric(structure, states), strict=True):
+        total = structure.plan.assemble(blocks.reshape(count, 12, 12))
+        for given, part in (
+            (structure.mesh.connections, _connections),
+            (structure.frame.braces, _braces),
+        ):
+            if given:
+                rows, forms = part(structure, state)
+                total = total + plan_assembly(rows, forms.shape[1]).assemble(forms)
+        found.append(total)
+    return tuple(found)
+
+
+def _geometric(structure: Structure, states: Sequence[StressState]) -> FloatArray:
+    """Return the geometric matrices of all elements in all states, (n_states, n, 12, 12)."""
+    if not states:
+        return np.zeros((0, len(structure.mesh.ends), 12, 12))
+    force, moment = (np.concatenate([getattr(s, n) for s in states]) for n in ("force", "moment"))
+    together = replace(states[0], force=force, moment=moment)
+    return geometric_matrices(structure, together).reshape(len(states), -1, 12, 12)
 
 
 def redundant_members(structure: Structure) -> tuple[str, ...]:
@@ -81,18 +113,21 @@ def _turned(force: FloatArray, line: FloatArray) -> FloatArray:
 
 
 def geometric_matrices(structure: Structure, state: StressState) -> FloatArray:
-    """Return the local geometric stiffness matrices of the elements, (n, 12, 12).
+    """Return the local geometric stiffness matrices of the elements, (s n, 12, 12).
 
     Arguments:
-        structure: a meshed frame.
-        state: its internal forces.
+        structure: a meshed frame of n elements.
+        state: its internal forces; of s states, those of one after the other.
     """
     mesh, force = structure.mesh, state.force
+    states = len(force) // len(mesh.ends)
     length = np.linalg.norm(mesh.xyz[mesh.ends[:, 1]] - mesh.xyz[mesh.ends[:, 0]], axis=1)
-    first, second = mesh.rigid.T
+    length = np.tile(length, states)
+    first, second = np.tile(mesh.rigid, (states, 1)).T
     L = length - first - second
     sections = [member.section for member in structure.frame.members]
     radius = np.array([section.Jp / section.A for section in sections])[mesh.member]
+    radius = np.tile(radius, states)
     axis = np.broadcast_to([1.0, 0.0, 0.0], force.shape)
     turned = _turned(force, axis)
     total = np.zeros((len(L), 12, 12))

@@ -22,10 +22,11 @@ from femubench.core.fem.kinematics import (
     rigid_arm,
     spring_rows,
 )
-from femubench.core.fem.mesh import Mesh, build_mesh, locate
+from femubench.core.fem.mesh import Mesh, build_mesh
 from femubench.core.fem.nominal import factored_properties, nominal_properties
 from femubench.core.fem.parameters import Parameter, apply_values
 from femubench.core.fem.preload import preload_stiffness
+from femubench.core.fem.sensing import sensor_rows
 from femubench.core.measurement import DIRECTIONS, Sensors
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
@@ -253,11 +254,14 @@ class Structure:
     def elastic_stiffness(self) -> SparseArray:
         """Return the stiffness without preloads and oscillators, (n, n)."""
         stiffness = self.plan.assemble(stiffness_matrices(self.properties))
-        joint = self.spring_rows.T @ sp.diags_array(self.springs) @ self.spring_rows
-        ground = self.attached((), self.frame.springs)[1]
+        if len(self.springs):
+            rows = self.spring_rows
+            stiffness = stiffness + rows.T @ sp.diags_array(self.springs) @ rows
+        if self.frame.springs:
+            stiffness = stiffness + self.attached((), self.frame.springs)[1]
         if self.frame.braces:
-            ground = ground + brace_stiffness(self)
-        return stiffness + ground + joint
+            stiffness = stiffness + brace_stiffness(self)
+        return stiffness
 
     def matrices(self) -> tuple[SparseArray, SparseArray]:
         """Return mass and stiffness on the free dofs, sparse, (n, n) each.
@@ -266,7 +270,8 @@ class Structure:
             ModelError: when a preload has no redundancy to live on.
         """
         mass = self.plan.assemble(mass_matrices(self.properties))
-        mass = mass + self.attached(self.frame.masses, ())[0]
+        if self.frame.masses:
+            mass = mass + self.attached(self.frame.masses, ())[0]
         stiffness = self.elastic_stiffness()
         if self.frame.oscillators:
             more_mass, more_stiffness = oscillator_matrices(self)
@@ -281,14 +286,7 @@ class Structure:
         Raises:
             ModelError: when a sensor lies off the structure.
         """
-        rows = []
-        for xyz, axis in zip(sensors.xyz, sensors.axes, strict=True):
-            place = locate(self.frame, xyz)
-            point = point_rows(self.frame, self.mesh, self.properties, place)
-            rows.append(sp.csr_array(axis[None, :]) @ point)
-        if not rows:
-            return sp.csr_array((0, self.kinematics.transform.shape[1]))
-        return sp.csr_array(sp.vstack(rows)) @ self.kinematics.transform
+        return sensor_rows(self, sensors)
 
     @cached_property
     def active_local(self) -> BoolArray:

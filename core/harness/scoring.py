@@ -9,7 +9,7 @@ from itertools import chain
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.case.case import Case
+from femubench.core.case.case import Case, Modification
 from femubench.core.harness.leaderboard import leaderboard
 from femubench.core.harness.ranking import rank_results, score_of
 from femubench.core.harness.results import Block, PairedMode
@@ -22,6 +22,7 @@ from femubench.core.modal.eigen import (
     solve_modes,
     zero_tolerance,
 )
+from femubench.core.modal.kept import modes_of, once_for
 from femubench.core.modal.pairing import LEAST_SENSORS, WINDOW, pair_modes
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.model import Model
@@ -102,6 +103,21 @@ def predict_block(
     return _predict(model, _modes_for(model, (measurement,)), measurement, modification)
 
 
+def modified_modes(model: Model, change: Modification) -> tuple[PairedMode, ...]:
+    """Return what a model predicts of a modified structure, computed once for this very model.
+
+    Raises:
+        ModelError: when the modified model has no modes or a sensor lies off the structure.
+    """
+
+    def make() -> tuple[Modification, tuple[PairedMode, ...]]:
+        changed = model.attach(change.masses, change.springs)
+        # With the change, so that nothing else gets its number as long as this is kept.
+        return change, predict_block(changed, change.measurement, change.name)
+
+    return once_for(model, ("modified", id(change)), make)[1]
+
+
 def score_model(case: Case, model: Model) -> dict[str, Block]:
     """Return the errors of a model by block: used, higher, modified, where the case has data.
 
@@ -143,7 +159,7 @@ def judge(case: Case, model: Model, reference: Reference) -> Judgement:
 def _modes_for(model: Model, measurements: Sequence[Measurement]) -> Modes:
     """Return all modes of a small model, of a large one those that could find a partner."""
     if model.size <= DENSE_LIMIT:
-        return solve_modes(model)
+        return modes_of(model)
     measured = np.concatenate([item.frequencies for item in measurements])
     top = WINDOW * float(measured.max(initial=0.0))
     count, limit = enough_modes(model, len(measured)) or model.size, model.size // 2
@@ -200,8 +216,7 @@ def _modified(case: Case, model: Model) -> tuple[tuple[PairedMode, ...], list[bo
     pairs: list[PairedMode] = []
     shaped: list[bool] = []
     for change in case.modifications:
-        changed = model.attach(change.masses, change.springs)
-        pairs += predict_block(changed, change.measurement, change.name)
+        pairs += modified_modes(model, change)
         shaped += _with_shape(change.measurement)
     return tuple(pairs), shaped
 

@@ -48,7 +48,8 @@ class JointGroup:
 
 
 def _outward(frame: Frame, member: Member, joint: str) -> FloatArray:
-    axis = member_axes(frame, member)[0][0]
+    first, last = frame.corners[frame.member_ends[frame.member_index[member.name]]]
+    axis = (last - first) / np.linalg.norm(last - first)
     return np.asarray(axis if member.ends[0] == joint else -axis)
 
 

@@ -16,7 +16,9 @@ from femubench import (
     Model,
     Preload,
     member_length,
+    once_for,
     preload_stiffness,
+    preload_stiffnesses,
     proportional,
     redundant_members,
     sparse_term,
@@ -62,8 +64,12 @@ class AxialPreload(FrameEffect):
         Raises:
             ModelError: when the frame is not redundant there.
         """
-        matrix = preload_stiffness(model.frame_structure, place, 1.0)
-        return proportional(sparse_term("stiffness", matrix))
+        structure = model.frame_structure
+        members = once_for(model, "preload places", lambda: tuple(self.places(model)))
+        if place not in members:
+            return proportional(sparse_term("stiffness", preload_stiffness(structure, place, 1.0)))
+        matrices = once_for(model, "preloads", lambda: preload_stiffnesses(structure, members))
+        return proportional(sparse_term("stiffness", matrices[members.index(place)]))
 
 
 def euler_load(frame: Frame, name: str) -> float:

@@ -83,10 +83,11 @@ class JointOffset(FrameEffect):
         keys = np.column_stack([_flexible(own), sides.sum(axis=1), *_shear_ratios(own)])
         keys = np.array([[float(f"{v:.{_DIGITS}e}") for v in key] for key in keys])
         groups, group = np.unique(keys, axis=0, return_inverse=True)
+        longest = _longest(structure, ends)
         terms: list[Term] = []
         for i in range(len(groups)):
             used = np.flatnonzero(group.ravel() == i)
-            fitted = _blocks(own.take(used), sides[used], groups[i], _longest(structure, ends))
+            fitted = _kept_blocks(model, rows[used], sides[used], groups[i], longest)
             operators = (ElementOperator(structure, rows[used], blocks) for blocks in fitted)
             terms += [Term("stiffness", operator) for operator in operators]
 
@@ -147,6 +148,22 @@ def _basis(key: FloatArray, lengths: FloatArray) -> FloatArray:
         powers = range(3 if b else 2)
         columns += [(1.0 + b) * left**power / (left**3 + b * left) for power in powers]
     return np.stack(columns, axis=1)
+
+
+def _kept_blocks(
+    model: Model, rows: IntArray, sides: FloatArray, key: FloatArray, longest: float
+) -> list[FloatArray]:
+    """Return `_blocks` of elements, which are the same whatever else takes part."""
+    known: dict[tuple[int, float, float], FloatArray] = once_for(model, "offset blocks", dict)
+    names = [
+        (int(row), float(one), float(two)) for row, (one, two) in zip(rows, sides, strict=True)
+    ]
+    fresh = [i for i, name in enumerate(names) if name not in known]
+    if fresh:
+        p = model.frame_structure.properties.take(rows[fresh])
+        made = np.stack(_blocks(p, sides[fresh], key, longest), axis=1)
+        known.update((names[i], blocks) for i, blocks in zip(fresh, made, strict=True))
+    return list(np.stack([known[name] for name in names], axis=1))
 
 
 def _blocks(

@@ -17,6 +17,7 @@ from femubench import (
     Term,
     element_labels,
     elements_of,
+    once_for,
     proportional,
     stiffness_matrices,
 )
@@ -45,5 +46,7 @@ class LocalStiffnessLoss(FrameEffect):
         """Return the stiffness of the element with a minus sign."""
         structure = model.frame_structure
         rows = elements_of(structure, place)
-        blocks = -stiffness_matrices(structure.properties.take(rows))
-        return proportional(Term("stiffness", ElementOperator(structure, rows, blocks)))
+        whole = once_for(
+            model, "element stiffness", lambda: stiffness_matrices(structure.properties)
+        )
+        return proportional(Term("stiffness", ElementOperator(structure, rows, -whole[rows])))

@@ -20,6 +20,7 @@ from femubench import (
     Term,
     eccentric_mass_parts,
     elements_of,
+    once_for,
 )
 
 _SCALE, _BOUND = 0.15, 1.0  # of the size of the section
@@ -58,7 +59,10 @@ class MassEccentricity(FrameEffect):
         axis = axis_of(structure.frame)
         elements = elements_of(structure, place)
         properties = structure.properties.take(elements)
-        parts = eccentric_mass_parts(properties)
+        whole = once_for(
+            model, "eccentric mass", lambda: eccentric_mass_parts(structure.properties)
+        )
+        parts = {name: blocks[elements] for name, blocks in whole.items()}
         own, other = properties.ecc_y[:, None, None], properties.ecc_z[:, None, None]
         own, other = (own, other) if axis == "y" else (other, own)
         linear = parts[axis] + 2.0 * own * parts[2 * axis] + other * parts["yz"]

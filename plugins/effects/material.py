@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import ClassVar, Literal
 
 from femubench import (
@@ -20,6 +21,7 @@ from femubench import (
     Term,
     elements_of,
     mass_matrices,
+    once_for,
     proportional,
     stiffness_matrices,
 )
@@ -80,8 +82,8 @@ class MaterialEffect(FrameEffect):
         if structure is not None:
             rows = elements_of(structure, place, arms=True)
             matrices = stiffness_matrices if self.constant == "E" else mass_matrices
-            blocks = matrices(structure.properties.take(rows))
-            return proportional(Term(kind, ElementOperator(structure, rows, blocks)))
+            whole = once_for(model, f"element {kind}", partial(matrices, structure.properties))
+            return proportional(Term(kind, ElementOperator(structure, rows, whole[rows])))
         parts = [self._matrix(model, place)]
         low_rank = model.stiffness_change if self.constant == "E" else model.mass_change
         if low_rank is not None and place == "all":

@@ -1,0 +1,60 @@
+"""What sensors read of a frame: at nodes all at once, between nodes one by one."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench.core.fem.kinematics import point_rows
+from femubench.core.fem.mesh import SAME_STATION, locate
+from femubench.core.measurement import Sensors
+from femubench.core.typing import FloatArray, IntArray, SparseArray
+
+if TYPE_CHECKING:
+    from femubench.core.fem.structure import Structure
+
+
+def sensor_rows(structure: Structure, sensors: Sensors) -> SparseArray:
+    """Return sensor readings from free dofs, sparse (n_sensors, n).
+
+    Raises:
+        ModelError: when a sensor lies off the structure.
+    """
+    transform = structure.kinematics.transform
+    if not len(sensors.xyz):
+        return sp.csr_array((0, transform.shape[1]))
+    node = _nodes_at(structure, sensors.xyz)
+    columns = 6 * np.maximum(node, 0)[:, None] + np.arange(6)
+    bounds = np.arange(0, columns.size + 1, 6)
+    shape = (len(node), transform.shape[0])
+    rows = sp.csr_array((sensors.axes.ravel(), columns.ravel(), bounds), shape=shape)
+    rows.eliminate_zeros()
+    if (node < 0).any():
+        parts = [
+            _between_nodes(structure, sensors, i) if n < 0 else rows[i : i + 1]
+            for i, n in enumerate(node)
+        ]
+        rows = sp.csr_array(sp.vstack(parts))
+    return rows @ transform
+
+
+def _nodes_at(structure: Structure, xyz: FloatArray) -> IntArray:
+    """Return the nodes at points, -1 where there is none or it takes a closer look, (k,).
+
+    At a flexible connection several nodes lie at one point, of which only the joint is sure.
+    """
+    mesh = structure.mesh
+    plain = len(mesh.xyz) - len(mesh.oscillators)  # which come last
+    nodes = mesh.xyz[: len(structure.frame.joints) if mesh.connections else plain]
+    distance = np.linalg.norm(xyz[:, None] - nodes, axis=2)
+    nearest = distance.argmin(axis=1)
+    return np.where(distance[np.arange(len(xyz)), nearest] <= SAME_STATION, nearest, -1)
+
+
+def _between_nodes(structure: Structure, sensors: Sensors, i: int) -> SparseArray:
+    """Return the reading of a sensor from node displacements, sparse (1, 6 n_nodes)."""
+    place = locate(structure.frame, sensors.xyz[i])
+    point = point_rows(structure.frame, structure.mesh, structure.properties, place)
+    return sp.csr_array(sensors.axes[i : i + 1]) @ point
