@@ -20,7 +20,7 @@ from femubench.core.errors import FemubenchError
 from femubench.core.model import Model
 
 _MAGNITUDES = (0.3, 1.0, 2.5)  # deviations of the prior
-_SEED = 2
+_SEED = 19
 
 
 def _case(hidden: Hidden) -> Case:

@@ -123,10 +123,13 @@ def explained(
         base=SimpleNamespace(names=book, parts=book),
         parts=names,
         searched=names,
+        effects=frozenset({*book, *names}),
         place=place,
         chi2=chi2,
         log_weight=float(np.log(probability)),
-        fit=SimpleNamespace(state=SimpleNamespace(jacobian=columns)),
+        fit=SimpleNamespace(
+            state=SimpleNamespace(jacobian=columns), log_evidence=float(np.log(probability))
+        ),
     )
 
 

@@ -9,11 +9,13 @@ import numpy as np
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.exact import extended
 from femubench.core.diagnosis.examine import Examination
-from femubench.core.diagnosis.explanation import Explanation
+from femubench.core.diagnosis.explanation import Explanation, Key, Posterior
 from femubench.core.diagnosis.fit import bounds_of
 from femubench.core.diagnosis.gain import Unseen, held_out, modified
 from femubench.core.diagnosis.verdict import inseparable
 from femubench.core.model import Model
+
+_TIED, _PLACES = 0.1, 6
 
 
 def extended_by(model: Model, explanation: Explanation) -> Model:
@@ -87,13 +89,24 @@ def stands(
 
 
 def another_stands(case: Case, examination: Examination) -> bool:
-    """Tell whether unseen data bear out another name that the used data cannot exclude."""
+    """Tell whether unseen data bear out what the used data cannot tell from the best guess.
+
+    That is another name of the group, or the same name at a place about as likely.
+    """
     posterior = examination.posterior
     if not any(posterior.names) or not (case.held_out or case.modifications):
         return False
-    for key in inseparable(posterior)[0][1:]:
-        other = posterior.best(key)
+    group = inseparable(posterior)[0]
+    others = [posterior.best(key) for key in group[1:]]
+    others += _other_places(posterior, group[0])
+    for other in others:
         model = extended_by(case.model, other)
         if stands(case, examination, other, model, unseen_of(case, examination, other, model)):
             return True
     return False
+
+
+def _other_places(posterior: Posterior, key: Key) -> list[Explanation]:
+    """Return the explanations of a name at other places that are not much less likely."""
+    (_, most), *rest = posterior.members(key)
+    return [e for e, p in rest if p >= _TIED * most][:_PLACES]

@@ -19,8 +19,8 @@ from femubench.core.measurement import Measurement
 from femubench.core.model import Model
 from femubench.core.typing import FloatArray
 
-# Below this many squared deviations unseen data cannot tell with the cause from without.
-_BLIND = 9.0
+# Below this many deviations unseen data cannot tell one model from another.
+_CLEARLY = 3.0
 _HALF_WAY = 0.5
 _IDEAL = 0.05
 _INADEQUATE, _GOOD = 2e-3, 0.05
@@ -44,8 +44,16 @@ class Unseen:
     std: FloatArray
 
     @property
+    def size(self) -> float:
+        """Return by how many deviations in all the causes change the unseen modes."""
+        return float(np.linalg.norm((self.before - self.after) / self.std))
+
+    @property
     def share(self) -> float:
-        """Return how far the causes move the prediction towards the data: 1 for all the way."""
+        """Return how far the causes move the prediction towards the data: 1 for all the way.
+
+        Its standard deviation is 1 / `size`.
+        """
         shift = (self.before - self.after) / self.std
         size = float(shift @ shift)
         return float(shift @ (self.before / self.std)) / size if size > 0.0 else 1.0
@@ -53,8 +61,7 @@ class Unseen:
     @property
     def visible(self) -> bool:
         """Tell whether the causes change unseen modes by more than noise."""
-        shift = (self.before - self.after) / self.std
-        return float(shift @ shift) > _BLIND
+        return self.size > _CLEARLY
 
     @property
     def probability(self) -> float:
@@ -76,7 +83,7 @@ class Unseen:
         """
         if len(self.before) == 0:
             return True
-        if self.visible and self.share < _HALF_WAY:
+        if self.share < _HALF_WAY and (1.0 - self.share) * self.size > _CLEARLY:
             return False
         if fitted > _FEW:
             return self.probability > _GOOD

@@ -68,6 +68,7 @@ class Projector:
 
     def __init__(self, model: Model, vectors: FloatArray) -> None:
         self.vectors, self.structure = vectors, model.structure
+        self.wider: dict[int, FloatArray] = {0: vectors}
         self.unit = np.zeros(len(vectors))
         if self.structure is not None:
             # What cannot move in the plane of the frame has no part in any product.
@@ -86,7 +87,7 @@ class Projector:
             rows, cores, motion = small
             weights = np.einsum("p,tpq,q->t", motion, cores, motion)
         else:
-            grown = _grown(self.vectors, change.extra)
+            grown = self._grown(change.extra)
             motion = self._shifted(change.terms, change.extra)
             rows = np.eye(grown.shape[1])
             cores = np.array([term.operator.project(grown) for term in change.terms])
@@ -122,7 +123,7 @@ class Projector:
                 core[: len(whole), : len(whole)] = whole
             elif isinstance(operator, RowOperator):
                 own = slice(last, last + len(operator.core))
-                rows[own] = operator.rows @ _grown(self.vectors, extra)
+                rows[own] = operator.rows @ self._grown(extra)
                 motion[own] = operator.rows @ moved
                 core[own, own] = operator.core
                 last = own.stop
@@ -150,6 +151,16 @@ class Projector:
         motion[n:] = -np.linalg.solve(pulled[n:, 1:], pulled[n:, 0])
         return motion
 
+    def _grown(self, extra: int) -> FloatArray:
+        """Return vectors with unit vectors of added dofs behind them, (n + extra, N + extra)."""
+        if extra not in self.wider:
+            n, m = self.vectors.shape
+            grown = np.zeros((n + extra, m + extra))
+            grown[:n, :m] = self.vectors
+            grown[n:, m:] = np.eye(extra)
+            self.wider[extra] = grown
+        return self.wider[extra]
+
     def _weight(self, term: Term, motion: FloatArray) -> float:
         if term.matrix == "stiffness":
             return 0.0
@@ -159,17 +170,6 @@ class Projector:
             blocks = blocks[:, self.active[:, None], self.active]
             return float(np.einsum("ei,eij,ej->", own, blocks, own))
         return float(operator.project(motion[:, None])[0, 0])
-
-
-def _grown(vectors: FloatArray, extra: int) -> FloatArray:
-    """Return vectors with unit vectors of added dofs behind them, (n + extra, N + extra)."""
-    if not extra:
-        return vectors
-    n, m = vectors.shape
-    grown = np.zeros((n + extra, m + extra))
-    grown[:n, :m] = vectors
-    grown[n:, m:] = np.eye(extra)
-    return grown
 
 
 def _direction(structure: Structure) -> int:

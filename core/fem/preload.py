@@ -31,6 +31,8 @@ from femubench.core.typing import FloatArray, SparseArray
 if TYPE_CHECKING:
     from femubench.core.fem.structure import Structure
 
+_AT_ONCE = 20000  # elements whose matrices are held, all states together
+
 
 def preload_stiffness(structure: Structure, member: str, force: float) -> SparseArray:
     """Return the geometric stiffness of one preload on the free dofs, sparse (n, n), N/m, N, N m.
@@ -62,8 +64,12 @@ def preload_stiffnesses(structure: Structure, members: Sequence[str]) -> tuple[S
     """
     states = [statics_of(structure).state(member) for member in members]
     count = len(structure.mesh.ends)
+    together = max(_AT_ONCE // count, 1)
     found = []
-    for state, blocks in zip(states, _geometric(structure, states), strict=True):
+    for i, state in enumerate(states):
+        if i % together == 0:
+            several = _geometric(structure, states[i : i + together])
+        blocks = several[i % together]
         total = structure.plan.assemble(blocks.reshape(count, 12, 12))
         for given, part in (
             (structure.mesh.connections, _connections),
