@@ -207,7 +207,6 @@ def draw_calibration(records: Sequence[Record], path: Path) -> None:
 def _save(figure: Any, path: Path) -> None:  # noqa: ANN401 - matplotlib is optional
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path.with_suffix(".svg"), metadata={"Date": None})
-    figure.savefig(path.with_suffix(".png"), dpi=130)
 
 
 def _markdown(rows: Iterable[Any]) -> str:
