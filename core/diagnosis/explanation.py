@@ -164,23 +164,32 @@ class Posterior:
 
     @cached_property
     def earned(self) -> frozenset[str]:
-        """Return the textbook effects that the data made part of the name."""
-        known = {name for e in self.explanations for name in e.base.names}
-        return frozenset(name for name in known if self._is_earned(name))
+        """Return the textbook effects that the data made part of the name.
 
-    def _is_earned(self, name: str) -> bool:
-        """Compare the best explanations with and without an effect, all else as it may be."""
-        total = sum(
-            p
-            for e, p in zip(self.explanations, self.probabilities, strict=True)
-            if name in e.base.names or name in e.searched
-        )
-        if total < _EARNED:
+        Each by itself; and where none of several can be missed by itself, all that cannot be
+        missed together.
+        """
+        likely = {name for e in self.explanations for name in e.base.names if self._likely(name)}
+        alone = frozenset(name for name in likely if self._missed(frozenset({name})))
+        rest = frozenset(likely - alone)
+        return alone | rest if len(rest) > 1 and self._missed(rest) else alone
+
+    def _likely(self, name: str) -> bool:
+        pairs = zip(self.explanations, self.probabilities, strict=True)
+        return sum(p for e, p in pairs if name in e.effects) >= _EARNED
+
+    def _missed(self, names: frozenset[str]) -> bool:
+        """Tell whether the best explanation with textbook effects is much better than without.
+
+        Textbook physics is weighed against the model without it, not against another effect that
+        is fitted to stand for it.
+        """
+        best = next((e for e in self.explanations if names <= set(e.base.names)), None)
+        if best is None:
             return False
-        best = next(e for e in self.explanations if name in e.base.names)
-        rest = best.effects - {name}
+        rest, fitted = best.effects - names, tuple(n for n in best.searched if n not in names)
         for other in self.explanations:
-            if other.effects == rest:
+            if other.effects == rest and other.searched == fitted:
                 return best.fit.log_evidence - other.fit.log_evidence > log(_FACTOR)
         return True
 

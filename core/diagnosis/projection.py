@@ -145,7 +145,8 @@ class Projector:
             return np.concatenate([self.unit, np.zeros(extra)])
         n = len(self.unit)
         motion = np.concatenate([self.unit, np.zeros(extra)])
-        both = np.column_stack([motion, np.eye(n + extra)[:, n:]])
+        both = np.column_stack([motion, np.zeros((n + extra, extra))])
+        both[n:, 1:] = np.eye(extra)
         springs = [term for term in terms if term.matrix == "stiffness"]
         pulled = np.sum([term.operator.apply(both) for term in springs], axis=0)
         motion[n:] = -np.linalg.solve(pulled[n:, 1:], pulled[n:, 0])

@@ -53,10 +53,10 @@ def with_shortlist(problem: Problem) -> Problem:
     if not isinstance(problem, LargeProblem):
         return problem
     vectors = problem.common.modes.shapes
-    local, project = _Local(problem.model, vectors), Projector(problem.model, vectors)
+    local = _Local(problem.model, vectors)
     ranked = list(_ranked(local, state_at(problem, (), np.zeros(0)), problem.hypotheses))
     chosen = _chosen(ranked, _MOST, _OF_A_NAME)
-    space = replace(problem.space, projections=tuple(project(h) for h in chosen))
+    space = replace(problem.space, projections=tuple(local.project(h) for h in chosen))
     return replace(problem, space=space)
 
 
@@ -108,9 +108,9 @@ def beside(problem: Problem, seed: Fit) -> Problem:
     there = state_at(own, space.projections, state.x)
     taken = {id(part.hypothesis) for part in seed.parts}
     free = [h for h in problem.hypotheses if id(h) not in taken]
-    project = Projector(problem.model, vectors)
-    ranked = list(_ranked(_Local(problem.model, vectors), there, free))
-    partners = tuple(project(h) for h in _chosen(ranked, _PARTNERS, 3))
+    local = _Local(problem.model, vectors)
+    ranked = list(_ranked(local, there, free))
+    partners = tuple(local.project(h) for h in _chosen(ranked, _PARTNERS, 3))
     rebased = replace(space, projections=partners).rebased(space.projections, state.x)
     return replace(own, space=rebased)
 
@@ -186,25 +186,11 @@ class _Local:
 
     def __init__(self, model: Model, vectors: FloatArray) -> None:
         self.vectors, structure = vectors, model.structure
+        self.project = Projector(model, vectors)
         self.elements: FloatArray | None = None
-        self.unit = np.zeros(len(vectors))
         if structure is not None:
-            axis = 0 if structure.frame.plane == "in-plane" else 2
-            self.unit = structure.kinematics.axes[:, axis]
             gathered = structure.gather @ vectors
             self.elements = np.asarray(gathered).reshape(-1, 12, vectors.shape[1])
-
-    def weights(self, hypothesis: Hypothesis) -> FloatArray:
-        """Return by how much each mass term makes the structure heavier in kg, (t,)."""
-        # What has no elements is not weighed.
-        extra = np.full(hypothesis.change.extra, float(self.elements is not None))
-        motion = np.append(self.unit, extra)[:, None]
-        return np.array(
-            [
-                float(term.operator.project(motion)[0, 0]) if term.matrix == "mass" else 0.0
-                for term in hypothesis.change.terms
-            ]
-        )
 
 
 def _directions(hypothesis: Hypothesis) -> tuple[FloatArray, FloatArray]:
@@ -243,7 +229,7 @@ def _first_order(
     mass = np.tensordot(factors[:, heavy], blocks[heavy], axes=1)
     weight = np.zeros(len(factors))
     if state.problem.data.mass is not None:
-        weight = factors @ local.weights(hypothesis)
+        weight = factors @ local.project(hypothesis).weights
     if change.extra:
         forces = _condensed(stiff, mass, values, change.extra)
     else:
