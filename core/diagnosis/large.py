@@ -35,7 +35,7 @@ from femubench.core.typing import FloatArray, SparseArray
 _A_MODE, _SPARE = 4, 20  # modes that are solved for every measured one, and besides
 _RIGID, _MISSED = 6, 6
 _SHIFT = 0.5  # of the first elastic eigenvalue, below zero
-_FROM_SENSORS, _FROM_HYPOTHESIS = 40, 32  # vectors at most
+_FROM_SENSORS, _FROM_HYPOTHESIS = 40, 64  # vectors at most
 _APART = 1e-10  # squared sine below which a vector lies in the span of the others
 _FELT = 1e-7  # of the largest force
 _FEW_TERMS = 6
