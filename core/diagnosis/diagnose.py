@@ -13,7 +13,7 @@ from femubench.core.diagnosis.advice import advise
 from femubench.core.diagnosis.confirm import another_stands, extended_by, stands, unseen_of
 from femubench.core.diagnosis.exact import departure
 from femubench.core.diagnosis.examine import Examination, examine
-from femubench.core.diagnosis.explanation import Explanation
+from femubench.core.diagnosis.explanation import Explanation, Posterior
 from femubench.core.diagnosis.gain import Unseen, gain_of, left_out
 from femubench.core.diagnosis.large import LargeProblem
 from femubench.core.diagnosis.localisation import locate
@@ -30,6 +30,7 @@ from femubench.core.diagnosis.tables import (
 from femubench.core.diagnosis.verdict import Decision, causes_of, decide
 from femubench.core.harness.scoring import score_model
 from femubench.core.model import Model
+from femubench.core.plugin.loader import registered_effects
 from femubench.core.plugin.roles import Effect
 
 _SAME_MODEL = 0.3  # deviations by which the extended model may differ from the fit
@@ -68,7 +69,13 @@ def diagnose(
     begin = time.perf_counter()
     used = case.measurement.select(case.used)
     scatter = case.tolerance if tolerance is None else tolerance
-    examination = examine(case.model, used, registered(effects), tolerance=scatter, pairs=pairs)
+    examination = examine(
+        case.model,
+        used,
+        registered_effects() if effects is None else effects,
+        tolerance=scatter,
+        pairs=pairs,
+    )
     best = examination.best
     model = extended_by(case.model, best)
     proof = _proof(case, examination, best, model)
@@ -79,15 +86,6 @@ def diagnose(
         confirmed = confirmed or another_stands(case, examination)
     decision = decide(examination.posterior, examination.adequacy, confirmed=confirmed)
     return _written(case, examination, decision, model, proof, begin)
-
-
-def registered(effects: Iterable[Effect] | None) -> tuple[Effect, ...]:
-    """Return the given effects, or all that plugins offer."""
-    if effects is not None:
-        return tuple(effects)
-    from femubench.core.plugin.loader import load_plugins
-
-    return tuple(load_plugins().effects.values())
 
 
 def _proof(case: Case, examination: Examination, best: Explanation, model: Model) -> _Proof:
@@ -114,7 +112,8 @@ def _written(
     best, posterior = examination.best, examination.posterior
     group = causes_of(posterior, decision.group)
     shown = group if decision.verdict == "ambiguous" else group[:1]
-    causes = _group_causes(examination, shown)
+    options = [causes_in(explanation, share, posterior.earned) for explanation, share in shown]
+    causes = _group_causes(posterior, options)
     top = posterior.names[decision.group[0]] if decision.group else decision.nothing
     named = bool(decision.group)
     after = best.fit.state if named else examination.nominal
@@ -122,7 +121,7 @@ def _written(
     return Diagnosis(
         case=case.name,
         verdict=decision.verdict,
-        sentence=sentence_of(decision, causes, _options(examination, shown), top, proof.gain),
+        sentence=sentence_of(decision, causes, options, top, proof.gain),
         causes=tuple(causes),
         rivals=rivals_of(examination, best if named else None),
         reason=_reason(decision),
@@ -143,30 +142,19 @@ def _written(
     )
 
 
-def _group_causes(
-    examination: Examination, group: Sequence[tuple[Explanation, float]]
-) -> list[Cause]:
+def _group_causes(posterior: Posterior, options: Iterable[Iterable[Cause]]) -> list[Cause]:
     """Return every effect of a group once, with the probability that it is part of the name.
 
     Arguments:
-        examination: what the group was weighed in.
-        group: explanations with the probability of their places, most probable first.
+        posterior: what the group was weighed in.
+        options: causes of every explanation with the probability of their places, most probable
+            explanation first.
     """
-    posterior = examination.posterior
     found: dict[str, Cause] = {}
-    for explanation, share in group:
-        for cause in causes_in(explanation, share, posterior.earned):
-            likely = share * posterior.inclusion(cause.effect)
-            found.setdefault(cause.effect, replace(cause, probability=likely))
+    for cause in (cause for option in options for cause in option):
+        likely = cause.probability * posterior.inclusion(cause.effect)
+        found.setdefault(cause.effect, replace(cause, probability=likely))
     return sorted(found.values(), key=lambda cause: -cause.probability)
-
-
-def _options(
-    examination: Examination, group: Sequence[tuple[Explanation, float]]
-) -> list[list[Cause]]:
-    """Return the causes of every explanation of a group."""
-    earned = examination.posterior.earned
-    return [causes_in(explanation, share, earned) for explanation, share in group]
 
 
 def _reason(decision: Decision) -> str:
@@ -218,4 +206,4 @@ def _notes(examination: Examination, proof: _Proof, best: Explanation) -> tuple[
     return tuple(notes)
 
 
-__all__ = ["diagnose", "extended_by", "registered"]
+__all__ = ["diagnose", "extended_by"]

@@ -149,16 +149,10 @@ class Posterior:
     probabilities: tuple[float, ...]
 
     @classmethod
-    def of(cls, explanations: Iterable[Explanation], temper: float = 1.0) -> Posterior:
-        """Weigh explanations against each other.
-
-        Arguments:
-            explanations: each with prior and evidence.
-            temper: exponent on the evidence, below 1 where the likelihood is known to be
-                sharper than the truth.
-        """
+    def of(cls, explanations: Iterable[Explanation]) -> Posterior:
+        """Weigh explanations against each other by prior and evidence."""
         ranked = sorted(explanations, key=lambda e: -e.log_weight)
-        weights = temper * np.array([e.log_weight for e in ranked])
+        weights = np.array([e.log_weight for e in ranked])
         shares = np.exp(weights - logsumexp(weights))
         return cls(tuple(ranked), tuple(float(p) for p in shares))
 

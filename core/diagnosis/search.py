@@ -76,10 +76,11 @@ class Search:
         """Return all explanations and the atlas of every base that was searched."""
         bases = textbook_bases(self.problem.space.projections)
         found = [self.on(bases[0])]
-        found += [self.on(base) for base in self.promising(bases[1:], found[0])]
+        bare = [self.bare(base) for base in bases[1:]]
+        found += [self.on(base) for base in self.promising(bare, found[0])]
         explanations = [e for item in found for e in item.explanations]
         searched = {item.base.names for item in found}
-        explanations += [self.bare(base) for base in bases if base.names not in searched]
+        explanations += [e for e in bare if e.base.names not in searched]
         if self.pairs and self.names:
             explanations += self.combined(found)
         if isinstance(self.problem, LargeProblem):
@@ -100,15 +101,11 @@ class Search:
         others = [e for e in explanations if e is not best]
         return [*others, replace(best, fit=agreed(best.fit))]
 
-    def promising(self, bases: Sequence[Base], plain: Found) -> list[Base]:
+    def promising(self, bare: Sequence[Explanation], plain: Found) -> list[Base]:
         """Return the textbook sets that come nearer to the data than the model as drawn."""
         nothing = plain.explanations[0].chi2
-        scored = []
-        for base in bases:
-            chi2 = state_at(*enriched(self.problem, base.parts), base.x).chi2
-            scored.append((chi2 - 2.0 * base.log_prior, chi2, base))
-        scored.sort(key=lambda item: item[0])
-        better = [base for _, chi2, base in scored if chi2 < nothing - 6.0]
+        ranked = sorted(bare, key=lambda e: e.chi2 - 2.0 * e.base.log_prior)
+        better = [e.base for e in ranked if e.chi2 < nothing - 6.0]
         return better[: 1 if self.adequate(plain.best) else 2]
 
     def adequate(self, explanation: Explanation) -> bool:

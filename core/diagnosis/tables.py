@@ -146,7 +146,6 @@ def smallest_visible(found: Found) -> tuple[SmallestVisible, ...]:
 def _visible(x: FloatArray, effect: FloatArray) -> float | None:
     """Return the least |x| at which an effect reaches 1, growing in proportion below the grid."""
     order = np.argsort(np.abs(x))
-    reach: float | None = None
     last, seen = 0.0, 0.0
     for i in order:
         size, height = float(abs(x[i])), float(effect[i])
@@ -156,7 +155,7 @@ def _visible(x: FloatArray, effect: FloatArray) -> float | None:
             return float(np.copysign(max(found, 1e-6), x[i]))
         if height > seen:
             last, seen = size, height
-    return reach
+    return None
 
 
 def evidence_rows(examination: Examination) -> tuple[LocationRow, ...]:
