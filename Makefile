@@ -8,7 +8,7 @@ ARGS ?=
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 # Folders too: their time changes when a file is added or removed.
-SOURCES := pyproject.toml $(shell find core plugins reports scenarios -not -path '*/__pycache__*')
+SOURCES := pyproject.toml $(shell find core papers plugins reports scenarios -not -path '*/__pycache__*')
 
 .PHONY: run test bench sweep format clean
 .DELETE_ON_ERROR:

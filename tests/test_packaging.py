@@ -28,7 +28,7 @@ def test_every_folder_with_python_files_is_a_listed_package() -> None:
     """A package missing from the list is silently absent from the wheel."""
     listed = {folder_of(package).resolve() for package in SETUPTOOLS["packages"]}
     assert len(listed) == len(SETUPTOOLS["packages"])
-    rooms = ("core", "plugins", "reports", "scenarios")
+    rooms = ("core", "papers", "plugins", "reports", "scenarios")
     found = {path.parent.resolve() for room in rooms for path in (ROOT / room).rglob("*.py")}
     assert listed == found
 
@@ -46,7 +46,7 @@ def test_every_data_file_is_in_the_wheel() -> None:
             matches = {path for path in folder_of(package).glob(glob) if path.is_file()}
             assert matches, f"{package}: {glob} matches no file"
             taken |= matches
-    rooms = ("core", "plugins", "reports", "scenarios")
+    rooms = ("core", "papers", "plugins", "reports", "scenarios")
     data = {
         path
         for room in rooms

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import pytest
 
@@ -38,9 +39,25 @@ def test_an_option_without_a_value_yet_takes_any_and_numbers_become_floats() -> 
     assert found.base == Spring(arm=0.02, arm_factor=7.0)
 
 
+def test_options_of_options_have_dotted_names() -> None:
+    words = "spring:options.damping=0.01,stiffness.ry=3.02e6,stiffness.x=3300000000"
+    found = strategy_of(words, KNOWN)
+    assert isinstance(found, Variant)
+    nominal = Spring()
+    assert found.base == replace(
+        nominal,
+        options=replace(nominal.options, damping=0.01),
+        stiffness={"ry": 3.02e6, "x": 3.3e9},
+    )
+    assert nominal.stiffness == {}
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
+        ("spring:options.dampin=1", "no option 'options.dampin'; did you mean 'options.damping'"),
+        ("spring:stiffness.ry=soft", r"option stiffness.ry is 'soft' \(expected float\)"),
+        ("spring:options.weighting=heavy", "weighting 'heavy' is neither"),
         ("generic-ls:orthogonalty=false", "no option 'orthogonalty'; did you mean 'orthogonality'"),
         ("generic-ls:orthogonality", "no option|orthogonality"),
         ("generic-ls:orthogonality=7", r"option orthogonality is '7' \(expected bool\)"),

@@ -40,6 +40,7 @@ _NAMES = {
         "Diverged FemubenchError InputError ModelError NotApplicable PluginError "
         "SelfCheckFailed StrategyFailure"
     ),
+    "figure": "Bars Curve Curves Figure MatrixImage StructureMap",
     "fem.beam": (
         "BeamProperties coupling_matrices eccentric_mass_parts mass_matrices stiffness_matrices"
     ),
@@ -71,6 +72,9 @@ _NAMES = {
     "plugin.loader": "registered_effects",
     "plugin.markers": "hookimpl",
     "plugin.roles": "Effect Reader Reporter Scenario",
+    "reproduction.cell": "Cell Page",
+    "reproduction.study": "Extra Study",
+    "reproduction.workbench": "Workbench",
     "strategy": "ParameterEstimate Strategy UpdateResult",
     "typing": "FloatArray IntArray SparseArray",
     "update.choices": "carried_by global_stiffness joint_stiffness",
@@ -141,6 +145,10 @@ if TYPE_CHECKING:
         ModelError as ModelError, NotApplicable as NotApplicable, PluginError as PluginError,
         SelfCheckFailed as SelfCheckFailed, StrategyFailure as StrategyFailure,
     )
+    from femubench.core.figure import (
+        Bars as Bars, Curve as Curve, Curves as Curves, Figure as Figure,
+        MatrixImage as MatrixImage, StructureMap as StructureMap,
+    )
     from femubench.core.fem.beam import (
         BeamProperties as BeamProperties, coupling_matrices as coupling_matrices,
         eccentric_mass_parts as eccentric_mass_parts, mass_matrices as mass_matrices,
@@ -204,6 +212,9 @@ if TYPE_CHECKING:
     from femubench.core.plugin.roles import (
         Effect as Effect, Reader as Reader, Reporter as Reporter, Scenario as Scenario,
     )
+    from femubench.core.reproduction.cell import Cell as Cell, Page as Page
+    from femubench.core.reproduction.study import Extra as Extra, Study as Study
+    from femubench.core.reproduction.workbench import Workbench as Workbench
     from femubench.core.strategy import (
         ParameterEstimate as ParameterEstimate, Strategy as Strategy, UpdateResult as UpdateResult,
     )

@@ -1,4 +1,7 @@
-"""Strategies with other options than their default ones: ``generic-ls:orthogonality=false``."""
+"""Strategies with other options than their default ones: ``generic-ls:orthogonality=false``.
+
+Options of options have a dotted name: ``global:options.damping=0.01``, ``spring:stiffness.ry=3e6``.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,7 @@ if TYPE_CHECKING:
     from femubench.core.model import Model
 
 _SIMPLE = (bool, int, float, str, type(None))
+_UNKNOWN = object()
 
 
 @dataclass(frozen=True)
@@ -64,18 +68,33 @@ def strategy_of(words: str, strategies: Mapping[str, Strategy]) -> Strategy:
     if not listed:
         return base
     known = _options(base)
-    values: dict[str, Any] = {}
+    changed: Any = base
     for pair in listed.split(","):
         key, found, text = (part.strip() for part in pair.partition("="))
-        if not found or key not in known:
+        present = known.get(key, _entry(base, key))
+        if not found or present is _UNKNOWN:
             near = did_you_mean(key, known) or f"; there are {', '.join(known) or 'none'}"
             raise InputError(f"strategy {name!r} has no option {key!r}{near}")
-        values[key] = _value(name, key, text, known[key])
-    try:
-        changed = replace(base, **values)  # type: ignore[type-var]
-    except (TypeError, ValueError) as error:
-        raise InputError(f"strategy {words!r}: {error}") from error
+        try:
+            changed = _with(changed, key, _value(name, key, text, present))
+        except (TypeError, ValueError) as error:
+            raise InputError(f"strategy {words!r}: {error}") from error
     return Variant(changed, words)
+
+
+def _with(holder: Any, key: str, value: object) -> Any:  # noqa: ANN401 - a strategy, or options of one
+    """Return a copy with one option set, of the thing itself or of one of its options."""
+    name, _, inner = key.partition(".")
+    if isinstance(holder, Mapping):
+        return {**holder, key: value}
+    return replace(holder, **{name: _with(getattr(holder, name), inner, value) if inner else value})
+
+
+def _entry(strategy: object, key: str) -> object:
+    """Return the present entry of an option that maps names to numbers."""
+    name, _, inner = key.partition(".")
+    holder = getattr(strategy, name, None) if is_dataclass(strategy) else None
+    return float(holder.get(inner, 0.0)) if inner and isinstance(holder, Mapping) else _UNKNOWN
 
 
 def _options(strategy: object) -> dict[str, Any]:
@@ -83,7 +102,10 @@ def _options(strategy: object) -> dict[str, Any]:
     if not is_dataclass(strategy) or isinstance(strategy, type):
         return {}
     present = {field.name: getattr(strategy, field.name) for field in fields(strategy)}
-    return {name: value for name, value in present.items() if isinstance(value, _SIMPLE)}
+    simple = {name: value for name, value in present.items() if isinstance(value, _SIMPLE)}
+    for name, value in present.items():
+        simple |= {f"{name}.{inner}": found for inner, found in _options(value).items()}
+    return simple
 
 
 def _value(strategy: str, key: str, text: str, present: object) -> object:

@@ -1,0 +1,95 @@
+"""One printed cell beside our value of it, and the verdict."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+Verdict = Literal["agrees", "agrees-under", "does-not-follow"]
+VERDICTS: tuple[Verdict, ...] = ("agrees", "agrees-under", "does-not-follow")
+_UNEXPLAINED = "no reading of the text was found that gives it"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One figure that a paper prints.
+
+    Arguments:
+        paper: slug, e.g. ``"frame"``.
+        table: as the paper numbers it, e.g. ``"4d"``.
+        row, column: what the paper calls them.
+        printed: its figure; an imaginary frequency is a negative one.
+        ours: the same from a re-run; None where there is none.
+        verdict: whether it agrees, agrees under a convention that the text does not state, or does
+            not follow from the text.
+        note: the convention, or why it does not follow; may be empty for ``agrees``.
+        unit: of both; ``%`` for a figure that is a percentage itself.
+    """
+
+    paper: str
+    table: str
+    row: str
+    column: str
+    printed: float
+    ours: float | None
+    verdict: Verdict
+    note: str = ""
+    unit: str = ""
+
+    @property
+    def deviation_percent(self) -> float | None:
+        """Return (ours - printed) / |printed| in percent; of percentages, ours - printed.
+
+        None where there is no value of ours, or the printed one is zero and ours is not.
+        """
+        return deviation(self.printed, self.ours, self.unit)
+
+
+def deviation(printed: float, ours: float | None, unit: str = "") -> float | None:
+    """Return the deviation of a cell in percent, see `Cell.deviation_percent`."""
+    if ours is None or not math.isfinite(ours):
+        return None
+    if unit == "%":
+        return ours - printed
+    if printed == 0.0:
+        return 0.0 if ours == 0.0 else None
+    return 100.0 * (ours - printed) / abs(printed)
+
+
+@dataclass(frozen=True)
+class Page:
+    """Where cells of one kind stand, and when they agree.
+
+    Arguments:
+        paper, table: as in `Cell`.
+        unit: of the cells.
+        tolerance: largest deviation that agrees, in percent (of percentages: in points).
+        decimals: digits behind the point in print: what rounds to the printed figure agrees too;
+            None for the tolerance alone.
+        convention: what the text does not state and the value rests on; empty for nothing.
+        reason: why cells that do not agree do not follow from the text.
+    """
+
+    paper: str
+    table: str
+    unit: str = ""
+    tolerance: float = 0.1
+    decimals: int | None = None
+    convention: str = ""
+    reason: str = _UNEXPLAINED
+
+    def cell(self, row: str, column: str, printed: float, ours: float | None) -> Cell:
+        """Return the cell with its verdict, which follows from the figures alone."""
+        off = deviation(printed, ours, self.unit)
+        same = ours is not None and round(ours - printed, 12) == 0.0
+        digits = math.inf if self.decimals is None else self.decimals
+        rounds = ours is not None and abs(ours - printed) <= 0.5000001 * 10.0**-digits
+        meets = same or rounds or (off is not None and abs(off) <= self.tolerance)
+        verdict: Verdict = "does-not-follow"
+        if meets:
+            verdict = "agrees-under" if self.convention else "agrees"
+        note = self.convention if meets else self.reason
+        return Cell(
+            self.paper, self.table, row, column, printed, ours, verdict, note, self.unit
+        )

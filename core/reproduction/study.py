@@ -1,0 +1,75 @@
+"""A paper worked through: its cells, what it left out, and its figures drawn anew."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from femubench.core.figure import Figure
+from femubench.core.reproduction.cell import VERDICTS, Cell, Verdict
+
+
+@dataclass(frozen=True)
+class Extra:
+    """A table that the paper does not print.
+
+    Arguments:
+        title: what it shows.
+        columns: headers, with units.
+        rows: text cells, one a column.
+        note: what it tells.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Study:
+    """What a re-run of a paper says.
+
+    Arguments:
+        paper: slug.
+        title, citation: of the paper.
+        premises: what was taken from where, one sentence each.
+        cells: every printed figure.
+        findings: what the re-run shows, one sentence each.
+        extras: what the paper did not print.
+        figures: its figures, and ours.
+    """
+
+    paper: str
+    title: str
+    citation: str
+    premises: tuple[str, ...]
+    cells: tuple[Cell, ...]
+    findings: tuple[str, ...] = ()
+    extras: tuple[Extra, ...] = ()
+    figures: tuple[Figure, ...] = ()
+
+
+def verdict_counts(cells: Sequence[Cell]) -> dict[Verdict, int]:
+    """Return the number of cells of every verdict, none left out."""
+    return {verdict: sum(cell.verdict == verdict for cell in cells) for verdict in VERDICTS}
+
+
+def cells_to_json(studies: Sequence[Study]) -> list[dict[str, Any]]:
+    """Return all cells as plain data; None for what is missing."""
+    return [
+        {
+            "paper": cell.paper,
+            "table": cell.table,
+            "row": cell.row,
+            "column": cell.column,
+            "printed": cell.printed,
+            "ours": cell.ours,
+            "deviation_percent": cell.deviation_percent,
+            "verdict": cell.verdict,
+            "note": cell.note,
+        }
+        for study in studies
+        for cell in study.cells
+    ]

@@ -1,0 +1,25 @@
+"""The two papers worked through: printed tables, and what recomputes every cell of them."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from femubench import Study, Workbench
+
+# Slug: the cases that a re-run works with.
+PAPERS = {
+    "frame": ("frame", "frame-beam", "frame-solid"),
+    "hframe": ("hframe", "hframe-solid"),
+}
+
+
+def study(paper: str, bench: Workbench) -> Study:
+    """Return the re-run of a paper.
+
+    Arguments:
+        paper: one of `PAPERS`.
+        bench: with the cases that `PAPERS` lists for it, and the built-in strategies.
+    """
+    found = import_module(f"femubench.papers.{paper}").study(bench)
+    assert isinstance(found, Study)
+    return found
