@@ -10,7 +10,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check
 # Folders too: their time changes when a file is added or removed.
 SOURCES := pyproject.toml $(shell find core papers plugins reports scenarios -not -path '*/__pycache__*')
 
-.PHONY: run test bench sweep format clean
+.PHONY: run test bench sweep fuzz format clean
 .DELETE_ON_ERROR:
 
 run: $(VENV)/.installed
@@ -28,6 +28,9 @@ bench: $(VENV)/.installed-test
 
 sweep: $(VENV)/.installed-test
 	$(BIN)/pytest -m sweep $(ARGS)
+
+fuzz: $(VENV)/.installed-test
+	$(BIN)/pytest tests/test_fuzz.py -m fuzz -s $(ARGS)
 
 format: $(VENV)/.installed-test
 	$(BIN)/ruff check --fix .

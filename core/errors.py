@@ -4,6 +4,21 @@ from __future__ import annotations
 
 from pathlib import Path
 
+_LONGEST = 600  # characters of one part of a message, which may quote what a stranger wrote
+
+
+def _clipped(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
+
+
+def harmless(text: str) -> str:
+    """Return text on one line, with escapes for what a terminal would obey or could not show.
+
+    Names of files and keys come from strangers; they must not move a cursor or hide a line.
+    """
+    line = " ".join(text.split())
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
+
 
 class FemubenchError(Exception):
     """Base of all errors that a user can act upon."""
@@ -32,9 +47,9 @@ class InputError(FemubenchError):
         self.what, self.file, self.line, self.key, self.expected = what, file, line, key, expected
         where = "" if file is None else str(file)
         where += "" if line is None else f":{line}"
-        parts = [part for part in (where, key, what) if part]
-        text = ": ".join(parts) + ("" if expected is None else f" (expected {expected})")
-        super().__init__(" ".join(text.split()))
+        parts = [part for part in (where, _clipped(key or ""), _clipped(what)) if part]
+        text = ": ".join(parts) + ("" if expected is None else f" (expected {_clipped(expected)})")
+        super().__init__(harmless(text))
 
     def __reduce__(self) -> tuple[object, ...]:
         return _input_error, (self.what, self.file, self.line, self.key, self.expected)

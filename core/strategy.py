@@ -64,11 +64,14 @@ class Strategy(ABC):
         needs: capabilities (of `CAPABILITIES`) that model or measurement must have: ``shapes``
             measured mode shapes, ``elements`` element matrices, ``geometry`` members that can be
             rebuilt with other parameters, ``joints`` places where members meet.
+        promises: what every result keeps (of ``used-modes``, ``rigid-body-modes``,
+            ``no-negative-eigenvalue``); `bench plugins check` measures it.
     """
 
     name: ClassVar[str]
     citation: ClassVar[str]
     needs: ClassVar[frozenset[str]] = frozenset()
+    promises: ClassVar[frozenset[str]] = frozenset()
 
     @abstractmethod
     def update(

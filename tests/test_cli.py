@@ -19,9 +19,9 @@ from click.testing import CliRunner, Result
 
 import femubench
 from femubench.core.cli import progress
-from femubench.core.cli.durations import seconds_of, spoken
 from femubench.core.cli.files import write_atomically
 from femubench.core.cli.main import VERBS, bench
+from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of
 
 CASE = """\
 [case]
@@ -171,7 +171,18 @@ class TestHelp:
             """
         ).split()
         numpy = python("import sys, numpy; print(' '.join(sys.modules))").split()
-        heavy = ("numpy", "scipy", "pandas", "rich", "pluggy", "pydantic", "tabulate", "pebble")
+        heavy = (
+            "numpy",
+            "scipy",
+            "pandas",
+            "rich",
+            "pluggy",
+            "pydantic",
+            "tabulate",
+            "psutil",
+            "jinja2",
+            "matplotlib",
+        )
         assert "femubench.core.cli.main" in loaded
         assert not {name.partition(".")[0] for name in loaded} & set(heavy)
         assert not {module for module, _ in VERBS.values()} & set(loaded)
@@ -287,6 +298,64 @@ class TestWrongInput:
             assert result.exit_code == 2
             assert result.stderr.startswith(f"bench: {expected}")
         assert "no results" in invoke("report").stderr
+
+
+class TestGoingOn:
+    """`--resume`, `--overwrite`, `--locked`, limits for single strategies."""
+
+    def test_a_run_is_continued_without_words(self, invoke: Invoke, tmp_path: Path) -> None:
+        case = put_case(tmp_path / "case")
+        words = ("-s", "test-nothing", "-s", "test-fails", "--seeds", 2, "-j", 1)
+        assert invoke("run", case, *words).exit_code == 1
+        store = tmp_path / "femubench-results" / "results.jsonl"
+        lines = store.read_text().splitlines()
+        # As if the power had failed after the first result.
+        store.write_text("\n".join(lines[:2]) + "\n" + lines[2][:40])
+        result = invoke("run", "--resume", "-j", 1)
+        assert result.exit_code == 1
+        assert "2 strategies, seeds 1-2" in " ".join(result.stdout.split())
+        records = [json.loads(line) for line in store.read_text().splitlines()]
+        assert [item["record"] for item in records].count("run") == 1
+        jobs = [
+            (item["result"]["strategy"], item["result"]["seed"])
+            for item in records
+            if item["record"] == "result"
+        ]
+        assert set(jobs) == {(n, s) for n in ("test-nothing", "test-fails") for s in (1, 2)}
+        assert jobs.count(("test-nothing", 1)) == 1
+
+    def test_resume_with_nothing_stored_is_a_run(self, invoke: Invoke, tmp_path: Path) -> None:
+        case = put_case(tmp_path / "case")
+        assert invoke("run", case, "-s", "test-nothing", "--resume").exit_code == 0
+
+    def test_a_locked_run_says_what_differs(self, invoke: Invoke, tmp_path: Path) -> None:
+        case = put_case(tmp_path / "case")
+        assert invoke("run", case, "-s", "test-nothing").exit_code == 0
+        (report,) = (tmp_path / "femubench-results").glob("*.md")
+        same = invoke("run", "--locked", report.stem)
+        assert same.exit_code == 0
+        assert f"environment: 0 differences from run {report.stem}" in same.stdout
+        assert f"results: 0 differences from run {report.stem}" in same.stdout
+        table = (case / "modes.csv").read_text()
+        (case / "modes.csv").write_text(table.replace("9.0", "9.5", 1))
+        other = invoke("run", "--locked", report.stem)
+        assert other.exit_code == 1
+        text = " ".join(other.stdout.split())
+        assert "environment: 1 difference" in text
+        assert "rod, test-nothing, seed 0: used rms" in text
+
+    def test_wrong_words(self, invoke: Invoke, tmp_path: Path) -> None:
+        case = put_case(tmp_path / "case")
+        for words, expected in (
+            (("run", case, "--locked", "2026"), "cases cannot be given beside it"),
+            (("run", "--locked", "2026"), "no results"),
+            (("run", case, "--timeout", "kabee=1m", "-s", "test-nothing"), "'kabee'"),
+            (("run", case, "--memory", "1k"), "no size >= 16M"),
+            (("run", case, "--overwrite", "some"), "'some' is not one of"),
+        ):
+            result = invoke(*words)
+            assert result.exit_code == 2
+            assert expected in result.stderr
 
 
 @pytest.fixture(scope="module")
@@ -443,6 +512,29 @@ class TestPluginsAndScenarios:
             assert shown.exit_code == 0
             assert 'cli_broken.py", line 1' in shown.stderr
 
+    def test_a_run_goes_on_without_broken_plugins_unless_it_is_strict(
+        self, invoke: Invoke, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.syspath_prepend(tmp_path)
+        put_distribution(tmp_path, "cli_broken", "import a_module_that_nobody_has\n")
+        put_distribution(tmp_path, "cli_typo", PLUGIN.replace("_strategies()", "_strategis()"))
+        put_distribution(tmp_path, "zz_cli_twin", PLUGIN)
+        case = put_case(tmp_path / "case")
+        result = invoke("run", case, "-s", "test-nothing", "-q")
+        assert result.exit_code == 0
+        assert len((tmp_path / "femubench-results" / "results.jsonl").read_text().split()) > 3
+        lines = [line for line in result.stderr.splitlines() if "cli_" in line]
+        for name, what in (
+            ("cli_broken", "ModuleNotFoundError"),
+            ("cli_typo", "did you mean 'femubench_strategies'"),
+            ("zz_cli_twin", "the name 'test-nothing' is taken"),
+        ):
+            assert any(f"plugin '{name}' ({name} 1.0)" in line and what in line for line in lines)
+        strict = invoke("run", case, "-s", "test-nothing", "--strict-plugins")
+        assert (strict.exit_code, strict.stdout) == (2, "")
+        assert strict.stderr.splitlines()[:-1] == result.stderr.splitlines()
+        assert strict.stderr.splitlines()[-1].endswith("faults in plugins, see above")
+
     def test_builtins_are_plugins_and_none_is_broken(self, invoke: Invoke) -> None:
         result = invoke("plugins", "list")
         assert result.stderr == ""
@@ -468,7 +560,7 @@ class TestPluginsAndScenarios:
 
 
 def parsed(text: str) -> float:
-    return seconds_of(click.Context(bench), click.Option(["--timeout"]), text)
+    return timeouts_of(click.Context(bench), click.Option(["--timeout"]), (text,))[""]
 
 
 @pytest.mark.parametrize(
@@ -484,6 +576,31 @@ def test_durations(text: str, seconds: float) -> None:
 def test_no_durations(text: str) -> None:
     with pytest.raises(click.BadParameter, match="no duration > 0"):
         parsed(text)
+
+
+def test_durations_of_single_strategies() -> None:
+    def several(*words: str) -> dict[str, float]:
+        return timeouts_of(click.Context(bench), click.Option(["--timeout"]), words)
+
+    wanted = {"": 600.0, "kabe": 90.0, "spring:arm=0.02": 3600.0}
+    assert several("10m", "kabe=90", "spring:arm=0.02=1h") == wanted
+    for words in (("1m", "2m"), ("kabe=1m", "kabe=2m"), ("kabe=soon",)):
+        with pytest.raises(click.BadParameter):
+            several(*words)
+
+
+@pytest.mark.parametrize(
+    ("text", "size"),
+    [("512M", 2**29), ("4G", 2**32), ("4GiB", 2**32), ("1.5gb", 3 * 2**29), ("33554432", 2**25)],
+)
+def test_sizes(text: str, size: int) -> None:
+    assert bytes_of(click.Context(bench), click.Option(["--memory"]), text) == size
+
+
+@pytest.mark.parametrize("text", ["", "0", "1k", "-4G", "4P", "much", "inf"])
+def test_no_sizes(text: str) -> None:
+    with pytest.raises(click.BadParameter, match="no size >= 16M"):
+        bytes_of(click.Context(bench), click.Option(["--memory"]), text)
 
 
 def test_progress_only_where_someone_watches(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,9 +13,11 @@ import pytest
 import scipy.sparse as sp
 
 from femubench.core.errors import StrategyFailure
+from femubench.core.harness.answers import head_of
 from femubench.core.harness.checks import check_model
 from femubench.core.harness.jobs import Job, execute, missing_capability, seed_words
-from femubench.core.harness.worker import run_in_worker, single_threaded_environment
+from femubench.core.harness.judging import run_strategy
+from femubench.core.harness.worker import environment
 from femubench.core.measurement import Measurement
 from femubench.core.model import LowRank, Model
 from femubench.core.strategy import Strategy
@@ -74,7 +76,7 @@ def test_a_strategy_that_cannot_be_unpickled_has_failed() -> None:
 
 
 def test_an_outcome_that_cannot_be_pickled_has_failed() -> None:
-    outcome = pickle.loads(run_in_worker(job(toys.Unpicklable())))
+    outcome = head_of(run_strategy(job(toys.Unpicklable())))
     assert outcome.status == "failed"
     assert outcome.reason.endswith("TypeError: this geometry stays here")
 
@@ -127,10 +129,12 @@ def test_thread_counts_are_restored(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
     import os
 
-    with single_threaded_environment():
+    with environment(FEMUBENCH_TEST="7"):
+        assert os.environ["FEMUBENCH_TEST"] == "7"
         assert os.environ["OMP_NUM_THREADS"] == os.environ["MKL_NUM_THREADS"] == "1"
     assert os.environ["OMP_NUM_THREADS"] == "3"
     assert "MKL_NUM_THREADS" not in os.environ
+    assert "FEMUBENCH_TEST" not in os.environ
 
 
 def skewed(matrix: SparseArray, gap: float) -> SparseArray:

@@ -13,10 +13,12 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from femubench.core.errors import InputError
-from femubench.core.harness import runner
+from femubench.core.harness import workers
+from femubench.core.harness.jobs import JobOutcome
+from femubench.core.harness.judging import judged
 from femubench.core.harness.results import JobResult
 from femubench.core.harness.runner import run_jobs
-from femubench.core.harness.scoring import leaderboard, score_model
+from femubench.core.harness.scoring import leaderboard, reference_of, score_model
 from femubench.core.harness.store import Store
 from femubench.core.measurement import Measurement
 from femubench.core.model import Model
@@ -85,12 +87,16 @@ def everything(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         ("grounded", "ok", ""),
         ("failing", "failed", "used modes reproduced: measured 0.25, allowed 1e-08"),
         ("exiting-7", "crashed", "the worker process ended with exit code 7"),
-        ("exiting-0", "crashed", "the worker process ended with exit code 70"),
+        ("exiting-0", "crashed", "the worker process ended with exit code 0"),
         ("exiting--9", "crashed", "the worker process was ended by SIGKILL"),
         ("looping", "timeout", "no result within 1 s"),
         ("locked", "failed", "_LockedError"),
         ("unpicklable", "failed", "the result cannot be sent back: TypeError: this geometry"),
-        ("unreadable", "failed", "the result cannot be read: RuntimeError: opened in the wrong"),
+        (
+            "unreadable",
+            "failed",
+            "the updated model holds harness_toys._Trap, which cannot be",
+        ),
         ("wrong-size", "failed", "stiffness has shape"),
         ("local", "failed", "Local cannot be sent to a worker process: "),
     ],
@@ -163,6 +169,20 @@ def test_a_strategy_cannot_find_held_out_data(everything: dict[str, Any]) -> Non
         assert (item.diagnostics["numbers"], item.diagnostics["words"]) == (0.0, 0.0)
 
 
+def test_a_strategy_cannot_find_held_out_data_in_its_memory(everything: dict[str, Any]) -> None:
+    case = everything["case"]
+    frequencies = [float(f) for f in case.measurement.frequencies]
+    changed = case.modifications[0].measurement.frequencies
+    held_out = frozenset([*frequencies[3:], *map(float, changed)])
+    spy = toys.Rummager(held_out, frozenset(frequencies[:3]))
+    (result,) = run_jobs([case], [spy], jobs=1).results
+    assert result.status == "ok", result.reason
+    found = result.diagnostics
+    assert found["bytes"] > 2**24  # it did look around
+    assert found["used"] > 0.0  # and finds what it was given
+    assert found["held_out"] == 0.0
+
+
 def test_seeds_draw_noise_for_the_strategy_and_score_against_the_record(
     everything: dict[str, Any],
 ) -> None:
@@ -225,10 +245,11 @@ def test_an_interrupt_stops_the_workers_and_keeps_what_is_done(
 def test_workers_that_cannot_start_end_the_run(
     everything: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(runner, "prepare", toys.cannot_start)
+    monkeypatch.setattr(workers, "serve", toys.cannot_start)
     run = run_jobs([everything["case"]], [toys.Unchanged(), toys.Softer()], jobs=1)
     assert {item.status for item in run.results} == {"crashed"}
-    assert {item.reason for item in run.results} == {"no worker process could start"}
+    reasons = {item.reason for item in run.results}
+    assert reasons == {"the worker process ended with exit code 3 before it was ready"}
 
 
 def test_wrong_input_is_told() -> None:
@@ -243,10 +264,8 @@ def test_wrong_input_is_told() -> None:
 
 def test_a_model_that_cannot_be_solved_has_failed() -> None:
     case = toys.tiny_case()
-    reference = runner.reference_of(case)
     massless = replace(case.model, mass=case.model.mass * 0.0)
-    slot = runner._Slot(case, "s", 0, None)
-    result = runner._judged(slot, runner.JobOutcome("ok", model=massless), reference)
+    result = judged(case, reference_of(case), "s", 0, JobOutcome("ok", model=massless))
     assert result.status == "failed"
     assert result.reason
     assert np.isclose(result.score, 10.0)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -116,16 +117,35 @@ def test_a_last_line_without_its_end_is_kept(tmp_path: Path) -> None:
     assert len(store.load().results) == 2
 
 
+def full(descriptor: int, data: bytes) -> int:
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def nearly_full(descriptor: int, data: bytes, real: Callable[[int, bytes], int] = os.write) -> int:
+    return real(descriptor, data[:10])
+
+
+@pytest.mark.parametrize("write", [full, nearly_full])
 def test_a_record_that_does_not_fit_on_the_disk_leaves_no_trace(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    write: Callable[[int, bytes], int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = stored(tmp_path, results=[GOOD])
     before = store.path.read_bytes()
-    real = os.write
-    monkeypatch.setattr(os, "write", lambda descriptor, data: real(descriptor, data[:10]))
-    with pytest.raises(OSError, match="could not be written in full"):
+    monkeypatch.setattr(os, "write", write)
+    with pytest.raises(InputError, match="cannot be written: No space left on device") as caught:
         store.append(META["run"], BAD)
+    assert str(store.path) in str(caught.value)
+    assert "\n" not in str(caught.value)
     assert store.path.read_bytes() == before
+
+
+def test_a_store_that_cannot_be_made_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    store = Store(tmp_path / "file" / "store")
+    with pytest.raises(InputError, match=r"file/store.*: .*written: Not a directory"):
+        store.begin(META)
+    with pytest.raises(InputError, match="written: Not a directory"), store.exclusive("r"):
+        pass
 
 
 @pytest.mark.parametrize(

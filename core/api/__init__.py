@@ -73,7 +73,7 @@ _NAMES = {
     "plugin.markers": "hookimpl",
     "plugin.roles": "Effect Reader Reporter Scenario",
     "reproduction.cell": "Cell Page",
-    "reproduction.study": "Extra Study",
+    "reproduction.study": "Extra Study verdict_counts",
     "reproduction.workbench": "Workbench",
     "strategy": "ParameterEstimate Strategy UpdateResult",
     "typing": "FloatArray IntArray SparseArray",
@@ -213,7 +213,9 @@ if TYPE_CHECKING:
         Effect as Effect, Reader as Reader, Reporter as Reporter, Scenario as Scenario,
     )
     from femubench.core.reproduction.cell import Cell as Cell, Page as Page
-    from femubench.core.reproduction.study import Extra as Extra, Study as Study
+    from femubench.core.reproduction.study import (
+        Extra as Extra, Study as Study, verdict_counts as verdict_counts,
+    )
     from femubench.core.reproduction.workbench import Workbench as Workbench
     from femubench.core.strategy import (
         ParameterEstimate as ParameterEstimate, Strategy as Strategy, UpdateResult as UpdateResult,

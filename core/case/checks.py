@@ -100,7 +100,9 @@ def _check_members(model: FrameSpec) -> None:
         elements += member.elements
         if elements > _MOST_ELEMENTS:
             what = f"more than {_MOST_ELEMENTS} elements"
-            raise Fault(("members", i, "elements"), what, "fewer elements")
+            raise Fault(
+                ("members", i, "elements"), what, f"fewer elements, {_MOST_ELEMENTS} in all at most"
+            )
 
 
 def _check_up(model: FrameSpec, i: int, along: FloatArray) -> None:

@@ -54,8 +54,12 @@ def dotted(path: KeyPath) -> str:
     """Return ``model.members[2].ends`` for a key path."""
     text = ""
     for part in path:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}"
+        text += f"[{part}]" if isinstance(part, int) else f".{_clipped(part)}"
     return text.lstrip(".")
+
+
+def _clipped(text: str) -> str:
+    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 3] + "..."
 
 
 def shown(value: object) -> str:
@@ -66,7 +70,7 @@ def shown(value: object) -> str:
     if isinstance(value, int) and not isinstance(value, bool) and abs(value) > 10**_LONGEST_VALUE:
         return "a very large number"
     text = str(value).lower() if isinstance(value, bool) else repr(value)
-    return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 3] + "..."
+    return _clipped(text)
 
 
 def first_fault(error: ValidationError, schema: type[BaseModel]) -> Fault:
@@ -90,7 +94,7 @@ def first_fault(error: ValidationError, schema: type[BaseModel]) -> Fault:
     if kind == "missing":
         return Fault(path, "missing key", expected)
     if kind == "extra_forbidden":
-        near = get_close_matches(str(path[-1]), owner.model_fields, n=1)
+        near = get_close_matches(_clipped(str(path[-1])), owner.model_fields, n=1)
         hint = f"; is {near[0]!r} meant?" if near else ""
         return Fault(path, f"unknown key{hint}", f"one of {', '.join(owner.model_fields)}")
     if kind.startswith("union_tag"):

@@ -12,10 +12,12 @@ from femubench.core.fem.frame import Place
 T = TypeVar("T")
 
 LARGEST, SMALLEST = 1e30, 1e-30
-ID = r"^[^\s\x00-\x1f\x7f@/:](?:[^\x00-\x1f\x7f@/:]*[^\s\x00-\x1f\x7f@/:])?$"
+# What a terminal obeys or what turns the direction of writing: no name and no title has it.
+_CONTROL = r"\x00-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069"
+ID = rf"^[^\s{_CONTROL}@/:](?:[^{_CONTROL}@/:]*[^\s{_CONTROL}@/:])?$"
 AT = 'a joint "A", a point "member@0.25" or {member = "name", s = 0.25}'
-_CASE = r"^[^\s\x00-\x1f\x7f](?:[^\x00-\x1f\x7f]*[^\s\x00-\x1f\x7f])?$"
-_LINE = r"^[^\x00-\x1f\x7f]*$"
+_CASE = rf"^[^\s{_CONTROL}](?:[^{_CONTROL}]*[^\s{_CONTROL}])?$"
+_LINE = rf"^[^{_CONTROL}]*$"
 _DIRECTION = r"^[+-]?(x|y|z|rx|ry|rz)$"
 
 

@@ -3,27 +3,44 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import posixpath
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
+from femubench.core import reading
 from femubench.core.case.faults import Misfit
 from femubench.core.errors import InputError
+from femubench.core.reading import MIB
 
-LARGEST_TEXT = 64 * 2**20  # bytes
+LARGEST_CASE = 16 * MIB  # bytes of case.toml
+LARGEST_TEXT = 64 * MIB  # of a table
+LARGEST_FILE = 1024 * MIB  # of a matrix, or what a reader plugin reads
 CASE_FILE = "case.toml"
+_CHUNK = MIB
 
 
 class CaseFiles:
-    """A case folder and the files of it that were asked for."""
+    """A case folder and the files of it that were asked for.
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    The folder itself may be reached by links, which are the user's own; a link inside it that
+    leads out of it is refused, for it came with the case.
+
+    Arguments:
+        folder: with a `case.toml`.
+        links: whether links may lead out all the same.
+    """
+
+    def __init__(self, folder: Path, *, links: bool = False) -> None:
+        self.folder, self.links = folder, links
         self.names: set[str] = {CASE_FILE}
-        if not folder.is_dir():
+        if not _is_folder(folder):
             expected = f"a folder with a {CASE_FILE}"
             raise InputError("folder does not exist", file=folder, expected=expected)
-        if not self.case_file.is_file():
+        if not os.path.lexists(self.case_file):
             raise InputError("missing file", file=self.case_file, expected="the file of the case")
+        if not self._holds(self.case_file):
+            what = "a link that leads out of the case folder, or nowhere"
+            raise InputError(what, file=self.case_file, expected="a file inside the folder")
 
     @property
     def case_file(self) -> Path:
@@ -34,7 +51,8 @@ class CaseFiles:
         """Return the path of a file that the case names.
 
         Raises:
-            Misfit: when it lies outside the folder or does not exist.
+            Misfit: when it lies outside the folder, also by a link, does not exist, is no regular
+                file or is too large.
         """
         windows = PureWindowsPath(name)
         normal = posixpath.normpath(name.replace("\\", "/"))
@@ -42,35 +60,53 @@ class CaseFiles:
         if outside or PurePosixPath(normal).is_absolute() or windows.drive or windows.root:
             raise Misfit(f"{name!r} leads out of the case folder", "a file inside the folder")
         path = self.folder / normal
-        if not path.is_file():
+        if not os.path.lexists(path):
             raise Misfit(f"there is no file {name!r}", f"a file in {self.folder}")
+        if not self._holds(path):
+            what = f"{name!r} is a link that leads out of the case folder, or nowhere"
+            raise Misfit(what, "a file inside the folder")
+        try:
+            reading.check_regular(path, LARGEST_FILE)
+        except InputError as error:
+            raise Misfit(f"{name!r}: {error.what}", error.expected or "a file") from None
         self.names.add(normal)
         return path
+
+    def _holds(self, path: Path) -> bool:
+        """Tell whether a path ends inside the folder once all links are followed."""
+        try:
+            found = path.resolve(strict=True)
+            return self.links or found.is_relative_to(self.folder.resolve())
+        except (OSError, RuntimeError):  # RuntimeError: links in a circle
+            return False
 
     def digest(self) -> str:
         """Return the sha256 over names and contents of all files asked for so far."""
         total = hashlib.sha256()
         for name in sorted(self.names):
-            content = (self.folder / name).read_bytes()
-            total.update(f"{name}\0{len(content)}\0".encode())
-            total.update(content)
+            path = self.folder / name
+            with reading.open_regular(path, LARGEST_FILE) as stream:
+                size = os.fstat(stream.fileno()).st_size
+                total.update(f"{name}\0{size}\0".encode())
+                try:
+                    while chunk := stream.read(_CHUNK):
+                        total.update(chunk)
+                except OSError as error:
+                    raise reading.unreadable(path, error) from None
         return total.hexdigest()
 
 
-def read_text(path: Path) -> str:
+def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
     """Return the text of a file, without a byte order mark, with any kind of line ends.
 
     Raises:
         InputError: when it cannot be read, is too large, or is not UTF-8.
     """
+    return reading.read_text(path, largest)
+
+
+def _is_folder(path: Path) -> bool:
     try:
-        if path.stat().st_size > LARGEST_TEXT:
-            expected = f"at most {LARGEST_TEXT // 2**20} MiB"
-            raise InputError("file is too large", file=path, expected=expected)
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=path) from None
-    except UnicodeDecodeError as error:
-        line = error.object[: error.start].count(b"\n") + 1
-        raise InputError("not a text", file=path, line=line, expected="UTF-8") from None
-    return text.replace("\r\n", "\n").replace("\r", "\n")
+        return path.is_dir()
+    except (OSError, ValueError):  # a name that is too long, a folder that may not be entered
+        return False

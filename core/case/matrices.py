@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +15,7 @@ from femubench.core.case.checks import check_unique
 from femubench.core.case.faults import Fault, Misfit, at_key
 from femubench.core.case.fields import LARGEST
 from femubench.core.case.files import CaseFiles
+from femubench.core.case.matrix_text import MatrixText
 from femubench.core.case.nodes import MatrixGeometry, read_dofs
 from femubench.core.case.schema import GroupSpec, MatricesSpec
 from femubench.core.errors import FemubenchError, InputError
@@ -21,7 +23,9 @@ from femubench.core.model import Model
 from femubench.core.plugin.roles import Reader
 from femubench.core.typing import SparseArray
 
-_MOST_DENSE = 20_000
+_MOST_DENSE = 10_000  # rows of a matrix in array form
+_MOST_ENTRIES = 50_000_000  # of a matrix in coordinate form
+_BROKEN = (ValueError, OverflowError, OSError, EOFError, IndexError, TypeError, MemoryError)
 _ASYMMETRY = 1e-8  # of the largest entry
 _MATRIX_MARKET = (".mtx", ".mtx.gz", ".mtx.bz2")
 
@@ -98,14 +102,20 @@ def reading_with(reader: Reader, file: Path) -> Iterator[None]:
 def _matrix_market(file: Path, size: int) -> SparseArray:
     expected = "a Matrix Market file, coordinate or array, real, symmetric or general"
     try:
-        rows, columns, _, form, field, symmetry = scipy.io.mminfo(file)
+        with MatrixText(file) as text:
+            rows, columns, entries, form, field, symmetry = scipy.io.mminfo(text)
         if field not in ("real", "integer") or symmetry not in ("general", "symmetric"):
             raise InputError(f"a matrix that is {field} {symmetry}", file=file, expected=expected)
         if (rows, columns) != (size, size) or (form == "array" and size > _MOST_DENSE):
             what = f"the matrix has {rows} rows and {columns} columns"
             raise InputError(what, file=file, expected=f"{size} of both as in the dofs file")
-        return sp.csc_array(scipy.io.mmread(file, spmatrix=False))
-    except (ValueError, OverflowError, OSError, EOFError, IndexError, TypeError) as error:
+        # The header is believed when memory is taken for the entries.
+        if form == "coordinate" and not 0 <= entries <= _MOST_ENTRIES:
+            what = f"the matrix has {entries} entries"
+            raise InputError(what, file=file, expected=f"at most {_MOST_ENTRIES}")
+        with MatrixText(file) as text:
+            return sp.csc_array(scipy.io.mmread(text, spmatrix=False))
+    except (*_BROKEN, zlib.error) as error:
         raise InputError(f"cannot be read: {error}", file=file, expected=expected) from None
 
 
@@ -167,7 +177,7 @@ def _rows(
     node, _, direction = entry.rpartition(":")
     if (node, direction) in rows:
         return [rows[node, direction]]
-    found = [row for (name, _), row in rows.items() if name == entry]
+    found = geometry.rows_of.get(entry)
     if not found:
         raise Misfit(f"there is no dof {entry[:60]!r}", 'a row number, "node" or "node:direction"')
     return found

@@ -17,6 +17,7 @@ from femubench.core.modal.complex_modes import real_modes
 from femubench.core.typing import FloatArray
 
 FREQUENCY_STD = 0.005  # of the frequency, where the table gives none
+_MOST_NUMBERS = 20_000_000  # modes times sensors
 NO_SENSORS = Sensors((), np.zeros((0, 3)), ())
 
 
@@ -37,6 +38,9 @@ def read_modes(file: Path, sensors: Sensors, shape_std: float) -> Measurement:
     table.check_columns(("mode", "frequency"), known)
     if not table.rows:
         raise InputError("no modes", file=file, expected="a row for every mode")
+    if len(table.rows) * len(labels) > _MOST_NUMBERS:
+        what = f"{len(table.rows)} modes at {len(labels)} sensors are too many numbers"
+        raise InputError(what, file=file, expected=f"at most {_MOST_NUMBERS}")
     numbers: dict[int, None] = {}
     for row in table.rows:
         number = row.whole("mode")

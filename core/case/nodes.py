@@ -44,6 +44,14 @@ class MatrixGeometry:
         return {(self.names[node], direction): i for i, (node, direction) in enumerate(pairs)}
 
     @cached_property
+    def rows_of(self) -> dict[str, list[int]]:
+        """Return from a node to its rows."""
+        found: dict[str, list[int]] = {}
+        for (name, _), row in self.rows.items():
+            found.setdefault(name, []).append(row)
+        return found
+
+    @cached_property
     def places(self) -> dict[str, FloatArray]:
         """Return where the nodes are in m."""
         first = np.unique(self.dofs.node, return_index=True)[1]

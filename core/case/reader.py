@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from femubench.core.case.case import Case, Modification
 from femubench.core.case.checks import check_unique
 from femubench.core.case.faults import Fault, KeyPath, at_key, dotted, first_fault
-from femubench.core.case.files import CaseFiles, read_text
+from femubench.core.case.files import LARGEST_CASE, CaseFiles, read_text
 from femubench.core.case.frames import FrameSite, Site, frame_of, ground_springs, point_masses
 from femubench.core.case.matrices import matrix_model, reader_of, reading_with
 from femubench.core.case.modes import (
@@ -40,26 +40,37 @@ _MESHED = (
     ("rigid_ends", "rigid end", "a shorter one"),
     ("preloads", "lack of fit", "a member of a ring with all constants of its section"),
 )
+_MOST_CHANGED = 5_000_000  # every change is built once while the case is read
+# The look-behind and the possessive plus keep the search linear.
+_LONG_KEY = re.compile(r"""(?<![\w"'.-])(?:["'\w-]++[ \t]*+\.[ \t]*+){50}""")
 _AT_LINE = re.compile(r"\s*\(at line (\d+), column \d+\)")
 
 
-def read_case(folder: Path, name: str | None = None, readers: Sequence[Reader] = ()) -> Case:
+def read_case(
+    folder: Path,
+    name: str | None = None,
+    readers: Sequence[Reader] = (),
+    *,
+    installed: bool = False,
+) -> Case:
     """Read a case folder.
 
     Arguments:
         folder: a folder with a `case.toml`.
         name: the name to give to the case; None takes its own.
         readers: reader plugins for files other than CSV and Matrix Market.
+        installed: whether the folder came with an installed package; some installers make such
+            a folder of links that lead out of it.
 
     Raises:
         InputError: for anything wrong in the folder.
     """
-    files = CaseFiles(Path(folder))
-    text = read_text(files.case_file)
+    files = CaseFiles(Path(folder), links=installed)
+    text = read_text(files.case_file, LARGEST_CASE)
     try:
         return _Building(files, _parsed(text, files.case_file), tuple(readers)).case(name)
     except Fault as fault:
-        line = line_of(key_lines(text), fault.path)
+        line = _line(text, fault.path)
         raise InputError(
             fault.what,
             file=files.case_file,
@@ -69,13 +80,24 @@ def read_case(folder: Path, name: str | None = None, readers: Sequence[Reader] =
         ) from None
 
 
+def _line(text: str, path: KeyPath) -> int | None:
+    try:
+        return line_of(key_lines(text), path)
+    except RecursionError:  # nearly too deep for the parser, and too deep for this one
+        return None
+
+
 def _parsed(text: str, file: Path) -> CaseSpec:
+    deep = InputError("nested too deeply", file=file, expected="a flat table")
+    # The parser takes time with the square of the parts of a dotted key.
+    if _LONG_KEY.search(text):
+        raise deep
     try:
         return parse_spec(tomllib.loads(text))
     except ValidationError as error:
         raise first_fault(error, CaseSpec) from None
     except RecursionError:
-        raise InputError("nested too deeply", file=file, expected="a flat table") from None
+        raise deep from None
     except tomllib.TOMLDecodeError as error:
         found = _AT_LINE.search(str(error))
         line = int(found.group(1)) if found else None
@@ -205,6 +227,9 @@ class _Building:
     def modifications(self, model: Model, site: Site, sensors: Sensors) -> tuple[Modification, ...]:
         specs = self.spec.modification
         check_unique((("modification", i, "name"), spec.name) for i, spec in enumerate(specs))
+        if len(specs) * model.size > _MOST_CHANGED:
+            what = f"{len(specs)} changes of {model.size} degrees of freedom"
+            raise Fault(("modification",), what, f"a product of at most {_MOST_CHANGED}")
         return tuple(
             self.modification(i, spec, model, site, sensors) for i, spec in enumerate(specs)
         )

@@ -43,6 +43,8 @@ from femubench.core.case.fields import (
 )
 from femubench.core.fem.frame import BeamTheory, BendingMass, Plane
 
+_MOST = 20_000  # entries of a list whose work grows with its length
+
 
 class CaseInfo(Table):
     """`[case]`."""
@@ -163,9 +165,11 @@ class FrameSpec(Table):
     members: Annotated[Many[MemberSpec], Field(min_length=1, max_length=20_000)] = Field(
         description="tables [[model.members]], one at least"
     )
-    masses: Many[MassSpec] = Field((), description="tables [[model.masses]]")
-    springs: Many[SpringSpec] = Field((), description="tables [[model.springs]]")
-    supports: Many[SupportSpec] = Field((), description="tables [[model.supports]]")
+    masses: Many[MassSpec] = Field((), max_length=_MOST, description="tables [[model.masses]]")
+    springs: Many[SpringSpec] = Field((), max_length=_MOST, description="tables [[model.springs]]")
+    supports: Many[SupportSpec] = Field(
+        (), max_length=_MOST, description="tables [[model.supports]]"
+    )
     joint_springs: Many[JointSpringSpec] = Field((), description="tables [[model.joint_springs]]")
     rigid_ends: Many[RigidEndSpec] = Field((), description="tables [[model.rigid_ends]]")
     factors: Many[FactorSpec] = Field((), description="tables [[model.factors]]")
@@ -195,7 +199,9 @@ class MatricesSpec(Table):
     mass: FileName = Field(description="a matrix file in the case folder")
     stiffness: FileName = Field(description="a matrix file in the case folder")
     dofs: FileName = Field(description="a CSV file: row,node,direction,x,y,z")
-    groups: Many[GroupSpec] = Field((), description="tables [[model.groups]]")
+    groups: Many[GroupSpec] = Field(
+        (), max_length=1000, description="tables [[model.groups]], 1000 at most"
+    )
 
 
 class WeightSpec(Table):
@@ -225,8 +231,10 @@ class ModificationSpec(Table):
     """`[[modification]]`."""
 
     name: Text = Field(description="one line of text")
-    masses: Many[MassSpec] = Field((), description="a list of {at, mass, offset}")
-    springs: Many[SpringSpec] = Field((), description="a list of {at, direction, stiffness}")
+    masses: Many[MassSpec] = Field((), max_length=_MOST, description="a list of {at, mass, offset}")
+    springs: Many[SpringSpec] = Field(
+        (), max_length=_MOST, description="a list of {at, direction, stiffness}"
+    )
     modes: FileName = Field(description="a file in the case folder")
 
 
@@ -247,7 +255,9 @@ class CaseSpec(Table):
         description="the table [model]"
     )
     measurement: MeasurementSpec = Field(description="the table [measurement]")
-    modification: Many[ModificationSpec] = Field((), description="tables [[modification]]")
+    modification: Many[ModificationSpec] = Field(
+        (), max_length=200, description="tables [[modification]], 200 at most"
+    )
     diagnosis: DiagnosisSpec = Field(DiagnosisSpec(), description="the table [diagnosis]")
 
 

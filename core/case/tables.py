@@ -21,7 +21,9 @@ from femubench.core.errors import InputError
 from femubench.core.fem.frame import Place, Vector
 from femubench.core.measurement import DIRECTIONS, Sensors
 
-_MOST_ROWS, _MOST_COLUMNS = 1_000_000, 50_000
+_MOST_ROWS, _MOST_COLUMNS, _MOST_CELLS = 1_000_000, 50_000, 10_000_000
+_MOST_SENSORS = 50_000
+_LONGEST_NUMBER = 100
 _REAL = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _NUMBER = re.compile(_REAL, re.ASCII)
 _COMPLEX = re.compile(rf"\(?(?:({_REAL})(?=[+-]))?({_REAL})[ijIJ]\)?", re.ASCII)
@@ -67,6 +69,9 @@ class Row:
         cell = self.cells.get(column, "")
         if not cell:
             return None
+        # No number is this long, and the patterns below take the square of a cell's length.
+        if len(cell) > _LONGEST_NUMBER:
+            raise self.error(column, f"{_shown(cell)} is too long", "a number")
         compact = "".join(cell.split())
         match = _COMPLEX.fullmatch(compact)
         if match is not None:
@@ -142,7 +147,7 @@ class Table:
                     "unknown column",
                     file=self.file,
                     line=1,
-                    key=column,
+                    key=column[:60],
                     expected=", ".join([*required, *sorted(set(known).difference(required))])[:200],
                 )
 
@@ -173,6 +178,8 @@ def read_table(file: Path) -> Table:
             rows.append(Row(file, reader.line_num, dict(zip(columns, cells, strict=True))))
             if len(rows) > _MOST_ROWS:
                 raise InputError("too many rows", file=file, expected=f"at most {_MOST_ROWS}")
+            if len(rows) * len(columns) > _MOST_CELLS:
+                raise InputError("too many cells", file=file, expected=f"at most {_MOST_CELLS}")
     except csv.Error as error:
         what = f"not a table: {error}"
         expected = "cells separated by commas"
@@ -183,15 +190,19 @@ def read_table(file: Path) -> Table:
 
 
 def _header(file: Path, line: int, cells: list[str]) -> tuple[str, ...]:
+    if len(cells) > _MOST_COLUMNS:
+        raise InputError("too many columns", file=file, expected=f"at most {_MOST_COLUMNS}")
+    seen: set[str] = set()
     for i, cell in enumerate(cells):
         if not cell or not cell.isprintable():
             what = f"column {i + 1} has no name"
             raise InputError(what, file=file, line=line, expected="a name for every column")
-        if cell in cells[:i]:
-            what = "column is listed twice"
-            raise InputError(what, file=file, line=line, key=cell, expected="every column once")
-    if len(cells) > _MOST_COLUMNS:
-        raise InputError("too many columns", file=file, expected=f"at most {_MOST_COLUMNS}")
+        if cell in seen:
+            what = f"column {_shown(cell)} is listed twice"
+            raise InputError(
+                what, file=file, line=line, key=cell[:60], expected="every column once"
+            )
+        seen.add(cell)
     return tuple(cells)
 
 
@@ -205,6 +216,8 @@ def read_sensors(file: Path, site: Site) -> Sensors:
     by_place = "at" in table.columns
     place = ("at",) if by_place else ("x", "y", "z")
     table.check_columns(("label", *place, "direction"))
+    if len(table.rows) > _MOST_SENSORS:
+        raise InputError("too many sensors", file=file, expected=f"at most {_MOST_SENSORS}")
     labels: dict[str, None] = {}
     points, directions = [], []
     for row in table.rows:
@@ -233,6 +246,8 @@ def parse_place(text: str) -> Place:
     member, found, station = text.rpartition("@")
     if not found:
         return Place(joint=text)
+    if len(station) > _LONGEST_NUMBER:
+        raise Misfit("a station is too long", "member@s with s in 0..1")
     if not _NUMBER.fullmatch(station) or not 0.0 <= float(station) <= 1.0:
         raise Misfit(f"{station[:20]!r} is not a station", "member@s with s in 0..1")
     return Place(member=member, s=float(station))

@@ -20,6 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from femubench.core.challenge.truth import Truth
 from femubench.core.errors import InputError
+from femubench.core.reading import read_bytes
 
 SEALED_FILE = "truth.sealed"
 _FORMAT = "femubench-sealed-1"
@@ -100,14 +101,7 @@ def read_small(path: Path, largest: int) -> str:
         InputError: when it cannot be read, is larger, or is no text.
     """
     try:
-        with path.open("rb") as stream:
-            content = stream.read(largest + 1)
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=path) from None
-    if len(content) > largest:
-        raise InputError("file is too large", file=path, expected=f"at most {largest} bytes")
-    try:
-        return content.decode("utf-8")
+        return read_bytes(path, largest).decode("utf-8")
     except UnicodeDecodeError:
         raise InputError("not a text", file=path, expected="UTF-8") from None
 

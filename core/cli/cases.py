@@ -31,7 +31,11 @@ def read_cases(words: Sequence[str], plugins: Plugins) -> list[Case]:
             wanted.setdefault(folder.resolve(), (name, folder))
     if not wanted:
         raise InputError("there is no case to run", expected="a case folder or a scenario plugin")
-    cases = [read_case(folder, name, readers) for name, folder in wanted.values()]
+    # A name is that of a scenario, whose folder came with a plugin.
+    cases = [
+        read_case(folder, name, readers, installed=name is not None)
+        for name, folder in wanted.values()
+    ]
     _check_names(cases)
     return cases
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +11,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from femubench.core.cli.cases import read_cases
-from femubench.core.cli.files import check_writable, make_folder, write_atomically
+from femubench.core.cli.files import (
+    check_can_make,
+    check_writable,
+    make_folder,
+    write_atomically,
+)
 from femubench.core.cli.registry import chosen, plugins_for
 from femubench.core.errors import FemubenchError, InputError, NotApplicable
 
@@ -156,11 +160,7 @@ def _check_new(folder: Path) -> None:
     """
     if folder.is_dir() and any(folder.iterdir()):
         raise InputError("is not empty", file=folder, expected="a new or an empty folder")
-    above = folder
-    while not above.exists() and above != above.parent:
-        above = above.parent
-    if not above.is_dir() or not os.access(above, os.W_OK | os.X_OK):
-        raise InputError("cannot be written to", file=above, expected="a folder of yours")
+    check_can_make(folder)
 
 
 def _has_model(found: Diagnosis) -> bool:

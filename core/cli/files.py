@@ -23,6 +23,19 @@ def check_writable(path: Path) -> None:
         raise InputError("folder cannot be written to", file=path.parent)
 
 
+def check_can_make(folder: Path) -> None:
+    """Make sure that a folder is there or can be made, before the work that fills it.
+
+    Raises:
+        InputError: when it, or the nearest folder above it, cannot be written to.
+    """
+    above = folder
+    while not above.exists() and above != above.parent:
+        above = above.parent
+    if not above.is_dir() or not os.access(above, os.W_OK | os.X_OK):
+        raise InputError("cannot be written to", file=above, expected="a folder of yours")
+
+
 def make_folder(folder: Path) -> None:
     """Make a folder with its parents.
 

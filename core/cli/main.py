@@ -27,6 +27,10 @@ VERBS = {
     "run": ("femubench.core.cli.run", "Run strategies on cases and rank them."),
     "report": ("femubench.core.cli.report", "Write a report on a stored run."),
     "diagnose": ("femubench.core.cli.diagnose", "Find what a model lacks, and extend it."),
+    "reproduce": (
+        "femubench.core.cli.reproduce",
+        "Recompute the tables of the papers, cell by cell.",
+    ),
     "init": (
         "femubench.core.cli.init",
         "Write a commented example case into FOLDER, which must be new or empty.",
@@ -36,7 +40,7 @@ VERBS = {
         "Write blind cases with a hidden fault, and judge answers.",
     ),
     "scenarios": ("femubench.core.cli.scenarios", "List the built-in scenarios, or show one."),
-    "plugins": ("femubench.core.cli.plugins", "List the plugins and what is wrong with them."),
+    "plugins": ("femubench.core.cli.plugins", "List, show and check plugins, or write a new one."),
 }
 
 

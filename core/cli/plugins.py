@@ -1,16 +1,46 @@
-"""``bench plugins``: what is installed and what is wrong with it."""
+"""``bench plugins``: what is installed, what is wrong with it, and a start for one's own."""
 
 from __future__ import annotations
 
+from importlib import import_module
+from pathlib import Path
+
 import click
 
-from femubench.core.cli.registry import warn, wrapped
-from femubench.core.plugin.loader import load_plugins
+from femubench.core.cli.registry import plugins_for, warn, wrapped
+from femubench.core.errors import InputError
+from femubench.core.plugin.loader import Plugins, load_plugins
+from femubench.core.plugin.validation import CHECKS, did_you_mean
+
+# What `new` writes, as in `KINDS` of the module that does it.
+_KINDS = ("strategy", "effect", "scenario", "reader")
+_NEXT = {
+    "strategy": "bench run frame -s {name} -s unchanged",
+    "effect": "bench init portal && bench diagnose portal --effects {name}",
+    "scenario": "bench run {name}",
+    "reader": "bench run {folder}/tests/case",
+}
 
 
-@click.group("plugins")
+class _Verbs(click.Group):
+    """A group whose verb `check` is imported when it is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs in the order in which one needs them."""
+        return ["list", "show", "new", "check"]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Return one verb."""
+        if cmd_name != "check":
+            return super().get_command(ctx, cmd_name)
+        command = import_module("femubench.core.cli.plugins_check").check
+        assert isinstance(command, click.Command)
+        return command
+
+
+@click.group("plugins", cls=_Verbs)
 def plugins() -> None:
-    """List the plugins and what is wrong with them."""
+    """List, show and check plugins, or write a new one."""
 
 
 @plugins.command("list")
@@ -31,3 +61,59 @@ def list_(ctx: click.Context, traceback: bool) -> None:
     warn(found.broken, with_traceback=wanted)
     if found.broken and not wanted:
         click.echo("bench plugins list --traceback tells where these come from", err=True)
+
+
+@plugins.command("show")
+@click.argument("name")
+@click.pass_context
+def show(ctx: click.Context, name: str) -> None:
+    """Show what NAME is, where it comes from, what it needs, and its options.
+
+    NAME is a strategy, scenario, effect, reader or reporter, or a plugin of `bench plugins list`.
+    """
+    from femubench.core.cli.plugin_pages import pages_of
+
+    found = plugins_for(ctx)
+    pages = list(pages_of(name, found))
+    if not pages:
+        hint = did_you_mean(name, _names(found)) or "; bench plugins list names all there are"
+        raise InputError(f"no plugin offers {name!r}{hint}")
+    click.echo("\n\n".join(pages))
+
+
+@plugins.command("new")
+@click.argument("name")
+@click.option(
+    "--kind",
+    type=click.Choice(_KINDS),
+    default="strategy",
+    show_default=True,
+    help="What the package brings.",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=".",
+    metavar="DIR",
+    help="Write the folder NAME there. Default: here.",
+)
+@click.pass_context
+def new(ctx: click.Context, name: str, kind: str, output: Path) -> None:
+    """Write a pip-installable package with a working plugin in the new folder NAME.
+
+    NAME, of lower-case letters, digits and dashes, is also the name of what the plugin brings.
+    """
+    from femubench.core.plugin.new_package import write_package
+
+    for path in write_package(name, kind, output, plugins_for(ctx)):
+        click.echo(f"wrote {path}")
+    folder = output / name
+    click.echo(f"Install it: pip install -e {folder}")
+    click.echo(f"then run:   {_NEXT[kind].format(name=name, folder=folder)}")
+
+
+def _names(found: Plugins) -> list[str]:
+    """Return every name that `show` takes."""
+    offered = [name for kind in CHECKS for name in getattr(found, kind)]
+    return list(dict.fromkeys([*offered, *(plugin.plugin for plugin in found.loaded)]))

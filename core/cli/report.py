@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import os
 from pathlib import Path
 
 import click
@@ -10,9 +10,8 @@ import click
 from femubench.core.cli.files import make_folder, write_atomically
 from femubench.core.cli.registry import chosen, plugins_for, store_folder
 from femubench.core.cli.reporting import rendered, run_name
-from femubench.core.errors import InputError
-from femubench.core.harness.frames import run_from_json
 from femubench.core.harness.results import Run
+from femubench.core.harness.serial import read_run
 from femubench.core.harness.store import Store
 
 FOLDER = click.Path(path_type=Path, file_okay=False)
@@ -68,13 +67,6 @@ def report(
 
 def _find(word: str | None, folder: Path) -> Run:
     """Return a run from a file or from the store."""
-    if word is None or not Path(word).is_file():
-        return Store(folder).load(word)
-    path = Path(word)
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as fault:
-        raise InputError(
-            f"not JSON: {fault}", file=path, expected="what 'bench run --json' writes"
-        ) from fault
-    return run_from_json(data, file=path)
+    if word is not None and os.path.exists(word) and not os.path.isdir(word):
+        return read_run(Path(word))
+    return Store(folder).load(word)

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import click
 
 import femubench
-from femubench.core.case.case import Case
 from femubench.core.cli.cases import read_cases
-from femubench.core.cli.durations import seconds_of, spoken
 from femubench.core.cli.files import check_writable, make_folder, write_atomically
 from femubench.core.cli.progress import progress_bar
-from femubench.core.cli.registry import chosen, counted, plugins_for, store_folder, wrapped
+from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of
+from femubench.core.cli.registry import counted, plugins_for, store_folder, wrapped
 from femubench.core.cli.reporting import (
     exit_code,
     rendered,
@@ -22,13 +21,33 @@ from femubench.core.cli.reporting import (
     reporter_for,
     run_name,
 )
+from femubench.core.cli.request import (
+    DEFAULT_TIMEOUT,
+    Request,
+    case_words,
+    check_timeouts,
+    request_of,
+    strategy_words,
+)
 from femubench.core.errors import InputError, PluginError
+from femubench.core.harness.recording import Overwrite
+from femubench.core.harness.repeat import environment_differences, result_differences
 from femubench.core.harness.results import Run
 from femubench.core.harness.runner import run_jobs
 from femubench.core.harness.store import Store
 from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.roles import Reporter
 from femubench.core.plugin.variants import strategy_of
+
+
+@dataclass(frozen=True)
+class Choice:
+    """How a run is gone about; none of it decides on results."""
+
+    workers: int
+    overwrite: Overwrite
+    resume: bool
+
 
 FILE = click.Path(path_type=Path, dir_okay=False)
 FOLDER = click.Path(path_type=Path, file_okay=False)
@@ -67,11 +86,38 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
 )
 @click.option(
     "--timeout",
-    callback=seconds_of,
-    default="10m",
+    "timeouts",
+    multiple=True,
+    callback=timeouts_of,
     metavar="DURATION",
-    show_default=True,
-    help="Give up on a job after this time, e.g. 90s, 10m, 1h.",
+    help="Give up on a job after this time, e.g. 90s, 10m, 1h. STRATEGY=DURATION is for one "
+    "strategy; may be repeated. Default: 10m.",
+)
+@click.option(
+    "--memory",
+    callback=bytes_of,
+    metavar="SIZE",
+    help="Stop a job that takes more, e.g. 512M, 4G. Default: an even share of the machine's.",
+)
+@click.option(
+    "--resume",
+    is_flag=True,
+    help="Go on with the last run of these jobs: do what is missing, and failures again. Without "
+    "CASE and -s, with the last run of the store.",
+)
+@click.option(
+    "--overwrite",
+    type=click.Choice(["always", "missing", "failed"]),
+    help="Which stored results of the very same jobs are computed anew: all, none, or the "
+    "failures. Default: always; with --resume: failed.",
+)
+@click.option(
+    "--locked",
+    metavar="RUN",
+    help="Repeat a stored run and say what differs; exit 1 where a result does.",
+)
+@click.option(
+    "--strict-plugins", is_flag=True, help="Stop with exit code 2 where a plugin is broken."
 )
 @click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the results as JSON.")
 @click.option("--csv", "csv_file", type=FILE, metavar="FILE", help="Write one line a job as CSV.")
@@ -97,7 +143,12 @@ def run(
     jobs: int | None,
     seeds: int | None,
     seed: int,
-    timeout: float,
+    timeouts: dict[str, float],
+    memory: int | None,
+    resume: bool,
+    overwrite: Overwrite | None,
+    locked: str | None,
+    strict_plugins: bool,
     json_file: Path | None,
     csv_file: Path | None,
     store: Path | None,
@@ -110,36 +161,75 @@ def run(
     folder with a case.toml. Without any, all built-in scenarios run.
     """
     plugins = plugins_for(ctx)
-    chosen("strategy", (words.partition(":")[0] for words in strategies), plugins.strategies)
-    names = tuple(dict.fromkeys(strategies)) or tuple(plugins.strategies)
-    if not names:
-        raise InputError("there is no strategy to run", expected="a plugin that brings one")
-    selected = [strategy_of(words, plugins.strategies) for words in names]
+    if strict_plugins and plugins.broken:
+        raise PluginError(f"{counted(len(plugins.broken), 'fault')} in plugins, see above")
     outputs = _outputs(plugins, json_file, csv_file, report_file)
-    read = read_cases(cases, plugins)
-    folder = store_folder(store)
-    make_folder(folder)
-    workers = jobs or len(os.sched_getaffinity(0))
-    # Seed 0 is the data as recorded; several runs are draws of noise and nothing else.
-    all_seeds = range(seed, seed + 1) if seeds is None else range(seed + 1, seed + seeds + 1)
-    if not quiet:
-        click.echo(wrapped(_header(read, names, all_seeds, workers, timeout), hanging=2))
-    with progress_bar(quiet=quiet) as progress:
-        outcome = run_jobs(
-            read,
-            selected,
-            seeds=tuple(all_seeds),
-            jobs=workers,
-            timeout=timeout,
-            store=Store(folder),
-            progress=progress,
-            run_seed=seed,
-        )
+    kept = Store(store_folder(store))
+    default = timeouts.pop("", DEFAULT_TIMEOUT)
+    request, old = Request(cases, strategies, seeds, seed, default, timeouts, memory), None
+    if locked is not None:
+        _check_locked(ctx)
+        old = kept.load(locked)
+        request = request_of(old)
+    elif resume and not cases and not strategies and kept.runs():
+        request = request_of(kept.load())
+    request = replace(request, strategies=strategy_words(request.strategies, plugins))
+    choice = Choice(jobs or len(os.sched_getaffinity(0)), overwrite or "always", resume)
+    outcome = _run(request, choice, plugins, kept, quiet=quiet)
     if report_file is None:
         markdown = reporter(plugins, "markdown")
-        outputs[folder / f"{run_name(outcome)}{markdown.suffix}"] = markdown
+        outputs[kept.folder / f"{run_name(outcome)}{markdown.suffix}"] = markdown
     _finish(outcome, outputs, None if quiet else reporter(plugins, "terminal"))
-    return exit_code(outcome)
+    return exit_code(outcome) if old is None else _compare(old, outcome)
+
+
+def _check_locked(ctx: click.Context) -> None:
+    """Refuse words that would make it another run.
+
+    Raises:
+        InputError: naming the first of them.
+    """
+    default = click.core.ParameterSource.DEFAULT
+    for name in ("cases", "strategies", "seeds", "seed", "timeouts", "memory", "resume"):
+        if ctx.get_parameter_source(name) is not default:
+            raise InputError(f"--locked repeats a run as it was; {name} cannot be given beside it")
+
+
+def _run(request: Request, choice: Choice, plugins: Plugins, store: Store, *, quiet: bool) -> Run:
+    """Run what is asked for."""
+    check_timeouts(request.timeouts, request.strategies)
+    selected = [strategy_of(words, plugins.strategies) for words in request.strategies]
+    read = read_cases(request.cases, plugins)
+    make_folder(store.folder)
+    if not quiet:
+        click.echo(wrapped(_header(request, len(read), choice.workers), hanging=2))
+    with progress_bar(quiet=quiet) as progress:
+        return run_jobs(
+            read,
+            selected,
+            seeds=tuple(request.all_seeds),
+            jobs=choice.workers,
+            timeout=request.timeout,
+            timeouts=request.timeouts,
+            memory=request.memory,
+            store=store,
+            overwrite=choice.overwrite,
+            resume=choice.resume,
+            progress=progress,
+            run_seed=request.seed,
+            request=replace(request, cases=case_words(request.cases, plugins)).to_json(),
+        )
+
+
+def _compare(old: Run, new: Run) -> int:
+    """Say what differs between a run and its repetition; return 1 where a result does."""
+    around = environment_differences(old.meta, new.meta)
+    results = result_differences(old, new)
+    for title, lines in (("environment", around), ("results", results)):
+        click.echo(f"{title}: {counted(len(lines), 'difference')} from run {old.meta['run']}")
+        for line in lines:
+            click.echo(wrapped(line, indent=2, hanging=4))
+    return int(bool(results))
 
 
 def _outputs(
@@ -157,17 +247,17 @@ def _outputs(
     return outputs
 
 
-def _header(
-    cases: Sequence[Case], strategies: Sequence[str], seeds: range, workers: int, timeout: float
-) -> str:
+def _header(request: Request, cases: int, workers: int) -> str:
     """Return one line with everything that decides on the outcome."""
+    seeds, strategies = request.all_seeds, len(request.strategies)
     named = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]}-{seeds[-1]}"
     meaning = "data as recorded" if seeds == range(1) else "noise added"
-    total = len(cases) * len(strategies) * len(seeds)
+    own = "".join(f", {name} {spoken(limit)}" for name, limit in request.timeouts.items())
     return (
-        f"femubench {femubench.__version__}: {counted(len(cases), 'case')}, "
-        f"{counted(len(strategies), 'strategy')}, {named} ({meaning}), {counted(total, 'job')}, "
-        f"{counted(workers, 'worker')}, timeout {spoken(timeout)}"
+        f"femubench {femubench.__version__}: {counted(cases, 'case')}, "
+        f"{counted(strategies, 'strategy')}, {named} ({meaning}), "
+        f"{counted(cases * strategies * len(seeds), 'job')}, {counted(workers, 'worker')}, "
+        f"timeout {spoken(request.timeout)}{own}"
     )
 
 

@@ -39,10 +39,24 @@ def _check_sparse(name: str, matrix: Any, size: int) -> None:  # noqa: ANN401 - 
     if not sp.issparse(matrix):
         raise StrategyFailure(f"{name} is {type(matrix).__name__}, expected a sparse array")
     _check_shape(name, matrix.shape, (size, size))
+    _check_indices(name, matrix)
     entries = sp.coo_array(matrix)
     _check_numbers(name, entries.data)
     transposed = sp.csr_array(entries).T
     _check_symmetry(name, sp.csr_array(entries) - transposed, entries.data)
+
+
+def _check_indices(name: str, matrix: Any) -> None:  # noqa: ANN401
+    """Make sure that no index points outside: compiled code would follow it."""
+    try:
+        if matrix.format in ("csr", "csc", "bsr"):
+            matrix.check_format(full_check=True)
+        elif matrix.format == "coo":
+            matrix._check()
+        elif matrix.format != "dia":
+            raise ValueError(f"format {matrix.format}, expected csc, csr, coo, bsr or dia")
+    except (ValueError, TypeError, AttributeError, IndexError) as error:
+        raise StrategyFailure(f"{name} is no valid sparse array: {error}") from error
 
 
 def _check_low_rank(name: str, change: Any, size: int) -> None:  # noqa: ANN401

@@ -138,6 +138,8 @@ def _attempt(
         return JobOutcome("diverged", _text(error), traceback.format_exc())
     except StrategyFailure as error:
         return JobOutcome("failed", _text(error), traceback.format_exc())
+    except MemoryError as error:
+        return JobOutcome("failed", f"out of memory: {one_line(error)}", traceback.format_exc())
     except BaseException as error:  # Ctrl-C does not reach a worker: this is the strategy's own
         return JobOutcome("failed", one_line(error), traceback.format_exc())
 

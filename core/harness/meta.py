@@ -12,6 +12,7 @@ from importlib import metadata
 from typing import Any
 
 from femubench.core.case.case import Case
+from femubench.core.harness.keys import blas_name, cpu_name
 from femubench.core.harness.scoring import Reference
 from femubench.core.strategy import Strategy
 
@@ -28,22 +29,28 @@ def run_meta(
     cases: Sequence[Case],
     strategies: Sequence[Strategy],
     references: Mapping[str, Reference],
-    *,
     seeds: Sequence[int],
-    jobs: int,
-    timeout: float | None,
-    run_seed: int,
+    settings: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Return the meta data of a run: id, seeds, versions, machine, commit, cases, references."""
+    """Return the meta data of a run: id, seeds, versions, machine, commit, cases, references.
+
+    Arguments:
+        settings: ``seed`` of the run's statistics, ``jobs``, ``timeout`` in s, ``memory`` in bytes,
+            ``plan`` (digest of the keys of all jobs), ``request`` (what was asked for, so that the
+            run can be continued and repeated).
+    """
     return {
         "run": new_run_id(),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
-        "seed": run_seed,
         "seeds": list(seeds),
-        "jobs": jobs,
-        "timeout": timeout,
+        **settings,
         "versions": versions(),
-        "machine": {"platform": platform.platform(), "cpu_count": os.cpu_count()},
+        "machine": {
+            "platform": platform.platform(),
+            "cpu": cpu_name(),
+            "cpu_count": os.cpu_count(),
+            "blas": blas_name(),
+        },
         "git_commit": git_commit(),
         "cases": {case.name: {"title": case.title, "digest": case.digest} for case in cases},
         "strategies": [strategy.name for strategy in strategies],

@@ -66,6 +66,8 @@ class JobResult:
         rank: within case and seed; 1 is best.
         parameters, history, diagnostics: as the strategy gave them, in plain data.
         traceback: of an exception, for whoever asks for it.
+        key: of the job, from everything that decides on its result; empty where it is not known.
+        provenance: versions, libraries, processor, commit and digests, in plain data.
     """
 
     case: str
@@ -86,6 +88,8 @@ class JobResult:
     history: tuple[Mapping[str, float], ...] = ()
     diagnostics: Mapping[str, float] = field(default_factory=dict)
     traceback: str = ""
+    key: str = ""
+    provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def unphysical(self) -> bool:

@@ -8,65 +8,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ValidationError
 
 from femubench.core.errors import InputError
-from femubench.core.harness.results import BLOCKS, Block, JobResult, PairedMode, Run, Status
-
-
-class _Record(BaseModel):
-    # What a later version adds is left out; what it must have is checked.
-    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
-
-
-class _ModeRecord(_Record):
-    mode: int = 0
-    measured_hz: float
-    predicted_hz: float | None
-    mac: float | None
-    modification: str | None = None
-
-
-class _BlockRecord(_Record):
-    rms_percent: float
-    mean_mac: float | None = None
-    modes: list[_ModeRecord]
-
-    def block(self) -> Block:
-        """Return the block of errors."""
-        modes = (
-            PairedMode(m.mode, m.measured_hz, m.predicted_hz, m.mac, m.modification)
-            for m in self.modes
-        )
-        return Block(self.rms_percent, self.mean_mac, tuple(modes))
-
-
-class _ResultRecord(_Record):
-    case: str
-    strategy: str
-    seed: int
-    status: Status
-    reason: str = ""
-    seconds: float = 0.0
-    used: _BlockRecord | None = None
-    higher: _BlockRecord | None = None
-    modified: _BlockRecord | None = None
-    rigid_body_modes: int | None = None
-    rigid_body_modes_expected: int | None = None
-    negative_eigenvalues: int | None = None
-    parameter_count: int | None = None
-    evaluations: int | None = None
-    score: float | None = None
-    rank: int | None = None
-    parameters: list[dict[str, str | float | None]] = []
-    history: list[dict[str, float | None]] = []
-    diagnostics: dict[str, float | None] = {}
-    traceback: str = ""
-
-
-class _RunRecord(_Record):
-    meta: dict[str, Any]
-    results: list[Any]
+from femubench.core.harness.results import BLOCKS, Block, JobResult, Run
+from femubench.core.harness.schema import (
+    LARGEST_RUN,
+    LONGEST_TEXT,
+    MetaRecord,
+    ResultRecord,
+    RunRecord,
+    check_depth,
+    check_extent,
+    parse_json,
+)
+from femubench.core.reading import read_text
 
 
 def result_to_json(result: JobResult) -> dict[str, Any]:
@@ -77,7 +33,7 @@ def result_to_json(result: JobResult) -> dict[str, Any]:
         "strategy": result.strategy,
         "seed": result.seed,
         "status": result.status,
-        "reason": result.reason,
+        "reason": result.reason[:LONGEST_TEXT],
         "seconds": result.seconds,
         **{name: None if block is None else _block(block) for name, block in blocks.items()},
         "rigid_body_modes": result.rigid_body_modes,
@@ -91,7 +47,9 @@ def result_to_json(result: JobResult) -> dict[str, Any]:
         "parameters": [dict(item) for item in result.parameters],
         "history": [dict(item) for item in result.history],
         "diagnostics": dict(result.diagnostics),
-        "traceback": result.traceback,
+        "traceback": result.traceback[-LONGEST_TEXT:],
+        "key": result.key,
+        "provenance": dict(result.provenance),
     }
     clean: dict[str, Any] = finite(record)
     return clean
@@ -109,7 +67,7 @@ def result_from_json(
     Raises:
         InputError: naming the first field that is wrong.
     """
-    data = _validated(_ResultRecord, record, file, line, key)
+    data = _validated(ResultRecord, record, file, line, key)
     found = {name: getattr(data, name) for name in BLOCKS}
     plain = data.model_dump(exclude=set(BLOCKS))
     plain["parameters"] = tuple(
@@ -135,12 +93,45 @@ def run_from_json(data: object, *, file: Path | str | None = None) -> Run:
     Raises:
         InputError: naming the first field that is wrong.
     """
-    record = _validated(_RunRecord, data, file, None, "")
-    results = (
+    record = _validated(RunRecord, data, file, None, "")
+    meta = meta_from_json(record.meta, file=file)
+    results = tuple(
         result_from_json(item, file=file, key=f"results[{i}]")
         for i, item in enumerate(record.results)
     )
-    return Run(record.meta, tuple(results))
+    check_extent(meta, results, file=file)
+    return Run(meta, results)
+
+
+def meta_from_json(
+    data: object, *, file: Path | str | None = None, line: int | None = None, key: str = "meta"
+) -> dict[str, Any]:
+    """Return the meta data of a run as they are, once checked.
+
+    Arguments:
+        data: what `run_to_json` gave under ``meta``.
+        file, line, key: where they stand, for the message.
+
+    Raises:
+        InputError: naming the first field that is wrong.
+    """
+    if not isinstance(data, dict):
+        raise InputError("no meta data", file=file, line=line, key=key, expected="a table")
+    check_depth(data, "meta data", file=file, line=line, key=key)
+    _validated(MetaRecord, data, file, line, key)
+    return data
+
+
+def read_run(file: Path) -> Run:
+    """Return the run in a file that ``bench run --json`` wrote, or somebody else.
+
+    Raises:
+        InputError: for anything but a run, with the first field that is wrong.
+    """
+    expected = "what 'bench run --json' writes"
+    return run_from_json(
+        parse_json(read_text(file, LARGEST_RUN), file=file, expected=expected), file=file
+    )
 
 
 def finite(data: Any) -> Any:  # noqa: ANN401 - JSON data of any form
@@ -176,7 +167,7 @@ def _block(block: Block) -> dict[str, Any]:
     }
 
 
-_R = TypeVar("_R", bound=_Record)
+_R = TypeVar("_R", bound=BaseModel)
 
 
 def _validated(

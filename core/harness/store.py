@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,9 @@ from typing import Any
 from femubench.core.errors import InputError
 from femubench.core.harness.ranking import rank_results
 from femubench.core.harness.results import JobResult, Run
-from femubench.core.harness.serial import finite, result_from_json, result_to_json
+from femubench.core.harness.schema import LARGEST_STORE, check_extent, parse_json
+from femubench.core.harness.serial import finite, meta_from_json, result_from_json, result_to_json
+from femubench.core.reading import read_bytes
 
 SCHEMA = 1
 FILE_NAME = "results.jsonl"
@@ -90,14 +93,72 @@ class Store:
             if line.record["run"] != wanted:
                 continue
             if line.record["record"] == "result":
-                found = result_from_json(
-                    line.record.get("result"), file=self.path, line=line.number, key="result"
-                )
+                found = self._result(line)
                 results[found.case, found.strategy, found.seed] = found
             else:
                 meta.update(self._meta(line))
         reference = meta.get("reference") or None
-        return Run({**meta, "notes": notes}, rank_results(results.values(), reference))
+        listed = tuple(results.values())
+        check_extent(meta, listed, file=self.path)
+        return Run({**meta, "notes": notes}, rank_results(listed, reference))
+
+    def keys(self, run_id: str) -> set[str]:
+        """Return the keys of the jobs that a run has a record of."""
+        return {item.key for run, item in self._results() if run == run_id and item.key}
+
+    def by_key(self) -> dict[str, JobResult]:
+        """Return the latest result of every job of all runs that has a key."""
+        return {item.key: item for _, item in self._results() if item.key}
+
+    def latest_of_plan(self, plan: str) -> dict[str, Any] | None:
+        """Return the meta data with which the latest run of the same jobs began."""
+        found = [meta for meta in self._begun() if meta.get("plan") == plan]
+        return found[-1] if found else None
+
+    @contextmanager
+    def exclusive(self, run_id: str) -> Iterator[None]:
+        """Keep a run to this process as long as the block runs.
+
+        Raises:
+            InputError: when another process is working on it.
+        """
+        path = self.folder / f".{run_id}.lock"
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        except OSError as error:
+            what = f"cannot be written: {error.strerror}"
+            raise InputError(what, file=self.folder, expected="a folder of yours") from error
+        try:
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                raise InputError(
+                    f"another process is working on run {run_id}",
+                    file=self.path,
+                    expected="one at a time",
+                ) from error
+            yield
+            path.unlink(missing_ok=True)
+        finally:
+            os.close(descriptor)
+
+    def _begun(self) -> list[dict[str, Any]]:
+        if not self.path.exists():
+            return []
+        lines, _ = self._lines()
+        return [self._meta(line) for line in lines if line.record["record"] == "run"]
+
+    def _results(self) -> Iterator[tuple[str, JobResult]]:
+        if not self.path.exists():
+            return
+        for line in self._lines()[0]:
+            if line.record["record"] == "result":
+                yield line.record["run"], self._result(line)
+
+    def _result(self, line: _Line) -> JobResult:
+        record = line.record.get("result")
+        return result_from_json(record, file=self.path, line=line.number, key="result")
 
     def _find(self, lines: list[_Line], run_id: str | None) -> str:
         known = [line.record["run"] for line in lines if line.record["record"] == "run"]
@@ -119,16 +180,11 @@ class Store:
         return str(matching[-1])
 
     def _meta(self, line: _Line) -> dict[str, Any]:
-        meta = line.record.get("meta")
-        if not isinstance(meta, dict):
-            raise InputError(
-                "no meta data", file=self.path, line=line.number, key="meta", expected="a table"
-            )
-        return meta
+        return meta_from_json(line.record.get("meta"), file=self.path, line=line.number)
 
     def _lines(self) -> tuple[list[_Line], list[str]]:
         """Return all records and what has to be told about the file."""
-        *whole, tail = self.path.read_bytes().split(b"\n")
+        *whole, tail = read_bytes(self.path, LARGEST_STORE).split(b"\n")
         found = [
             _Line(number, self._record(text, number))
             for number, text in enumerate(whole, start=1)
@@ -142,12 +198,7 @@ class Store:
         return found, [f"{self.path}:{number}: the last line is cut short and was left out"]
 
     def _record(self, text: bytes, number: int) -> dict[str, Any]:
-        try:
-            record = json.loads(text)
-        except ValueError as error:
-            raise InputError(
-                f"not JSON: {error}", file=self.path, line=number, expected="one record a line"
-            ) from error
+        record = parse_json(text, file=self.path, line=number, expected="one record a line")
         if not isinstance(record, dict) or record.get("record") not in _KINDS:
             raise InputError(
                 "not a record",
@@ -170,13 +221,14 @@ class Store:
 
     def _write(self, record: dict[str, Any]) -> None:
         text = json.dumps(finite({"schema": SCHEMA, **record}), allow_nan=False)
-        self.folder.mkdir(parents=True, exist_ok=True)
-        with _locked(self.path) as descriptor:
-            size = _mend(descriptor)
-            line = text.encode() + b"\n"
-            if os.write(descriptor, line) != len(line):
-                os.ftruncate(descriptor, size)
-                raise OSError(f"{self.path}: the record could not be written in full")
+        line = text.encode() + b"\n"
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            with _locked(self.path) as descriptor:
+                _add(descriptor, line)
+        except OSError as error:
+            what = f"a record cannot be written: {error.strerror or error}"
+            raise InputError(what, file=self.path, expected="a store with room") from error
 
 
 @contextmanager
@@ -187,6 +239,18 @@ def _locked(path: Path) -> Iterator[int]:
         yield descriptor
     finally:
         os.close(descriptor)
+
+
+def _add(descriptor: int, line: bytes) -> None:
+    """Add a line whole or not at all."""
+    size = _mend(descriptor)
+    try:
+        if os.write(descriptor, line) != len(line):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    except OSError:
+        with suppress(OSError):
+            os.ftruncate(descriptor, size)
+        raise
 
 
 def _mend(descriptor: int) -> int:
@@ -214,5 +278,5 @@ def _mend(descriptor: int) -> int:
 def _is_json(text: bytes) -> bool:
     try:
         return isinstance(json.loads(text), dict)
-    except ValueError:
+    except (ValueError, RecursionError):
         return False

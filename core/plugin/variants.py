@@ -67,7 +67,7 @@ def strategy_of(words: str, strategies: Mapping[str, Strategy]) -> Strategy:
     base = strategies[name]
     if not listed:
         return base
-    known = _options(base)
+    known = options_of(base)
     changed: Any = base
     for pair in listed.split(","):
         key, found, text = (part.strip() for part in pair.partition("="))
@@ -97,14 +97,14 @@ def _entry(strategy: object, key: str) -> object:
     return float(holder.get(inner, 0.0)) if inner and isinstance(holder, Mapping) else _UNKNOWN
 
 
-def _options(strategy: object) -> dict[str, Any]:
+def options_of(strategy: object) -> dict[str, Any]:
     """Return the options that fit on a command line, with their present values."""
     if not is_dataclass(strategy) or isinstance(strategy, type):
         return {}
     present = {field.name: getattr(strategy, field.name) for field in fields(strategy)}
     simple = {name: value for name, value in present.items() if isinstance(value, _SIMPLE)}
     for name, value in present.items():
-        simple |= {f"{name}.{inner}": found for inner, found in _options(value).items()}
+        simple |= {f"{name}.{inner}": found for inner, found in options_of(value).items()}
     return simple
 
 

@@ -90,6 +90,4 @@ class Page:
         if meets:
             verdict = "agrees-under" if self.convention else "agrees"
         note = self.convention if meets else self.reason
-        return Cell(
-            self.paper, self.table, row, column, printed, ours, verdict, note, self.unit
-        )
+        return Cell(self.paper, self.table, row, column, printed, ours, verdict, note, self.unit)

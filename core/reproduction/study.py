@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -65,7 +66,7 @@ def cells_to_json(studies: Sequence[Study]) -> list[dict[str, Any]]:
             "row": cell.row,
             "column": cell.column,
             "printed": cell.printed,
-            "ours": cell.ours,
+            "ours": cell.ours if math.isfinite(cell.ours or 0.0) else None,
             "deviation_percent": cell.deviation_percent,
             "verdict": cell.verdict,
             "note": cell.note,

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, get_args
 
 import numpy as np
 
+from femubench.core.errors import InputError
 from femubench.core.fem.structure import Structure
 from femubench.core.measurement import Measurement
 from femubench.core.model import Model
 from femubench.core.strategy import Strategy, UpdateResult
 from femubench.core.update.element_families import ElementFamily
 from femubench.core.update.equation_error import update_by_equation_error
+from femubench.core.update.wanted import Expansion, Frequencies
 
 
 @dataclass(frozen=True)
@@ -23,12 +25,24 @@ class ElementStrategy(Strategy):
     Arguments:
         orthogonality: whether the orthogonality of the modes adds equations: the paper counts them
             in, and without them the used frequencies are not met.
+        expansion: of measured shapes: `rotation` of the current model's, the paper's equations (16)
+            and (17), or `force`, its equation (15) with the nominal model.
+        frequencies: that the equations ask for: the `measured` ones, or `nominal`, the nominal
+            model's own, which leaves the measured shapes as the only data.
     """
 
     needs: ClassVar[frozenset[str]] = frozenset({"shapes", "elements"})
     keep_rigid: ClassVar[bool] = False
 
     orthogonality: bool = True
+    expansion: Expansion = "rotation"
+    frequencies: Frequencies = "measured"
+
+    def __post_init__(self) -> None:
+        if self.expansion not in get_args(Expansion):
+            raise InputError(f"the expansion is rotation or force, not {self.expansion!r}")
+        if self.frequencies not in get_args(Frequencies):
+            raise InputError(f"the frequencies are measured or nominal, not {self.frequencies!r}")
 
     @abstractmethod
     def family(self, structure: Structure) -> ElementFamily:
@@ -51,4 +65,6 @@ class ElementStrategy(Strategy):
             self.family(model.frame_structure),
             orthogonality=self.orthogonality,
             keep_rigid=self.keep_rigid,
+            expansion=self.expansion,
+            frequencies=self.frequencies,
         )

@@ -76,7 +76,9 @@ class EntryUpdate:
         )
 
 
-def equations_of(pattern: EntryPattern, model: Model, quasi: QuasiModes) -> Equations:
+def equations_of(
+    pattern: EntryPattern, model: Model, quasi: QuasiModes, cutoff: float = CUTOFF
+) -> Equations:
     """Return the equations for further relative changes of a current estimate.
 
     Phi' K Phi = Lambda is exact, K Phi = M Phi Lambda fitted, with rows scaled so that
@@ -87,6 +89,8 @@ def equations_of(pattern: EntryPattern, model: Model, quasi: QuasiModes) -> Equa
         pattern: entries of the nominal stiffness.
         model: the current estimate.
         quasi: measured modes at the current estimate.
+        cutoff: change of forces, of the inertia forces for entries that change by 100 %, below
+            which a direction is left alone.
 
     Source: Kabe (1985); Ahmadian, Gladwell & Ismail (1997), section 4.
     """
@@ -101,11 +105,13 @@ def equations_of(pattern: EntryPattern, model: Model, quasi: QuasiModes) -> Equa
         exact_right=(np.eye(len(eigenvalues)) - energy)[np.triu_indices(len(eigenvalues))],
         fitted=pattern.products(shapes * size, scale),
         fitted_right=(scale[:, None] * (inertia - force) * size).ravel(),
-        cutoff=CUTOFF,
+        cutoff=cutoff,
     )
 
 
-def update_entries(model: Model, measurement: Measurement, rigid: FloatArray) -> EntryUpdate:
+def update_entries(
+    model: Model, measurement: Measurement, rigid: FloatArray, cutoff: float = CUTOFF
+) -> EntryUpdate:
     """Return the model whose changed entries give the used modes, pattern kept exactly.
 
     Five iterations, and further ones until the used modes are there.
@@ -114,6 +120,7 @@ def update_entries(model: Model, measurement: Measurement, rigid: FloatArray) ->
         model: the nominal model.
         measurement: the used modes.
         rigid: rigid-body modes that must stay at zero frequency, (n, r).
+        cutoff: as in `equations_of`.
 
     Raises:
         NotApplicable: when the matrix has too many entries, or a low-rank term.
@@ -126,7 +133,7 @@ def update_entries(model: Model, measurement: Measurement, rigid: FloatArray) ->
     history: list[Mapping[str, float]] = []
     for step in range(MOST_ITERATIONS):
         quasi = _next_quasi(current, measurement, history)
-        equations = equations_of(pattern, current, quasi)
+        equations = equations_of(pattern, current, quasi, cutoff)
         if free is not None:
             change, rank = smallest_change(equations, free)
         else:

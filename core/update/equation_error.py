@@ -18,7 +18,8 @@ from femubench.core.strategy import ParameterEstimate, UpdateResult
 from femubench.core.typing import FloatArray, SparseArray
 from femubench.core.update.element_families import ElementFamily
 from femubench.core.update.positive import nearest_positive, smallest_core_eigenvalue
-from femubench.core.update.quasi import ITERATIONS, QuasiModes, quasi_measured_modes
+from femubench.core.update.quasi import ITERATIONS, QuasiModes
+from femubench.core.update.wanted import Expansion, Frequencies, WantedModes
 
 MOST_UNKNOWNS = 2000  # dense, so that rank is decidable: about 20 s for five iterations
 # Weights of phi_i' K phi_j / (omega_i omega_j) = delta_ij, relative to the inertia forces. An error
@@ -176,6 +177,8 @@ def update_by_equation_error(
     *,
     orthogonality: bool = True,
     keep_rigid: bool = False,
+    expansion: Expansion = "rotation",
+    frequencies: Frequencies = "measured",
 ) -> UpdateResult:
     """Return the model after five iterations of expansion and solution.
 
@@ -186,6 +189,10 @@ def update_by_equation_error(
             semidefinite.
         orthogonality: whether the orthogonality of the modes adds equations.
         keep_rigid: whether the rigid-body modes of the model are hard constraints.
+        expansion: `rotation`, equations (16)-(17) with the current model; `force`, equation (15)
+            with the nominal one (small models only).
+        frequencies: those of the equations; `nominal` are the nominal model's own, so that shapes
+            alone are measured.
 
     Raises:
         NotApplicable: when there are too many unknowns, or no rigid-body modes to keep.
@@ -199,7 +206,8 @@ def update_by_equation_error(
     if keep_rigid and rigid.shape[1] == 0:
         raise NotApplicable("the model has no free rigid-body modes that could be kept")
     basis = rigid_basis(model, family, rigid) if keep_rigid else None
-    current, solution, history = _iterate(model, measurement, family, basis, orthogonality)
+    modes = WantedModes(model, measurement, expansion, frequencies)
+    current, solution, history = _iterate(model, modes, family, basis, orthogonality)
     promised = keep_rigid or family.cores is not None
     diagnostics = {
         "equations": float(solution.equations),
@@ -215,7 +223,7 @@ def update_by_equation_error(
 
 def _iterate(
     model: Model,
-    measurement: Measurement,
+    modes: WantedModes,
     family: ElementFamily,
     basis: FloatArray | None,
     orthogonality: bool,
@@ -223,7 +231,7 @@ def _iterate(
     """Return the last model, its solution and the history; mass and zero point stay nominal."""
     current, x, history = model, np.zeros(len(family)), []
     for _ in range(ITERATIONS):
-        quasi = quasi_measured_modes(current, measurement)
+        quasi = modes.at(current)
         a, b, size = equations(model, family, quasi, orthogonality=orthogonality)
         solution = solve_least_change(a, b, family, basis)
         change = np.linalg.norm(solution.x - x) / max(float(np.linalg.norm(solution.x)), 1e-300)

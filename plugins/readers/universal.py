@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -19,6 +22,7 @@ _WANTED = (*_COORDINATES, _UNITS, *_SYSTEMS, *_SHAPES)
 _NORMAL_MODE, _COMPLEX_MODES = 2, (3, 7)
 _MOTIONS = (0, 1, 8, 11, 12)  # unknown, general, displacement, velocity, acceleration
 _FREQUENCY_STD, _SHAPE_STD = 0.005, 0.015
+_LARGEST, _MOST_NUMBERS = 256, 20_000_000  # MiB of a file; modes times places
 _GLOBAL = (0, 1)  # numbers that writers use for the global axes without defining them
 
 Dataset = Mapping[str, Any]
@@ -70,6 +74,8 @@ def _datasets(path: Path) -> tuple[list[Dataset], set[int]]:
     """Return the datasets that are of use, and the numbers of the others."""
     import pyuff
 
+    if path.stat().st_size > _LARGEST * 2**20:
+        raise InputError("file is too large", file=path, expected=f"at most {_LARGEST} MiB")
     wanted: list[Dataset] = []
     other: set[int] = set()
     try:
@@ -82,7 +88,9 @@ def _datasets(path: Path) -> tuple[list[Dataset], set[int]]:
             other.add(number)
             continue
         try:
-            wanted.append(file.read_sets(i))
+            # pyuff prints what it does not know.
+            with redirect_stdout(StringIO()):
+                wanted.append(file.read_sets(i))
         except Exception as error:
             key = f"dataset {number} (block {i + 1})"
             raise InputError(f"cannot be read: {error}", file=path, key=key) from None
@@ -160,9 +168,8 @@ def _modes(path: Path, datasets: Sequence[Dataset]) -> list[_Mode]:
         modes = [
             _Mode(i + 1, mode.frequency, mode.damping, mode.shape) for i, mode in enumerate(modes)
         ]
-    numbers = [mode.number for mode in modes]
-    for number in numbers:
-        if numbers.count(number) > 1:
+    for number, count in Counter(mode.number for mode in modes).items():
+        if count > 1:
             what = f"mode {number} is listed twice"
             raise InputError(what, file=path, key="mode number", expected="every mode once")
     return [mode for mode in modes if mode.frequency > 0.0]
@@ -251,6 +258,9 @@ def _from_eigenvalue(eigenvalue: complex) -> tuple[float, float]:
 def _measurement(path: Path, nodes: Mapping[int, Point], modes: Sequence[_Mode]) -> Measurement:
     if modes:
         listed = dict.fromkeys(place for mode in modes for place in mode.shape)
+        if len(listed) * len(modes) > _MOST_NUMBERS:
+            what = f"{len(modes)} modes at {len(listed)} places are too many numbers"
+            raise InputError(what, file=path, expected=f"at most {_MOST_NUMBERS}")
         places = [p for p in listed if any(mode.shape.get(p, 0.0) != 0.0 for mode in modes)]
     else:
         places = [(node, direction) for node in nodes for direction in _DIRECTIONS[:3]]

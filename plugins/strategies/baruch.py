@@ -71,6 +71,7 @@ class Baruch(Strategy):
         "modes. AIAA Journal 16, 346-351; Ahmadian, Gladwell & Ismail (1997), equation (18)"
     )
     needs: ClassVar[frozenset[str]] = frozenset({"shapes"})
+    promises: ClassVar[frozenset[str]] = frozenset({"used-modes"})
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator

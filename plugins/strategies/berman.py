@@ -105,6 +105,7 @@ class Berman(Strategy):
         "data. AIAA Journal 21, 1168-1173"
     )
     needs: ClassVar[frozenset[str]] = frozenset({"shapes"})
+    promises: ClassVar[frozenset[str]] = frozenset({"used-modes"})
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator

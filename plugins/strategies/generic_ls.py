@@ -26,6 +26,7 @@ class GenericLS(ElementStrategy):
         "Ahmadian, Gladwell & Ismail (1997), section 4.3, table 4, LS solution; Gladwell & "
         "Ahmadian (1995), Generic element matrices suitable for finite element model updating"
     )
+    promises: ClassVar[frozenset[str]] = frozenset({"no-negative-eigenvalue"})
 
     plain: Symmetry = "half-turn"
     joint: Symmetry = "none"

@@ -18,6 +18,7 @@ class KabeRigid(Strategy):
         "1431-1436; rigid-body modes as in Ahmadian, Gladwell & Ismail (1997), section 4.1"
     )
     needs: ClassVar[frozenset[str]] = frozenset({"shapes"})
+    promises: ClassVar[frozenset[str]] = frozenset({"used-modes", "rigid-body-modes"})
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator

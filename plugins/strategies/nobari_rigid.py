@@ -21,6 +21,7 @@ class NobariRigid(ElementStrategy):
         "Nobari, Robb & Ewins (1993), with the rigid-body modes as data: Ahmadian, Gladwell & "
         "Ismail (1997), section 4.2"
     )
+    promises: ClassVar[frozenset[str]] = frozenset({"rigid-body-modes"})
     keep_rigid: ClassVar[bool] = True
 
     def family(self, structure: Structure) -> ElementFamily:

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 import types
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
@@ -372,6 +373,55 @@ class Spy(Strategy):
         return UpdateResult(model, diagnostics=found)
 
 
+class Rummager(Strategy):
+    """Reads all memory of its own process and counts numbers that it was not given.
+
+    It knows them masked alone, and masks what it reads: so it does not find its own list.
+    """
+
+    name = "rummager"
+    citation = "none"
+    mask = 0x5A5A_F00D_1234_8765
+
+    def __init__(self, held_out: frozenset[float], used: frozenset[float]) -> None:
+        self.held_out, self.used = ([masked(f, self.mask) for f in fs] for fs in (held_out, used))
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        found = {"bytes": 0.0, "held_out": 0.0, "used": 0.0}
+        wanted = {name: np.array(getattr(self, name), np.uint64) for name in ("held_out", "used")}
+        for block in memory_of_this_process():
+            found["bytes"] += len(block)
+            for offset in range(8):
+                whole = (len(block) - offset) // 8 * 8
+                words = np.frombuffer(block[offset : offset + whole], np.uint64)
+                words = words ^ np.uint64(self.mask)
+                for name, numbers in wanted.items():
+                    found[name] += float(np.isin(words, numbers).sum())
+        return UpdateResult(model, diagnostics=found)
+
+
+def masked(number: float, mask: int) -> int:
+    return int(np.float64(number).view(np.uint64)) ^ mask
+
+
+def memory_of_this_process() -> Iterator[bytes]:
+    regions = []
+    for line in Path("/proc/self/maps").read_text().splitlines():
+        where, access, *_ = line.split()
+        start, stop = (int(number, 16) for number in where.split("-"))
+        if access.startswith("rw") and stop - start < 2**28:
+            regions.append((start, stop))
+    with open("/proc/self/mem", "rb", buffering=0) as memory:
+        for start, stop in regions:
+            try:
+                memory.seek(start)
+                yield memory.read(stop - start)
+            except (OSError, ValueError, OverflowError):
+                continue
+
+
 def hashed(number: float) -> str:
     return hashlib.sha256(float(number).hex().encode()).hexdigest()
 
@@ -400,5 +450,5 @@ def search(roots: list[object], hashes: frozenset[str]) -> dict[str, float]:
     return found
 
 
-def cannot_start() -> None:
+def cannot_start(*_: object) -> None:
     os._exit(3)

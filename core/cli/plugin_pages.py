@@ -1,0 +1,148 @@
+"""What ``bench plugins show`` tells of a plugin, kind by kind."""
+
+from __future__ import annotations
+
+import inspect
+import textwrap
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
+
+from femubench.core.cli.registry import wrapped
+from femubench.core.plugin.loader import LoadedPlugin, Plugins
+from femubench.core.plugin.roles import Effect, Reader, Reporter, Scenario
+from femubench.core.plugin.validation import CHECKS
+from femubench.core.plugin.variants import options_of
+from femubench.core.strategy import Strategy
+
+Row = tuple[str, str]
+
+_KINDS = {
+    "strategies": "strategy",
+    "scenarios": "scenario",
+    "effects": "effect",
+    "readers": "reader",
+    "reporters": "reporter",
+}
+# Headings of docstrings: what follows is for programmers.
+_SECTIONS = ("Arguments:", "Attributes:", "Raises:", "Returns:", "Source:", "Args:", "Parameters")
+_PARAGRAPHS = 3
+
+
+def pages_of(name: str, plugins: Plugins) -> Iterator[str]:
+    """Return a page for everything that is offered by that name, else on the plugin as a whole.
+
+    Arguments:
+        name: of what a plugin offers, or of the plugin.
+        plugins: what there is.
+    """
+    found = False
+    for kind in CHECKS:
+        offered = getattr(plugins, kind).get(name)
+        if offered is not None:
+            found = True
+            source = _source(kind, name, plugins.loaded)
+            yield _page(f"{name}: {_KINDS[kind]}", _about(offered), [source, *_ROWS[kind](offered)])
+    for plugin in plugins.loaded:
+        if plugin.plugin == name and not found:
+            offers = [(kind, ", ".join(names)) for kind, names in plugin.offers.items() if names]
+            yield _page(f"{name}: plugin", (), [("from", plugin.distribution), *offers])
+
+
+def _page(heading: str, paragraphs: Iterable[str], rows: Iterable[Row]) -> str:
+    listed = list(rows)
+    width = max(len(key) for key, _ in listed) + 2
+    lines = [heading]
+    for paragraph in paragraphs:
+        lines += [wrapped(paragraph, indent=2, hanging=2), ""]
+    for key, value in listed:
+        first = f"{key + ':':{width}}" if key else " " * width
+        # Filled without the key: wrapping would take blanks at the start of a line for its indent.
+        text = textwrap.fill(
+            value,
+            80,
+            initial_indent=f"  {first}",
+            subsequent_indent=" " * (width + 2),
+            break_on_hyphens=False,
+            break_long_words=False,
+        )
+        lines.append(text)
+    return "\n".join(lines)
+
+
+def _source(kind: str, name: str, loaded: Iterable[LoadedPlugin]) -> Row:
+    found = next(plugin for plugin in loaded if name in plugin.offers.get(kind, ()))
+    return "from", f"{found.distribution}, plugin {found.plugin}"
+
+
+def _about(offered: object) -> Iterator[str]:
+    """Return the first paragraphs of a class's own docstring, up to its sections."""
+    if isinstance(offered, Scenario):
+        return
+    text = type(offered).__doc__ or ""
+    for number, paragraph in enumerate(inspect.cleandoc(text).split("\n\n")):
+        if number == _PARAGRAPHS or paragraph.lstrip().startswith(_SECTIONS):
+            return
+        if paragraph.strip():
+            yield " ".join(paragraph.split())
+
+
+def _strategy(strategy: Strategy) -> Iterator[Row]:
+    yield "citation", strategy.citation
+    yield "needs", ", ".join(sorted(strategy.needs)) or "nothing but frequencies"
+    if strategy.promises:
+        yield "promises", ", ".join(sorted(strategy.promises))
+    options = [f"{name} = {_value(value)}" for name, value in options_of(strategy).items()]
+    options += [f"{name}.KEY = (none)" for name in _open_mappings(strategy)]
+    for number, line in enumerate(options or ["none"]):
+        yield "" if number else "options", line
+    example = f":{options[0].replace(' ', '')}" if options and "(none)" not in options[0] else ""
+    yield "run", f"bench run -s {strategy.name}{example}"
+
+
+def _open_mappings(strategy: object) -> Iterator[str]:
+    """Return options that take further entries by name, such as ``stiffness.ry=1e4``."""
+    if is_dataclass(strategy):
+        for field in fields(strategy):
+            if isinstance(getattr(strategy, field.name), Mapping):
+                yield field.name
+
+
+def _value(value: object) -> str:
+    """Return a value as the command line takes it."""
+    if value is None:
+        return "(none)"
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _scenario(scenario: Scenario) -> Iterator[Row]:
+    yield "title", scenario.title
+    for number, (name, folder) in enumerate(scenario.cases.items()):
+        yield "" if number else "cases", f"{name} in {folder}"
+    yield "run", f"bench run {scenario.name}"
+
+
+def _effect(effect: Effect) -> Iterator[Row]:
+    yield "means", str(getattr(effect, "summary", "") or "not stated")
+    yield "run", f"bench diagnose CASE --effects {effect.name}"
+
+
+def _reader(reader: Reader) -> Iterator[Row]:
+    yield "suffixes", ", ".join(reader.suffixes)
+    yield (
+        "run",
+        f"name such a file in a case.toml, e.g. measurement.modes = modes{reader.suffixes[0]}",
+    )
+
+
+def _reporter(reporter: Reporter) -> Iterator[Row]:
+    yield "suffix", reporter.suffix
+    yield "run", f"bench report --format {reporter.name}"
+
+
+_ROWS: dict[str, Callable[..., Iterator[Row]]] = {
+    "strategies": _strategy,
+    "scenarios": _scenario,
+    "effects": _effect,
+    "readers": _reader,
+    "reporters": _reporter,
+}

@@ -1,0 +1,155 @@
+"""Find a plugin by name, run its checks, and put the findings into plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, get_args
+
+from femubench.core.conformance import (
+    effect_checks,
+    other_checks,
+    result_checks,
+    strategy_checks,
+    survival_checks,
+)
+from femubench.core.conformance.kit import (
+    CHECKS,
+    SECONDS,
+    Bench,
+    Check,
+    Role,
+    Status,
+    Verdict,
+    judged,
+    prepare,
+)
+from femubench.core.conformance.problems import Problem
+from femubench.core.errors import InputError
+from femubench.core.plugin.loader import Plugins
+from femubench.core.plugin.validation import did_you_mean
+from femubench.core.plugin.variants import strategy_of
+
+REFERENCE = "physical"
+# Importing them fills the list.
+_SOURCES = (strategy_checks, survival_checks, result_checks, effect_checks, other_checks)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A plugin that is checked.
+
+    Arguments:
+        role, name: what it is and what it is called.
+        bench: where it is tried.
+    """
+
+    role: Role
+    name: str
+    bench: Bench
+
+    @property
+    def checks(self) -> tuple[Check, ...]:
+        """Return the checks that concern it."""
+        return checks_of(self.role)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A check and its verdict."""
+
+    check: Check
+    verdict: Verdict
+
+
+def checks_of(role: Role) -> tuple[Check, ...]:
+    """Return the checks of a role in the order in which they are shown."""
+    return tuple(check for check in CHECKS if check.role == role)
+
+
+def subjects(
+    name: str, plugins: Plugins, *, cases: Sequence[Problem] = (), seconds: float = SECONDS
+) -> list[Subject]:
+    """Return every strategy, effect, reader and scenario of a name.
+
+    Arguments:
+        name: of a plugin; a strategy may have options, as in ``bench run -s``.
+        plugins: those that are installed.
+        cases: further problems for strategies.
+        seconds: what one trial may take.
+
+    Raises:
+        InputError: when there is none of that name.
+    """
+    found = [
+        Subject(role, name, _bench(role, item, plugins, cases, seconds))
+        for role, item in _named(name, plugins)
+    ]
+    if not found:
+        known = {word for role in get_args(Role) for word in _of_role(role, plugins)}
+        near = did_you_mean(name, sorted(known)) or "; bench plugins list shows what there is"
+        raise InputError(f"no strategy, effect, reader or scenario {name!r}{near}")
+    return found
+
+
+def findings(subject: Subject) -> Iterator[Finding]:
+    """Run all checks of a subject, side by side where they can."""
+    if subject.role == "strategy":
+        prepare(subject.checks, subject.bench)
+    for check in subject.checks:
+        yield Finding(check, judged(check, subject.bench))
+
+
+def counts(found: Iterable[Finding]) -> dict[str, int]:
+    """Return how many checks have each status."""
+    statuses = [finding.verdict.status for finding in found]
+    return {status: statuses.count(status) for status in get_args(Status)}
+
+
+def to_json(subject: Subject, found: Sequence[Finding]) -> dict[str, Any]:
+    """Return the findings as plain data."""
+    return {
+        "role": subject.role,
+        "name": subject.name,
+        "checks": [
+            {
+                "check": finding.check.name,
+                "status": finding.verdict.status,
+                "message": finding.verdict.message,
+                "sentence": finding.check.sentence,
+            }
+            for finding in found
+        ],
+        "counts": counts(found),
+    }
+
+
+def _of_role(role: Role, plugins: Plugins) -> dict[str, Any]:
+    by_role: dict[Role, dict[str, Any]] = {
+        "strategy": {**plugins.strategies},
+        "effect": {**plugins.effects},
+        "reader": {**plugins.readers},
+        "scenario": {**plugins.scenarios},
+    }
+    return by_role[role]
+
+
+def _named(name: str, plugins: Plugins) -> Iterator[tuple[Role, Any]]:
+    if name.partition(":")[0] in plugins.strategies:
+        yield "strategy", strategy_of(name, plugins.strategies)
+    for role in get_args(Role)[1:]:
+        if name in _of_role(role, plugins):
+            yield role, _of_role(role, plugins)[name]
+
+
+def _bench(
+    role: Role,
+    item: Any,  # noqa: ANN401 - any role
+    plugins: Plugins,
+    cases: Sequence[Problem],
+    seconds: float,
+) -> Bench:
+    if role == "strategy":
+        reference = plugins.strategies.get(REFERENCE)
+        return Bench(item, reference=reference, cases=cases, seconds=seconds)
+    return Bench(item, helpers=tuple(plugins.readers.values()), seconds=seconds)

@@ -1,0 +1,229 @@
+"""What an effect must keep, one check a function; all of it runs in workers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from femubench.core.conformance.kit import (
+    Bench,
+    Verdict,
+    check,
+    failed,
+    not_applicable,
+    passed,
+    warned,
+)
+from femubench.core.conformance.place_words import known_place
+from femubench.core.conformance.prints import fingerprint, first_difference
+from femubench.core.conformance.problems import PLAIN, problem
+from femubench.core.conformance.results import Given, finite as finite_entries, symmetric
+from femubench.core.conformance.strategy_checks import own_doc
+from femubench.core.diagnosis.effect import EffectParameter
+from femubench.core.errors import NotApplicable
+from femubench.core.modal.eigen import solve_modes
+from femubench.core.model import Model
+from femubench.core.plugin.roles import Effect
+from femubench.core.strategy import UpdateResult
+
+_PROBLEMS = (
+    PLAIN, "grounded frame in plane", "grounded frame in space", "free frame out of plane",
+    "matrices alone",
+)  # fmt: skip
+_SAME = 1e-6  # relative, of frequencies: stiff springs stand for rigid joints
+_STEP = 1e-4  # of the scale
+
+
+def _models() -> Iterator[tuple[str, Model]]:
+    return ((name, problem(name).model) for name in _PROBLEMS)
+
+
+def _spots(effect: Effect) -> Iterator[tuple[str, Model, str]]:
+    """Return the places of every model, two of each kind of word at most: first and last."""
+    for name, model in _models():
+        places = tuple(effect.places(model))
+        for place in dict.fromkeys((*places[:2], *places[-1:])):
+            yield f"{name}, place {place!r}", model, place
+
+
+def _apart(bench: Bench, function: Callable[[Effect], Verdict]) -> Verdict:
+    if isinstance(bench.code, str):
+        return not_applicable("not looked at: it cannot be sent to a worker")
+    return bench.apart(function, bench.subject)
+
+
+@check("effect", "described", "It has a summary or a docstring.")
+def described(bench: Bench) -> Verdict:
+    """Look for a text that tells what the model lacks."""
+    effect = bench.subject
+    if getattr(effect, "summary", "") or own_doc(type(effect)):
+        return passed()
+    return failed("neither summary nor docstring, expected what the model lacks")
+
+
+@check("effect", "picklable", "It can be sent to a worker, and an extended model back.")
+def picklable(bench: Bench) -> Verdict:
+    """Pickle the effect and what it makes."""
+    if isinstance(bench.code, str):
+        return failed(f"{bench.code}, expected an effect that pickle can send")
+    return _apart(bench, _sendable)
+
+
+@check("effect", "places", "Its places are in the model, each once, and have parameters.")
+def places(bench: Bench) -> Verdict:
+    """Read every place of every model."""
+    return _apart(bench, _places)
+
+
+@check("effect", "neutral", "With neutral values the model stays what it was.")
+def neutral(bench: Bench) -> Verdict:
+    """Extend models with neutral values."""
+    return _apart(bench, _neutral)
+
+
+@check("effect", "finite", "The extended model and its rates of change are finite and symmetric.")
+def finite(bench: Bench) -> Verdict:
+    """Extend models by one scale, and by a little more."""
+    return _apart(bench, _finite)
+
+
+@check("effect", "deterministic", "Two extensions are equal to the last bit.")
+def deterministic(bench: Bench) -> Verdict:
+    """Extend models twice."""
+    return _apart(bench, _deterministic)
+
+
+@check("effect", "inputs", "The nominal model stays as it was given.")
+def inputs(bench: Bench) -> Verdict:
+    """Compare models before and after."""
+    return _apart(bench, _inputs)
+
+
+def _values(parameters: tuple[EffectParameter, ...], x: float) -> list[float]:
+    found = []
+    for item in parameters:
+        low, high = item.range
+        at = x if low <= x <= high else -x
+        found.append(float(item.value(min(max(at, low), high))))
+    return found
+
+
+def _extended(effect: Effect, model: Model, place: str, x: float = 1.0) -> Model:
+    return effect.extend(model, place, _values(tuple(effect.parameters(model, place)), x))
+
+
+def _sendable(effect: Effect) -> Verdict:
+    from femubench.core.conformance.results import sendable
+
+    for where, model, place in _spots(effect):
+        extended = _extended(effect, model, place)
+        fault = sendable(_given(model, extended))
+        if fault:
+            return failed(f"{where}: {fault}")
+    return passed()
+
+
+def _given(model: Model, extended: Model) -> Given:
+    plain = problem(PLAIN)
+    return Given(type(plain)("", model, plain.measurement), UpdateResult(extended), frozenset())
+
+
+def _places(effect: Effect) -> Verdict:
+    count = 0
+    for name, model in _models():
+        found = list(effect.places(model))
+        count += len(found)
+        for place in found:
+            where = f"{name}, place {place!r}"
+            if not isinstance(place, str) or found.count(place) > 1:
+                return failed(f"{where}: not a text, or there twice, expected every place once")
+            if not known_place(model, place):
+                return failed(f"{where}: not in the model, expected a word of docs/effects.md")
+            fault = _parameters(effect, model, place)
+            if fault:
+                return failed(f"{where}: {fault}")
+    return passed() if count else not_applicable("it has no place in any of the models")
+
+
+def _parameters(effect: Effect, model: Model, place: str) -> str | None:
+    parameters = list(effect.parameters(model, place))
+    names = [item.name for item in parameters]
+    if not parameters or len(set(names)) < len(names):
+        return f"parameters {names}, expected one or more, every name once"
+    for item in parameters:
+        if not (np.isfinite(item.scale) and item.scale > 0.0):
+            return f"scale of {item.name!r} is {item.scale}, expected a number > 0"
+        if not item.lower <= item.neutral <= item.upper:
+            bounds = f"{item.lower} .. {item.upper}"
+            return f"neutral value {item.neutral} of {item.name!r} is outside its bounds {bounds}"
+    return None
+
+
+def _neutral(effect: Effect) -> Verdict:
+    count = 0
+    for where, model, place in _spots(effect):
+        count += 1
+        values = [item.neutral for item in effect.parameters(model, place)]
+        try:
+            extended = effect.extend(model, place, values)
+        except NotApplicable:
+            continue
+        gap = _distance(model, extended)
+        if not gap <= _SAME:
+            text = f"{where}: neutral values change frequencies by {gap:.2g}, expected {_SAME:g}"
+            # A rigid spring may leave the arm behind which it sits.
+            return failed(text) if np.isfinite(values).all() else warned(text)
+    return passed() if count else not_applicable("it has no place in any of the models")
+
+
+def _distance(model: Model, other: Model) -> float:
+    """Return the largest relative difference of the five lowest elastic frequencies."""
+    one, two = (solve_modes(item).elastic.eigenvalues[:5] for item in (model, other))
+    if len(two) < len(one):
+        return float("inf")
+    return float(np.abs(np.sqrt(np.abs(two[: len(one)] / one)) - 1.0).max())
+
+
+def _finite(effect: Effect) -> Verdict:
+    count = 0
+    for where, model, place in _spots(effect):
+        try:
+            one, more = (_extended(effect, model, place, x) for x in (1.0, 1.0 + _STEP))
+        except NotApplicable:
+            continue
+        count += 1
+        for extended in (one, more):
+            given = _given(extended, extended)
+            fault = finite_entries(given) or symmetric(given)
+            if fault:
+                return failed(f"{where}: {fault}")
+        same = one.stiffness.shape == more.stiffness.shape
+        if not same or not np.isfinite(_distance(one, more) / _STEP):
+            return failed(f"{where}: no rate of change at one scale, expected a smooth change")
+    return passed() if count else not_applicable("it has no place in any of the models")
+
+
+def _deterministic(effect: Effect) -> Verdict:
+    for where, model, place in _spots(effect):
+        try:
+            one, other = (fingerprint(_extended(effect, model, place), "model") for _ in range(2))
+        except NotApplicable:
+            continue
+        path = first_difference(one, other)
+        if path:
+            return failed(f"{where}: {path} differs between two extensions, expected equality")
+    return passed()
+
+
+def _inputs(effect: Effect) -> Verdict:
+    for where, model, place in _spots(effect):
+        before = fingerprint(model, "model")
+        try:
+            _extended(effect, model, place)
+        except NotApplicable:
+            continue
+        path = first_difference(before, fingerprint(model, "model"))
+        if path:
+            return failed(f"{where}: {path} was changed in place, expected a copy")
+    return passed()

@@ -1,0 +1,238 @@
+"""Checks, their verdicts, and the bench on which things are tried in workers."""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+from femubench.core.conformance.problems import PLAIN, Problem, problem
+from femubench.core.conformance.trial import Observation, Trial, observation_of, run_trial
+from femubench.core.harness.jobs import one_line
+from femubench.core.harness.limits import MIB, Limits
+from femubench.core.harness.task import Ending
+from femubench.core.harness.workers import Workers
+from femubench.core.strategy import Strategy
+
+Status = Literal["pass", "fail", "warn", "not-applicable"]
+Role = Literal["strategy", "effect", "reader", "scenario"]
+SECONDS, MEMORY = 60.0, 1024 * MIB
+_ATTEMPTS = 3  # to start a process
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a check found: its status, and one line on what was seen and what was expected."""
+
+    status: Status
+    message: str = ""
+
+
+def passed(message: str = "") -> Verdict:
+    """Return that all is well."""
+    return Verdict("pass", message)
+
+
+def failed(message: str) -> Verdict:
+    """Return what was seen and what was expected."""
+    return Verdict("fail", " ".join(message.split()))
+
+
+def warned(message: str) -> Verdict:
+    """Return what may be meant, but should be known."""
+    return Verdict("warn", " ".join(message.split()))
+
+
+def not_applicable(message: str) -> Verdict:
+    """Return why there was nothing to check."""
+    return Verdict("not-applicable", message)
+
+
+@dataclass(frozen=True)
+class Want:
+    """A trial that a check looks at.
+
+    Arguments:
+        problem: its name.
+        seed, scramble, traced: as in `Trial`.
+        reference: whether it is the strategy to compare with that runs.
+    """
+
+    problem: str
+    seed: int = 0
+    scramble: int = 0
+    traced: bool = False
+    reference: bool = False
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that a plugin must keep.
+
+    Arguments:
+        role: of the plugins that it concerns.
+        name: one word, for the command line and the docs.
+        sentence: what must hold.
+        judge: from a bench to a verdict.
+        wants: the trials that it will look at, so that they can run side by side.
+        first: whether it comes before the plain run and needs no result of it.
+    """
+
+    role: Role
+    name: str
+    sentence: str
+    judge: Callable[[Bench], Verdict]
+    wants: Callable[[Bench], Sequence[Want]] = lambda bench: ()
+    first: bool = False
+
+
+CHECKS: list[Check] = []
+
+
+def check(
+    role: Role,
+    name: str,
+    sentence: str,
+    *,
+    wants: Callable[[Bench], Sequence[Want]] = lambda bench: (),
+    first: bool = False,
+) -> Callable[[Callable[[Bench], Verdict]], Callable[[Bench], Verdict]]:
+    """Put a function on the list of checks."""
+
+    def put(judge: Callable[[Bench], Verdict]) -> Callable[[Bench], Verdict]:
+        CHECKS.append(Check(role, name, sentence, judge, wants, first))
+        return judge
+
+    return put
+
+
+class Bench:
+    """Where one plugin is tried; every trial runs once, in a process of its own.
+
+    Arguments:
+        subject: the strategy, effect, reader or scenario.
+        reference: the strategy that time and memory are compared with, if there is one.
+        cases: further problems.
+        helpers: what a check of another role needs besides, e.g. readers.
+        seconds, memory: what one trial may take.
+        jobs: number of workers; None for the number of processors.
+    """
+
+    def __init__(
+        self,
+        subject: Any,  # noqa: ANN401 - any role
+        *,
+        reference: Strategy | None = None,
+        cases: Sequence[Problem] = (),
+        helpers: Any = None,  # noqa: ANN401 - whatever the role needs
+        seconds: float = SECONDS,
+        memory: int = MEMORY,
+        jobs: int | None = None,
+    ) -> None:
+        self.subject, self.reference, self.helpers = subject, reference, helpers
+        self.cases = {item.name: item for item in cases}
+        self.limits = Limits(seconds=seconds, memory=memory)
+        self._jobs = jobs or len(os.sched_getaffinity(0))
+        self._seen: dict[Want, Observation] = {}
+
+    @cached_property
+    def code(self) -> bytes | str:
+        """Return the pickled subject, or in one line why it cannot be pickled."""
+        try:
+            data = pickle.dumps(self.subject)
+        except Exception as error:
+            return one_line(error)
+        return data
+
+    @cached_property
+    def sound(self) -> str | None:
+        """Return why there is no use in further trials; None where the plain one came back."""
+        if isinstance(self.code, str):
+            return "not looked at: it cannot be sent to a worker"
+        if not self.observe([Want(PLAIN)])[0].survived:
+            return f"not looked at: nothing came back from the {PLAIN}"
+        return None
+
+    def observe(self, wants: Sequence[Want]) -> list[Observation]:
+        """Return what is seen in some trials; those that have not run yet run now."""
+        missing = [want for want in dict.fromkeys(wants) if want not in self._seen]
+        tasks = {want: (run_trial, self._trial(want)) for want in missing}
+        for want, ending in run_apart(tasks, self.limits, self._jobs).items():
+            self._seen[want] = observation_of(want.problem, ending)
+        return [self._seen[want] for want in wants]
+
+    def apart(self, function: Callable[[Any], Verdict], argument: object) -> Verdict:
+        """Return the verdict of a function that runs in a worker.
+
+        Arguments:
+            function: importable by name.
+            argument: its argument.
+        """
+        task = (_judged, (function, pickle.dumps(argument)))
+        ending = run_apart({0: task}, self.limits, 1)[0]
+        if ending.how != "answer":
+            return failed(f"{ending.reason}, expected an answer")
+        return Verdict(*json.loads(ending.answer))
+
+    def _trial(self, want: Want) -> Trial:
+        code = pickle.dumps(self.reference) if want.reference else self.code
+        assert isinstance(code, bytes)
+        given = self.cases.get(want.problem) or problem(want.problem)
+        return Trial(code, given, want.seed, want.scramble, want.traced)
+
+
+def run_apart(
+    tasks: Mapping[Any, tuple[Callable[[Any], bytes], object]], limits: Limits, count: int
+) -> dict[Any, Ending]:
+    """Return how every task ended, each in a worker of its own.
+
+    Arguments:
+        tasks: by key, a function that is importable by name and its argument.
+        limits: what each may take.
+        count: number of workers.
+    """
+    found: dict[Any, Ending] = {}
+    waiting, attempts = list(tasks), dict.fromkeys(tasks, 0)
+    if not waiting:
+        return found
+    with Workers[Any](count).open() as workers:
+        while waiting or workers.busy:
+            while workers.free and waiting:
+                key = waiting.pop(0)
+                attempts[key] += 1
+                ending = workers.start(key, *tasks[key], limits)
+                if ending is not None:
+                    found[key] = ending
+            for key, ending in workers.wait() if workers.busy else ():
+                if ending.how == "no-start" and attempts[key] < _ATTEMPTS:
+                    waiting.append(key)
+                else:
+                    found[key] = ending
+    return found
+
+
+def _judged(task: tuple[Callable[[Any], Verdict], bytes]) -> bytes:
+    """Return the verdict of a function as JSON; runs in a worker."""
+    function, argument = task
+    try:
+        verdict = function(pickle.loads(argument))
+    except BaseException as error:
+        verdict = failed(f"{one_line(error)}, expected no exception")
+    return json.dumps([verdict.status, verdict.message]).encode()
+
+
+def judged(check: Check, bench: Bench) -> Verdict:
+    """Return the verdict of one check."""
+    if check.role == "strategy" and not check.first and bench.sound:
+        return not_applicable(bench.sound)
+    return check.judge(bench)
+
+
+def prepare(checks: Sequence[Check], bench: Bench) -> None:
+    """Run the trials that some checks will look at, side by side."""
+    if bench.sound is None:
+        bench.observe([want for check in checks for want in check.wants(bench)])

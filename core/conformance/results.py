@@ -1,0 +1,237 @@
+"""What a strategy hands back, looked at from one side at a time, inside its worker."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench.core.conformance.prints import fingerprint, first_difference
+from femubench.core.conformance.problems import Problem
+from femubench.core.errors import FemubenchError
+from femubench.core.harness.answers import head_of, packed, unpacked
+from femubench.core.harness.checks import check_model
+from femubench.core.harness.jobs import JobOutcome, one_line
+from femubench.core.harness.scoring import frequency_error, predict_block
+from femubench.core.modal.eigen import solve_modes, zero_tolerance
+from femubench.core.modal.rigid import rigid_modes_of
+from femubench.core.model import LowRank, Model
+from femubench.core.strategy import ParameterEstimate, UpdateResult
+
+USED_MODES = 1e-6
+_RIGID = 1e-6  # of the first elastic eigenvalue
+
+
+@dataclass(frozen=True)
+class Given:
+    """A result and what it was made from.
+
+    Arguments:
+        problem: the nominal model and the used modes, untouched.
+        result: of the strategy.
+        promises: what the strategy says that it keeps.
+    """
+
+    problem: Problem
+    result: UpdateResult
+    promises: frozenset[str]
+
+
+Look = Callable[[Given], str | None]
+
+
+def sizes(given: Given) -> str | None:
+    """Return what is wrong with the kinds and sizes of the matrices."""
+    model, nominal = given.result.model, given.problem.model
+    size = len(model.dofs)
+    own = model.structure is not None and model.structure.kinematics.transform.shape[1] == size
+    if size != nominal.size and not own:
+        return f"the updated model has {size} degrees of freedom, expected {nominal.size}"
+    for name in ("mass", "stiffness"):
+        matrix, change = getattr(model, name), getattr(model, f"{name}_change")
+        if not sp.issparse(matrix):
+            return f"{name} is {type(matrix).__name__}, expected a sparse array"
+        if tuple(matrix.shape) != (size, size):
+            return f"{name} has shape {tuple(matrix.shape)}, expected {(size, size)}"
+        if change is None:
+            continue
+        if not isinstance(change, LowRank):
+            return f"{name}_change is {type(change).__name__}, expected LowRank"
+        basis, core = np.shape(change.basis), np.shape(change.core)
+        if len(basis) != 2 or basis[0] != size or core != (basis[1], basis[1]):
+            wanted = f"({size}, p) and (p, p)"
+            return f"{name}_change has shapes {basis} and {core}, expected {wanted}"
+    return None
+
+
+def finite(given: Given) -> str | None:
+    """Return which matrix has entries that are no finite real numbers."""
+    for name, numbers in _numbers(given.result.model):
+        if numbers.dtype.kind not in "fiu":
+            return f"{name} has entries of type {numbers.dtype}, expected real numbers"
+        bad = int(np.count_nonzero(~np.isfinite(numbers)))
+        if bad:
+            return f"{name} has {bad} entries that are not finite, expected none"
+    return None
+
+
+def symmetric(given: Given) -> str | None:
+    """Return which matrix is not symmetric, as the harness sees it."""
+    if sizes(given) or finite(given):
+        return None
+    try:
+        check_model(given.result.model, given.problem.model)
+    except FemubenchError as error:
+        return str(error)
+    return None
+
+
+def figures(given: Given) -> str | None:
+    """Return which figure of history, diagnostics or parameters is not a finite number."""
+    for name, value in _figures(given.result):
+        if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+            return f"{name} is {_short(value)}, expected a number"
+        if not np.isfinite(value):
+            return f"{name} is {value}, expected a finite number"
+    return None
+
+
+def parameter_count(given: Given) -> str | None:
+    """Return what is wrong with the number of unknowns."""
+    count = given.result.parameter_count
+    if isinstance(count, bool) or not isinstance(count, int | np.integer):
+        return f"parameter_count is {_short(count)}, expected a whole number"
+    if count < 0:
+        return f"parameter_count is {count}, expected 0 or more"
+    if count == 0 and _changed(given):
+        return "parameter_count is 0 and the model is another one, expected the number of unknowns"
+    return None
+
+
+def _changed(given: Given) -> bool:
+    nominal, model = given.problem.model, given.result.model
+    parts = ("mass", "stiffness", "mass_change", "stiffness_change")
+    before, after = ([getattr(item, part) for part in parts] for item in (nominal, model))
+    return first_difference(fingerprint(before, ""), fingerprint(after, "")) is not None
+
+
+def sendable(given: Given) -> str | None:
+    """Return why the updated model cannot leave the worker, or is not the same outside."""
+    model = given.result.model
+    data = packed(JobOutcome("ok", model=model))
+    head = head_of(data)
+    if head.status != "ok":
+        return f"{head.reason}, expected a model that pickle can send"
+    try:
+        arrived = unpacked(data).model
+    except FemubenchError as error:
+        return str(error)
+    path = first_difference(fingerprint(model, "model"), fingerprint(arrived, "model"))
+    return None if path is None else f"{path} is another one after sending, expected the same"
+
+
+def used_modes(given: Given) -> str | None:
+    """Return which used mode the updated model does not have."""
+    pairs = predict_block(given.result.model, given.problem.measurement, None)
+    worst = max(pairs, key=frequency_error)
+    error = frequency_error(worst)
+    if error <= USED_MODES:
+        return None
+    seen = "no such mode" if worst.predicted_hz is None else f"{worst.predicted_hz:.7g} Hz"
+    wanted = f"{worst.measured_hz:.7g} Hz within {USED_MODES:g}"
+    return f"used-modes: mode {worst.number}: {seen}, expected {wanted}"
+
+
+def rigid_body_modes(given: Given) -> str | None:
+    """Return how many rigid-body modes of the nominal model got lost."""
+    nominal, model = given.problem.model, given.result.model
+    wanted = rigid_modes_of(nominal).shape[1]
+    floor = _RIGID / 1e-6 * zero_tolerance(solve_modes(nominal))
+    found = int(np.count_nonzero(np.abs(solve_modes(model).eigenvalues) <= floor))
+    if found >= wanted:
+        return None
+    return f"rigid-body-modes: {found} modes without frequency, expected {wanted}"
+
+
+def no_negative(given: Given) -> str | None:
+    """Return how many eigenvalues are negative."""
+    floor = zero_tolerance(solve_modes(given.problem.model))
+    values = solve_modes(given.result.model).eigenvalues
+    count = int(np.count_nonzero(values < -floor))
+    return f"no-negative-eigenvalue: {count} are negative, expected none" if count else None
+
+
+PROMISES: Mapping[str, Look] = {
+    "used-modes": used_modes,
+    "rigid-body-modes": rigid_body_modes,
+    "no-negative-eigenvalue": no_negative,
+}
+
+
+def promises(given: Given) -> str | None:
+    """Return the first promise that the result breaks."""
+    if sizes(given) or finite(given) or symmetric(given):
+        return None
+    for name in sorted(given.promises & set(PROMISES)):
+        fault = PROMISES[name](given)
+        if fault:
+            return fault
+    return None
+
+
+LOOKS: Mapping[str, Look] = {
+    "sizes": sizes,
+    "finite": finite,
+    "symmetric": symmetric,
+    "figures": figures,
+    "parameter-count": parameter_count,
+    "picklable": sendable,
+    "promises": promises,
+}
+
+
+def faults_of(given: Given) -> dict[str, str]:
+    """Return what is wrong with a result, by the check that asks for it."""
+    found: dict[str, str] = {}
+    for name, look in LOOKS.items():
+        try:
+            fault = look(given)
+        except Exception as error:  # whatever a strange object does when it is looked at
+            fault = f"cannot be looked at: {one_line(error)}"
+        if fault:
+            found[name] = " ".join(fault.split())
+    return found
+
+
+def _numbers(model: Model) -> Iterator[tuple[str, np.ndarray[Any, Any]]]:
+    for name in ("mass", "stiffness"):
+        matrix, change = getattr(model, name), getattr(model, f"{name}_change")
+        if sp.issparse(matrix):
+            yield name, sp.coo_array(matrix).data
+        if isinstance(change, LowRank):
+            yield f"{name}_change.basis", np.asarray(change.basis)
+            yield f"{name}_change.core", np.asarray(change.core)
+
+
+def _figures(result: UpdateResult) -> Iterator[tuple[str, object]]:
+    for i, entry in enumerate(result.history):
+        for key, value in entry.items():
+            yield f"history[{i}][{key!r}]", value
+    for key, value in result.diagnostics.items():
+        yield f"diagnostics[{key!r}]", value
+    for item in tuple[Any, ...](result.parameters):
+        if not isinstance(item, ParameterEstimate):
+            yield "a parameter", item
+            continue
+        yield f"parameter {item.name!r} before", item.before
+        yield f"parameter {item.name!r} after", item.after
+        if item.std is not None:
+            yield f"parameter {item.name!r} std", item.std
+
+
+def _short(value: object) -> str:
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,173 @@
+"""One run of a strategy on one problem in a worker, and all that can be seen of it."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import random
+import time
+import tracemalloc
+import warnings
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from femubench.core.conformance.prints import fingerprint, first_difference, global_state
+from femubench.core.conformance.problems import Problem
+from femubench.core.conformance.results import Given, faults_of
+from femubench.core.errors import NotApplicable, StrategyFailure
+from femubench.core.harness.jobs import missing_capability, one_line
+from femubench.core.harness.task import Ending
+from femubench.core.model import Model
+from femubench.core.plugin.variants import Variant
+from femubench.core.strategy import Strategy, UpdateResult
+
+Kind = Literal["result", "lacking", "not-applicable", "failed", "error", "stopped"]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What a worker is to do.
+
+    Arguments:
+        strategy: pickled.
+        problem: what it is given.
+        seed: of its random generator.
+        scramble: seed of the global random generators, which no strategy should look at.
+        traced: whether memory is traced, which slows Python down.
+    """
+
+    strategy: bytes
+    problem: Problem
+    seed: int = 0
+    scramble: int = 0
+    traced: bool = False
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What was seen.
+
+    Arguments:
+        problem: its name.
+        kind: ``lacking`` where the problem has not what the strategy says that it needs,
+            ``error`` for an exception that is no verdict, ``stopped`` for a worker that died or
+            had to be stopped.
+        text: the reason, in one line, of everything but a result.
+        seconds: wall time of the strategy.
+        peak: bytes that Python and numpy held at most; None where it was not traced.
+        faults: what is wrong with the result, by check.
+        changed: the part of model or measurement that was changed in place.
+        disturbed: what of the process was changed and not restored.
+        prints: of the result.
+    """
+
+    problem: str
+    kind: Kind
+    text: str = ""
+    seconds: float = 0.0
+    peak: int | None = None
+    faults: Mapping[str, str] = field(default_factory=dict)
+    changed: str | None = None
+    disturbed: str | None = None
+    prints: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def survived(self) -> bool:
+        """Tell whether there was a result or an honest refusal."""
+        return self.kind not in ("error", "stopped")
+
+
+def run_trial(trial: Trial) -> bytes:
+    """Return the observation of a trial as JSON; runs in a worker."""
+    try:
+        found = _observe(trial)
+    except Exception as error:
+        found = Observation(trial.problem.name, "error", one_line(error))
+    return json.dumps(asdict(found)).encode()
+
+
+def observation_of(problem: str, ending: Ending) -> Observation:
+    """Return what a worker saw, or how it ended."""
+    if ending.how != "answer":
+        return Observation(problem, "stopped", ending.reason, ending.seconds)
+    return Observation(**json.loads(ending.answer))
+
+
+def _observe(trial: Trial) -> Observation:
+    strategy: Strategy = pickle.loads(trial.strategy)
+    problem = trial.problem
+    reason = missing_capability(frozenset(strategy.needs), problem.model, problem.measurement)
+    if reason is not None:
+        return Observation(problem.name, "lacking", reason)
+    # What is handed over may be spoilt; the problem itself is needed to judge the result.
+    model, measurement = pickle.loads(pickle.dumps((problem.model, problem.measurement)))
+    given = Problem(problem.name, model, measurement)
+    before = _inputs(given)
+    random.seed(trial.scramble)
+    np.random.seed(trial.scramble)  # noqa: NPY002 - so that two runs find another state
+    around = global_state()
+    found, result = _called(strategy, given, trial)
+    disturbed = first_difference(around, global_state())
+    found = replace(found, changed=first_difference(before, _inputs(given)), disturbed=disturbed)
+    if result is None:
+        return found
+    with warnings.catch_warnings(), np.errstate(all="warn"):
+        warnings.simplefilter("ignore")
+        faults = faults_of(Given(problem, result, promises_of(strategy)))
+    return replace(found, faults=faults, prints=fingerprint(result, "result"))
+
+
+def _inputs(given: Problem) -> dict[str, str]:
+    return fingerprint(given.model, "model") | fingerprint(given.measurement, "measurement")
+
+
+def _called(
+    strategy: Strategy, given: Problem, trial: Trial
+) -> tuple[Observation, UpdateResult | None]:
+    rng = np.random.default_rng(np.random.SeedSequence([trial.seed, *given.name.encode()]))
+    name, start = given.name, time.perf_counter()
+    if trial.traced:
+        tracemalloc.start()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            result = strategy.update(given.model, given.measurement, rng)
+    except NotApplicable as error:
+        return _refusal(name, "not-applicable", error), None
+    except StrategyFailure as error:
+        return _refusal(name, "failed", error), None
+    except BaseException as error:
+        return Observation(name, "error", one_line(error)), None
+    seconds = time.perf_counter() - start
+    peak = tracemalloc.get_traced_memory()[1] if trial.traced else None
+    tracemalloc.stop()
+    wrong = _wrong_type(result)
+    if wrong:
+        return Observation(name, "error", wrong, seconds), None
+    return Observation(name, "result", "", seconds, peak), result
+
+
+def promises_of(strategy: Strategy) -> frozenset[str]:
+    """Return what a strategy says that it keeps, with or without options."""
+    inner = strategy.base if isinstance(strategy, Variant) else strategy
+    promises: object = inner.promises
+    return promises if isinstance(promises, frozenset) else frozenset()
+
+
+def _refusal(name: str, kind: Kind, error: Exception) -> Observation:
+    text = " ".join(str(error).split())
+    if not text:
+        return Observation(name, "error", f"{type(error).__name__} without a sentence")
+    return Observation(name, kind, text)
+
+
+def _wrong_type(result: object) -> str | None:
+    if not isinstance(result, UpdateResult):
+        return f"update returned {type(result).__name__} instead of UpdateResult"
+    model: object = result.model
+    if not isinstance(model, Model):
+        return f"the updated model is {type(model).__name__} instead of Model"
+    return None

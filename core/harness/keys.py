@@ -1,0 +1,132 @@
+"""What makes two jobs the same, and where a result comes from."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import sys
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import femubench
+from femubench.core.case.case import Case
+from femubench.core.plugin.variants import Variant
+from femubench.core.strategy import Strategy
+
+
+def job_key(case: Case, strategy: str, code: bytes, version: str, seed: int) -> str:
+    """Return the key of a job: equal keys have equal results, whoever computes them.
+
+    Arguments:
+        case: its name and the digest of its files go in.
+        strategy: name, with options.
+        code: the pickled strategy: its class and its parameters.
+        version: from `strategy_version`.
+        seed: of the noise.
+    """
+    parts = (
+        *(femubench.__version__, case.name, case.digest, strategy),
+        *(hashlib.sha256(code).hexdigest(), version, str(seed)),
+    )
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
+
+
+def plan_digest(keys: Iterable[str]) -> str:
+    """Return one digest for the keys of all jobs of a run, in any order."""
+    return hashlib.sha256("\0".join(sorted(keys)).encode()).hexdigest()[:32]
+
+
+def strategy_version(strategy: Strategy) -> str:
+    """Return the version of the package that a strategy comes from, and a digest of its source.
+
+    The digest is there because a package in the making changes and keeps its number.
+    """
+    inner = strategy.base if isinstance(strategy, Variant) else strategy
+    top = type(inner).__module__.partition(".")[0]
+    return f"{_number(top)}+{_digest(top, type(inner).__module__)}"
+
+
+@cache
+def _number(top: str) -> str:
+    return str(getattr(sys.modules.get(top), "__version__", "") or _installed(top))
+
+
+def _installed(top: str) -> str:
+    from importlib import metadata
+
+    try:
+        return metadata.version(top)
+    except metadata.PackageNotFoundError:
+        return "0"
+
+
+@cache
+def _digest(top: str, module: str) -> str:
+    """Return a digest of the Python files of a package, or of the file of a lone module."""
+    package = sys.modules.get(top)
+    folders = [Path(folder) for folder in getattr(package, "__path__", ())]
+    files = sorted({file for folder in folders for file in _python_files(folder)})
+    own = getattr(sys.modules.get(module), "__file__", None)
+    if not files and own:
+        files = [Path(own)]
+    found = hashlib.sha256()
+    for file in files:
+        found.update(file.name.encode() + b"\0")
+        with suppress(OSError):  # a link that leads nowhere is no source
+            found.update(file.read_bytes())
+    return found.hexdigest()[:12]
+
+
+def _python_files(folder: Path) -> Iterable[Path]:
+    for where, below, names in os.walk(folder, followlinks=True):
+        below[:] = [name for name in below if name != "__pycache__"]
+        yield from (Path(where) / name for name in names if name.endswith(".py"))
+
+
+def provenance(meta: Mapping[str, Any], case: Case, version: str, seed: int) -> dict[str, Any]:
+    """Return where a result comes from, in plain data.
+
+    Arguments:
+        meta: of the run.
+        case, version, seed: of the job.
+    """
+    machine = meta["machine"]
+    return {
+        **meta["versions"],
+        "blas": machine["blas"],
+        "cpu": machine["cpu"],
+        "git": meta["git_commit"],
+        "case": case.digest,
+        "strategy": version,
+        "seed": seed,
+    }
+
+
+@cache
+def cpu_name() -> str:
+    """Return what the machine calls its processor."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return " ".join(line.partition(":")[2].split())
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+def blas_name() -> str:
+    """Return the linear algebra libraries that are loaded, with version and kernel."""
+    from threadpoolctl import threadpool_info
+
+    found = {
+        " ".join(
+            str(item[key]) for key in ("internal_api", "version", "architecture") if item.get(key)
+        )
+        for item in threadpool_info()
+        if item.get("user_api") == "blas"
+    }
+    return ", ".join(sorted(found)) or "unknown"

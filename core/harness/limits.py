@@ -1,0 +1,45 @@
+"""What one job may take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import psutil
+
+MIB = 2**20
+_SHARE = 0.9  # of the memory that is there, for all workers together
+_LEAST = 512 * MIB
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one job may take before it is stopped.
+
+    Arguments:
+        seconds: wall time; None for no limit.
+        memory: bytes beyond what a fresh worker has, of all processes of the job together; None
+            for no limit.
+        output: bytes that it may print.
+        answer: bytes that it may hand back.
+        file: size of the largest file that it may write.
+    """
+
+    seconds: float | None = 600.0
+    memory: int | None = None
+    output: int = 16 * MIB
+    answer: int = 1024 * MIB
+    file: int = 1024 * MIB
+
+
+def memory_share(workers: int) -> int:
+    """Return the bytes that one of several workers may take: an even share of the machine's."""
+    return max(int(_SHARE * psutil.virtual_memory().total / workers), _LEAST)
+
+
+def spoken_bytes(count: float) -> str:
+    """Return a size as one would type it: ``512 MiB``, ``1.5 GiB``."""
+    for unit in ("B", "KiB", "MiB"):
+        if count < 1024.0:
+            return f"{count:.3g} {unit}"
+        count /= 1024.0
+    return f"{count:.3g} GiB"

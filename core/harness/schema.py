@@ -1,0 +1,179 @@
+"""The schema of stored results, which may come from strangers: types, bounds, limits."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from femubench.core.errors import InputError
+from femubench.core.harness.results import Block, JobResult, PairedMode, Status
+from femubench.core.reading import MIB
+
+LARGEST_RUN = 256 * MIB  # bytes of a file of `bench run --json`
+LARGEST_STORE = 1024 * MIB  # bytes of a store, which holds many runs
+MOST_RESULTS = 100_000
+LONGEST_TEXT = 100_000  # characters of a reason or a traceback
+_MOST_NAMES, _MOST_JOBS = 1_000, 1_000_000
+_DEEPEST = 32
+
+Name = Annotated[str, Field(max_length=1_000)]
+_Text = Annotated[str, Field(max_length=LONGEST_TEXT)]
+_Whole = Annotated[int, Field(ge=0, lt=2**63)]
+_Percent = Annotated[float, Field(ge=0, le=1e150)]
+_Mac = Annotated[float, Field(ge=-1e-6, le=1 + 1e-6)]
+
+
+class Record(BaseModel):
+    """Base of all records."""
+
+    # What a later version adds is left out; what it must have is checked.
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+
+
+class _ModeRecord(Record):
+    mode: _Whole = 0
+    measured_hz: Annotated[float, Field(gt=0, le=1e30)]
+    # Bounded so that the square of a relative error is a number.
+    predicted_hz: Annotated[float, Field(ge=-1e100, le=1e100)] | None
+    mac: _Mac | None
+    modification: _Text | None = None
+
+
+class _BlockRecord(Record):
+    rms_percent: _Percent
+    mean_mac: _Mac | None = None
+    modes: list[_ModeRecord]
+
+    def block(self) -> Block:
+        """Return the block of errors."""
+        modes = (
+            PairedMode(m.mode, m.measured_hz, m.predicted_hz, m.mac, m.modification)
+            for m in self.modes
+        )
+        return Block(self.rms_percent, self.mean_mac, tuple(modes))
+
+
+class ResultRecord(Record):
+    """One result."""
+
+    case: Name
+    strategy: Name
+    seed: _Whole
+    status: Status
+    reason: _Text = ""
+    seconds: Annotated[float, Field(ge=0)] = 0.0
+    used: _BlockRecord | None = None
+    higher: _BlockRecord | None = None
+    modified: _BlockRecord | None = None
+    rigid_body_modes: _Whole | None = None
+    rigid_body_modes_expected: _Whole | None = None
+    negative_eigenvalues: _Whole | None = None
+    parameter_count: _Whole | None = None
+    evaluations: _Whole | None = None
+    score: Annotated[float, Field(gt=0, le=1e150)] | None = None
+    rank: Annotated[int, Field(ge=1, lt=2**63)] | None = None
+    parameters: list[dict[Name, _Text | float | None]] = []
+    history: list[dict[Name, float | None]] = []
+    diagnostics: dict[Name, float | None] = {}
+    traceback: _Text = ""
+    key: Name = ""
+    provenance: dict[Name, _Text | int | float | None] = {}
+
+
+class RunRecord(Record):
+    """What ``bench run --json`` writes; results are checked one by one."""
+
+    meta: dict[str, Any]
+    results: Annotated[list[Any], Field(max_length=MOST_RESULTS)]
+
+
+class _CaseMeta(Record):
+    title: _Text | None = None
+
+
+class MetaRecord(BaseModel):
+    """The meta data that reports rest on; anything else in there is only shown."""
+
+    model_config = ConfigDict(extra="allow", allow_inf_nan=False, strict=True)
+
+    run: Name | None = None
+    seed: _Whole = 0
+    seeds: Annotated[list[_Whole], Field(max_length=MOST_RESULTS)] = []
+    strategies: Annotated[list[Name], Field(max_length=_MOST_NAMES)] = []
+    cases: dict[Name, _CaseMeta] = {}
+    citations: dict[Name, _Text] | None = None
+    reference: dict[Name, dict[Name, _Percent]] | None = None
+
+
+def check_depth(data: object, what: str, **where: Any) -> None:  # noqa: ANN401 - of InputError
+    """Check that plain data are not nested deeply, which functions that call themselves rely on.
+
+    Arguments:
+        data: mappings, lists and plain values.
+        what: its name, for the message.
+        where: file, line and key, for the message.
+
+    Raises:
+        InputError: when they are.
+    """
+    level: list[object] = [data]
+    for _ in range(_DEEPEST):
+        level = [
+            entry
+            for item in level
+            if isinstance(item, (dict, list))
+            for entry in (item.values() if isinstance(item, dict) else item)
+        ]
+        if not level:
+            return
+    expected = f"at most {_DEEPEST} levels"
+    raise InputError(f"{what} nested too deeply", **where, expected=expected)
+
+
+def check_extent(
+    meta: Mapping[str, Any], results: tuple[JobResult, ...], *, file: Path | str | None
+) -> None:
+    """Check that the table of all strategies on all cases and seeds can be made.
+
+    Raises:
+        InputError: when names and seeds are too many.
+    """
+    strategies = {*meta.get("strategies", ()), *(result.strategy for result in results)}
+    cases = {*(meta.get("cases") or ()), *(meta.get("reference") or ())}
+    cases |= {result.case for result in results}
+    seeds = {*meta.get("seeds", ()), *(result.seed for result in results)}
+    jobs = len(strategies) * len(cases) * len(seeds)
+    if len(strategies) > _MOST_NAMES or jobs > _MOST_JOBS:
+        what = f"{len(strategies)} strategies on {len(cases)} cases with {len(seeds)} seeds"
+        expected = f"at most {_MOST_NAMES} strategies and {_MOST_JOBS} jobs"
+        raise InputError(what, file=file, key="results", expected=expected)
+
+
+def parse_json(
+    text: str | bytes, *, file: Path | str | None = None, line: int | None = None, expected: str
+) -> Any:  # noqa: ANN401 - JSON data of any form
+    """Return the data of a JSON text from a stranger.
+
+    Arguments:
+        text: not longer than the caller can bear.
+        file, line: where it stands, for the message.
+        expected: what it should have been, for the message.
+
+    Raises:
+        InputError: when it is no JSON, has NaN or infinity in it, or is nested too deeply.
+    """
+    try:
+        return json.loads(text, parse_constant=_not_json)
+    except RecursionError:
+        raise InputError("nested too deeply", file=file, line=line, expected=expected) from None
+    except ValueError as error:
+        what = f"not JSON: {error}"
+        raise InputError(what, file=file, line=line, expected=expected) from None
+
+
+def _not_json(word: str) -> NoReturn:
+    raise ValueError(f"{word} is not a number of JSON")

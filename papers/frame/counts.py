@@ -1,0 +1,118 @@
+"""Counts and claims in figures that stand in the text."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench import (
+    Cell,
+    IntArray,
+    Page,
+    Structure,
+    Workbench,
+    generic_family,
+    physical_family,
+)
+from femubench.papers.frame.common import CASE, PAPER, modes_of, rigid_modes, strain_modes
+from femubench.papers.printed import printed
+
+_NAMES = {
+    "joints_L": "L joints",
+    "joints_T": "T joints",
+    "measured_points": "measured coordinates",
+    "elements": "elements",
+    "joint_elements": "elements at joints",
+    "symmetric_elements": "other elements, symmetric",
+    "element_order": "order of an element matrix",
+    "element_rank": "rank of an element stiffness matrix",
+    "joint_element_parameters": "generic parameters of an element at a joint",
+    "symmetric_element_parameters": "generic parameters of a symmetric element",
+    "nonzeros": "non-zero entries in the upper triangle of K0",
+    "equations": "equations for three modes",
+    "nobari_parameters": "parameters of Nobari's method",
+    "generic_parameters": "generic parameters",
+    "rigid_body_modes": "rigid-body modes",
+    "nobari_imaginary": "imaginary frequencies of Nobari's model",
+    "nobari_zero": "zero frequencies of Nobari's model",
+    "nobari_rigid_difference": "Nobari's model with rigid-body modes against the physical one",
+}
+_EQUAL = 1e-6  # of the frequency: what counts as the same result
+_ZERO = 1e-3  # Hz
+
+
+def count_cells(bench: Workbench) -> tuple[Cell, ...]:
+    """Return the cells of what the text counts or claims in figures."""
+    ours = _of_structure(bench) | _of_strategies(bench)
+    page = Page(PAPER, "text", tolerance=0.0)
+    cells = [
+        page.cell(_NAMES[key], "count", float(value), float(ours[key]))
+        for key, value in printed(PAPER)["text"].items()
+        if key in ours
+    ]
+    return (*cells, _same_results(bench))
+
+
+def _of_structure(bench: Workbench) -> dict[str, int]:
+    case = bench.cases[CASE]
+    structure, types = case.model.frame_structure, Counter(_types(case.model.frame_structure))
+    at_joints = {
+        structure.element_ends[e][0] for ends in structure.joint_ends.values() for e in ends
+    }
+    family = generic_family(structure)
+    free = (family.columns >= 0).sum(axis=1)
+    touches = np.isin(family.elements, list(at_joints))
+    element = physical_family(structure).patterns[0].sum(axis=0)
+    return {
+        "joints_L": types["L"],
+        "joints_T": types["T"],
+        "measured_points": len(case.measurement.sensors),
+        "elements": len(family.elements),
+        "joint_elements": int(touches.sum()),
+        "symmetric_elements": int((~touches).sum()),
+        "element_order": int(structure.active_local.sum()),
+        "element_rank": int(np.linalg.matrix_rank(element, hermitian=True)),
+        "joint_element_parameters": _only(free[touches]),
+        "symmetric_element_parameters": _only(free[~touches]),
+        "nonzeros": int(sp.triu(case.model.stiffness).nnz),
+        "rigid_body_modes": int(modes_of(bench, "unchanged").rigid.sum()),
+    }
+
+
+def _types(structure: Structure) -> list[str]:
+    return [joint.type for joint in structure.frame.joints]
+
+
+def _only(values: IntArray) -> int:
+    """Return the one value that all elements have; -1 where they differ."""
+    return int(values[0]) if (values == values[0]).all() else -1
+
+
+def _of_strategies(bench: Workbench) -> dict[str, int]:
+    rigid = rigid_modes(bench, "nobari")
+    return {
+        "equations": int(bench.update(CASE, "generic-ls").diagnostics["equations"]),
+        "nobari_parameters": bench.update(CASE, "nobari").parameter_count,
+        "generic_parameters": bench.update(CASE, "generic-ls").parameter_count,
+        "nobari_imaginary": int((rigid < -_ZERO).sum()),
+        "nobari_zero": int((np.abs(rigid) <= _ZERO).sum()),
+    }
+
+
+def largest_difference(bench: Workbench) -> float:
+    """Return how far Nobari's stiffness with rigid-body modes is from the physical one."""
+    one, other = (
+        bench.update(CASE, words).model.stiffness for words in ("nobari-rigid", "physical")
+    )
+    return float(np.abs(one - other).max() / np.abs(other).max())
+
+
+def _same_results(bench: Workbench) -> Cell:
+    """Return the claim that both give the same frequencies, as the largest relative difference."""
+    page = Page(PAPER, "text", "%", tolerance=100.0 * _EQUAL)
+    one, other = strain_modes(bench, "nobari-rigid"), strain_modes(bench, "physical")
+    off = 100.0 * float(np.abs(one / other - 1.0).max())
+    key = "nobari_rigid_difference"
+    return page.cell(_NAMES[key], "difference", float(printed(PAPER)["text"][key]), off)

@@ -1,0 +1,61 @@
+"""Table 2: natural frequencies on four meshes, and with accelerometers on the third."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from femubench import Case, Cell, FloatArray, Model, Page, solve_modes
+from femubench.papers.printed import printed
+
+MODES = 8
+
+
+def frequencies(model: Model, count: int = MODES) -> FloatArray:
+    """Return the lowest elastic natural frequencies in Hz, (count,)."""
+    return solve_modes(model).elastic.natural_frequencies[:count]
+
+
+def bare(case: Case, mesh: Sequence[int]) -> Model:
+    """Return the frame without accelerometers on another mesh.
+
+    Arguments:
+        mesh: elements of the horizontal, of each lower and of each upper leg.
+    """
+    frame = case.model.frame_structure.frame
+    count = dict(zip(("horizontal", "lower", "upper"), mesh, strict=True))
+    members = tuple(replace(m, elements=count[m.name.split("-")[0]]) for m in frame.members)
+    return Model.of(replace(frame, members=members, masses=()))
+
+
+def mesh_frequencies(case: Case) -> dict[str, FloatArray]:
+    """Return frequencies in Hz, (8,) for every row of table 2."""
+    meshes = printed("hframe")["test_article"]["mesh"]
+    found = {name: frequencies(bare(case, mesh)) for name, mesh in meshes.items()}
+    return {**found, "C_a": frequencies(case.model)}
+
+
+def mesh_cells(case: Case) -> tuple[Cell, ...]:
+    """Return table 2, normalised with mesh A; what agrees rounds to the printed digit."""
+    tables, found = printed("hframe"), mesh_frequencies(case)
+    cells = []
+    for row, values in tables["table2"].items():
+        for k, (theirs, hertz, base) in enumerate(zip(values, found[row], found["A"], strict=True)):
+            ours = float(hertz / base)
+            reason = _edge(theirs, ours)
+            if row == "C_a":
+                own = tables["table3"]["analytical"][k]
+                reason += f"; the printed {own} Hz of table 3 over our mesh A is {own / base:.6f}"
+            page = Page("hframe", "2", tolerance=0.0, decimals=3, reason=reason)
+            cells.append(page.cell(row, f"mode {k + 1}", theirs, ours))
+    return tuple(cells)
+
+
+def _edge(theirs: float, ours: float) -> str:
+    """Return why a ratio rounds to another digit."""
+    edge = theirs + (0.0005 if ours > theirs else -0.0005)
+    off = 100.0 * abs(ours / edge - 1.0)
+    return (
+        f"at a rounding edge: {ours:.6f} rounds to {ours:.3f}, the printed digit begins at "
+        f"{edge:.4f}, {off:.4f} % away"
+    )

@@ -1,0 +1,176 @@
+"""The five updates of table 4: the words that run them, and what the text leaves open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from femubench import Case, Model, Parameter, UpdateResult, Workbench
+from femubench.papers.printed import printed
+
+# The printed springs, arms and rigidities; the case knows the half depth of 20 mm.
+SPRINGS = "stiffness.x=3.30e9,stiffness.z=4.48e9,stiffness.ry=3.02e6"
+RIGID_SPRINGS = "stiffness.x=3.30e13,stiffness.z=4.48e13,stiffness.ry=3.02e10"
+FREE_EI = f"spring:{SPRINGS}"
+_TO_THE_LAST = "options.tolerance=1e-9,options.cost_tolerance=1e-12"
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a column rests on.
+
+    Arguments:
+        words: ``strategy:option=value,...``, as after ``bench run hframe -s``.
+        convention: what the text does not state; empty where the words are what it says.
+    """
+
+    words: str
+    convention: str = ""
+
+    @property
+    def note(self) -> str:
+        """Return the convention with the words that repeat it."""
+        return self.convention and f"{self.convention}: bench run hframe -s '{self.words}'"
+
+    @property
+    def start(self) -> str:
+        """Return the words of the model before the first step."""
+        return f"{self.words}{',' if ':' in self.words else ':'}options.max_iterations=0"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One of the updates (a) to (e).
+
+    Arguments:
+        letter: in the paper.
+        key: in the printed tables.
+        title: what is updated.
+        updated: how the updated column follows.
+        names: from the paper's symbol to our parameter.
+        before: how the initial column follows where that is another model.
+        apart: symbols that follow from another reading.
+        converged: words without the convention on damping, where there is one.
+    """
+
+    letter: str
+    key: str
+    title: str
+    updated: Reading
+    names: Mapping[str, str]
+    before: Reading | None = None
+    apart: Mapping[str, Reading] = field(default_factory=dict)
+    converged: str = ""
+
+    @property
+    def table(self) -> str:
+        """Return the name of the table, e.g. ``4a``."""
+        return f"4{self.letter}"
+
+    @property
+    def initial(self) -> Reading:
+        """Return what the initial column rests on."""
+        return self.before or Reading(self.updated.words)
+
+
+ROWS = (
+    Row(
+        "a",
+        "a_global_prototype",
+        "EI of all members",
+        Reading("global"),
+        {"EI": "EI all members"},
+    ),
+    Row(
+        "b",
+        "b_local_prototype",
+        "EI of the elements at the joints",
+        Reading(
+            "local:options.damping=0.01,options.max_iterations=6",
+            "stopped a little short of convergence",
+        ),
+        {"EI_x": "EI at T branch", "EI_z": "EI at T through"},
+        converged="local",
+    ),
+    Row(
+        "c",
+        "c_global_spring",
+        "EI and rho A of all members, springs at the joints",
+        Reading(
+            f"spring:variant=global,{RIGID_SPRINGS},options.damping=1.0,"
+            f"options.max_iterations=30,{_TO_THE_LAST}",
+            "springs made rigid, unlike those of the initial column; only EI / rho A is "
+            "determined, and where the two stand along it is where the iteration stops",
+        ),
+        {"EI": "EI all members", "rhoA": "rhoA all members"},
+        before=Reading(f"spring:variant=global,{SPRINGS}"),
+    ),
+    Row(
+        "d",
+        "d_spring",
+        "springs at the joints",
+        Reading(
+            f"spring:free_stiffness=false,{SPRINGS},options.damping=0.3,"
+            f"options.max_iterations=200,{_TO_THE_LAST}",
+            "EI frozen, which the text sets free; damped so strongly that k_x and k_z, on which "
+            "the frequencies hardly depend, have not drifted further when k_theta settles",
+        ),
+        {"k_x": "k_x T branch", "k_z": "k_z T branch", "k_theta": "k_ry T branch"}
+        | {"EI": "EI all members"},
+        converged=f"spring:free_stiffness=false,{SPRINGS}",
+    ),
+    Row(
+        "e",
+        "e_offset",
+        "partly rigid elements at the joints and EI",
+        Reading("offset"),
+        {"a_H": "a T branch", "a_V": "a T through", "EI": "EI all members"},
+        apart={
+            "a_V": Reading("offset:options.damping=3e-3", "damping strong enough to hold it still")
+        },
+    ),
+)
+
+
+def run(bench: Workbench, words: str) -> UpdateResult:
+    """Return an update of the H-frame."""
+    return bench.update("hframe", words)
+
+
+def nominal(case: Case, symbol: str) -> float:
+    """Return what a factor multiplies: EI in N m2 or rho A in kg/m; 1 for what is no factor."""
+    member = case.model.frame_structure.frame.members[0]
+    if symbol.startswith("EI"):
+        return member.material.E * member.section.Iy
+    return member.material.rho * member.section.A if symbol == "rhoA" else 1.0
+
+
+def parameter_values(bench: Workbench, row: Row, words: str) -> dict[str, tuple[float, float]]:
+    """Return initial and updated value of every parameter of a row by the paper's symbol."""
+    found = {p.name: (p.before, p.after) for p in run(bench, words).parameters}
+    values = {}
+    for symbol, name in row.names.items():
+        unit = nominal(bench.cases["hframe"], symbol)
+        before, after = found.get(name, (1.0, 1.0))  # a frozen factor keeps its value
+        values[symbol] = unit * before, unit * after
+    return values
+
+
+def at_printed(bench: Workbench, row: Row) -> Model:
+    """Return the model of the updated column with the parameters that the paper prints."""
+    structure = run(bench, row.updated.start).model.frame_structure
+    known = {parameter.name: parameter for parameter, _ in structure.changes}
+    theirs = printed("hframe")["table4"][row.key]["parameters"]
+    chosen: list[Parameter] = []
+    values: list[float] = []
+    for symbol, name in row.names.items():
+        if name in known:
+            first, last = theirs[symbol]
+            chosen.append(known[name])
+            values.append(last / first if known[name].is_factor else last)
+    return Model.of(structure.with_values(chosen, values))
+
+
+def row_of(letter: str) -> Row:
+    """Return one of the rows a to e."""
+    return next(row for row in ROWS if row.letter == letter)

@@ -1,0 +1,228 @@
+"""A paper worked through, cell by cell, as a report of any form."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from femubench import Cell, Extra, Figure, Study, verdict_counts
+from femubench.reports.blocks import (
+    Block,
+    Column,
+    Drawing,
+    Items,
+    Section,
+    Table,
+    to_markdown,
+    to_terminal,
+)
+from femubench.reports.cells import plain
+from femubench.reports.digits import Digits, off
+from femubench.reports.html import to_html
+from femubench.reports.markdown import escape
+from femubench.reports.terminal import WIDTH
+
+Drawings = Mapping[str, str]  # name of a figure -> SVG
+
+FIGURES = "figures"
+# Short words for the screen, whole ones for documents; a mark tells them apart without colour.
+_SHORT = {"agrees": "✓ yes", "agrees-under": "≈ if", "does-not-follow": "✗ no"}
+_WORDS = {
+    "agrees": "✓ agrees",
+    "agrees-under": "≈ agrees under",
+    "does-not-follow": "✗ does not follow",
+}
+_MEANING = {
+    "agrees": "ours rounds to the printed figure, or lies within the tolerance of the row's kind",
+    "agrees-under": "agrees under a convention that the text does not state: the note below the "
+    "table tells which",
+    "does-not-follow": "does not follow from the text: the note tells why",
+}
+_DEVIATION = (
+    "Deviation: (ours - printed) / |printed| in percent; of figures that are percentages "
+    "themselves, ours - printed in points (pt). A frequency with an i is imaginary. – : there is "
+    "no value of ours."
+)
+_EDGE, _GAP = 2, 2
+# A column of texts of so many characters is squeezed when it gets fewer than so many.
+_SENTENCE, _SQUEEZED = 30, 14
+_TITLE = 14  # characters of a title that stay on one line where there is room
+_NUMERIC = frozenset("0123456789+-–<>.")
+
+
+def counts_line(studies: Iterable[Study]) -> str:
+    """Return how many cells there are, and how many of every verdict."""
+    return _counts([cell for study in studies for cell in study.cells])
+
+
+def reproduction_text(studies: Sequence[Study]) -> str:
+    """Return studies as plain text of 80 columns, but for the first line: all the counts."""
+    sections = [*_legend(_SHORT), *_chapters(studies, _SHORT, None, "")]
+    return f"{counts_line(studies)}\n\n{to_terminal(sections)}"
+
+
+def reproduction_markdown(studies: Sequence[Study], *, figures: bool = False) -> str:
+    """Return studies in GitHub's Markdown; `figures`: link to `FIGURES`/NAME.svg."""
+    folder = f"{FIGURES}/" if figures else ""
+    sections = [*_legend(_WORDS), *_chapters(studies, _WORDS, None, folder)]
+    return f"# {escape(counts_line(studies))}\n\n{to_markdown(sections)}"
+
+
+def reproduction_html(studies: Sequence[Study], drawings: Drawings) -> str:
+    """Return studies as one HTML document that needs nothing besides itself."""
+    sections = [*_legend(_WORDS), *_chapters(studies, _WORDS, drawings, "")]
+    names = ", ".join(study.paper for study in studies)
+    return to_html(sections, title=f"Reproduced: {names}", heading=counts_line(studies))
+
+
+def _counts(cells: Sequence[Cell]) -> str:
+    counts = verdict_counts(cells)
+    noun = "cell" if len(cells) == 1 else "cells"
+    return (
+        f"{len(cells)} printed {noun}: {counts['agrees']} agree, "
+        f"{counts['agrees-under']} agree under a stated convention, "
+        f"{counts['does-not-follow']} do not follow from the text"
+    )
+
+
+def _summary(cells: Sequence[Cell]) -> str:
+    """Return the counts of a table without those that are zero."""
+    counts = verdict_counts(cells)
+    told = {
+        "agree": counts["agrees"],
+        "agree under a convention": counts["agrees-under"],
+        "do not follow": counts["does-not-follow"],
+    }
+    noun = "cell" if len(cells) == 1 else "cells"
+    parts = ", ".join(f"{number} {what}" for what, number in told.items() if number)
+    return f"{len(cells)} {noun}: {parts}"
+
+
+def _legend(words: Mapping[str, str]) -> Iterator[Section]:
+    entries = [(words[verdict], meaning) for verdict, meaning in _MEANING.items()]
+    yield Section("How to read it", [Items(entries), _DEVIATION])
+
+
+def _chapters(
+    studies: Iterable[Study], words: Mapping[str, str], drawings: Drawings | None, folder: str
+) -> Iterator[Section]:
+    for study in studies:
+        yield Section(study.title, [study.citation, f"{_counts(study.cells)}."])
+        yield from _remarks("What was taken from where", study.premises)
+        for table, cells in _grouped(study.cells).items():
+            title = _heading(table)
+            yield Section(title, list(_page(cells, words)), level=3)
+        yield from _remarks("What the re-run shows", study.findings)
+        for extra in study.extras:
+            yield Section(extra.title, list(_extra(extra)), level=3)
+        if study.figures:
+            found = [_drawing(figure, drawings, folder) for figure in study.figures]
+            yield Section("Figures", found, level=3)
+
+
+def _grouped(cells: Iterable[Cell]) -> dict[str, list[Cell]]:
+    """Return the cells by table, in the order in which the tables come up."""
+    tables: dict[str, list[Cell]] = {}
+    for cell in cells:
+        tables.setdefault(cell.table, []).append(cell)
+    return tables
+
+
+def _remarks(title: str, sentences: Sequence[str]) -> Iterator[Section]:
+    if sentences:
+        yield Section(title, [Items([("", sentence) for sentence in sentences])], level=3)
+
+
+def _page(cells: Sequence[Cell], words: Mapping[str, str]) -> Iterator[Block]:
+    """Return the cells of one table, then every note once."""
+    notes = list(dict.fromkeys(cell.note for cell in cells if cell.note))
+    marks = {note: f"[{number}]" for number, note in enumerate(notes, 1)}
+    units = list(dict.fromkeys(cell.unit for cell in cells))
+    digits = {
+        unit: Digits.of(cell.printed for cell in cells if cell.unit == unit) for unit in units
+    }
+    rows = []
+    for cell in cells:
+        own = digits[cell.unit]
+        row = [
+            cell.row,
+            cell.column,
+            own.printed(cell.printed, cell.unit),
+            own.ours(cell.ours, cell.unit, beside=cell.printed),
+            off(cell.deviation_percent, cell.unit),
+            f"{words[cell.verdict]} {marks.get(cell.note, '')}".rstrip(),
+        ]
+        rows.append([*row[:2], cell.unit, *row[2:]] if len(units) > 1 else row)
+    titles = ["row", "column", "unit", "printed", "ours", "dev. %", "verdict"]
+    sides = "lllrrrl"
+    if len(units) == 1:
+        titles, sides = [title for title in titles if title != "unit"], "llrrrl"
+    caption = f"{_summary(cells)}{f'; in {units[0]}' if units[0] and len(units) == 1 else ''}."
+    yield Table(_columns(titles, rows, sides), rows, caption, [cell.verdict for cell in cells])
+    if notes:
+        yield Items([(marks[note], note) for note in notes], whole=True)
+
+
+def _extra(extra: Extra) -> Iterator[Block]:
+    """Return a table; a column of sentences that the screen has no room for stands below it."""
+    columns = list(zip(*extra.rows, strict=True)) or [()] * len(extra.columns)
+    sides = "l" + "".join("r" if _figures(cells) else "l" for cells in columns[1:])
+    made = _columns(extra.columns, extra.rows, sides)
+    squeezed = [
+        place
+        for place, column in enumerate(made)
+        if place
+        and column.width < _SQUEEZED
+        and max(map(len, columns[place]), default=0) >= _SENTENCE
+    ]
+    kept = [place for place in range(len(made)) if place not in squeezed]
+    rows = [[row[place] for place in kept] for row in extra.rows]
+    titles = [extra.columns[place] for place in kept]
+    yield Table(_columns(titles, rows, "".join(sides[place] for place in kept)), rows)
+    notes = [(row[0], row[place]) for place in squeezed for row in extra.rows]
+    if notes or extra.note:
+        yield Items([*notes, *([("Note", extra.note)] if extra.note else [])], whole=True)
+
+
+def _figures(cells: Iterable[str]) -> bool:
+    return all(not cell or cell[0] in _NUMERIC for cell in cells)
+
+
+def _columns(titles: Sequence[str], rows: Sequence[Sequence[str]], sides: str) -> list[Column]:
+    """Return columns that fit on the screen together: titles break, then cells between words."""
+    lengths, words = [], []
+    for title, *cells in zip(titles, *rows, strict=True):
+        title_words = plain(title).split()
+        lengths.append(max(min(len(plain(title)), _TITLE), *map(len, map(plain, cells)), 1))
+        words.append(max(map(len, [*title_words, *(w for c in cells for w in plain(c).split())])))
+    room = WIDTH - _EDGE - _GAP * (len(titles) - 1)
+    widths = [max(pair) for pair in zip(lengths, words, strict=True)]
+    widths = _narrowed(_narrowed(widths, words, room), [1] * len(words), room)
+    return [
+        Column("\n".join(textwrap.wrap(plain(title), width)), width, side == "l", wrap=True)
+        for title, width, side in zip(titles, widths, sides, strict=True)
+    ]
+
+
+def _narrowed(widths: Sequence[int], least: Sequence[int], room: int) -> list[int]:
+    """Return widths of which the largest give way until all fit, or none has room to give."""
+    narrow = list(widths)
+    while sum(narrow) > room:
+        free = [place for place, width in enumerate(narrow) if width > least[place]]
+        if not free:
+            break
+        narrow[max(free, key=lambda place: narrow[place])] -= 1
+    return narrow
+
+
+def _drawing(figure: Figure, drawings: Drawings | None, folder: str) -> Drawing:
+    svg = drawings[figure.name] if drawings is not None else ""
+    file = f"{folder}{figure.name}.svg" if folder else ""
+    return Drawing(figure.title, figure.caption, svg, file)
+
+
+def _heading(table: str) -> str:
+    """Return a heading for a table by the paper's number, or by what the cells are from."""
+    if table[:1].isdigit():
+        return f"Table {table}"
+    return "Said in the text" if table == "text" else table[:1].upper() + table[1:]

@@ -1,0 +1,84 @@
+"""A drawing inside of an HTML document: names of its own, nothing that runs or is fetched."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from xml.etree import ElementTree
+
+from markupsafe import Markup
+
+_SVG, _XLINK = "http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"
+_PICTURE = "data:image/png;base64,"  # how a matrix image lies in a drawing
+# What can run, what can hold anything, and what no reader sees.
+_REFUSED = frozenset({"script", "foreignObject", "metadata"})
+_ID_LISTS = ("aria-labelledby", "aria-describedby")
+_REFERENCE = re.compile(r"url\(\s*['\"]?([^'\")]*)['\"]?\s*\)")
+
+
+def embedded(svg: str, prefix: str, label: str) -> Markup:
+    """Return a drawing for the middle of a document.
+
+    Arguments:
+        svg: a document of its own.
+        prefix: put before every id, as a page with several drawings must not have one twice.
+        label: what a screen reader says where the drawing names nothing itself.
+
+    Raises:
+        ValueError: when it is no SVG.
+    """
+    root = ElementTree.fromstring(svg)
+    if root.tag != f"{{{_SVG}}}svg":
+        raise ValueError(f"{label}: not a drawing but {root.tag!r}")
+    _clean(root, prefix)
+    root.set("role", "img")
+    if not root.get("aria-labelledby"):
+        root.set("aria-label", label)
+    ElementTree.register_namespace("", _SVG)
+    ElementTree.register_namespace("xlink", _XLINK)
+    return Markup(ElementTree.tostring(root, encoding="unicode"))
+
+
+def _clean(element: ElementTree.Element, prefix: str) -> None:
+    for child in list(element):
+        if _local(child.tag) in _REFUSED:
+            element.remove(child)
+        else:
+            _clean(child, prefix)
+    kept = {
+        name: value
+        for name, value in element.attrib.items()
+        if not _local(name).startswith("on") and _stays(name, value)
+    }
+    element.attrib.clear()
+    element.attrib.update(_prefixed(kept, prefix))
+    if element.text and _local(element.tag) == "style":
+        element.text = _REFERENCE.sub("none", element.text).replace("@import", "")
+
+
+def _stays(name: str, value: str) -> bool:
+    return _local(name) != "href" or value.startswith(("#", _PICTURE))
+
+
+def _prefixed(attributes: Mapping[str, str], prefix: str) -> dict[str, str]:
+    """Return attributes whose ids, and whose references to ids, are those of this drawing."""
+
+    def renamed(match: re.Match[str]) -> str:
+        target = match[1]
+        return f"url(#{prefix}-{target[1:]})" if target.startswith("#") else "none"
+
+    found = {}
+    for name, value in attributes.items():
+        if name == "id":
+            found[name] = f"{prefix}-{value}"
+        elif name in _ID_LISTS:
+            found[name] = " ".join(f"{prefix}-{word}" for word in value.split())
+        elif _local(name) == "href" and value.startswith("#"):
+            found[name] = f"#{prefix}-{value[1:]}"
+        else:
+            found[name] = _REFERENCE.sub(renamed, value)
+    return found
+
+
+def _local(name: str) -> str:
+    return name.rpartition("}")[2]

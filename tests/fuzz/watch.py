@@ -1,0 +1,82 @@
+"""Watch what a reader does while it reads: the time it takes and the files it opens."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+SECONDS = 30.0  # that no small file may take; the largest mesh allowed takes some 7 s
+_WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+_NEVER = ("os.remove", "os.rename", "os.mkdir", "os.rmdir", "os.link", "os.symlink", "os.chmod",
+          "os.system", "os.exec", "os.posix_spawn", "subprocess.Popen", "socket.connect",
+          "pickle.find_class", "ctypes.dlopen")  # fmt: skip
+# A module that is imported only now is no file of the case.
+_CODE = (".py", ".pyc", ".so")
+
+
+class Hang(BaseException):
+    """A reader that takes too long; no reader may take this for a fault of the file."""
+
+
+@dataclass
+class Watch:
+    """What happened that must not, as long as `folder` is set."""
+
+    folder: Path | None = None
+    faults: list[str] = field(default_factory=list)
+
+    def hook(self, event: str, arguments: tuple[Any, ...]) -> None:
+        """Note an event; see the table of audit events in Python's documentation."""
+        if self.folder is None:
+            return
+        if event in _NEVER:
+            self.faults.append(f"{event} {arguments!r}"[:300])
+        elif event == "open" and isinstance(arguments[0], (str, bytes)):
+            path = Path(os.fsdecode(arguments[0]))
+            reading = not (arguments[2] or 0) & _WRITING
+            inside = path.resolve().is_relative_to(self.folder)
+            if not (reading and (inside or path.name.endswith(_CODE))):
+                self.faults.append(f"opens {path} {'' if reading else 'for writing'}")
+
+
+_WATCH = Watch()
+_installed: list[bool] = []
+
+
+@contextmanager
+def watched(folder: Path) -> Iterator[None]:
+    """Raise AssertionError when the block touches a file elsewhere, Hang when it takes long."""
+    if not _installed:
+        sys.addaudithook(_WATCH.hook)
+        _installed.append(True)
+    late: list[bool] = []
+
+    def stop(*_: object) -> None:
+        late.append(True)
+        raise Hang(f"more than {SECONDS} s")
+
+    before = signal.signal(signal.SIGALRM, stop)
+    files = _listing(folder)
+    _WATCH.faults.clear()
+    _WATCH.folder = folder.resolve()
+    signal.setitimer(signal.ITIMER_REAL, SECONDS)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+        _WATCH.folder = None
+    assert _WATCH.faults == []
+    assert _listing(folder) == files
+    # A library that catches everything catches the alarm as well.
+    assert not late
+
+
+def _listing(folder: Path) -> list[str]:
+    return sorted(str(path) for path in folder.rglob("*"))

@@ -1,0 +1,173 @@
+"""Figures as SVG: well-formed, self-contained, the same every time, legible, escaped."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import matplotlib
+import numpy as np
+import pytest
+
+from femubench import Bars, Curve, Curves, Figure, MatrixImage, StructureMap
+from femubench.reports.drawing import STYLES, drawn, figure_canvas
+
+AWKWARD = 'a < b & "c" $x_1$ $'
+X = np.linspace(0.0, 1100.0, 50)
+CURVES = Curves(
+    "curves", "Title < & $a$", AWKWARD, "frequency, Hz", "receptance, dB re 1 m/N",
+    (
+        Curve(AWKWARD, X, np.cos(X), "measured"),
+        Curve("predicted", X, np.sin(X), "predicted"),
+        Curve("nominal", X, 0.5 * np.sin(X), "nominal"),
+        Curve("second", X, 0.7 * np.sin(X), "predicted"),
+    ),
+)  # fmt: skip
+MATRIX = MatrixImage(
+    "matrix", "Matrix", "caption", np.diag([1e6, -1e3, 10.0, 0.0]), "row", "column", "size, N/m",
+    (2,),
+)  # fmt: skip
+MAP = StructureMap(
+    "map", "Map", "caption", np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[1.0, 0.0], [1.0, 0.5]]),
+    np.array([0.25, 0.0123]), "x, m", "y, m", "change", (("J1", 0.0, 0.0),),
+)  # fmt: skip
+BARS = Bars(
+    "bars", "Bars", "caption", ("one", "two"), (("a", (1.0, -2.0)), ("b & c", (0.5, 0.25))),
+    "mode", "error, %", (("limit", 4.0),),
+)  # fmt: skip
+FIGURES = (CURVES, MATRIX, MAP, BARS)
+each = pytest.mark.parametrize("figure", FIGURES, ids=lambda f: f.name)
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def texts(figure: Figure) -> list[str]:
+    return ["".join(node.itertext()) for node in ET.fromstring(drawn(figure)).iter(f"{SVG}text")]
+
+
+@each
+def test_is_one_titled_element(figure: Figure) -> None:
+    text = drawn(figure)
+    assert text.startswith("<svg ")
+    root = ET.fromstring(text)
+    assert root.tag == f"{SVG}svg"
+    assert root[0].tag == f"{SVG}title"
+    assert root[0].text == figure.title
+    assert root[1].text == figure.caption
+    assert root.get("role") == "img"
+
+
+@each
+def test_same_text_every_time(figure: Figure) -> None:
+    assert drawn(figure) == drawn(figure)
+
+
+def test_same_text_in_another_process() -> None:
+    here = "\n".join(drawn(figure) for figure in (MATRIX, BARS))
+    code = (
+        "import sys, numpy as np; from femubench import Bars, MatrixImage;"
+        "from femubench.reports.drawing import drawn;"
+        f"array = np.array; print(drawn({MATRIX!r}) + chr(10) + drawn({BARS!r}), end='')"
+    )
+    found = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, encoding="utf-8"
+    )
+    assert found.stdout == here
+
+
+@each
+def test_nothing_from_outside_and_no_date(figure: Figure) -> None:
+    text = drawn(figure)
+    for link in re.findall(r'(?:xlink:)?href="([^"]*)"', text):
+        assert link.startswith(("#", "data:image/png"))
+    assert "<style" not in text
+    assert "<metadata" not in text
+    assert "<script" not in text
+
+
+@each
+def test_references_lead_to_ids_that_carry_the_name(figure: Figure) -> None:
+    text = drawn(figure)
+    ids = re.findall(r' id="([^"]*)"', text)
+    linked = set(re.findall(r'(?:url\(|href=")#([^")]+)', text))
+    assert linked <= set(ids)
+    assert len(ids) == len(set(ids))
+    assert all(name.startswith(figure.name) for name in ids)
+
+
+def test_settings_of_the_user_play_no_part_and_stay() -> None:
+    plain = drawn(CURVES)
+    with matplotlib.rc_context({"font.size": 20.0, "axes.grid": True, "lines.linewidth": 5.0}):
+        assert drawn(CURVES) == plain
+        assert matplotlib.rcParams["font.size"] == 20.0
+
+
+def test_figures_of_one_page_share_no_id() -> None:
+    both = drawn(BARS) + drawn(replace(BARS, name="other"))
+    ids = re.findall(r' id="([^"]*)"', both)
+    assert len(ids) == len(set(ids))
+
+
+@each
+def test_text_is_text_and_large_enough(figure: Figure) -> None:
+    assert texts(figure)
+    sizes = [
+        float(s) for s in re.findall(r"font(?:-size)?: (?:[a-z0-9]+ )*([\d.]+)px", drawn(figure))
+    ]
+    assert sizes
+    assert min(sizes) >= 9.0
+    assert "sans-serif" in drawn(figure)
+
+
+def test_labels_are_as_given() -> None:
+    found = texts(CURVES)
+    assert AWKWARD in found
+    assert "Title < & $a$" in found
+    assert "frequency, Hz" in found
+    assert "receptance, dB re 1 m/N" in found
+    assert {"J1", "0.25", "0.012"} <= set(texts(MAP))
+    assert "b & c" in texts(BARS)
+    assert "10⁶" in texts(MATRIX)
+
+
+def test_curves_differ_without_colour() -> None:
+    lines = figure_canvas(CURVES).axes[0].get_lines()
+    looks = {(str(line._dash_pattern), line.get_marker()) for line in lines}  # type: ignore[attr-defined]
+    assert len(looks) == len(CURVES.curves)
+    assert len({str(style["linestyle"]) for style in STYLES.values()}) == len(STYLES)
+
+
+def test_bars_differ_without_colour() -> None:
+    series = tuple((str(i), (1.0, 2.0)) for i in range(5))
+    patches = figure_canvas(replace(BARS, series=series)).axes[0].patches
+    assert len({patch.get_hatch() for patch in patches}) == len(series)
+
+
+def test_structure_keeps_its_proportions_and_matrix_its_values() -> None:
+    assert figure_canvas(MAP).axes[0].get_aspect() == 1.0
+    (image,) = figure_canvas(MATRIX).axes[0].images
+    values = image.get_array()
+    assert values is not None
+    shown = np.ma.getdata(values)
+    np.testing.assert_array_equal(shown, np.abs(MATRIX.matrix))
+
+
+@pytest.mark.parametrize(
+    "figure",
+    [
+        replace(MATRIX, matrix=np.zeros((3, 3))),
+        replace(MAP, values=np.zeros(2)),
+        replace(CURVES, log_y=True, curves=(Curve("a", X + 1.0, X + 1.0),)),
+        replace(BARS, lines=()),
+    ],
+    ids=lambda f: f.name,
+)
+def test_plain_figures_are_drawn_too(figure: Figure) -> None:
+    ET.fromstring(drawn(figure))
+
+
+def test_matplotlib_is_imported_on_use_only() -> None:
+    code = "import sys, femubench.reports.drawing; sys.exit('matplotlib' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)

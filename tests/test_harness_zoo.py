@@ -1,0 +1,70 @@
+"""A zoo of hostile strategies beside good ones: each is told by its status, and harms no other."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from femubench.core.harness import runner
+from femubench.core.harness.limits import MIB, Limits
+from femubench.core.harness.results import JobResult, Run
+from femubench.core.harness.runner import run_jobs
+
+sys.path.insert(0, str(Path(__file__).parent / "toys"))
+import harness_toys as toys
+import zoo
+
+GOOD = (toys.Unchanged(), toys.Softer(), toys.Grounded())
+MEMORY = 400 * MIB
+
+
+def small(seconds: float | None, memory: int | None) -> Limits:
+    """The same limits, and small ones on what is printed and handed back."""
+    return Limits(seconds, memory, output=4 * MIB, answer=16 * MIB)
+
+
+@pytest.fixture(scope="module")
+def runs() -> Iterator[dict[str, Run]]:
+    """One run with the zoo and one without."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(runner, "Limits", small)
+        yield both()
+
+
+def both() -> dict[str, Run]:
+    case = toys.tiny_case()
+    options: dict[str, Any] = {"timeout": 3.0, "memory": MEMORY, "seeds": (0, 1)}
+    calm = run_jobs([case], GOOD, jobs=1, **options)
+    animals = [animal() for animal in zoo.ANIMALS]
+    mixed = [*animals[:10], *GOOD, *animals[10:]]
+    wild = run_jobs([case], mixed, jobs=2, **{**options, "seeds": (0,)})
+    return {"calm": calm, "wild": wild}
+
+
+def found(run: Run, strategy: str) -> JobResult:
+    return next(item for item in run.results if (item.strategy, item.seed) == (strategy, 0))
+
+
+@pytest.mark.parametrize("animal", zoo.ANIMALS, ids=lambda animal: animal.name)
+def test_every_animal_is_told_by_its_status(runs: dict[str, Run], animal: type[zoo.Animal]) -> None:
+    result = found(runs["wild"], animal.name)
+    status, reason = animal.ends
+    assert (result.status, result.reason[: len(reason)]) == (status, reason)
+    assert "\n" not in result.reason
+
+
+def test_the_good_have_the_results_that_they_have_among_themselves(runs: dict[str, Run]) -> None:
+    for strategy in GOOD:
+        alone, among = (found(runs[name], strategy.name) for name in ("calm", "wild"))
+        same = {"seconds": 0.0, "rank": None, "provenance": {}}
+        assert replace(alone, **same) == replace(among, **same)
+
+
+def test_nothing_is_left_behind(runs: dict[str, Run]) -> None:
+    assert runs["wild"].results
+    assert list(zoo.leftovers()) == []

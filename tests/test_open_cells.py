@@ -1,0 +1,114 @@
+"""The search for the ladder paper's open columns: its engine, and what its page says."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from femubench import InputError, Strategy, read_case, solve_modes
+from femubench.core.plugin.variants import strategy_of
+from femubench.plugins.strategies.generic_adjusted import GenericAdjusted
+from femubench.plugins.strategies.generic_ls import GenericLS
+from femubench.plugins.strategies.nobari import Nobari
+from femubench.plugins.strategies.physical import Physical
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from equation_readings import Reading, expanded, nominal_of, predicted
+from ladder_settings import FRAME
+from nearest_model import nearest_with
+from open_cells import column, deviation
+
+STRATEGIES: dict[str, Strategy] = {
+    s.name: s for s in (Physical(), Nobari(), GenericLS(), GenericAdjusted())
+}
+
+
+def by_strategy(words: str) -> Any:
+    case = read_case(FRAME, "frame", ())
+    strategy = strategy_of(words, STRATEGIES)
+    rng = np.random.default_rng(0)
+    model = strategy.update(case.model, case.used_measurement(0), rng).model
+    return solve_modes(model).natural_frequencies[:8]
+
+
+@pytest.mark.parametrize("family", list(STRATEGIES))
+@pytest.mark.parametrize(
+    ("words", "choices"),
+    [
+        ("", {}),
+        ("orthogonality=false", {"diagonal": 0.0, "cross": 0.0}),
+        ("expansion=force", {"expansion": "force", "start": "nominal"}),
+        ("frequencies=nominal", {"target": "nominal"}),
+    ],
+)
+def test_engine_is_the_strategies(family: str, words: str, choices: dict[str, Any]) -> None:
+    rigid, modes = predicted(Reading(family=family, **choices))
+    ours = np.sort(np.append(rigid, modes))
+    theirs = np.sort(by_strategy(f"{family}:{words}" if words else family))
+    elastic = np.abs(theirs) > 1.0
+    np.testing.assert_allclose(ours[elastic], theirs[elastic], rtol=1e-6)
+
+
+def test_own_frequencies_give_the_hardly_moved_column() -> None:
+    _, modes = predicted(Reading(target="nominal"))
+    assert deviation(modes, "physical") < 0.3
+    assert modes[3] > column("physical")[3] > 911.3  # up, as printed
+    assert modes[4] < 1047.0  # and down
+
+
+def test_raw_expansion_by_forces_hides_most_of_the_frequency_error() -> None:
+    raw: dict[str, Any] = {"metric": "raw", "rows": "raw", "diagonal": 0.0, "cross": 0.0}
+    _, modes = predicted(Reading(expansion="force", start="nominal", **raw))
+    assert 2.5 < deviation(modes, "physical") < 3.5
+    scaled = {**raw, "metric": "diagonal", "rows": "paper"}
+    _, modes = predicted(Reading(expansion="force", start="nominal", **scaled))
+    assert deviation(modes, "physical") > 5.0
+
+
+def test_that_is_what_the_printed_frequencies_would_need() -> None:
+    nominal, least, there, _ = nearest_with(Reading(), column("physical"))
+    assert least < 0.1 * nominal
+    assert there > 0.9 * nominal
+
+
+def test_nearest_model_with_the_measured_frequencies_is_near_least_squares() -> None:
+    _, met = predicted(Reading(iterations=1))
+    _, least, there, _ = nearest_with(Reading(), met)
+    assert there == pytest.approx(least, rel=2e-2)
+
+
+def test_expansion_by_forces_gives_the_generic_column() -> None:
+    _, modes = predicted(Reading(family="generic-ls", expansion="force", start="nominal"))
+    assert deviation(modes, "generic-ls") < 0.3
+    _, modes = predicted(Reading(family="generic-ls"))
+    assert deviation(modes, "generic-ls") > 2.0
+
+
+def test_true_shapes_at_all_dofs_give_the_adjusted_column() -> None:
+    true = Reading(family="generic-adjusted", data="beam", expansion="all dofs")
+    _, modes = predicted(Reading(**{**vars(true), "diagonal": 3.0, "cross": 0.0}))
+    assert deviation(modes, "generic-adjusted") < 0.5
+    _, modes = predicted(true)
+    assert deviation(modes, "generic-adjusted") < 1.2
+    _, modes = predicted(Reading(family="generic-adjusted"))
+    assert deviation(modes, "generic-adjusted") > 5.0
+
+
+def test_expansions_keep_the_readings() -> None:
+    nominal = nominal_of(Reading())
+    reading = Reading(expansion="force")
+    shapes = expanded(reading, nominal, nominal.stiffness, nominal.measured)
+    seen = nominal.sensors @ shapes
+    ratio = (seen / nominal.measured)[np.abs(nominal.measured[:, 0]) > 0.1]
+    np.testing.assert_allclose(ratio, np.broadcast_to(ratio[0], ratio.shape), rtol=1e-8)
+
+
+def test_unknown_choices_are_refused() -> None:
+    with pytest.raises(InputError, match="expansion is rotation or force"):
+        strategy_of("physical:expansion=serep", STRATEGIES)
+    with pytest.raises(InputError, match="measured or nominal"):
+        strategy_of("physical:frequencies=mine", STRATEGIES)

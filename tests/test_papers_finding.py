@@ -1,0 +1,240 @@
+"""The frame paper's errors taken apart, and its figures: what must hold whatever comes out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from femubench import Bars, Curves, MatrixImage, Place, StructureMap, Workbench, receptance
+from femubench.core.case.reader import read_case
+from femubench.core.fem.frame import GroundSpring, PointMass
+from femubench.core.modal.eigen import solve_modes
+from femubench.core.model import Model
+from femubench.core.plugin.loader import load_plugins
+from femubench.papers import PAPERS
+from femubench.papers.frame.causes import CAUSES, JOINTS, TORSION, Ladder, best_factor, shares_of
+from femubench.papers.frame.changes import (
+    SOLUTIONS,
+    change_figures,
+    difference_matrix,
+    element_kinds,
+    recovered_change,
+    relative_change,
+)
+from femubench.papers.frame.finding import finding
+from femubench.papers.frame.receptances import (
+    DAMPING,
+    bundles,
+    receptance_figures,
+    receptance_sentences,
+)
+from femubench.papers.printed import printed
+from femubench.scenarios import HERE
+
+TABLE = printed("frame")["table1"]
+
+
+@pytest.fixture(scope="module")
+def bench() -> Workbench:
+    cases = {name: read_case(HERE / name, name) for name in PAPERS["frame"]}
+    return Workbench(load_plugins().strategies, cases)
+
+
+@pytest.fixture(scope="module")
+def ladder(bench: Workbench) -> Ladder:
+    return Ladder.of(bench)
+
+
+def worst(ladder: Ladder, causes: tuple[str, ...], factor: float = 1.0, **options: object) -> float:
+    found = ladder.frequencies(ladder.frame(causes, **options))  # type: ignore[arg-type]
+    scale = best_factor(found, ladder.measured) if factor == 0.0 else factor
+    return float(np.abs(ladder.errors(scale * found)).max())
+
+
+def test_no_cause_is_the_paper_s_model(ladder: Ladder) -> None:
+    np.testing.assert_allclose(ladder.frequencies(ladder.frame(())), TABLE["fe"], rtol=1e-3)
+    np.testing.assert_allclose(
+        ladder.errors(ladder.frequencies(ladder.nominal)), TABLE["error_percent"], atol=0.4
+    )
+
+
+@pytest.mark.parametrize("accelerometer", [True, False])
+def test_textbook_beams_meet_the_test_with_nothing_tuned(
+    ladder: Ladder, accelerometer: bool
+) -> None:
+    options = {"young": 70e9, "accelerometer": accelerometer}
+    assert worst(ladder, CAUSES[:2], **options) < 4.0
+    assert worst(ladder, CAUSES[:2], factor=0.0, **options) < 2.0
+    assert worst(ladder, (), **options) > 12.0
+    assert worst(ladder, (), factor=0.0, **options) > 5.0
+
+
+def test_rebuilt_textbook_frequencies(ladder: Ladder) -> None:
+    found = ladder.frequencies(ladder.frame(CAUSES[:2], young=70e9, accelerometer=False))
+    np.testing.assert_allclose(found, [235.3, 279.7, 556.8, 884.8, 1011.7], rtol=2e-3)
+
+
+def test_steps_add_up_to_the_whole_error(ladder: Ladder) -> None:
+    shares = shares_of(ladder)
+    causes = sum(shares.mean[c] for c in CAUSES)
+    np.testing.assert_allclose(causes + shares.complete, shares.whole, atol=1e-9)
+    rest = shares.accelerometer + shares.young + shares.rest
+    np.testing.assert_allclose(causes + rest, shares.whole, atol=1e-9)
+    # All but mesh and mass matrix is then the beam model that meets the test.
+    assert np.abs(shares.rest).max() < 0.1
+
+
+def test_torsion_is_the_largest_cause_of_mode_1_in_both_orders(ladder: Ladder) -> None:
+    shares = shares_of(ladder)
+    for order in (shares.first, shares.last, shares.mean):
+        assert order[TORSION][0] > 0.8 * shares.whole[0]
+        assert order[TORSION][0] > 2.0 * max(order[c][0] for c in CAUSES if c != TORSION)
+    # Flexible joints take over part of what torsion does, so a cause weighs less as the last.
+    assert shares.last[JOINTS][0] < shares.mean[JOINTS][0] < shares.first[JOINTS][0]
+
+
+def test_the_best_factor_balances_the_extremes() -> None:
+    measured, found = np.array([100.0, 200.0, 300.0]), np.array([101.0, 208.0, 309.0])
+    error = best_factor(found, measured) * found / measured - 1.0
+    assert error.max() == pytest.approx(-error.min())
+
+
+def test_finding_gives_tables_figures_and_sentences(bench: Workbench) -> None:
+    extras, figures, sentences = finding(bench)
+    for extra in extras:
+        assert all(len(row) == len(extra.columns) for row in extra.rows)
+    chain, causes = figures
+    assert isinstance(chain, Bars)
+    assert isinstance(causes, Bars)
+    (first, *_, last) = [np.array(values) for _, values in chain.series]
+    assert first[0] == pytest.approx(TABLE["error_percent"][0], abs=0.05)
+    assert np.abs(last).max() < 2.0
+    assert len(causes.series) == 3
+    assert all(sentence.endswith(".") for sentence in sentences)
+
+
+def test_difference_matrix_is_symmetric_and_in_one_unit(bench: Workbench) -> None:
+    model = bench.cases["frame"].model
+    updated = bench.update("frame", "baruch").model
+    change = difference_matrix(model, updated)
+    np.testing.assert_allclose(change, change.T, atol=1e-9 * np.abs(change).max())
+    assert updated.stiffness_change is not None
+    length = model.frame_structure.properties.length.mean()
+    turns = np.array([d.startswith("r") for d in model.dofs.direction])
+    scale = np.where(turns, 1.0 / length, 1.0)
+    dense = updated.stiffness_change.toarray() * np.outer(scale, scale)
+    assert np.linalg.norm(change) == pytest.approx(np.linalg.norm(dense), rel=1e-6)
+    assert np.linalg.matrix_rank(change, tol=1e-8 * np.linalg.norm(change)) == 3
+
+
+@pytest.mark.parametrize("words", SOLUTIONS.values())
+def test_element_matrices_are_recovered_from_the_parameters(bench: Workbench, words: str) -> None:
+    from femubench import generic_family
+
+    model = bench.cases["frame"].model
+    structure = model.frame_structure
+    result = bench.update("frame", words)
+    family = generic_family(structure, tied=words == "generic-adjusted")
+    assembled = structure.plan.assemble(recovered_change(family, result))
+    expected = result.model.stiffness - model.stiffness
+    assert abs(assembled - expected).max() < 1e-9 * abs(expected).max()
+
+
+def test_a_factor_on_all_elements_is_their_relative_change(bench: Workbench) -> None:
+    from femubench import stiffness_matrices
+
+    structure = bench.cases["frame"].model.frame_structure
+    change = 0.07 * np.asarray(stiffness_matrices(structure.properties))
+    np.testing.assert_allclose(relative_change(structure, change), 0.07, rtol=1e-12)
+
+
+def test_change_figures(bench: Workbench) -> None:
+    matrix, *maps = change_figures(bench)
+    assert isinstance(matrix, MatrixImage)
+    assert matrix.matrix.shape == (81, 81)
+    assert matrix.separators == (18, 27, 36, 45, 54, 63, 72)
+    for figure in maps:
+        assert isinstance(figure, StructureMap)
+        assert len(figure.values) == 28
+        assert figure.values.min() > 0.0
+    structure = bench.cases["frame"].model.frame_structure
+    assert element_kinds(structure).sum(axis=1).tolist() == [8, 6, 14]
+    # Tied elements of a kind change alike.
+    tied = maps[1].values  # type: ignore[union-attr]
+    for kind in element_kinds(structure)[[0, 2]]:
+        assert np.ptp(tied[kind > 0.0]) < 0.01
+
+
+def test_stand_in_resonates_where_the_test_does(bench: Workbench) -> None:
+    before, after = bundles(bench)
+    case = bench.cases["frame-beam"]
+    np.testing.assert_allclose(
+        before.test.resonances[:5], bench.cases["frame"].measurement.frequencies, rtol=2e-4
+    )
+    stored = case.modifications[0].measurement.frequencies
+    np.testing.assert_allclose(after.test.resonances[: len(stored)], stored, rtol=1e-5)
+
+
+def test_resonances_and_antiresonances_are_where_the_curve_says(bench: Workbench) -> None:
+    point = bundles(bench)[0].test
+    for found, sign in ((point.resonances[:5], -1.0), (point.antiresonances[:5], 1.0)):
+        beside = np.stack([found * (1.0 - DAMPING), found, found * (1.0 + DAMPING)])
+        level = sign * np.array([point.level(row) for row in beside])
+        assert (level[1] < level[0]).all()
+        assert (level[1] < level[2]).all()
+
+
+def test_what_is_attached_at_a_point_leaves_its_antiresonances(bench: Workbench) -> None:
+    before, after = bundles(bench)
+    for one, other in ((before.test, after.test), (before.nominal, after.nominal)):
+        np.testing.assert_allclose(one.antiresonances[:4], other.antiresonances[:4], rtol=1e-6)
+
+
+def test_antiresonances_are_those_of_the_held_structure(bench: Workbench) -> None:
+    model = bench.cases["frame-beam"].model
+    place = Place(member="front-left", s=0.5)
+    held = solve_modes(model.attach((), (GroundSpring(place, "z", 1e13),))).natural_frequencies
+    found = bundles(bench)[0].nominal.antiresonances[:4]
+    assert all(np.abs(held / f - 1.0).min() < 1e-4 for f in found)
+
+
+def test_receptance_of_the_stand_in_is_reciprocal(bench: Workbench) -> None:
+    model = Model.of(Ladder.of(bench).truth)
+    rows = model.observe(bench.cases["frame-beam"].measurement.sensors)
+    found = receptance(solve_modes(model), rows, rows, np.array([50.0, 227.0, 700.0]), DAMPING)
+    np.testing.assert_allclose(found, np.swapaxes(found, 1, 2), rtol=1e-9, atol=1e-18)
+
+
+def test_modal_receptance_is_the_inverse_dynamic_stiffness(bench: Workbench) -> None:
+    case = bench.cases["frame-beam"]
+    mass = PointMass(Place(member="front-left", s=0.5), 0.5)
+    model = case.model.attach((mass,), ())
+    row = model.observe(case.measurement.sensors)[[5]].toarray()
+    omega = 2.0 * np.pi * 400.0
+    dynamic = (model.stiffness - omega**2 * model.mass).toarray()
+    direct = float((row @ np.linalg.solve(dynamic, row.T))[0, 0])
+    modal = receptance(solve_modes(model), row, row, np.array([400.0]))[0, 0, 0]
+    assert modal.real == pytest.approx(direct, rel=1e-8)
+
+
+def test_receptance_figures(bench: Workbench) -> None:
+    figures = receptance_figures(bench)
+    assert [f.name for f in figures] == [f"frame-figure-{n}" for n in range(6, 12)]
+    for figure in figures:
+        assert isinstance(figure, Curves)
+        assert "Hz" in figure.x_label
+        assert "dB re 1 m/N" in figure.y_label
+        assert "0.2 %" in figure.caption
+        assert len({curve.role for curve in figure.curves}) == len(figure.curves)
+        assert all(np.isfinite(curve.y).all() for curve in figure.curves)
+    # Baruch's model has three resonances of the test and the others of the nominal model.
+    before, _ = bundles(bench)
+    baruch = before.updated["baruch"].resonances
+    np.testing.assert_allclose(baruch[:3], before.test.resonances[:3], rtol=1e-6)
+    np.testing.assert_allclose(baruch[3:5], before.nominal.resonances[3:5], rtol=1e-6)
+
+
+def test_sentences_name_the_models(bench: Workbench) -> None:
+    text = " ".join(receptance_sentences(bench))
+    assert all(word in text for word in ("Baruch", "Kabe", "generic elements", "dB", "Hz"))
+    assert "-0.0 " not in text

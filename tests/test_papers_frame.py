@@ -1,0 +1,262 @@
+"""The ladder-frame paper recomputed: what must agree, what must not, and the sets behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from femubench import Cell, Extra, InputError, Study, Workbench, read_case, solve_modes
+from femubench.core.plugin.loader import load_plugins
+from femubench.papers import PAPERS, study
+from femubench.papers.frame import (
+    counts,
+    mass_matrix,
+    misprints,
+    predictions,
+    readings,
+    spaces,
+    tables,
+)
+from femubench.papers.frame.common import CASE, TRUTH, rigid_modes, strain_modes
+from femubench.papers.printed import printed
+
+Key = tuple[str, str, str]
+MEASURED = np.array([226.8, 275.2, 537.4])
+
+
+@pytest.fixture(scope="module")
+def bench() -> Workbench:
+    plugins = load_plugins()
+    cases = {name: read_case(plugins.scenarios[name].cases[name]) for name in PAPERS["frame"]}
+    return Workbench(plugins.strategies, cases)
+
+
+@pytest.fixture(scope="module")
+def rerun(bench: Workbench) -> Study:
+    return study("frame", bench)
+
+
+@pytest.fixture(scope="module")
+def cells(rerun: Study) -> Mapping[Key, Cell]:
+    return {(cell.table, cell.row, cell.column): cell for cell in rerun.cells}
+
+
+def column(cells: Mapping[Key, Cell], table: str, name: str) -> list[Cell]:
+    return [cells[table, f"mode {i}", name] for i in range(1, 6)]
+
+
+def extra(rerun: Study, title: str) -> Extra:
+    return next(item for item in rerun.extras if item.title.startswith(title))
+
+
+def test_every_cell_is_there_once_and_none_is_without_a_reason(
+    rerun: Study, cells: Mapping[Key, Cell]
+) -> None:
+    assert len(cells) == len(rerun.cells) >= 60
+    for cell in rerun.cells:
+        assert cell.ours is not None
+        assert np.isfinite(cell.ours)
+        assert cell.verdict == "agrees" or len(cell.note) > 30
+
+
+def test_every_printed_figure_has_its_cell(rerun: Study) -> None:
+    data = printed("frame")
+    figures = data["table1"]["fe"] + data["table1"]["error_percent"]
+    figures += list(data["generalised_mass"]["off_diagonal"].values()) + list(data["text"].values())
+    for table in ("table2", "table3", "table4"):
+        for one in data[table].values():
+            figures += one["modes"] + one.get("rigid", [])[:1]
+    assert sorted(cell.printed for cell in rerun.cells) == sorted(float(f) for f in figures)
+
+
+@pytest.mark.parametrize(("table", "name"), [("1", "FE model"), ("2", "Baruch's method")])
+def test_columns_that_no_shape_enters_agree_to_a_thousandth(
+    cells: Mapping[Key, Cell], table: str, name: str
+) -> None:
+    for cell in column(cells, table, name):
+        assert cell.deviation_percent is not None
+        assert abs(cell.deviation_percent) <= 0.1
+        assert cell.verdict != "does-not-follow"
+
+
+def test_kabe_with_rigid_modes_agrees_within_half_a_percent(cells: Mapping[Key, Cell]) -> None:
+    found = column(cells, "2", "changing non-zeros + rigid modes")
+    assert [cell.verdict for cell in found] == ["agrees"] * 3 + ["agrees-under"] * 2
+    assert max(abs(cell.deviation_percent or 0.0) for cell in found) <= 0.5
+
+
+def test_what_does_not_follow_is_known(rerun: Study) -> None:
+    """One list: a cell that starts or ceases to agree is news and must be looked at."""
+    found: dict[tuple[str, str], set[str]] = {}
+    for cell in rerun.cells:
+        if cell.verdict == "does-not-follow" and cell.table != "generalised mass":
+            found.setdefault((cell.table, cell.column), set()).add(cell.row)
+    modes = {f"mode {i}" for i in range(1, 6)}
+    assert found == {
+        ("1", "error"): modes - {"mode 1"},
+        ("2", "changing non-zeros"): {"rigid-body modes", "mode 4", "mode 5"},
+        ("3", "physical parameters"): modes,
+        ("3", "Nobari's method"): modes | {"rigid-body modes"},
+        ("3", "Nobari's method + rigid-body modes (text of 4.2)"): modes,
+        ("4", "adjusted solution"): {"mode 4", "mode 5"},
+    }
+
+
+def test_all_counts_of_the_text_agree(rerun: Study) -> None:
+    text = [cell for cell in rerun.cells if cell.table == "text"]
+    assert {28.0, 14.0, 231.0, 249.0, 112.0, 140.0} <= {cell.printed for cell in text}
+    assert {cell.verdict for cell in text} == {"agrees"}
+
+
+def test_least_squares_column_comes_from_one_reading_that_the_note_names(
+    bench: Workbench, cells: Mapping[Key, Cell]
+) -> None:
+    found = column(cells, "4", "LS solution")
+    assert [cell.verdict for cell in found] == ["agrees"] * 3 + ["agrees-under"] * 2
+    assert tables.LS_FORCED in found[3].note
+    ours = strain_modes(bench, tables.LS_FORCED)
+    np.testing.assert_allclose(ours, [cell.printed for cell in found], rtol=3e-3)
+    text = strain_modes(bench, "generic-ls")[3:] / [cell.printed for cell in found[3:]]
+    assert np.abs(text - 1.0).min() > 0.01
+
+
+def test_a_column_that_hardly_moves_is_not_explained_by_what_hardly_moves(
+    bench: Workbench,
+) -> None:
+    values = printed("frame")["table3"]["physical"]["modes"]
+    assert readings.farthest(bench, "unchanged", values) < 1.0
+    assert readings.farthest(bench, "physical", values) > 10.0
+
+
+def test_nobari_keeps_one_zero_and_turns_one_imaginary(bench: Workbench) -> None:
+    lowest, zero, third = rigid_modes(bench, "nobari")
+    assert lowest < -50.0
+    assert abs(zero) < 1e-3
+    assert third > 10.0
+
+
+def test_nobari_with_rigid_modes_is_physical(bench: Workbench) -> None:
+    assert counts.largest_difference(bench) <= 1e-6
+    one, other = strain_modes(bench, "nobari-rigid"), strain_modes(bench, "physical")
+    np.testing.assert_allclose(one, other, rtol=1e-6)
+
+
+def test_sets_of_matrices_are_counted_by_rank_and_coincide(bench: Workbench) -> None:
+    found = spaces.compare_spaces(bench.cases[CASE].model)
+    assert (found.entries, found.kept_by_rigid, found.outside) == (231, 89, 23)
+    assert found.beam_and_rod - found.outside == found.within == found.kept_by_rigid
+    assert found.same_as_generic < 1e-9
+    assert (found.nobari, found.nobari_kept, found.physical) == (112, 56, 56)
+    assert found.same_as_physical < 1e-9
+    assert found.gap > 1e6
+    assert bench.update(CASE, "kabe-rigid").parameter_count == found.kept_by_rigid
+
+
+def test_sets_are_the_same_by_sampling_too(bench: Workbench) -> None:
+    """A change by kabe-rigid is an assembly of beams and rods: no coupling is left over."""
+    nominal, kept = bench.cases[CASE].model, bench.update(CASE, "kabe-rigid").model
+    structure = nominal.frame_structure
+    change = (kept.stiffness - nominal.stiffness).toarray()
+    family = spaces.generic_family(structure, plain="none", joint="none")
+    size = 1.0 / np.sqrt(nominal.stiffness.diagonal())
+    chosen = [i for i, n in enumerate(family.names) if n.startswith(("k11", "k12", "k22", "k33"))]
+    entries = (change * np.outer(size, size))[np.triu_indices(nominal.size)]
+    columns = spaces._assembled(family, chosen, size)
+    rest = entries - columns @ np.linalg.lstsq(columns, entries, rcond=None)[0]
+    assert np.linalg.norm(rest) < 1e-9 * np.linalg.norm(entries)
+    fewer = columns[:, [i for i, c in enumerate(chosen) if not family.names[c].startswith("k12")]]
+    rest = entries - fewer @ np.linalg.lstsq(fewer, entries, rcond=None)[0]
+    assert np.linalg.norm(rest) > 1e-3 * np.linalg.norm(entries)
+
+
+def test_mass_matrix_is_the_unit_matrix_for_the_models_own_modes(bench: Workbench) -> None:
+    case = bench.cases[CASE]
+    modes = solve_modes(case.model).elastic
+    own = replace(
+        case.measurement,
+        frequencies=modes.natural_frequencies[:5],
+        shapes=case.model.observe(case.measurement.sensors) @ modes.shapes[:, :5],
+    )
+    np.testing.assert_allclose(mass_matrix.generalised_mass(case.model, own), np.eye(5), atol=1e-6)
+
+
+def test_mass_matrix_of_the_twin_is_below_the_printed_one(
+    bench: Workbench, cells: Mapping[Key, Cell]
+) -> None:
+    found = [cell for cell in cells.values() if cell.table == "generalised mass"]
+    assert len(found) == 10
+    assert {cell.verdict for cell in found} == {"does-not-follow"}
+    case = bench.cases[CASE]
+    low, high = (mass_matrix.scatter(case.model, case.measurement, s) for s in (0.01, 0.03))
+    size = np.sqrt(np.mean([cell.printed**2 for cell in found]))
+    assert low < size < high
+
+
+def test_cutoff_decides_on_the_non_zeros(rerun: Study, bench: Workbench) -> None:
+    rows = extra(rerun, "Changing non-zeros").rows
+    ranks = [int(row[1]) for row in rows]
+    assert ranks == sorted(ranks)
+    assert ranks[-1] < 231
+    assert "i" not in rows[1][2]
+    assert "i" in rows[-1][2]
+    with pytest.raises(InputError, match="not positive"):
+        bench.update(CASE, "kabe:cutoff=0")
+    firm = strain_modes(bench, readings.kabe_words(0.001))[4] / strain_modes(bench, "kabe")[4]
+    assert abs(firm - 1.0) > 0.02
+
+
+def test_one_factor_on_the_whole_stiffness_beats_the_nominal_model(bench: Workbench) -> None:
+    case = bench.cases[CASE]
+    quasi = readings.quasi_measured_modes(case.model, case.used_measurement())
+    factor, before, after = readings.uniform_factor(bench, quasi)
+    nominal = strain_modes(bench, "unchanged")[:3]
+    assert (MEASURED / nominal).min() ** 2 < factor < (MEASURED / nominal).max() ** 2
+    assert after < 0.5 * before
+
+
+def test_energy_of_the_used_modes_is_hardly_shear(bench: Workbench) -> None:
+    bend, shear, twist = readings.energy_shares(bench)
+    assert bend + shear + twist == pytest.approx(100.0)
+    assert shear < 5.0 < twist < bend
+
+
+def test_misprints_are_told_by_their_figures(bench: Workbench) -> None:
+    right, transposed = misprints.rotations(bench)
+    assert right < 0.1 * transposed
+    structure = bench.cases[CASE].model.frame_structure
+    as_printed = misprints.with_printed_torsional_mass(structure)
+    fe = np.array(printed("frame")["table1"]["fe"])
+    assert np.abs(as_printed / fe - 1.0).max() > 0.01
+    terms = misprints.coupling_terms(structure)
+    assert terms == {"half-turn": ("k13",), "mirror": ("k23",), "full": ()}
+
+
+def test_held_out_modes_of_every_strategy(rerun: Study) -> None:
+    rows = {row[0]: row for row in extra(rerun, "Held-out").rows}
+    assert {"physical", "nobari", "generic-ls", "baruch", "kabe-rigid"} <= set(rows)
+    assert rows["baruch"][1:3] == rows["unchanged"][1:3]
+    assert rows["physical"] == ("physical", *rows["nobari-rigid"][1:])
+
+
+def test_design_change_brings_the_fourth_strain_mode_below_the_range(bench: Workbench) -> None:
+    change = bench.cases[TRUTH].modifications[0]
+    truth = change.measurement.frequencies
+    assert truth[predictions.SENTENCES[2].mode] < predictions.RANGE
+    assert bench.cases[TRUTH].measurement.frequencies[3] > predictions.RANGE
+    baruch = predictions.after_change(bench, TRUTH, "baruch")
+    assert (baruch[4].predicted_hz or 0.0) > predictions.RANGE
+    assert baruch[1].predicted_hz == pytest.approx(truth[1], rel=1e-3)
+
+
+def test_a_sentence_is_judged_by_its_figures(bench: Workbench) -> None:
+    claims = [
+        predictions.Sentence("", ("baruch",), 4, claim) for claim in ("wrong", "exact", "absent")
+    ]
+    assert [predictions.holds(bench, TRUTH, s)[0] for s in claims] == [True, False, True]
+    better = predictions.Sentence("", ("kabe-rigid", "baruch"), 4, "better")
+    worse = predictions.Sentence("", ("baruch", "kabe-rigid"), 4, "better")
+    assert predictions.holds(bench, TRUTH, better)[0]
+    assert not predictions.holds(bench, TRUTH, worse)[0]

@@ -1,0 +1,313 @@
+"""``bench plugins new`` and ``show``: packages that work as they are written, names, faults."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterable
+from importlib.metadata import distributions
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+import femubench
+from femubench import InputError
+from femubench.core.cli.main import bench
+from femubench.core.plugin import new_package
+from femubench.core.plugin.loader import load_plugins
+from femubench.core.plugin.new_package import KINDS, write_package
+
+SITE = Path(str(femubench.__file__)).parents[1]
+LONGEST = "a-method-that-has-got-a-rather-long-name"
+
+
+def invoke(*words: str | Path) -> Result:
+    return CliRunner().invoke(bench, [str(word) for word in words])
+
+
+@pytest.fixture(scope="module")
+def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with one package of each kind."""
+    folder = tmp_path_factory.mktemp("packages")
+    for kind in KINDS:
+        result = invoke("plugins", "new", f"my-{kind}", "--kind", kind, "--output", folder)
+        assert (result.exit_code, result.stderr) == (0, "")
+    return folder
+
+
+def installed(package: Path) -> None:
+    """Make a package importable with its entry points, as `pip install -e` would."""
+    project = tomllib.loads((package / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    info = package / "src" / f"{project['name'].replace('-', '_')}-{project['version']}.dist-info"
+    info.mkdir(exist_ok=True)
+    head = f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
+    (info / "METADATA").write_text(head, encoding="utf-8")
+    points = project["entry-points"]["femubench"]
+    lines = [f"{name} = {module}" for name, module in points.items()]
+    (info / "entry_points.txt").write_text("\n".join(["[femubench]", *lines]), encoding="utf-8")
+
+
+def python(
+    *words: str | Path, packages: Iterable[Path], cwd: Path
+) -> subprocess.CompletedProcess[str]:
+    """Run Python with some packages and femubench, away from this process."""
+    path = os.pathsep.join(map(str, [*(package / "src" for package in packages), SITE]))
+    env = os.environ | {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
+    return subprocess.run(
+        [sys.executable, *map(str, words)], capture_output=True, text=True, env=env, cwd=cwd
+    )
+
+
+def pytest_of(package: Path) -> subprocess.CompletedProcess[str]:
+    words = (
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        "--rootdir",
+        package,
+        package / "tests",
+    )
+    return python(*words, packages=[package], cwd=package)
+
+
+@pytest.fixture
+def copy(packages: Path, tmp_path: Path, request: pytest.FixtureRequest) -> Path:
+    """Return a copy of one package that a test may spoil."""
+    return Path(shutil.copytree(packages / f"my-{request.param}", tmp_path / "copy"))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_package_passes_its_own_tests(packages: Path, kind: str) -> None:
+    result = pytest_of(packages / f"my-{kind}")
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
+@pytest.mark.parametrize(
+    ("copy", "old", "new"),
+    [
+        ("strategy", "ratio.sum() / (ratio @ ratio)", "1.0 / ratio.mean()"),
+        ("strategy", "        ratio = ", "        model.stiffness.data *= 1.5\n        ratio = "),
+        ("effect", 'Factor("EI"', 'Factor("E"'),
+        ("reader", "len(modes), len(points)).T", "len(points), len(modes))"),
+    ],
+    indirect=["copy"],
+)
+def test_its_tests_fail_when_the_plugin_is_wrong(copy: Path, old: str, new: str) -> None:
+    (source,) = copy.glob("src/*/__init__.py")
+    text = source.read_text(encoding="utf-8")
+    assert text.count(old) == 1
+    source.write_text(text.replace(old, new), encoding="utf-8")
+    result = pytest_of(copy)
+    assert result.returncode == 1, result.stdout + result.stderr
+
+
+@pytest.mark.parametrize("copy", ["scenario"], indirect=True)
+def test_scenario_with_sensors_in_the_wrong_place_fails_its_test(copy: Path) -> None:
+    (sensors,) = copy.glob("src/*/case/sensors.csv")
+    text = sensors.read_text(encoding="utf-8")
+    sensors.write_text(text.replace("beam_quarter,beam@0.25", "beam_quarter,beam@0.9"), "utf-8")
+    assert pytest_of(copy).returncode == 1
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_any_name_gives_tidy_code(kind: str, tmp_path: Path) -> None:
+    for name in ("q", LONGEST, "strategy", "model", "none", "path"):
+        for path in write_package(name, kind, tmp_path, load_plugins([])):
+            text = path.read_text(encoding="utf-8")
+            assert "{{" not in text
+            assert text.endswith("\n")
+            assert not text.endswith("\n\n")
+            if path.suffix == ".py":
+                nodes = list(ast.walk(ast.parse(text)))
+                classes = {node.name for node in nodes if isinstance(node, ast.ClassDef)}
+                assert not classes & {*dir(femubench), "None", "Path"}
+    for words in (["check", "--no-cache"], ["format", "--no-cache", "--check"]):
+        command = [sys.executable, "-m", "ruff", *words, str(tmp_path)]
+        found = subprocess.run(command, capture_output=True, text=True)
+        assert found.returncode == 0, found.stdout
+
+
+class TestInstalled:
+    """What `bench` says and does once a package is installed."""
+
+    @pytest.fixture
+    def bench_with(self, packages: Path, tmp_path: Path) -> Any:
+        def run(kinds: Iterable[str], *words: str | Path) -> subprocess.CompletedProcess[str]:
+            found = [packages / f"my-{kind}" for kind in kinds]
+            for package in found:
+                installed(package)
+            return python("-m", "femubench.core.cli.main", *words, packages=found, cwd=tmp_path)
+
+        return run
+
+    def test_list_names_all_of_them(self, bench_with: Any) -> None:
+        result = bench_with(tuple(KINDS), "plugins", "list")
+        assert (result.returncode, result.stderr) == (0, "")
+        for kind, (offers, _) in KINDS.items():
+            assert f"my-{kind} (my-{kind} 0.1.0)\n  {offers}: my-{kind}\n" in result.stdout
+
+    def test_show_knows_where_it_comes_from(self, bench_with: Any) -> None:
+        shown = bench_with(["strategy"], "plugins", "show", "my-strategy").stdout
+        assert shown.startswith("my-strategy: strategy\n")
+        assert "my-strategy 0.1.0, plugin my-strategy" in shown
+        assert "Your name (year)" in shown
+
+    def test_strategy_is_ranked(self, bench_with: Any) -> None:
+        result = bench_with(["strategy"], "run", "frame", "-s", "my-strategy", "-s", "unchanged")
+        assert result.returncode == 0, result.stderr
+        assert re.search(r"1  my-strategy +0\.3.*\n2  unchanged +1\.000", result.stdout)
+
+    def test_scenario_is_run(self, bench_with: Any) -> None:
+        result = bench_with(["scenario"], "run", "my-scenario", "-s", "global", "-s", "unchanged")
+        assert result.returncode == 0, result.stderr
+        assert result.stdout.index("global ") < result.stdout.index("unchanged ")
+
+    def test_effect_is_tried(self, bench_with: Any, tmp_path: Path) -> None:
+        assert bench_with(["effect"], "init", "portal").returncode == 0
+        result = bench_with(
+            ["effect"], "diagnose", "portal", "--effects", "my-effect", "--no-pairs"
+        )
+        assert result.returncode == 0, result.stderr
+        assert result.stdout
+
+    def test_reader_reads_its_case(self, bench_with: Any, packages: Path) -> None:
+        case = packages / "my-reader" / "tests" / "case"
+        result = bench_with(["reader"], "run", case, "-s", "global", "-s", "unchanged")
+        assert result.returncode == 0, result.stderr
+        assert result.stdout.index("global ") < result.stdout.index("unchanged ")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("My Method", "e.g. my-method"),
+        ("my_method", "e.g. my-method"),
+        ("../evil", "lower-case letters, digits and dashes"),
+        ("/tmp/evil", "lower-case letters, digits and dashes"),
+        ("2nd-method", "begins with a letter"),
+        ("-method", "o such option"),
+        ("method-", "lower-case"),
+        ("", "lower-case"),
+        ("mé", "lower-case"),
+        ("x" * 41, "40 characters at most"),
+        ("class", "keyword of Python"),
+        ("json", "standard library"),
+        ("femubench", "name of this program"),
+        ("numpy", "installed"),
+        ("baruch", "there is a strategy of that name"),
+    ],
+)
+def test_names_that_cannot_be(name: str, words: str, tmp_path: Path) -> None:
+    result = invoke("plugins", "new", name, "--output", tmp_path)
+    assert result.exit_code == 2
+    assert len(result.stderr.splitlines()) == 1
+    assert words in result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("kind", "taken"), [("effect", "density"), ("scenario", "frame")])
+def test_name_is_taken_within_its_kind_alone(kind: str, taken: str, tmp_path: Path) -> None:
+    result = invoke("plugins", "new", taken, "--kind", kind, "--output", tmp_path)
+    assert (result.exit_code, list(tmp_path.iterdir())) == (2, [])
+    assert f"there is a {kind} of that name" in result.stderr
+    assert invoke("plugins", "new", taken, "--kind", "reader", "--output", tmp_path).exit_code == 0
+
+
+def test_folders_in_the_way_are_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "thesis.txt").write_text("everything", encoding="utf-8")
+    (tmp_path / "file").write_text("a file", encoding="utf-8")
+    (tmp_path / "link").symlink_to(tmp_path / "full")
+    before = sorted(tmp_path.rglob("*"))
+    for name, words in (("full", "is not empty"), ("file", "in the way"), ("link", "in the way")):
+        result = invoke("plugins", "new", name, "--output", tmp_path)
+        assert result.exit_code == 2
+        assert words in result.stderr
+    result = invoke("plugins", "new", "method", "--output", tmp_path / "nowhere")
+    assert result.exit_code == 2
+    assert "does not exist" in result.stderr
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_empty_folder_is_filled(tmp_path: Path) -> None:
+    (tmp_path / "my-method").mkdir()
+    assert invoke("plugins", "new", "my-method", "--output", tmp_path).exit_code == 0
+    assert (tmp_path / "my-method" / "pyproject.toml").is_file()
+
+
+def test_full_disk_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(folder: Path) -> None:
+        (folder / "part").write_text("half", encoding="utf-8")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(new_package, "_write_case", lambda folder, name: full(folder.parent))
+    with pytest.raises(InputError, match="No space left on device"):
+        write_package("bridge", "scenario", tmp_path, load_plugins([]))
+    assert list(tmp_path.iterdir()) == []
+
+
+class TestShow:
+    def test_strategy(self) -> None:
+        result = invoke("plugins", "show", "spring")
+        assert result.exit_code == 0
+        for line in (
+            "spring: strategy",
+            "  from:     femubench",
+            "  needs:    geometry, joints",
+            "            free_stiffness = true",
+            "            arm = (none)",
+            "            options.damping = 0.003",
+            "            stiffness.KEY = (none)",
+        ):
+            assert line in result.stdout
+        assert "Horton" in result.stdout
+        assert "Arguments" not in result.stdout
+
+    def test_options_shown_are_options_taken(self) -> None:
+        """Every line can be given to `bench run -s` as it stands."""
+        from femubench.core.plugin.variants import strategy_of
+
+        known = load_plugins().strategies
+        for name in known:
+            text = invoke("plugins", "show", name).stdout
+            pairs = [line.split(": ")[-1].strip() for line in text.splitlines() if " = " in line]
+            for pair in pairs:
+                if "(none)" not in pair:
+                    strategy_of(f"{name}:{pair.replace(' ', '')}", known)
+
+    @pytest.mark.parametrize(
+        ("name", "expected"),
+        [
+            ("design-change", ["design-change: scenario", "design-change/ladder-beam in"]),
+            ("density", ["density: effect", "means: the density is another"]),
+            ("universal file", ["universal file: reader", "suffixes: .uff, .unv, .uf"]),
+            ("markdown", ["markdown: reporter", "suffix: .md"]),
+            ("strategies", ["strategies: plugin", "unchanged, baruch"]),
+        ],
+    )
+    def test_other_kinds(self, name: str, expected: list[str]) -> None:
+        result = invoke("plugins", "show", name)
+        assert result.exit_code == 0
+        assert all(part in result.stdout for part in expected)
+
+    def test_unknown_name_is_told_with_near_ones(self) -> None:
+        result = invoke("plugins", "show", "barch")
+        assert (result.exit_code, result.stdout) == (2, "")
+        assert "did you mean 'baruch'?" in result.stderr
+        assert "bench plugins list" in invoke("plugins", "show", "zzz").stderr
+
+
+def test_distributions_of_the_test_are_found(packages: Path) -> None:
+    """The stand-in for pip really makes a distribution with the entry point of the package."""
+    installed(packages / "my-effect")
+    (found,) = distributions(path=[str(packages / "my-effect" / "src")])
+    assert [point.name for point in found.entry_points] == ["my-effect"]

@@ -1,0 +1,254 @@
+"""Runs that are continued, repeated and shared: what is reused, what is done again."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from femubench.core.errors import InputError
+from femubench.core.harness import keys
+from femubench.core.harness.repeat import environment_differences, result_differences
+from femubench.core.harness.results import JobResult, Run
+from femubench.core.harness.runner import run_jobs
+from femubench.core.harness.store import Store
+
+sys.path.insert(0, str(Path(__file__).parent / "toys"))
+import harness_toys as toys
+
+TOYS = Path(__file__).parent / "toys"
+KILLS, JOBS = 20, 208
+CASE = toys.tiny_case()
+
+
+def stable(run: Run) -> dict[tuple[str, str, int], dict[str, Any]]:
+    """What of a run does not depend on when and how often it was interrupted."""
+    from femubench.core.harness.serial import result_to_json
+
+    volatile = {"seconds", "rank", "score"}
+    return {
+        (item.case, item.strategy, item.seed): {
+            name: value for name, value in result_to_json(item).items() if name not in volatile
+        }
+        for item in run.results
+    }
+
+
+def records(store: Store) -> list[Mapping[str, Any]]:
+    return [json.loads(line) for line in store.path.read_text().splitlines()]
+
+
+def some(store: Store, **options: Any) -> Run:
+    strategies = [toys.Unchanged(), toys.Softer(), toys.Failing()]
+    return run_jobs([CASE], strategies, jobs=2, store=store, **options)
+
+
+def test_a_finished_run_is_left_as_it_is(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    run_jobs([CASE], [toys.Unchanged(), toys.Softer()], store=store)
+    before = [item for item in records(store) if item["record"] != "end"]
+    seen: list[int] = []
+    again = run_jobs(
+        [CASE],
+        [toys.Unchanged(), toys.Softer()],
+        store=store,
+        resume=True,
+        progress=lambda result, done, total: seen.append(done),
+    )
+    assert seen == [1, 2]
+    assert [item for item in records(store) if item["record"] != "end"] == before
+    assert again.results == store.load().results
+    assert len(store.runs()) == 1
+
+
+def test_a_failure_is_never_taken_for_a_result(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    some(store)
+    some(store, resume=True)
+    kept = [item["result"]["strategy"] for item in records(store) if item["record"] == "result"]
+    assert sorted(kept) == ["failing", "failing", "softer", "unchanged"]
+    assert len(store.runs()) == 1
+    some(store, resume=True, overwrite="missing")
+    assert len([item for item in records(store) if item["record"] == "result"]) == 4
+
+
+def test_another_run_takes_results_from_the_store(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    first = some(store)
+    done: list[JobResult] = []
+
+    def progress(result: JobResult, count: int, total: int) -> None:
+        done.append(result)
+
+    more = run_jobs(
+        [CASE],
+        [toys.Grounded(), toys.Softer()],
+        store=store,
+        overwrite="missing",
+        progress=progress,
+    )
+    assert [item.strategy for item in done] == ["softer", "grounded"]  # the known one at once
+    known = next(item for item in first.results if item.strategy == "softer")
+    taken = next(item for item in more.results if item.strategy == "softer")
+    assert replace(taken, rank=None) == replace(known, rank=None)
+    assert len(store.runs()) == 2
+    always = run_jobs([CASE], [toys.Softer()], store=store)
+    assert always.meta["run"] != more.meta["run"]
+
+
+def test_what_belongs_to_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    def key(case: Any = CASE, name: str = "s", code: bytes = b"c", version: str = "1") -> str:
+        return keys.job_key(case, name, code, version, 0)
+
+    others = [
+        key(replace(CASE, digest="4567")),
+        key(name="t"),
+        key(code=b"d"),
+        key(version="2"),
+        keys.job_key(CASE, "s", b"c", "1", 1),
+    ]
+    monkeypatch.setattr("femubench.__version__", "9.9")
+    others.append(key())
+    monkeypatch.undo()
+    assert len({key(), *others}) == 7
+    assert key() == key()
+    assert keys.plan_digest(["a", "b"]) == keys.plan_digest(["b", "a"]) != keys.plan_digest(["a"])
+
+
+def test_options_and_source_of_a_strategy_belong_to_its_version(tmp_path: Path) -> None:
+    version = keys.strategy_version(toys.Softer())
+    assert version == keys.strategy_version(toys.Unchanged())  # of one file
+    for text in ("A = 1\n", "A = 2\n"):
+        (tmp_path / "lone.py").write_text(text)
+        found = subprocess.run(
+            [sys.executable, "-c", _VERSION],
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        assert found.startswith("0+")
+        assert found != version
+        version = found
+
+
+_VERSION = """
+import lone
+from femubench.core.harness.keys import strategy_version
+from femubench import Strategy
+print(strategy_version(type("S", (Strategy,), {"__module__": "lone", "update": print})()))
+"""
+
+
+def test_one_process_works_on_a_run(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    run = some(store)
+    with store.exclusive(run.meta["run"]), pytest.raises(InputError, match="another process"):
+        some(store, resume=True)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["results.jsonl"]
+
+
+def test_results_do_not_depend_on_the_number_of_workers(tmp_path: Path) -> None:
+    one, four = (
+        run_jobs([CASE], [toys.Unchanged(), toys.Softer()], seeds=(0, 1, 2), jobs=jobs)
+        for jobs in (1, 4)
+    )
+    assert stable(one) == stable(four)
+    assert result_differences(one, four) == []
+
+
+def test_differences_between_a_run_and_its_repetition_are_told() -> None:
+    run = run_jobs([CASE], [toys.Unchanged(), toys.Softer()])
+    first, second = run.results
+    block = replace(first.blocks["used"], rms_percent=7.0)
+    changed = replace(first, blocks={**first.blocks, "used": block})
+    failed = replace(second, status="failed")
+    told = result_differences(run, replace(run, results=(changed, failed)))
+    assert len(told) == 2
+    assert told[0].startswith(
+        "corner, softer" if second.strategy < first.strategy else "corner, un"
+    )
+    assert any("then, 7.0 % now" in line for line in told)
+    assert any("ok then, failed now" in line for line in told)
+    assert "not run now" in result_differences(run, replace(run, results=(first,)))[0]
+    assert environment_differences(run.meta, run.meta) == []
+    other = {**run.meta, "versions": {**run.meta["versions"], "numpy": "1.0"}}
+    assert environment_differences(run.meta, other) == [
+        f"numpy: {run.meta['versions']['numpy']} then, 1.0 now"
+    ]
+
+
+def test_every_result_tells_where_it_comes_from() -> None:
+    (result,) = run_jobs([CASE], [toys.Softer()], seeds=(3,)).results
+    assert result.key
+    assert {"python", "numpy", "scipy", "femubench", "blas", "cpu", "git"} <= set(result.provenance)
+    assert (result.provenance["case"], result.provenance["seed"]) == ("0123", 3)
+
+
+_RUN = """
+import sys
+sys.path.insert(0, {toys!r})
+import harness_toys as toys
+from femubench.core.harness.runner import run_jobs
+from femubench.core.harness.store import Store
+
+if __name__ == "__main__":
+    strategies = [toys.Unchanged(), toys.Softer()]
+    cases = [toys.tiny_case(), toys.tiny_case("other", 80.0e9)]
+    run_jobs(cases, strategies, seeds=range({seeds}), jobs=2, store=Store({store!r}), resume=True)
+"""
+
+
+def timed(script: Path) -> float:
+    before = time.monotonic()
+    subprocess.run([sys.executable, str(script)], check=True)
+    return time.monotonic() - before
+
+
+def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(tmp_path: Path) -> None:
+    """SIGKILL of the parent at random moments; the last one is left to finish."""
+    draw = random.Random(20)
+    seeds = JOBS // 4
+    stores = {name: Store(tmp_path / name) for name in ("calm", "killed")}
+    scripts = {}
+    for name, store in stores.items():
+        scripts[name] = tmp_path / f"{name}.py"
+        text = _RUN.format(toys=str(TOYS), seeds=seeds, store=str(store.folder))
+        scripts[name].write_text(text)
+    whole, start = (timed(scripts["calm"]) for _ in range(2))  # the second has nothing to do
+    ended_early = 0
+    for _ in range(KILLS):
+        process = subprocess.Popen([sys.executable, str(scripts["killed"])])
+        try:
+            # Most of the moments lie among the first jobs of a start, some before them.
+            process.wait(draw.uniform(0.6, 1.0) * start + 0.1 * draw.random() * (whole - start))
+            ended_early += 1
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+    assert ended_early < KILLS
+    subprocess.run([sys.executable, str(scripts["killed"])], check=True)
+    calm, killed = (stores[name].load() for name in ("calm", "killed"))
+    assert len(calm.results) == JOBS
+    assert stable(killed) == stable(calm)
+    assert len(stores["killed"].runs()) == 1
+    for name in ("plan", "cases", "reference"):
+        assert killed.meta[name] == calm.meta[name]
+    good = [
+        item["result"]["key"]
+        for item in records(stores["killed"])
+        if item["record"] == "result" and item["result"]["status"] == "ok"
+    ]
+    assert len(good) == len(set(good)) == JOBS  # no result was computed twice
+    assert [path.name for path in stores["killed"].folder.iterdir()] == ["results.jsonl"]

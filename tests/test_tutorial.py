@@ -1,0 +1,190 @@
+"""docs/tutorial.md, executed word for word in a fresh virtual environment.
+
+The text is followed in one shell: a line that begins with ``$`` is a command and must succeed; the
+lines below it must appear in what it prints, in order, where ``...`` stands for anything. Blocks of
+code are files, named by the comment in their first line.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import secrets
+import shutil
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+TUTORIAL = ROOT / "docs" / "tutorial.md"
+ROOMS = ("core", "papers", "plugins", "reports", "scenarios")
+ALL_TIME = 540.0  # s, for a machine that hangs; nothing is said about how long it takes
+CACHES = shutil.ignore_patterns("__pycache__", "*.egg-info")
+
+
+@dataclass(frozen=True)
+class Command:
+    """A line to type, and what must be seen after it."""
+
+    line: str
+    output: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class File:
+    """A file to write, relative to where the reader is."""
+
+    name: str
+    text: str
+
+
+def steps(text: str) -> Iterator[Command | File]:
+    """Return what a tutorial asks for, in order."""
+    for language, block in re.findall(r"^```(\w+)\n(.*?)^```", text, re.DOTALL | re.MULTILINE):
+        if language == "console":
+            yield from commands(block)
+        else:
+            first, _, rest = block.partition("\n")
+            assert first.startswith("# "), f"block without the name of its file: {first}"
+            yield File(first.removeprefix("# "), rest)
+
+
+def commands(block: str) -> Iterator[Command]:
+    """Return the commands of a block with the output quoted below each."""
+    for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
+        line, *output = part.rstrip("\n").split("\n")
+        yield Command(line, tuple(output))
+
+
+def missing(quoted: tuple[str, ...], printed: str) -> str:
+    """Return the first quoted line that was not printed below those before it, blanks alike."""
+    lines = iter([" ".join(line.split()) for line in printed.splitlines()])
+    for quote in quoted:
+        wanted = [re.escape(" ".join(part.split())) for part in quote.split("...")]
+        pattern = re.compile(".*".join(wanted))
+        if quote.strip() not in ("", "...") and not any(map(pattern.search, lines)):
+            return quote
+    return ""
+
+
+class Shell:
+    """A shell in which commands are typed one after the other."""
+
+    def __init__(self, folder: Path, env: dict[str, str]) -> None:
+        self.folder = folder
+        self.process = subprocess.Popen(
+            ["/bin/bash", "--norc"],
+            cwd=folder,
+            env=env,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            encoding="utf-8",
+        )
+        self.timer = threading.Timer(ALL_TIME, self.process.kill)
+        self.timer.start()
+
+    def type(self, line: str) -> tuple[int, str]:
+        """Return the exit code of a command and all that it printed."""
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        mark = f"done-{secrets.token_hex(8)}"
+        # What the command might read must not be the next command.
+        self.process.stdin.write(f"{{ {line}\n}} </dev/null; code=$?; echo; echo {mark} $code\n")
+        self.process.stdin.flush()
+        printed: list[str] = []
+        for answer in self.process.stdout:
+            if answer.startswith(mark):
+                return int(answer.split()[1]), "".join(printed)
+            printed.append(answer)
+        raise AssertionError(f"the shell ended after: {line}\n{''.join(printed)}")
+
+    def where(self) -> Path:
+        """Return the folder in which the reader is now."""
+        return Path(self.type("pwd")[1].strip())
+
+    def close(self) -> None:
+        """End the shell."""
+        self.timer.cancel()
+        self.process.kill()
+        self.process.communicate()
+
+
+@pytest.fixture
+def shell(tmp_path: Path) -> Iterator[Shell]:
+    """Return a shell beside a copy of the sources, with python3 and without our own packages."""
+    sources = tmp_path / "femubench"
+    for room in ROOMS:
+        # A copy: pip leaves its build folders in the tree that it installs.
+        shutil.copytree(ROOT / room, sources / room, ignore=CACHES)
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, sources)
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    python = tools / "python3"
+    python.write_text(f'#!/bin/sh\nexec "{sys.executable}" "$@"\n', encoding="utf-8")
+    python.chmod(0o755)
+    ours = ("PYTHON", "PYTEST", "VIRTUAL_ENV", "FEMUBENCH", "COV_", "COLUMNS", "FORCE_COLOR")
+    env = {name: value for name, value in os.environ.items() if not name.startswith(ours)}
+    env |= {"PATH": f"{tools}:/usr/bin:/bin", "PIP_QUIET": "1", "NO_COLOR": "1"}
+    opened = Shell(tmp_path, env)
+    yield opened
+    opened.close()
+
+
+def test_every_line_of_the_tutorial(shell: Shell) -> None:
+    for step in steps(TUTORIAL.read_text(encoding="utf-8")):
+        if isinstance(step, File):
+            target = shell.where() / step.name
+            assert target.is_file(), f"the tutorial replaces {step.name}, which is not there"
+            target.write_text(step.text, encoding="utf-8")
+            continue
+        code, printed = shell.type(step.line)
+        if code and step.line.startswith("pip install"):
+            pytest.fail(f"{step.line}: needs a package index or pip's cache\n{printed}")
+        assert code == 0, f"$ {step.line}\n{printed}"
+        lost = missing(step.output, printed)
+        assert not lost, f"$ {step.line}\nnever printed: {lost}\nbut:\n{printed}"
+
+
+def test_tutorial_asks_for_what_it_is_about() -> None:
+    """The steps are found at all; a block that is no step is not passed over in silence."""
+    text = TUTORIAL.read_text(encoding="utf-8")
+    assert text.count("```") == 2 * len(re.findall(r"^```(?:console|python)$", text, re.MULTILINE))
+    lines = [step.line for step in steps(text) if isinstance(step, Command)]
+    for start in (
+        "bench plugins new my-method",
+        "pip install -e",
+        "pytest",
+        "bench plugins check my-method",
+        "bench run frame -s my-method",
+    ):
+        assert any(line.startswith(start) for line in lines), start
+    assert [step.name for step in steps(text) if isinstance(step, File)]
+
+
+def test_quoted_output_is_compared() -> None:
+    printed = "one  two\nthree 3.14 s\nfour\n"
+    assert missing(("one two", "...", "three ... s"), printed) == ""
+    assert missing(("three ... s", "one two"), printed) == "one two"
+    assert missing(("two three",), printed) == "two three"
+
+
+def test_shell_keeps_its_place_and_tells_what_failed(tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    shell = Shell(tmp_path, dict(os.environ))
+    try:
+        assert shell.type("cd sub")[0] == 0
+        assert shell.where() == tmp_path / "sub"
+        assert shell.type("false")[0] == 1
+        assert shell.type("cat")[1].strip() == ""  # has nothing to read, and ends
+        code, printed = shell.type("sh -c 'echo seen >&2; exit 3'")
+        assert (code, printed.strip()) == (3, "seen")
+    finally:
+        shell.close()

@@ -1,0 +1,403 @@
+"""Strategies that break one rule each, in a module that worker processes can import."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench import (
+    EffectParameter,
+    Frame,
+    FrameEffect,
+    GroundSpring,
+    InputError,
+    LowRank,
+    Measurement,
+    Model,
+    NotApplicable,
+    Place,
+    SparseArray,
+    Strategy,
+    StrategyFailure,
+    UpdateResult,
+    solve_modes,
+)
+
+
+def scaled(model: Model, factor: float = 0.95) -> Model:
+    return replace(model, stiffness=factor * model.stiffness)
+
+
+class Good(Strategy):
+    """Scale the stiffness by the first frequency."""
+
+    name: ClassVar[str] = "good"
+    citation: ClassVar[str] = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        first = solve_modes(model).elastic.eigenvalues[0]
+        return self.finish(scaled(model, float(measurement.eigenvalues[0] / first)))
+
+    def finish(self, model: Model) -> UpdateResult:
+        return UpdateResult(model, parameter_count=1)
+
+
+class InPlace(Good):
+    """Write into the nominal stiffness, and put it right too late."""
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        result = super().update(model, measurement, rng)
+        model.stiffness.data *= 1.01
+        return result
+
+
+class Normalising(Good):
+    """Scale the measured shapes where they are."""
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        measurement.shapes[:] /= 2.0
+        return super().update(model, measurement, rng)
+
+
+class Unseeded(Good):
+    """Draw from a generator of its own."""
+
+    def finish(self, model: Model) -> UpdateResult:
+        own = np.random.default_rng()
+        return UpdateResult(scaled(model, 1.0 + 1e-14 * own.integers(1, 10**6)), 1)
+
+
+class Silencing(Good):
+    """Turn numpy's warnings off for everybody."""
+
+    def finish(self, model: Model) -> UpdateResult:
+        np.seterr(all="ignore")
+        return super().finish(model)
+
+
+class CellsWanted(Good):
+    """Want every shape cell."""
+
+    needs: ClassVar[frozenset[str]] = frozenset({"shapes"})
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        if np.isnan(measurement.shapes).any():
+            raise ValueError("array must not contain infs or NaNs")
+        return super().update(model, measurement, rng)
+
+
+class Asymmetric(Good):
+    """Change one entry and not its mirror image."""
+
+    def finish(self, model: Model) -> UpdateResult:
+        stiffness = sp.lil_array(model.stiffness)
+        stiffness[0, 1] += 1e-3 * stiffness[0, 0]
+        return super().finish(replace(model, stiffness=sp.csc_array(stiffness)))
+
+
+class NotNumbers(Good):
+    """Return a core of nan."""
+
+    def finish(self, model: Model) -> UpdateResult:
+        change = LowRank(np.ones((model.size, 1)), np.array([[np.nan]]))
+        return super().finish(replace(model, stiffness_change=change))
+
+
+class WrongSize(Good):
+    """Leave a row and a column out."""
+
+    def finish(self, model: Model) -> UpdateResult:
+        return super().finish(replace(model, stiffness=sp.csc_array(model.stiffness[:-1, :-1])))
+
+
+class Dense(Good):
+    """Return a dense matrix."""
+
+    def finish(self, model: Model) -> UpdateResult:
+        return super().finish(replace(model, stiffness=model.stiffness.toarray()))
+
+
+class Locked(Good):
+    """Hold something that cannot be pickled."""
+
+    def __init__(self) -> None:
+        self.key = lambda: 1
+
+
+class _Trap:
+    def __getstate__(self) -> dict[str, bool]:
+        raise TypeError("this geometry stays here")
+
+
+class LockedResult(Good):
+    """Return a model that cannot be pickled."""
+
+    def finish(self, model: Model) -> UpdateResult:
+        return super().finish(replace(model, geometry=_Trap()))  # type: ignore[arg-type]
+
+
+class Undeclared(Good):
+    """Use the frame without saying so."""
+
+    def finish(self, model: Model) -> UpdateResult:
+        assert model.frame_structure is not None
+        return super().finish(model)
+
+
+class ByIndex(Good):
+    """Give the model's modes the measured frequencies in the order in which they come."""
+
+    promises: ClassVar[frozenset[str]] = frozenset({"used-modes"})
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        modes = solve_modes(model).elastic
+        count = len(measurement)
+        change = np.diag(measurement.eigenvalues - modes.eigenvalues[:count])
+        low_rank = LowRank(model.mass_times(modes.shapes[:, :count]), change)
+        return self.finish(replace(model, stiffness_change=low_rank))
+
+
+class Looping(Good):
+    """Never come back."""
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        while True:
+            time.sleep(0.05)
+
+
+class LoopingWhenFree(Good):
+    """Never come back from a structure without supports."""
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        if np.linalg.matrix_rank(model.stiffness.toarray(), hermitian=True) < model.size:
+            time.sleep(600.0)
+        return super().update(model, measurement, rng)
+
+
+class Exiting(Good):
+    """Leave the process."""
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        os._exit(0)
+
+
+class Segfaulting(Good):
+    """Die of a signal."""
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        os.kill(os.getpid(), signal.SIGSEGV)
+        raise AssertionError
+
+
+class Hog(Good):
+    """Take all memory that there is."""
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        kept = []
+        while True:
+            kept.append(np.ones(2**24))
+
+
+class SilentRefusal(Good):
+    """Refuse without a reason."""
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        raise StrategyFailure
+
+
+class Inverting(Good):
+    """Invert the stiffness."""
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        if np.linalg.matrix_rank(model.stiffness.toarray(), hermitian=True) < model.size:
+            raise np.linalg.LinAlgError("Singular matrix")
+        return super().update(model, measurement, rng)
+
+
+class InvertingMass(Good):
+    """Invert the mass."""
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        if not model.mass.diagonal().all():
+            raise np.linalg.LinAlgError("Singular matrix")
+        return super().update(model, measurement, rng)
+
+
+class Flat(Good):
+    """Know the directions of frames in one plane alone."""
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        if "rz" in model.dofs.direction:
+            raise KeyError("rz")
+        return super().update(model, measurement, rng)
+
+
+class TwoModes(Good):
+    """Take a second mode for granted."""
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        assert measurement.eigenvalues[1] > 0.0
+        return super().update(model, measurement, rng)
+
+
+class Exact(Good):
+    """Trust that the largest of every shape has one digit, which noise spoils."""
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        largest = np.abs(measurement.shapes).max(axis=0)
+        if np.abs(largest - np.round(largest, 1)).max() > 1e-6:
+            raise ArithmeticError("the shapes are not scaled")
+        return super().update(model, measurement, rng)
+
+
+class Uncounted(Good):
+    """Change the model with no unknown at all."""
+
+    def finish(self, model: Model) -> UpdateResult:
+        return UpdateResult(model)
+
+
+class BadHistory(Good):
+    """Report a residual of nan."""
+
+    def finish(self, model: Model) -> UpdateResult:
+        return UpdateResult(model, 1, history=({"residual": 1.0}, {"residual": float("nan")}))
+
+
+@dataclass(frozen=True)
+class Secretive(Good):
+    """Have an option that nobody is told of."""
+
+    cutoff: float = 1.0
+
+
+class Boastful(Good):
+    """Promise what nobody knows."""
+
+    promises: ClassVar[frozenset[str]] = frozenset({"fame"})
+
+
+class Declining(Good):
+    """Refuse everything with a reason, which is honest."""
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        raise NotApplicable("needs a full moon")
+
+
+class Spring(FrameEffect):
+    """A spring to ground, as an effect that keeps all rules."""
+
+    name: ClassVar[str] = "toy-spring"
+    summary: ClassVar[str] = "something touches the structure"
+    start: ClassVar[float] = 0.0
+
+    def places(self, model: Model) -> Sequence[str]:
+        if model.structure is None or model.structure.frame.plane != "out-of-plane":
+            return ()
+        return tuple(joint.name for joint in model.structure.frame.joints if joint.name != "C")
+
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+        return (EffectParameter("stiffness", "N/m", 1.0e3, lower=0.0, one_sided=True),)
+
+    def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
+        spring = GroundSpring(Place(joint=place), "z", values[0] + self.start)
+        return frame.with_attachments((), (spring,))
+
+
+class Elsewhere(Spring):
+    """Name a place that is not there."""
+
+    def places(self, model: Model) -> Sequence[str]:
+        return (*super().places(model), "Z") if super().places(model) else ()
+
+    def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
+        return super().frame(frame, "A" if place == "Z" else place, values)
+
+
+class NeverNeutral(Spring):
+    """Leave a spring where there should be none."""
+
+    start: ClassVar[float] = 5.0e4
+
+
+class Reader:
+    """Refuse everything, which is what a reader should do with rubbish."""
+
+    name = "toy"
+    suffixes = (".toy",)
+
+    def read_matrix(self, path: Path) -> SparseArray:
+        return self.read(path)
+
+    def read_modes(self, path: Path) -> Any:
+        return self.read(path)
+
+    def read(self, path: Path) -> Any:
+        raise InputError("is not of this format", file=path)
+
+
+class Careless(Reader):
+    """Take the first line for granted."""
+
+    def read(self, path: Path) -> Any:
+        if not path.read_bytes():
+            return path.read_text().splitlines()[0]
+        return super().read(path)
+
+
+class Decoding(Reader):
+    """Believe that all bytes are text."""
+
+    def read(self, path: Path) -> Any:
+        path.read_text(encoding="utf-8")
+        return super().read(path)
+
+
+class Hungry(Good):
+    """Hold a hundred megabytes for a moment."""
+
+    def finish(self, model: Model) -> UpdateResult:
+        assert np.ones(2**23).all()
+        return super().finish(model)
+
+
+FAULTS: Mapping[type[Strategy], str] = {
+    InPlace: "inputs",
+    Normalising: "inputs",
+    Unseeded: "deterministic",
+    Silencing: "global-state",
+    CellsWanted: "missing-shapes",
+    Asymmetric: "symmetric",
+    NotNumbers: "finite",
+    WrongSize: "sizes",
+    Dense: "sizes",
+    Locked: "picklable",
+    LockedResult: "picklable",
+    Undeclared: "capabilities",
+    ByIndex: "promises",
+    Looping: "returns",
+    LoopingWhenFree: "free-structure",
+    Exiting: "returns",
+    Segfaulting: "returns",
+    Hog: "returns",
+    SilentRefusal: "returns",
+    Inverting: "free-structure",
+    InvertingMass: "massless-dofs",
+    Flat: "planes",
+    TwoModes: "one-mode",
+    Exact: "noise",
+    Uncounted: "parameter-count",
+    BadHistory: "figures",
+    Secretive: "options-documented",
+    Boastful: "described",
+}

@@ -1,0 +1,78 @@
+"""A paper that nobody wrote, worked through: every kind of cell, and text that wants escaping."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from femubench import Bars, Curve, Curves, Extra, Figure, Page, Study
+
+EVIL = "<script>alert(1)</script> | *x* & `y` [z](w)"
+CONVENTION = "with the words frame:weight=30, which the text does not give"
+REASON = "the described least squares gives another column"
+
+
+def study(paper: str = "frame") -> Study:
+    """Return a study with two tables, three verdicts, five kinds of figures, and two drawings."""
+    plain = Page(paper, "1", unit="Hz", tolerance=0.1, decimals=1)
+    under = Page(paper, "1", unit="Hz", tolerance=0.1, convention=CONVENTION, reason=REASON)
+    share = Page(paper, "4d", unit="%", tolerance=0.05, reason=EVIL)
+    stiff = Page(paper, "4d", unit="N/m")
+    count = Page(paper, "4d", tolerance=0.0)
+    cells = (
+        plain.cell("mode 1", "FE", 255.8, 255.83),
+        plain.cell("mode 2", "FE", 500.0, 500.02),
+        under.cell("mode 3", "FE", 581.3, 581.41),
+        under.cell("mode 4", "FE", 911.3, 867.6),
+        under.cell("mode 5", "FE", 1049.4, None),
+        under.cell("rigid 1", "Kabe", -1197.6, -1197.9),
+        share.cell("error <b>1</b>", "C|a", 12.8, 15.0),
+        stiff.cell("k_x", "updated", 3.24e9, 3.2412e9),
+        count.cell("unknowns", "K", 231, 231),
+    )
+    extra = Extra(
+        "Held-out modes",
+        ("model", "error of mode 6 (%)"),
+        (("C_a as built", "+5.02"), (EVIL, "-0.84")),
+        note="None of them was computed.",
+    )
+    premises = ("The geometry was recovered.", EVIL)
+    return Study(
+        paper,
+        f"Toys & {paper}",
+        "A. Author 1999 <nowhere>",
+        premises,
+        cells,
+        findings=("Torsion it is.",),
+        extras=(extra,),
+        figures=figures(paper),
+    )
+
+
+def figures(paper: str) -> tuple[Figure, ...]:
+    """Return a plot and a bar chart."""
+    x = np.linspace(0.0, 1.0, 3)
+    curve = Curves(
+        f"{paper}-curve",
+        "Receptance <6Z/6Z>",
+        "Measured & predicted.",
+        "frequency (Hz)",
+        "receptance (dB)",
+        (Curve("measured", x, x, "measured"),),
+    )
+    series = (("us", (1.0, 2.0)),)
+    bars = Bars(f"{paper}-bars", "Bars", "One of two.", ("a", "b"), series, "group", "%")
+    return curve, bars
+
+
+def drawn(figure: Figure) -> str:
+    """Return a drawing as a plotting library would write it, with what must not get through."""
+    return f"""<?xml version="1.0" encoding="utf-8" standalone="no"?>
+<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd">
+<svg xmlns:xlink="http://www.w3.org/1999/xlink" xmlns="http://www.w3.org/2000/svg"
+ viewBox="0 0 10 10" onload="alert(2)"><metadata>made somewhere</metadata>
+<style>@import url(http://far.example/x.css); *{{stroke-linejoin: round}}</style>
+<defs><clipPath id="clip"><rect width="9" height="9"/></clipPath><path id="m" d="M 0 0"/></defs>
+<script>alert(3)</script><foreignObject><p>{figure.name}</p></foreignObject>
+<g clip-path="url(#clip)" style="fill: url(http://far.example/y)">
+<use xlink:href="#m"/><use href="http://far.example/z"/><text>{figure.name}</text>
+<image xlink:href="data:image/png;base64,AAAA"/><image xlink:href="data:text/html,x"/></g></svg>"""
