@@ -34,14 +34,15 @@ _WORDS = {
 }
 _MEANING = {
     "agrees": "ours rounds to the printed figure, or lies within the tolerance of the row's kind",
-    "agrees-under": "agrees under a convention that the text does not state: the note below the "
-    "table tells which",
-    "does-not-follow": "does not follow from the text: the note tells why",
+    "agrees-under": "agrees under a convention that the text does not state, or states otherwise: "
+    "the note below the table tells which",
+    "does-not-follow": "does not follow from the text: a misprint, data that are not in print, or "
+    "a step that is missing; the note tells which",
 }
 _DEVIATION = (
     "Deviation: (ours - printed) / |printed| in percent; of figures that are percentages "
-    "themselves, ours - printed in points (pt). A frequency with an i is imaginary. – : there is "
-    "no value of ours."
+    "themselves, ours - printed in points (pt). A frequency with an i is imaginary and counts as "
+    "negative. – : there is no value of ours."
 )
 _EDGE, _GAP = 2, 2
 # A column of texts of so many characters is squeezed when it gets fewer than so many.

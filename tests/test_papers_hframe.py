@@ -14,7 +14,7 @@ from femubench.core.plugin.variants import strategy_of
 from femubench.core.reproduction.study import verdict_counts
 from femubench.papers import study
 from femubench.papers.hframe.beyond import compare
-from femubench.papers.hframe.meshes import frequencies, mesh_cells
+from femubench.papers.hframe.meshes import RECOVERED, frequencies, mesh_cells
 from femubench.papers.hframe.physical import physical_model, shape_paired_errors
 from femubench.papers.hframe.rows import FREE_EI, ROWS, at_printed, parameter_values, row_of, run
 from femubench.papers.hframe.shapes import expanded_mac, shape_cells
@@ -22,10 +22,10 @@ from femubench.papers.printed import printed
 from femubench.scenarios import HERE
 
 Cells = dict[tuple[str, str, str], Cell]
-ROTATED = (2, 3, 4, 5, 6)  # whose twin's MAC is not the test's by more than five points
+PAIRS = (*((k, k) for k in range(1, 7)), (8, 7))  # the twin's MAC is none of the test's
 OPEN = {
     ("2", "C_a", "mode 5"),
-    *(("3", f"measured {k}", f"analytical {k}") for k in ROTATED),
+    *(("3", f"measured {i}", f"analytical {k}") for i, k in PAIRS),
     *(("4c", f"mode {k}", "initial error") for k in (1, 4)),
     ("4d", "mode 4", "initial error"),
     *(("4d", k, "initial") for k in ("k_x", "k_z", "k_theta")),
@@ -72,7 +72,7 @@ def test_what_does_not_follow_is_what_is_known_and_says_why(cells: Cells) -> Non
         assert len(cells[key].note) > 30
         assert "no reading of the text" not in cells[key].note
     assert all(c.note for c in cells.values() if c.verdict == "agrees-under")
-    assert verdict_counts(tuple(cells.values()))["agrees"] > 120
+    assert verdict_counts(tuple(cells.values()))["agrees"] > 90
 
 
 def test_table_2_to_the_printed_digit_but_one_at_an_edge(cells: Cells) -> None:
@@ -172,7 +172,8 @@ def test_row_c_determines_a_ratio_only(bench: Workbench) -> None:
 
 
 def test_conventions_are_words_that_bench_run_takes(bench: Workbench, cells: Cells) -> None:
-    notes = {c.note for c in cells.values() if c.verdict == "agrees-under" and c.table > "3"}
+    under = {c.note for c in cells.values() if c.verdict == "agrees-under" and c.table > "3"}
+    notes = under - {RECOVERED}
     assert len(notes) == 4
     for note in notes:
         words = re.search(r"bench run hframe -s '([^']+)'$", note)

@@ -41,7 +41,8 @@ class Cell:
     def deviation_percent(self) -> float | None:
         """Return (ours - printed) / |printed| in percent; of percentages, ours - printed.
 
-        None where there is no value of ours, or the printed one is zero and ours is not.
+        None where there is no value of ours, the printed one is zero and ours is not, or one of
+        two frequencies is imaginary; two imaginary ones are compared by size.
         """
         return deviation(self.printed, self.ours, self.unit)
 
@@ -54,6 +55,11 @@ def deviation(printed: float, ours: float | None, unit: str = "") -> float | Non
         return ours - printed
     if printed == 0.0:
         return 0.0 if ours == 0.0 else None
+    if unit == "Hz" and printed < 0.0:
+        # Imaginary frequencies are compared by size, and with nothing else.
+        return None if ours >= 0.0 else 100.0 * (ours / printed - 1.0)
+    if unit == "Hz" and ours < 0.0:
+        return None
     return 100.0 * (ours - printed) / abs(printed)
 
 

@@ -76,10 +76,11 @@ def premises(bench: Workbench) -> tuple[str, ...]:
     return (
         f"Ladder of {len(p)} elements with {case.model.size} dofs, sqrt(E/rho) = {speed:.0f} m/s, "
         f"{lump:.1f} g at coordinate 1 for the accelerometer: recovered from the printed "
-        "frequencies, since neither a modulus nor centre lines nor that mass are in the text.",
-        "As in the paper, GJ / EI = "
-        f"{float(p.GJ[0] / p.EIy[0]):.3f}: the polar moment as torsion constant; "
-        "Euler-Bernoulli beams.",
+        "frequencies, since neither a modulus nor centre lines nor that mass are in the text, and "
+        "the drawings were not at hand.",
+        "Euler-Bernoulli beams as in the paper. GJ / EI = "
+        f"{float(p.GJ[0] / p.EIy[0]):.3f}, the polar moment as torsion constant, is recovered too: "
+        "the text has no figure for it.",
         f"Frequencies are the test's. Shapes at {len(case.measurement.sensors)} points come from a "
         "solid twin coupled with the accelerometer's mass; the paper prints none.",
         f"Modes {used} are used, expanded by (16)-(17) with R = U V'; five iterations from K0.",

@@ -145,6 +145,13 @@ def change_sentences(bench: Workbench) -> tuple[str, ...]:
     )
 
 
+def _joints(structure: Structure) -> str:
+    """Return which joints are of which kind."""
+    joints = structure.frame.joints
+    kinds = {kind: ", ".join(j.name for j in joints if j.type == kind) for kind in "LT"}
+    return "; ".join(f"{kind} joints: {names}" for kind, names in kinds.items())
+
+
 def _element_figure(bench: Workbench, number: int, solution: str) -> StructureMap:
     structure, words = bench.cases[CASE].model.frame_structure, SOLUTIONS[solution]
     mesh = structure.mesh
@@ -152,7 +159,7 @@ def _element_figure(bench: Workbench, number: int, solution: str) -> StructureMa
         name=f"frame-figure-{number}",
         title=f"Fig. {number}: relative change of element stiffness, {solution} solution",
         caption=f"‖ΔKₑ‖/‖K₀ₑ‖ of every element, Frobenius norms on w, L dw/dx, L θ, strategy "
-        f"{words}, modes 1-3. The shapes are a solid twin's, not the test's.",
+        f"{words}, modes 1-3. {_joints(structure)}. The shapes are a solid twin's, not the test's.",
         starts=mesh.xyz[mesh.ends[:, 0], :2],
         stops=mesh.xyz[mesh.ends[:, 1], :2],
         values=solution_changes(bench, words),

@@ -30,7 +30,8 @@ def mass_cells(bench: Workbench) -> tuple[tuple[Cell, ...], str]:
     theirs = np.array(list(table.values()))
     mine = np.array([ours[int(key[0]) - 1, int(key[1]) - 1] for key in table])
     reason = (
-        "needs the test's shapes, which the paper does not print; the twin's give "
+        "needs the test's shapes, which the paper does not print, so it cannot be checked (signs "
+        "hang on those of the modes, too); the twin's give "
         f"{_rms(mine):.4f} rms off the diagonal, {np.abs(mine).max():.4f} at most, against "
         f"{_rms(theirs):.4f} and {np.abs(theirs).max():.4f} printed"
     )
@@ -73,7 +74,7 @@ def _finding(model: Model, measurement: Measurement, ours: float, theirs: float)
     return (
         f"The generalised mass matrix is off the diagonal by {theirs:.4f} rms in print and by "
         f"{ours:.4f} with shapes free of scatter; readings with an error of about {needed:.1f} % "
-        "of the largest component explain the difference."
+        "of the largest component would be enough for the difference."
     )
 
 

@@ -153,7 +153,8 @@ def _figure(number: int, bundle: Bundle, words: str, title: str) -> Curves:
         name=f"frame-figure-{number}",
         title=f"Fig. {number}: receptance {POINT}/{POINT}, {title}",
         caption=f"Stand-in for the test: the beam model that meets the five measured "
-        f"frequencies{change}. Updated from its modes 1-3 (case {CASE}, strategy {words}). "
+        f"frequencies{change}. No model carries the accelerometer, so the FE model starts above "
+        f"the printed one. Updated from its modes 1-3 (case {CASE}, strategy {words}). "
         f"The paper's damping ratios are not printed: {100.0 * DAMPING:.1f} % is assumed for every "
         "elastic mode of every model; rigid-body modes are included.",
         x_label="frequency, Hz",

@@ -148,8 +148,12 @@ def _history(bench: Workbench, row: Row) -> Extra:
     rows = tuple(
         (f"{entry['iteration']:.0f}", *(f"{entry[name]:.6g}" for name in names)) for entry in kept
     )
-    heads = [name if name != "cost" else "cost, (rad/s)^4" for name in names]
-    return Extra(f"Iterations of table {row.table}", ("iteration", *heads), rows, words)
+    units = {p.name: p.unit or "factor" for p in run(bench, words).parameters}
+    heads = [f"{name}, {units.get(name, '(rad/s)^4')}" for name in names]
+    note = f"bench run hframe -s '{words}'"
+    if row.converged:
+        note += "; to convergence, where the cells stop short or are damped"
+    return Extra(f"Iterations of table {row.table}", ("iteration", *heads), rows, note)
 
 
 def _misprints(bench: Workbench) -> Extra:

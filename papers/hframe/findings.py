@@ -25,12 +25,14 @@ def premises(bench: Workbench) -> tuple[str, ...]:
     first, second = frame.masses
     place = first.at.s or 0.0, second.at.s or 0.0
     return (
-        f"The dimensions are missing in print; {horizontal:.3f} m across, {lower:.3f} m below and "
-        f"{upper:.3f} m above the joints, centre line to centre line, were recovered from the "
-        "printed frequencies of the meshes, EI and rho A from table 4.",
+        f"The text gives no dimensions, and the drawings were not at hand: {horizontal:.3f} m "
+        f"across, {lower:.3f} m below and {upper:.3f} m above the joints, centre line to "
+        "centre line, were recovered from the printed frequencies of the meshes. EI and "
+        "rho A are from table 4.",
         f"Two accelerometers of {1e3 * first.mass:.1f} g, one {place[0] * horizontal:.5f} m along "
         f"the horizontal on a lever of {1e3 * first.offset[2]:.1f} mm toward the long legs, one "
-        f"{(1.0 - place[1]) * lower:.4f} m down a short leg, were recovered from row C_a.",
+        f"{(1.0 - place[1]) * lower:.4f} m down a short leg, were recovered from row C_a and the "
+        "frequencies of table 3, which are therefore no check of their own.",
         "The measured frequencies are those of table 1; they are data, and no cells.",
         "The measured shapes are not printed: a solid twin's stand for them. They pair modes and "
         "make table 3, and no update fits them.",
@@ -71,11 +73,14 @@ def _best(comparison: Comparison) -> str:
     named = comparison.errors["diagnosed"]
     rms = float(np.sqrt(np.mean(errors[:USED] ** 2)))
     return (
-        "What is missing is joint rotation and shear: with textbook shear and rotary inertia two "
-        f"numbers, k_theta = {best.joint_stiffness / 1e3:.0f} kN m/rad at the column's face and "
-        f"E x {best.young:.3f}, leave {rms:.2f} % rms on the five modes and {errors[-2]:+.2f}, "
-        f"{errors[-1]:+.2f} % on the two held out. The strategy diagnosed, given the five, finds "
-        f"{', '.join(comparison.causes)} ({100.0 * comparison.probability:.0f} %) and predicts "
+        "What the model lacks, as far as seven frequencies tell, is joint rotation and shear: with "
+        f"textbook shear and rotary inertia two numbers, k_theta = "
+        f"{best.joint_stiffness / 1e3:.0f} kN m/rad at the column's face and E x {best.young:.3f}, "
+        f"leave {rms:.2f} % rms on the five modes and {errors[-2]:+.2f}, {errors[-1]:+.2f} % on "
+        "the two held out. The factor stands for E, EI / rho A and the shear coefficient together; "
+        "as a modulus of steel it would be too high. The strategy diagnosed, given the five, finds "
+        f"{', '.join(comparison.causes)} (probability {100.0 * comparison.probability:.0f} %) and "
+        "predicts "
         f"{named[-2]:+.2f}, {named[-1]:+.2f} %."
     )
 
@@ -133,7 +138,7 @@ def _rotations(bench: Workbench) -> str:
     )
     largest = [float(values[apart].max()) for values in (theirs, ours, moved)]
     return (
-        "The MAC of table 3 must count rotations (rad) and translations (m) as one vector: modes "
-        f"that are no pair reach {largest[0]:.0f} % in print, {largest[1]:.0f} % with the twin's "
-        f"shapes at all dofs, and {largest[2]:.1f} % at the translations alone."
+        "The MAC of table 3 most likely counts rotations (rad) and translations (m) as one vector: "
+        f"modes that are no pair reach {largest[0]:.0f} % in print, {largest[1]:.0f} % with the "
+        f"twin's shapes at all dofs, and {largest[2]:.1f} % at the translations alone."
     )

@@ -9,6 +9,9 @@ from femubench import Case, Cell, FloatArray, Model, Page, solve_modes
 from femubench.papers.printed import printed
 
 MODES = 8
+RECOVERED = (
+    "dimensions and accelerometers are recovered from these very frequencies: no independent check"
+)
 
 
 def frequencies(model: Model, count: int = MODES) -> FloatArray:
@@ -46,7 +49,8 @@ def mesh_cells(case: Case) -> tuple[Cell, ...]:
             if row == "C_a":
                 own = tables["table3"]["analytical"][k]
                 reason += f"; the printed {own} Hz of table 3 over our mesh A is {own / base:.6f}"
-            page = Page("hframe", "2", tolerance=0.0, decimals=3, reason=reason)
+            fitted = RECOVERED if row == "C_a" else ""
+            page = Page("hframe", "2", "", 0.0, 3, fitted, reason)
             cells.append(page.cell(row, f"mode {k + 1}", theirs, ours))
     return tuple(cells)
 

@@ -87,7 +87,8 @@ ROWS = (
         "EI of the elements at the joints",
         Reading(
             "local:options.damping=0.01,options.max_iterations=6",
-            "stopped a little short of convergence",
+            "stopped a little short of convergence; damping and number of steps were chosen to "
+            "meet the two printed parameters",
         ),
         {"EI_x": "EI at T branch", "EI_z": "EI at T through"},
         converged="local",
@@ -100,7 +101,8 @@ ROWS = (
             f"spring:variant=global,{RIGID_SPRINGS},options.damping=1.0,"
             f"options.max_iterations=30,{_TO_THE_LAST}",
             "springs made rigid, unlike those of the initial column; only EI / rho A is "
-            "determined, and where the two stand along it is where the iteration stops",
+            "determined, and where the two stand along it is where the iteration stops, which was "
+            "chosen to meet them",
         ),
         {"EI": "EI all members", "rhoA": "rhoA all members"},
         before=Reading(f"spring:variant=global,{SPRINGS}"),
@@ -113,7 +115,8 @@ ROWS = (
             f"spring:free_stiffness=false,{SPRINGS},options.damping=0.3,"
             f"options.max_iterations=200,{_TO_THE_LAST}",
             "EI frozen, which the text sets free; damped so strongly that k_x and k_z, on which "
-            "the frequencies hardly depend, have not drifted further when k_theta settles",
+            "the frequencies hardly depend, have not drifted further when k_theta settles; the "
+            "damping was chosen to meet these two",
         ),
         {"k_x": "k_x T branch", "k_z": "k_z T branch", "k_theta": "k_ry T branch"}
         | {"EI": "EI all members"},
