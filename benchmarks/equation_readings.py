@@ -6,8 +6,8 @@ element strategies do, without their bound on positive elements.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from functools import cache
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 
 import numpy as np
 import scipy.linalg as la
@@ -49,6 +49,13 @@ class Reading:
         layout: of the 13 sensors: ``midpoints``, ``quarters``, ``rungs`` (the last two: beam).
         noise: standard deviation of every reading, of the largest in its mode.
         seed: of the noise.
+        sharing: of a tied core: ``turned`` end for end where the second end is at the joint,
+            ``numbered`` (equal in the numbering of each element), ``mirrored`` (turned, and twist
+            of the other sign where the joint goes on to the other side).
+        backward: members numbered from their other end, joined by ``+``.
+        confused: two measured modes whose frequencies are exchanged, ``1-2`` or ``2-3``.
+        mispaired: two measured modes whose partners in the model are exchanged.
+        scale: factor of all expanded shapes, 1 for unit modal mass.
     """
 
     family: str = "physical"
@@ -75,6 +82,11 @@ class Reading:
     layout: str = "midpoints"
     noise: float = 0.0
     seed: int = 0
+    sharing: str = "turned"
+    backward: str = ""
+    confused: str = ""
+    mispaired: str = ""
+    scale: float = 1.0
 
     @property
     def words(self) -> str:
@@ -101,7 +113,8 @@ def _paired(
     """Return partners' shapes and frequencies, and all low shapes."""
     _, hz, shapes = modes_of(nominal, stiffness)
     low = shapes[:, :12]
-    index = pair_modes(nominal.frequencies, measured, hz[:12], nominal.sensors @ low).index
+    in_order = np.sort(nominal.frequencies)  # pairs by shape, though frequencies be confused
+    index = pair_modes(in_order, measured, hz[:12], nominal.sensors @ low).index
     if (index < 0).any():
         raise StrategyFailure("a measured mode has no partner")
     return low[:, index], hz[index], low
@@ -127,12 +140,12 @@ def _by_force(
     return np.asarray(found)
 
 
-@cache
+@lru_cache(maxsize=32)
 def _unseen(nominal: Setting) -> FloatArray:
     return np.asarray(la.null_space(nominal.sensors))
 
 
-@cache
+@lru_cache(maxsize=32)
 def _root_inverse_of(nominal: Setting, of: str) -> FloatArray:
     matrix = nominal.mass if of == "mass" else nominal.stiffness + SOFT * nominal.mass
     return _root_inverse(matrix)
@@ -143,11 +156,20 @@ def _root_inverse(matrix: FloatArray) -> FloatArray:
     return np.asarray(vectors / np.sqrt(values) @ vectors.T)
 
 
+def _exchanged(pair: str) -> list[int]:
+    order = [0, 1, 2]
+    if pair:
+        i, j = (int(mode) - 1 for mode in pair.split("-"))
+        order[i], order[j] = j, i
+    return order
+
+
 def expanded(
     reading: Reading, nominal: Setting, stiffness: FloatArray, measured: FloatArray
 ) -> FloatArray:
     """Return the quasi-measured shapes at all dofs, (n, m)."""
     full, _, low = _paired(nominal, stiffness, measured)
+    full = full[:, _exchanged(reading.mispaired)]
     seen = nominal.sensors @ full
     sign = np.sign(np.einsum("ij,ij->j", measured, seen))
     alike = measured * sign * np.linalg.norm(seen, axis=0) / np.linalg.norm(measured, axis=0)
@@ -219,7 +241,12 @@ def solution(reading: Reading, a: FloatArray, b: FloatArray, change: FloatArray)
 
 def nominal_of(reading: Reading) -> Setting:
     """Return the setting of a reading; other layouts than midpoints have beam data."""
-    return setting(reading.data, reading.layout, reading.bredt, reading.accelerometer)
+    made = setting(
+        reading.data, reading.layout, reading.bredt, reading.accelerometer, reading.backward
+    )
+    if not reading.confused:
+        return made
+    return replace(made, frequencies=made.frequencies[_exchanged(reading.confused)])
 
 
 def predicted(reading: Reading) -> tuple[FloatArray, FloatArray]:
@@ -229,7 +256,7 @@ def predicted(reading: Reading) -> tuple[FloatArray, FloatArray]:
         StrategyFailure: when a measured mode has no partner on the way.
     """
     nominal = nominal_of(reading)
-    change = patterns(reading.family, reading.tied, reading.only, nominal)
+    change = patterns(reading.family, reading.tied, reading.only, nominal, reading.sharing)
     draw = np.random.default_rng(reading.seed).standard_normal(nominal.measured.shape)
     measured = nominal.measured + reading.noise * np.abs(nominal.measured).max(axis=0) * draw
     _, own, _ = _paired(nominal, nominal.stiffness, measured)
@@ -237,7 +264,7 @@ def predicted(reading: Reading) -> tuple[FloatArray, FloatArray]:
     wanted, stiffness = np.square(2.0 * np.pi * hz), nominal.stiffness
     x = np.zeros(len(change))
     for _ in range(reading.iterations):
-        shapes = expanded(reading, nominal, stiffness, measured)
+        shapes = reading.scale * expanded(reading, nominal, stiffness, measured)
         a, b, _ = system(reading, nominal, change, shapes, wanted)
         x = reading.damping * x + (1.0 - reading.damping) * solution(reading, a, b, change)
         stiffness = nominal.stiffness + np.tensordot(x, change, axes=1)

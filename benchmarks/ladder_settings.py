@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -72,14 +72,18 @@ def _layout(name: str) -> Sensors:
     return Sensors(tuple(f"{i}Z" for i in range(1, 14)), xyz, ("z",) * 13)
 
 
-@cache
-def setting(data: str, layout: str, bredt: bool, accelerometer: bool) -> Setting:
+@lru_cache(maxsize=32)
+def setting(
+    data: str, layout: str, bredt: bool, accelerometer: bool, backward: str = ""
+) -> Setting:
     """Return the nominal model and the first three modes that stand for the measured ones."""
     case = read_case(FRAME, "frame", ())
     frame: Frame = case.model.frame_structure.frame
     if bredt:
         tubes = [replace(m, section=replace(m.section, J=BREDT)) for m in frame.members]
         frame = replace(frame, members=tuple(tubes))
+    if backward:
+        frame = numbered(frame, backward.split("+"))
     model = Model.of(frame if accelerometer else replace(frame, masses=()))
     used, dofs = case.used_measurement(0), model.dofs
     tested = ladder_truth(rectangular_tube(0.0254, 0.0254, 0.00238))
@@ -115,12 +119,51 @@ def _entries(nominal: Setting) -> FloatArray:
     return np.asarray(np.einsum("jk,jab->kab", free, patterns))
 
 
-@cache
-def patterns(name: str, tied: str, only: str, nominal: Setting) -> FloatArray:
+def numbered(frame: Frame, backward: Sequence[str]) -> Frame:
+    """Return the frame with these members numbered from their other end."""
+    turned = [replace(m, ends=m.ends[::-1]) if m.name in backward else m for m in frame.members]
+    return replace(frame, members=tuple(turned))
+
+
+def _sides(structure: Structure) -> FloatArray:
+    """Return -1 for elements whose joint goes on to their left only, +1 for others, (n,)."""
+    frame, sides = structure.frame, np.ones(len(structure.properties))
+    place = {joint.name: np.array(joint.xyz) for joint in frame.joints}
+    for joint, at in place.items():
+        along = {
+            m.name: place[m.ends[m.ends[0] == joint]] - at for m in frame.members if joint in m.ends
+        }
+        units = {name: d / np.linalg.norm(d) for name, d in along.items()}
+        for name, d in units.items():
+            left = np.cross(d, sum(units.values()))[2]
+            sides[structure.element_ends[f"{name}@{joint}"][0]] = -1.0 if left > 1e-9 else 1.0
+    return sides
+
+
+def shared(family: ElementFamily, structure: Structure, sharing: str) -> ElementFamily:
+    """Return a tied generic family whose elements share their core in another way."""
+    assert family.cores is not None
+    signs = np.sign(family.cores.sum(axis=(2, 3)))
+    if sharing == "mirrored":
+        twist = np.abs(family.cores[..., :2, 2]).sum(axis=2) > 0.0  # k13, k23
+        signs = np.where(twist, _sides(structure)[family.elements][:, None], 1.0)
+    return replace(
+        family,
+        patterns=family.patterns * signs[..., None, None],
+        cores=family.cores * signs[..., None, None],
+    )
+
+
+@lru_cache(maxsize=32)
+def patterns(
+    name: str, tied: str, only: str, nominal: Setting, sharing: str = "turned"
+) -> FloatArray:
     """Return the change of K for a unit of every unknown, (n_unknowns, n, n)."""
     if name == "kabe-rigid":
         return _entries(nominal)
     family: ElementFamily = FAMILIES[name](nominal.structure)
+    if sharing != "turned" and name == "generic-adjusted":
+        family = shared(family, nominal.structure, sharing)
     plan = nominal.structure.plan
     unit = np.eye(len(family))
     each = np.array([plan.assemble(family.change(x)).toarray() for x in unit])

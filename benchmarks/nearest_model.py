@@ -23,9 +23,9 @@ def nearest_with(reading: Reading, target: FloatArray) -> tuple[float, float, fl
         with exactly those frequencies; its largest relative change of a parameter.
     """
     nominal = nominal_of(reading)
-    change = patterns(reading.family, reading.tied, reading.only, nominal)
+    change = patterns(reading.family, reading.tied, reading.only, nominal, reading.sharing)
     wanted = np.square(2.0 * np.pi * nominal.frequencies)
-    shapes = expanded(reading, nominal, nominal.stiffness, nominal.measured)
+    shapes = reading.scale * expanded(reading, nominal, nominal.stiffness, nominal.measured)
     a, b, size = system(reading, nominal, change, shapes, wanted)
     sharp = size / 0.01  # 0.01 Hz weighs as much as the inertia forces
 

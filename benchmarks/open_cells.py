@@ -18,7 +18,8 @@ import pandas as pd
 import scipy.linalg as la
 from equation_readings import Reading, predicted
 from nearest_model import nearest_with
-from open_cells_choices import AXES, CLOSING, EXPANSIONS, NO_FAMILY, WEIGHTS
+from open_cells_choices import ALONE, AXES, CLOSING, EXPANSIONS, WEIGHTS
+from open_cells_numbering import DIRECTIONS, SHAPES, direction
 from threadpoolctl import threadpool_limits
 
 from femubench import FloatArray, StrategyFailure
@@ -162,12 +163,33 @@ def axis_rows() -> list[dict[str, str]]:
         row = {"departure": axis}
         for family in ("physical", "nobari", "generic-adjusted"):
             base = Reading(family=family)
-            skipped = axis in NO_FAMILY and family != "physical"
+            skipped = ALONE.get(axis, family) != family
             results = [] if skipped else found(replace(base, **choice) for choice in choices)
             off = [one.deviation for one in results]
             said = f"{_percent(min(off))} to {_percent(max(off))}" if len(off) > 1 else ""
             row[f"{COLUMNS[family][0]}, %"] = said or (_percent(off[0]) if off else "-")
         rows.append(row)
+    return rows
+
+
+def numbering_rows() -> list[dict[str, str]]:
+    """Return the adjusted column where tied cores follow the numbering of the members."""
+    rows = []
+    for name, words in SHAPES.items():
+        base = replace(Reading(family="generic-adjusted"), **words)
+        tried = found(replace(base, sharing="numbered", backward=b) for b in DIRECTIONS)
+        off = [round(one.deviation, 6) for one in tried]  # all turned is none turned
+        best = tried[int(np.argmin(off))]
+        rows.append(
+            {
+                "reading": name,
+                "turned (built in), %": f"{found([base])[0].deviation:.2f}",
+                "not turned, %": f"{min(off):.2f} to {max(off):.2f}",
+                "within 1 %, 0.5 %": f"{sum(x < 1.0 for x in off)}, {sum(x < CLOSED for x in off)}",
+                "best, Hz": " ".join(f"{hz:.1f}" for hz in best.modes),
+                "its numbering": direction(best.reading.backward),
+            }
+        )
     return rows
 
 
@@ -237,6 +259,8 @@ def block(quick: bool) -> str:
         _markdown(best),
         "Single departures from the built-in reading, largest deviation:",
         _markdown(axis_rows()),
+        "Adjusted column, tied cores not turned end for end, every member numbered either way:",
+        _markdown(numbering_rows()),
         "Equation error over inertia forces, physical family, shapes of the first iteration:",
         _markdown(need_rows()),
         "The readings that close a column, or come nearest, with other shapes:",

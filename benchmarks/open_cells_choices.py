@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from equation_readings import Reading
+from open_cells_numbering import DIRECTIONS, EACH, SHAPES
 
 WEIGHTS = ((0.0, 0.0), (1.0, 1.0), (3.0, 0.0), (10.0, 2.0), (100.0, 100.0))
 EXPANSIONS: tuple[dict[str, object], ...] = (
@@ -47,6 +48,22 @@ AXES: dict[str, tuple[dict[str, object], ...]] = {
     ),
     "expansion": EXPANSIONS,
     "the model's own frequencies": ({"target": "nominal"},),
+    "frequencies of modes 1-2, 2-3 exchanged": (
+        {"confused": "1-2"},
+        {"confused": "2-3", "iterations": 1},  # the second finds no partners
+    ),
+    "partners of modes 1-2, 2-3 exchanged": ({"mispaired": "1-2"}, {"mispaired": "2-3"}),
+    "shapes 2 to 10 % too large or small": tuple(
+        {"scale": s} for s in (0.9, 0.95, 0.98, 1.02, 1.05, 1.1)
+    ),
+    "members numbered from the other end": tuple({"backward": b} for b in EACH),
+    **{
+        f"{name}, not turned, 128 numberings": tuple(
+            {**words, "sharing": "numbered", "backward": b} for b in DIRECTIONS
+        )
+        for name, words in SHAPES.items()
+    },
+    **{f"{name}, mirrored": ({**words, "sharing": "mirrored"},) for name, words in SHAPES.items()},
 }
 # Readings that close a column, or come nearest to it, with little or nothing tuned.
 _FORCED = Reading(expansion="force", start="nominal")
@@ -60,5 +77,11 @@ CLOSING = (
     replace(_FORCED, family="kabe-rigid"),
     Reading("generic-adjusted", data="beam", expansion="all dofs"),
     Reading("generic-adjusted", data="beam", expansion="all dofs", diagonal=3.0, cross=0.0),
+    Reading("generic-adjusted", data="beam", expansion="all dofs", sharing="mirrored"),
 )
-NO_FAMILY = {"tied by kind, r fixed", "bending alone, torsion alone"}  # physical alone has them
+# Departures that exist for one family alone.
+ALONE = {
+    "tied by kind, r fixed": "physical",
+    "bending alone, torsion alone": "physical",
+    **{axis: "generic-adjusted" for axis, (first, *_) in AXES.items() if "sharing" in first},
+}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +18,11 @@ from femubench.plugins.strategies.nobari import Nobari
 from femubench.plugins.strategies.physical import Physical
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-from equation_readings import Reading, expanded, nominal_of, predicted
-from ladder_settings import FRAME
+from equation_readings import Reading, expanded, nominal_of, predicted, solution, system
+from ladder_settings import FRAME, patterns
 from nearest_model import nearest_with
 from open_cells import column, deviation
+from open_cells_numbering import EACH, MEMBERS
 
 STRATEGIES: dict[str, Strategy] = {
     s.name: s for s in (Physical(), Nobari(), GenericLS(), GenericAdjusted())
@@ -105,6 +107,56 @@ def test_expansions_keep_the_readings() -> None:
     seen = nominal.sensors @ shapes
     ratio = (seen / nominal.measured)[np.abs(nominal.measured[:, 0]) > 0.1]
     np.testing.assert_allclose(ratio, np.broadcast_to(ratio[0], ratio.shape), rtol=1e-8)
+
+
+@pytest.mark.parametrize("family", list(STRATEGIES))
+def test_numbering_of_members_changes_nothing(family: str) -> None:
+    _, modes = predicted(Reading(family=family))
+    for backward in (EACH[-1], MEMBERS[1], "+".join(MEMBERS[::3])):
+        _, other = predicted(Reading(family=family, backward=backward))
+        np.testing.assert_allclose(other, modes, rtol=1e-9)
+
+
+def test_cores_that_are_not_turned_depend_on_the_numbering() -> None:
+    tied = Reading(family="generic-adjusted", data="beam", expansion="all dofs")
+    _, turned = predicted(tied)
+    _, numbered = predicted(replace(tied, sharing="numbered"))
+    assert np.abs(numbered / turned - 1.0).max() > 2e-3
+    _, other = predicted(replace(tied, sharing="numbered", backward=MEMBERS[1]))
+    assert np.abs(other / numbered - 1.0).max() > 2e-4
+    _, every = predicted(replace(tied, sharing="numbered", backward=EACH[-1]))
+    np.testing.assert_allclose(every, numbered, rtol=1e-9)
+
+
+def test_mirrored_corner_cores_keep_the_left_right_symmetry() -> None:
+    nominal = nominal_of(Reading(accelerometer=False, data="beam"))
+    dofs = nominal.model.dofs
+    middle = np.round(dofs.xyz - dofs.xyz.mean(axis=0), 6)
+    here = {(*p, d): i for i, (p, d) in enumerate(zip(middle, dofs.direction, strict=True))}
+    image = [here[(-x, y, z, d)] for (x, y, z, d) in here]
+    sign = np.array([-1.0 if d == "ry" else 1.0 for *_, d in here])
+    for sharing, alike in (("mirrored", True), ("turned", False)):
+        corners = patterns("generic-adjusted", "no", "", nominal, sharing)[:6]
+        mirrored = corners[:, image][:, :, image] * np.outer(sign, sign)
+        assert np.allclose(mirrored, corners, atol=1e-9 * corners.max()) == alike
+
+
+@pytest.mark.parametrize("expansion", ["rotation", "force", "serep", "own", "all dofs"])
+def test_signs_and_sizes_of_measured_shapes_change_nothing(expansion: str) -> None:
+    reading = Reading(data="beam", expansion=expansion)
+    nominal = nominal_of(reading)
+    factor = np.array([-1.0, 3.0, -0.2])
+    other = replace(
+        nominal, measured=nominal.measured * factor, everywhere=nominal.everywhere * factor
+    )
+    change = patterns("physical", "no", "", nominal)
+    wanted = np.square(2.0 * np.pi * nominal.frequencies)
+    found = []
+    for case in (nominal, other):
+        shapes = expanded(reading, case, case.stiffness, case.measured)
+        a, b, _ = system(reading, case, change, shapes, wanted)
+        found.append(solution(reading, a, b, change))
+    np.testing.assert_allclose(found[1], found[0], atol=1e-8 * np.abs(found[0]).max())
 
 
 def test_unknown_choices_are_refused() -> None:
