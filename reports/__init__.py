@@ -1,11 +1,13 @@
-"""Reports on stored results: screen, Markdown, CSV, JSON; nothing here runs anything."""
+"""Reports on stored results: screen, HTML, Markdown, tables, JSON; nothing here runs anything."""
 
 from __future__ import annotations
 
 from femubench import Reporter, hookimpl
 from femubench.reports.csvs import CsvReporter, ModesCsvReporter
+from femubench.reports.htmls import HtmlReporter
 from femubench.reports.jsons import JsonReporter
 from femubench.reports.markdown import MarkdownReporter
+from femubench.reports.parquets import ParquetReporter
 from femubench.reports.terminal import TerminalReporter
 
 
@@ -14,8 +16,10 @@ def femubench_reporters() -> list[Reporter]:
     """Return the built-in reporters."""
     return [
         TerminalReporter(),
+        HtmlReporter(),
         MarkdownReporter(),
         CsvReporter(),
         ModesCsvReporter(),
         JsonReporter(),
+        ParquetReporter(),
     ]

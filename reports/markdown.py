@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import chain
+from typing import Any
 
 from femubench import JobResult, PairedMode, Run, leaderboard
 from femubench.reports.cells import NOTHING, fixed, hertz, interval, plain, whole
+from femubench.reports.page.papers import papers_of
+from femubench.reports.page.statistics import statistics
 from femubench.reports.summary import (
     Trouble,
     cases_of,
@@ -16,6 +20,7 @@ from femubench.reports.summary import (
     changes_of,
     first_seed,
     header,
+    notes_of,
     strategies_of,
     troubles,
     unconverged,
@@ -36,6 +41,7 @@ _FOOTNOTES = (
     "all physical ones.",
     "**parameters, evaluations, seconds**: unknowns that were free, eigenvalue solutions, wall "
     "time; median over the cases.",
+    "**ok**: jobs that gave a model, of those whose case has what the strategy needs.",
 )
 
 
@@ -47,14 +53,16 @@ class MarkdownReporter:
 
     def render(self, run: Run) -> str:
         """Return the report."""
+        printed = papers_of(run)
         sections = [
             f"# Updating strategies compared: run {escape(run.meta.get('run', ''))}",
             table(["", ""], ([title, escape(text)] for title, text in header(run)), "ll"),
+            *_notes(run),
             "## Leaderboard",
-            _leaderboard(run),
+            *_leaderboard(run),
             *_FOOTNOTES,
             *_coverage(run),
-            *chain.from_iterable(_case(run, case) for case in cases_of(run)),
+            *chain.from_iterable(_case(run, case, printed.get(case, {})) for case in cases_of(run)),
             *chain.from_iterable(_changes(run, *item) for item in changes_of(run).items()),
             *_citations(run.meta.get("citations") or {}),
         ]
@@ -74,11 +82,21 @@ def table(headers: Sequence[str], rows: Iterable[Sequence[str]], align: str) -> 
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def _leaderboard(run: Run) -> str:
+def _notes(run: Run) -> Iterator[str]:
+    """Return what was left out and what is missing."""
+    notes = notes_of(run)
+    if notes:
+        yield "\n".join(f"- **Note**: {escape(note)}" for note in notes)
+
+
+def _leaderboard(run: Run) -> Iterator[str]:
+    """Return the ranking with the groups that cannot be told apart, and what that rests on."""
     board = leaderboard(run)
+    tested = statistics(run, board)
+    letters, names = tested.letters(), strategies_of(run)
     headers = [
         *("rank", "strategy", "skill", "unseen", "used %", "higher %", "modified %"),
-        *("rigid lost", "negative", "parameters", "evaluations", "seconds"),
+        *("rigid lost", "negative", "parameters", "evaluations", "seconds", "ok", "group"),
     ]
     several = bool(board["skill_low"].notna().any())
     if several:
@@ -94,11 +112,19 @@ def _leaderboard(run: Run) -> str:
             *(whole(row[key]) for key in ("rigid_modes_lost", "negative_eigenvalues")),
             *(whole(row[key]) for key in ("parameters", "evaluations")),
             fixed(row["seconds"], 3, 7),
+            _share_of_jobs(row),
+            letters.get(names.index(row["strategy"]), NOTHING),
         ]
         if several:
             cells.insert(3, interval(row["skill_low"], row["skill_high"]))
         rows.append(cells)
-    return table(headers, rows, "rl" + "r" * (len(headers) - 2))
+    yield table(headers, rows, "rl" + "r" * (len(headers) - 3) + "l")
+    yield f"**group**: {escape(tested.note)}"
+
+
+def _share_of_jobs(row: Mapping[Any, Any]) -> str:
+    """Return how many jobs gave a model, of those that the strategy applies to."""
+    return f"{whole(row['ok'])} of {whole(row['total'] - row['not_applicable'])}"
 
 
 def _coverage(run: Run) -> Iterator[str]:
@@ -136,8 +162,12 @@ def _troubles(items: Iterable[Trouble]) -> str:
     return table(["case", "strategy", "seeds", "status", "reason"], rows, "lllll")
 
 
-def _case(run: Run, case: str) -> Iterator[str]:
-    """Return the frequencies of one case, a strategy a row, as the papers tabulate them."""
+def _case(run: Run, case: str, printed: Mapping[str, Mapping[int, float]]) -> Iterator[str]:
+    """Return the frequencies of one case, a strategy a row, as the papers tabulate them.
+
+    Arguments:
+        printed: frequencies in Hz that a paper has for a strategy, by the mode's number.
+    """
     seed = first_seed(run)
     found = [r for r in run.results if r.case == case and r.seed == seed]
     shown = [result for result in found if result.blocks]
@@ -163,7 +193,20 @@ def _case(run: Run, case: str) -> Iterator[str]:
                 fixed(result.score, 3, 6),
             ]
         )
+        if result.strategy in printed:
+            rows.append(_printed(result.strategy, printed[result.strategy], columns))
     yield table([*headers, "mean MAC", "score"], rows, "l" + "r" * (len(columns) + 2))
+
+
+def _printed(
+    strategy: str, hertz_of: Mapping[int, float], columns: Mapping[tuple[str, int], PairedMode]
+) -> list[str]:
+    """Return the row of a paper, to stand under ours."""
+    modes = (
+        replace(mode, predicted_hz=hertz_of.get(number)) for (_, number), mode in columns.items()
+    )
+    cells = (NOTHING if mode.predicted_hz is None else _predicted(mode) for mode in modes)
+    return [f"*{escape(strategy)}, as the paper prints it*", *cells, NOTHING, NOTHING]
 
 
 def _tested(result: JobResult) -> dict[tuple[str, int], PairedMode]:

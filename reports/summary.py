@@ -131,3 +131,33 @@ def _spoken(value: Any) -> str:  # noqa: ANN401 - plain data of any kind
     if isinstance(value, (list, tuple)):
         return " ".join(plain(entry) for entry in value)
     return plain(value)
+
+
+def measured_modes(run: Run, case: str) -> list[tuple[str, PairedMode]]:
+    """Return the measured modes of a case as tested with their blocks, from any of its results."""
+    found: dict[tuple[str, int], PairedMode] = {}
+    for result in run.results:
+        for name in ("used", "higher") if result.case == case else ():
+            block = result.blocks.get(name)
+            for mode in block.modes if block is not None else ():
+                found.setdefault((name, mode.number), mode)
+    return [(name, mode) for (name, _), mode in found.items()]
+
+
+def notes_of(run: Run) -> list[str]:
+    """Return what a reader has to know before anything else: what was left out, what is missing."""
+    told = run.meta.get("notes")
+    notes = [plain(note) for note in told] if isinstance(told, (list, tuple)) else []
+    jobs = len(cases_of(run)) * len(strategies_of(run)) * len(seeds_of(run))
+    if "finished" in run.meta and run.meta["finished"] is None:
+        notes.append(f"the run has not ended: {len(run.results)} of {jobs} jobs are there")
+    elif run.meta.get("interrupted") is True:
+        notes.append(f"the run was interrupted: {len(run.results)} of {jobs} jobs are there")
+    elif len(run.results) < jobs:
+        notes.append(f"{jobs - len(run.results)} of {jobs} jobs are missing and score as failures")
+    return notes
+
+
+def seeds_of(run: Run) -> list[int]:
+    """Return the seeds that were asked for and those that are there, in order."""
+    return sorted({*run.meta.get("seeds", ()), *(result.seed for result in run.results)})

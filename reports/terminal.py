@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from femubench import Run, leaderboard
 from femubench.reports.cells import fixed, interval, plain, shortened, whole
-from femubench.reports.summary import Trouble, spared, troubles, unconverged
+from femubench.reports.summary import Trouble, notes_of, spared, troubles, unconverged
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -138,6 +138,7 @@ def _unseen(board: pd.DataFrame) -> str:
 
 
 def _notes(run: Run) -> Iterator[str]:
+    yield from (f"Note: {note}." for note in notes_of(run))
     moving = unconverged(run.results)
     if moving:
         named = ", ".join(f"{plain(name)} ({count})" for name, count in moving.items())

@@ -22,6 +22,7 @@ from femubench.core.cli import progress
 from femubench.core.cli.files import write_atomically
 from femubench.core.cli.main import VERBS, bench
 from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of
+from femubench.core.harness.store import Store
 
 CASE = """\
 [case]
@@ -324,6 +325,25 @@ class TestGoingOn:
         assert set(jobs) == {(n, s) for n in ("test-nothing", "test-fails") for s in (1, 2)}
         assert jobs.count(("test-nothing", 1)) == 1
 
+    def test_a_run_is_continued_under_other_limits(self, invoke: Invoke, tmp_path: Path) -> None:
+        case = put_case(tmp_path / "case")
+        assert invoke("run", case, "-s", "test-nothing", "--timeout", "50s").exit_code == 0
+        result = invoke("run", "--resume", "--timeout", "70s")
+        assert "timeout 70s" in " ".join(result.stdout.split())
+        result = invoke("run", "--resume", "--seeds", 3)
+        assert result.exit_code == 2
+        assert "seeds needs CASE or -s" in result.stderr
+
+    def test_a_request_that_is_none_is_told_in_one_line(
+        self, invoke: Invoke, tmp_path: Path
+    ) -> None:
+        for field, value in (("seeds", "x"), ("timeouts", [1]), ("timeout", -1), ("cases", 5)):
+            request = {"cases": [], "strategies": ["unchanged"], field: value}
+            Store(tmp_path / field).begin({"run": "r", "request": request})
+            result = invoke("run", "--locked", "r", "--store", tmp_path / field)
+            assert result.exit_code == 2
+            assert f"request of run r: {field}" in result.stderr
+
     def test_resume_with_nothing_stored_is_a_run(self, invoke: Invoke, tmp_path: Path) -> None:
         case = put_case(tmp_path / "case")
         assert invoke("run", case, "-s", "test-nothing", "--resume").exit_code == 0
@@ -349,6 +369,8 @@ class TestGoingOn:
         for words, expected in (
             (("run", case, "--locked", "2026"), "cases cannot be given beside it"),
             (("run", "--locked", "2026"), "no results"),
+            (("run", "--locked", "2026", "--overwrite", "missing"), "overwrite cannot be given"),
+            (("run", case, "--seed", 2**63), "not in the range"),
             (("run", case, "--timeout", "kabee=1m", "-s", "test-nothing"), "'kabee'"),
             (("run", case, "--memory", "1k"), "no size >= 16M"),
             (("run", case, "--overwrite", "some"), "'some' is not one of"),
@@ -393,7 +415,9 @@ class TestRun:
 
     def test_screen(self, done: tuple[Path, Result]) -> None:
         lines = done[1].stdout.splitlines()
-        assert max(len(line) for line in lines if not line.startswith("markdown: ")) <= 80
+        assert (
+            max(len(line) for line in lines if not line.startswith(("html: ", "markdown: "))) <= 80
+        )
         found = [re.match(r"[ *]*(\d)  (test-\w+) +\d", line) for line in lines]
         ranks = {match[2]: match[1] for match in found if match}
         assert ranks == {"test-nothing": "1", "test-picky": "2", "test-fails": "3"}
@@ -414,7 +438,8 @@ class TestRun:
         ]
         assert (folder / "r.csv").read_text(encoding="utf-8").count("\n") == 7
         report = folder / "store" / f"{data['meta']['run']}.md"
-        assert result.stdout.splitlines()[-1] == f"markdown: {report}"
+        written = [f"html: {report.with_suffix('.html')}", f"markdown: {report}"]
+        assert result.stdout.splitlines()[-2:] == written
         assert report.read_text(encoding="utf-8").startswith("# ")
         assert not list(folder.rglob(".*"))
 
@@ -461,7 +486,8 @@ class TestRun:
         result = invoke("run", "case/case.toml", *words, "--report", "mine.csv")
         assert (result.exit_code, result.output) == (0, "")
         assert (tmp_path / "mine.csv").read_text().splitlines()[1].startswith("rod,test-nothing,3")
-        assert [path.name for path in (tmp_path / "elsewhere").iterdir()] == ["results.jsonl"]
+        kept = sorted(path.name for path in (tmp_path / "elsewhere").iterdir())
+        assert kept == ["exhibits", "results.jsonl"]
 
     def test_ctrl_c(self, site: Path, tmp_path: Path) -> None:
         """A real signal to a real process: exit code 130, no traceback, no worker left behind."""

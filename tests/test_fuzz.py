@@ -7,7 +7,7 @@ import shutil
 import sys
 from collections import Counter
 from collections.abc import Callable
-from contextlib import redirect_stdout
+from contextlib import redirect_stdout, suppress
 from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
@@ -33,7 +33,8 @@ INPUTS = {"toml": 6000, "csv": 5000, "mtx": 4000, "universal": 3500, "run": 2500
 MOST_CHARACTERS = 2500
 _CLI_SAMPLE = 12
 READERS = tuple(femubench_readers())
-REPORTERS = tuple(femubench_reporters())
+REPORTERS = tuple(r for r in femubench_reporters() if r.name != "parquet")
+_PAGE_SHARE = 10  # the page takes longer than all other reports: one input in ten gets it
 
 
 @dataclass
@@ -92,10 +93,13 @@ def fuzz(
     return tally
 
 
-def refused_by_command(words: list[str]) -> None:
+def refused_by_command(words: list[str], *, lenient: bool = False) -> None:
+    """Call the command; a lenient one may also show what is whole."""
     result = CliRunner().invoke(bench, words)
-    assert result.exit_code == 2, result.output
     assert "Traceback" not in result.output
+    if lenient and result.exit_code == 0:
+        return
+    assert result.exit_code == 2, result.output
     assert len(result.output.splitlines()) == 1
 
 
@@ -154,9 +158,18 @@ def results_format(folder: Path, share: float, format: str) -> None:
     text = run_text() if format == "run" else store_text(folder / "store")
     file = folder / ("run.json" if format == "run" else "results.jsonl")
 
+    count = 0
+
     def report() -> None:
+        nonlocal count
+        if format == "store":
+            with suppress(FemubenchError):
+                Store(folder).load(lenient=True)
         run = read_run(file) if format == "run" else Store(folder).load()
+        count += 1
         for reporter in REPORTERS:
+            if reporter.name == "html" and count % _PAGE_SHARE != 1:
+                continue
             shown = reporter.render(run)
             if reporter.name in ("terminal", "markdown"):
                 assert all(line.isprintable() for line in shown.split("\n"))
@@ -180,7 +193,7 @@ def results_format(folder: Path, share: float, format: str) -> None:
     for content in tally.refused:
         file.write_bytes(content)
         words = [str(file)] if format == "run" else ["--store", str(folder)]
-        refused_by_command(["report", *words])
+        refused_by_command(["report", *words], lenient=format == "store")
 
 
 FORMATS = ["toml", "csv", "mtx", "universal", "run", "store"]

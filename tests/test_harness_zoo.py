@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -11,9 +12,14 @@ from typing import Any
 import pytest
 
 from femubench.core.harness import runner
+from femubench.core.harness.jobs import JobOutcome
 from femubench.core.harness.limits import MIB, Limits
 from femubench.core.harness.results import JobResult, Run
 from femubench.core.harness.runner import run_jobs
+from femubench.core.harness.schedule import _Bench
+from femubench.core.harness.serial import result_from_json, result_to_json
+from femubench.core.harness.slots import Slot
+from femubench.core.harness.task import Ending
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
@@ -63,6 +69,22 @@ def test_the_good_have_the_results_that_they_have_among_themselves(runs: dict[st
         alone, among = (found(runs[name], strategy.name) for name in ("calm", "wild"))
         same = {"seconds": 0.0, "rank": None, "provenance": {}}
         assert replace(alone, **same) == replace(among, **same)
+
+
+def test_what_they_say_can_be_stored(runs: dict[str, Run]) -> None:
+    for result in runs["wild"].results:
+        text = json.dumps(result_to_json(result))
+        assert result_from_json(json.loads(text)).status == result.status
+
+
+def test_a_judgement_out_of_bounds_ends_its_job_alone() -> None:
+    record = {"case": "c", "strategy": "s", "seed": 0, "status": "ok", "parameter_count": -1}
+    slot = Slot(toys.tiny_case(), "s", 0, "", {}, None)
+    answer = json.dumps({"result": record, "exhibit": None}).encode()
+    outcome = _Bench([slot], {}, {}, None)._judgement(slot, Ending("answer", answer))
+    assert isinstance(outcome, JobOutcome)
+    assert outcome.status == "failed"
+    assert outcome.reason.startswith("its result is out of bounds: parameter_count")
 
 
 def test_nothing_is_left_behind(runs: dict[str, Run]) -> None:

@@ -201,6 +201,7 @@ class TestInstalled:
         ("x" * 41, "40 characters at most"),
         ("class", "keyword of Python"),
         ("json", "standard library"),
+        ("structure", "a file of the package's own tests"),
         ("femubench", "name of this program"),
         ("numpy", "installed"),
         ("baruch", "there is a strategy of that name"),

@@ -12,6 +12,7 @@ from dataclasses import replace
 import pytest
 
 from femubench import Block, JobResult, PairedMode, Reporter, Run
+from femubench.core.cli.reporting import rendered
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.validation import check_reporter
 from femubench.reports import femubench_reporters
@@ -121,14 +122,14 @@ def with_header(text: str, *start: str) -> list[list[str]]:
 def test_builtin_reporters_fill_the_role() -> None:
     reporters = femubench_reporters()
     names = [check_reporter(reporter).name for reporter in reporters]
-    assert names == ["terminal", "markdown", "csv", "modes-csv", "json"]
+    assert names == ["terminal", "html", "markdown", "csv", "modes-csv", "json", "parquet"]
     assert list(load_plugins().reporters)[: len(names)] == names
 
 
 @pytest.mark.parametrize("reporter", femubench_reporters(), ids=lambda reporter: reporter.name)
 def test_every_format_takes_an_empty_run(reporter: Reporter) -> None:
-    text = reporter.render(run_of(strategies=[]))
-    assert "nan" not in text
+    content = rendered(reporter, run_of(strategies=[]))
+    assert isinstance(content, bytes) or "nan" not in content
 
 
 class TestTerminal:

@@ -133,7 +133,7 @@ class TestScreen:
         assert re.search(r"mode 1 +FE +255\.8 +255\.83 +\+0\.01 +✓ yes\n", text)
         assert re.search(r"mode 4 +FE +911\.3 +867\.60 +-4\.80 +✗ no \[2\]\n", text)
         assert re.search(r"mode 5 +FE +1049\.4 +– +– +✗ no \[2\]\n", text)
-        assert re.search(r"rigid 1 +Kabe +1197\.6 i +1197\.90 i +-0\.03 +≈ if \[1\]\n", text)
+        assert re.search(r"rigid 1 +Kabe +1197\.6 i +1197\.90 i +\+0\.03 +≈ if \[1\]\n", text)
 
     def test_a_note_stands_once_a_table(self) -> None:
         text = " ".join(reproduction_text(STUDIES[:1]).split())

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from femubench.core.errors import InputError
-from femubench.core.harness import keys
+from femubench.core.harness import keys, locks, slots
 from femubench.core.harness.repeat import environment_differences, result_differences
 from femubench.core.harness.results import JobResult, Run
 from femubench.core.harness.runner import run_jobs
@@ -44,6 +44,10 @@ def stable(run: Run) -> dict[tuple[str, str, int], dict[str, Any]]:
     }
 
 
+def by_name(run: Run) -> list[JobResult]:
+    return sorted(run.results, key=lambda item: (item.case, item.strategy, item.seed))
+
+
 def records(store: Store) -> list[Mapping[str, Any]]:
     return [json.loads(line) for line in store.path.read_text().splitlines()]
 
@@ -67,7 +71,7 @@ def test_a_finished_run_is_left_as_it_is(tmp_path: Path) -> None:
     )
     assert seen == [1, 2]
     assert [item for item in records(store) if item["record"] != "end"] == before
-    assert again.results == store.load().results
+    assert by_name(again) == by_name(store.load())
     assert len(store.runs()) == 1
 
 
@@ -80,6 +84,60 @@ def test_a_failure_is_never_taken_for_a_result(tmp_path: Path) -> None:
     assert len(store.runs()) == 1
     some(store, resume=True, overwrite="missing")
     assert len([item for item in records(store) if item["record"] == "result"]) == 4
+
+
+def test_a_failure_does_not_hide_a_result(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    first = some(store)
+    softer = next(item for item in first.results if item.strategy == "softer")
+    # As a run with a shorter time limit would leave it.
+    store.begin({**first.meta, "run": "hasty", "plan": "other"})
+    store.append("hasty", replace(softer, status="timeout", blocks={}))
+    again = some(store, resume=True)
+    assert by_name(again) == by_name(store.load(first.meta["run"]))
+    assert {item.strategy: item.status for item in again.results}["softer"] == "ok"
+    jobs = [
+        (item["run"], item["result"]["strategy"]) for item in records(store) if "result" in item
+    ]
+    assert jobs.count((first.meta["run"], "softer")) == 1
+
+
+def test_a_result_of_another_run_takes_the_place_of_a_failure(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    first = some(store)
+    failing = next(item for item in first.results if item.strategy == "failing")
+    store.begin({**first.meta, "run": "patient", "plan": "other"})
+    store.append("patient", replace(failing, status="not-applicable"))
+    again = some(store, resume=True)
+    stored = store.load(first.meta["run"])
+    for run in (again, stored):
+        found = {item.strategy: item.status for item in run.results}
+        assert found["failing"] == "not-applicable"
+
+
+def test_a_result_of_a_source_that_changed_has_no_key(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for versions, kept in (("11", True), ("12", False)):
+        store, found = Store(tmp_path / versions), [*versions]
+
+        def version(strategy: object, found: list[str] = found) -> str:
+            """Asked for when the key is made, and again when the result is there."""
+            return found.pop(0) if len(found) > 1 else found[0]
+
+        monkeypatch.setattr(slots, "strategy_version", version)
+        (result,) = run_jobs([CASE], [toys.Softer()], store=store, jobs=1).results
+        assert bool(result.key) is kept
+        assert ("changed during the run" in result.provenance["strategy"]) is not kept
+        assert bool(store.by_key()) is kept
+
+
+def test_a_damaged_store_is_told_before_anything_is_written(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    store.path.write_text("{}\n")
+    with pytest.raises(InputError, match="not a record"):
+        some(store)
+    assert store.path.read_text() == "{}\n"
 
 
 def test_another_run_takes_results_from_the_store(tmp_path: Path) -> None:
@@ -156,7 +214,30 @@ def test_one_process_works_on_a_run(tmp_path: Path) -> None:
     run = some(store)
     with store.exclusive(run.meta["run"]), pytest.raises(InputError, match="another process"):
         some(store, resume=True)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["results.jsonl"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["exhibits", "results.jsonl"]
+
+
+def test_the_lock_of_an_interrupted_run_is_removed(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt), Store(tmp_path).exclusive("a"):
+        raise KeyboardInterrupt
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_lock_of_a_file_that_was_removed_keeps_nobody_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, flock = tmp_path / "lock", locks.fcntl.flock
+    removed = iter([True, False])
+
+    def late(descriptor: int, how: int) -> None:
+        flock(descriptor, how)
+        if next(removed):
+            path.unlink()
+
+    monkeypatch.setattr(locks.fcntl, "flock", late)
+    descriptor = locks.held(path)
+    assert os.path.samestat(os.fstat(descriptor), path.stat())
+    os.close(descriptor)
 
 
 def test_results_do_not_depend_on_the_number_of_workers(tmp_path: Path) -> None:
@@ -251,4 +332,7 @@ def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(tmp_p
         if item["record"] == "result" and item["result"]["status"] == "ok"
     ]
     assert len(good) == len(set(good)) == JOBS  # no result was computed twice
-    assert [path.name for path in stores["killed"].folder.iterdir()] == ["results.jsonl"]
+    names = {path.name for path in stores["killed"].folder.iterdir()}
+    assert names == {"exhibits", "results.jsonl"}
+    kept = {key for key in good if stores["killed"].exhibits.of(key) is not None}
+    assert len(kept) == 4  # of the first seed: two cases, two strategies

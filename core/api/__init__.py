@@ -54,7 +54,7 @@ _NAMES = {
     "fem.structure": "Structure",
     "harness.frames": "modes_frame results_frame run_from_json run_to_json",
     "harness.leaderboard": "leaderboard",
-    "harness.ranking": "rank_results",
+    "harness.ranking": "OFFSET_PERCENT SCORE_OF_FAILURE rank_results",
     "harness.results": "Block JobResult PairedMode Run",
     "harness.runner": "run_jobs",
     "harness.scoring": "frequency_error predict_block score_model",
@@ -176,7 +176,10 @@ if TYPE_CHECKING:
         run_to_json as run_to_json,
     )
     from femubench.core.harness.leaderboard import leaderboard as leaderboard
-    from femubench.core.harness.ranking import rank_results as rank_results
+    from femubench.core.harness.ranking import (
+        OFFSET_PERCENT as OFFSET_PERCENT, SCORE_OF_FAILURE as SCORE_OF_FAILURE,
+        rank_results as rank_results,
+    )
     from femubench.core.harness.results import (
         Block as Block, JobResult as JobResult, PairedMode as PairedMode, Run as Run,
     )

@@ -27,9 +27,12 @@ if TYPE_CHECKING:
 
 FILE = click.Path(path_type=Path, dir_okay=False, allow_dash=True)
 FOLDER = click.Path(path_type=Path, file_okay=False)
+REPORT = click.Path(path_type=Path, dir_okay=False)
 SCREEN = Path("-")
 # Verdicts that leave no model to write.
 _NO_MODEL = ("none", "unknown")
+# Formats of a report by the suffix of its file.
+_STYLES = {".html": "html", ".md": "markdown"}
 _LONGEST = 70  # of 80 characters that a name may have
 
 
@@ -76,6 +79,13 @@ def _share(ctx: click.Context, param: click.Parameter, value: float | None) -> f
     show_default=True,
     help="What is printed.",
 )
+@click.option(
+    "--report",
+    "report_file",
+    type=REPORT,
+    metavar="FILE",
+    help="Write the report to a file: .html is a page with drawings, .md is Markdown.",
+)
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 @click.pass_context
 def diagnose(
@@ -87,6 +97,7 @@ def diagnose(
     no_pairs: bool,
     effects: str | None,
     style: str,
+    report_file: Path | None,
     quiet: bool,
 ) -> None:
     """Find what a model lacks, and extend it.
@@ -94,10 +105,14 @@ def diagnose(
     CASE is a scenario with one case (bench scenarios list), one case of a scenario, or a folder
     with a case.toml. Held-out modes and design changes only judge the outcome.
     """
+    from femubench.core.diagnosis.serial import diagnosis_to_json
+
     plugins = plugins_for(ctx)
     names = _effects(effects, plugins)
     if json_file is not None and json_file != SCREEN:
         check_writable(json_file)
+    if report_file is not None:
+        _check_report(report_file)
     if output is not None:
         _check_new(output)
     read = _one_case(case, plugins)
@@ -106,7 +121,10 @@ def diagnose(
     found = _diagnosed(read, names, plugins, pairs=not no_pairs)
     fault = _extended(read, found, output)
     written = output if output is not None and fault is None and _has_model(found) else None
-    _tell(found, written, json_file, None if quiet else style)
+    data = diagnosis_to_json(found, written=written, case=read)
+    if report_file is not None:
+        write_atomically(report_file, _report(data, _STYLES[report_file.suffix.lower()]))
+    _tell(data, json_file, None if quiet else style)
     if fault is not None:
         raise fault
     if output is not None and written is None:
@@ -186,13 +204,8 @@ def _extended(case: Case, found: Diagnosis, folder: Path | None) -> Exception | 
     return None
 
 
-def _tell(
-    found: Diagnosis, written: Path | None, json_file: Path | None, style: str | None
-) -> None:
+def _tell(data: Mapping[str, Any], json_file: Path | None, style: str | None) -> None:
     """Print the report, and write or print the JSON."""
-    from femubench.core.diagnosis.serial import diagnosis_to_json
-
-    data = diagnosis_to_json(found, written=written)
     if json_file is not None:
         text = json.dumps(data, indent=1, allow_nan=False)
         if json_file == SCREEN:
@@ -203,7 +216,22 @@ def _tell(
         click.echo(_report(data, style))
 
 
+def _check_report(file: Path) -> None:
+    """Make sure that a report can be written there before the search starts.
+
+    Raises:
+        InputError: for a suffix that says no format, or a file that cannot be written.
+    """
+    if file.suffix.lower() not in _STYLES:
+        known = " or ".join(_STYLES)
+        raise InputError("does not say its format", file=file, expected=f"a name with {known}")
+    check_writable(file)
+
+
 def _report(data: Mapping[str, Any], style: str) -> str:
     from femubench.reports.diagnosis import diagnosis_markdown, diagnosis_text
+    from femubench.reports.diagnosis_page import diagnosis_html
 
+    if style == "html":
+        return diagnosis_html(data)
     return diagnosis_markdown(data) if style == "markdown" else diagnosis_text(data)

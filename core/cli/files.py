@@ -50,13 +50,15 @@ def make_folder(folder: Path) -> None:
         raise InputError("folder cannot be written to", file=folder)
 
 
-def write_atomically(path: Path, text: str) -> None:
-    """Write a text with a final newline; a reader sees the old file or the new, never a part."""
+def write_atomically(path: Path, content: str | bytes) -> None:
+    """Write bytes, or a text with a final newline; a reader sees the old file or the new."""
+    if isinstance(content, str):
+        content = (content.rstrip("\n") + "\n").encode()
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     part = Path(name)
     try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="") as stream:
-            stream.write(text.rstrip("\n") + "\n")
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
         # mkstemp gives 0600; a report is as public as any file that the user makes.
         part.chmod(0o666 & ~_umask())
         part.replace(path)

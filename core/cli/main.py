@@ -26,6 +26,11 @@ DONE, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 VERBS = {
     "run": ("femubench.core.cli.run", "Run strategies on cases and rank them."),
     "report": ("femubench.core.cli.report", "Write a report on a stored run."),
+    "compare": (
+        "femubench.core.cli.compare",
+        "Set run B beside run A; exit with 1 where B is worse.",
+    ),
+    "publish": ("femubench.core.cli.publish", "Merge result files into a static site in DIR."),
     "diagnose": ("femubench.core.cli.diagnose", "Find what a model lacks, and extend it."),
     "reproduce": (
         "femubench.core.cli.reproduce",

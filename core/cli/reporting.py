@@ -31,22 +31,52 @@ def reporter(plugins: Plugins, name: str) -> Reporter:
     return plugins.reporters[name]
 
 
-def rendered(found: Reporter, run: Run) -> str:
-    """Return a reporter's text.
+def rendered(found: Reporter, run: Run, exhibits: object = None) -> str | bytes:
+    """Return a reporter's text, or its bytes where the format is no text.
+
+    Arguments:
+        exhibits: what the store has to draw of the run, for a reporter that can.
 
     Raises:
         PluginError: naming the reporter, whatever it raised.
     """
+    as_bytes, with_exhibits = (
+        getattr(found, name, None) for name in ("render_bytes", "render_with")
+    )
     try:
-        text = found.render(run)
+        if callable(as_bytes):
+            content = as_bytes(run)
+        elif callable(with_exhibits):
+            content = with_exhibits(run, exhibits)
+        else:
+            content = found.render(run)
     except FemubenchError:
         raise
     except Exception as error:
         what = f"reporter {found.name!r} failed: {type(error).__name__}: {error}"
         raise PluginError(what) from error
-    if not isinstance(text, str):
-        raise PluginError(f"reporter {found.name!r} gave {type(text).__name__}, expected str")
-    return text
+    expected = bytes if callable(as_bytes) else str
+    if not isinstance(content, expected):
+        raise PluginError(
+            f"reporter {found.name!r} gave {type(content).__name__}, expected {expected.__name__}"
+        )
+    return content
+
+
+def text_of(found: Reporter, content: str | bytes) -> str:
+    """Return what a reporter gave, for the screen.
+
+    Raises:
+        InputError: for a format that is no text.
+    """
+    if isinstance(content, bytes):
+        raise InputError(f"format {found.name} is no text", expected="a file")
+    return content
+
+
+def is_for_files(found: Reporter) -> bool:
+    """Tell whether a format is of no use on the screen."""
+    return found.name == "html" or callable(getattr(found, "render_bytes", None))
 
 
 def reporter_for(plugins: Plugins, path: Path) -> Reporter:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field, TypeAdapter, ValidationError
 
 from femubench.core.cli.registry import chosen
 from femubench.core.errors import InputError
@@ -13,6 +15,7 @@ from femubench.core.harness.results import Run
 from femubench.core.plugin.loader import Plugins
 
 DEFAULT_TIMEOUT = 600.0  # s
+_Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 @dataclass(frozen=True)
@@ -31,11 +34,11 @@ class Request:
 
     cases: tuple[str, ...]
     strategies: tuple[str, ...]
-    seeds: int | None = None
-    seed: int = 0
-    timeout: float = DEFAULT_TIMEOUT
-    timeouts: Mapping[str, float] = field(default_factory=dict)
-    memory: int | None = None
+    seeds: Annotated[int, Field(ge=1)] | None = None
+    seed: Annotated[int, Field(ge=0)] = 0
+    timeout: _Seconds = DEFAULT_TIMEOUT
+    timeouts: Mapping[str, _Seconds] = field(default_factory=dict)
+    memory: Annotated[int, Field(ge=1)] | None = None
 
     @property
     def all_seeds(self) -> range:
@@ -60,20 +63,17 @@ def request_of(run: Run) -> Request:
         InputError: when it was not kept, as by earlier versions and by calls from Python.
     """
     kept = run.meta.get("request")
-    names = {item.name for item in fields(Request)}
     if not isinstance(kept, Mapping) or not {"cases", "strategies"} <= kept.keys():
         what = f"run {run.meta.get('run')} does not tell what it was asked for"
         raise InputError(what, expected="a run of `bench run` of this version")
     try:
-        return Request(
-            **{
-                **{name: value for name, value in kept.items() if name in names},
-                "cases": tuple(map(str, kept["cases"])),
-                "strategies": tuple(map(str, kept["strategies"])),
-            }
-        )
-    except TypeError as error:
-        raise InputError(f"request of run {run.meta.get('run')}: {error}") from error
+        found = TypeAdapter(Request).validate_python(dict(kept))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"]))
+        what = f"request of run {run.meta.get('run')}: {where}: {first['msg']}"
+        raise InputError(what, expected="what `bench run` keeps") from error
+    return replace(found, timeouts=dict(found.timeouts))
 
 
 def case_words(words: Iterable[str], plugins: Plugins) -> tuple[str, ...]:

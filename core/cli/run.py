@@ -20,6 +20,7 @@ from femubench.core.cli.reporting import (
     reporter,
     reporter_for,
     run_name,
+    text_of,
 )
 from femubench.core.cli.request import (
     DEFAULT_TIMEOUT,
@@ -45,7 +46,7 @@ class Choice:
     """How a run is gone about; none of it decides on results."""
 
     workers: int
-    overwrite: Overwrite
+    overwrite: Overwrite | None
     resume: bool
 
 
@@ -78,7 +79,7 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
 )
 @click.option(
     "--seed",
-    type=click.IntRange(0),
+    type=click.IntRange(0, 2**62),
     default=0,
     metavar="S",
     show_default=True,
@@ -132,7 +133,8 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
     "report_file",
     type=FILE,
     metavar="FILE",
-    help="Write the report there; its suffix tells the format. Default: DIR/RUN.md in the store.",
+    help="Write the report there; its suffix tells the format. Default: RUN.html and "
+    "RUN.md in the store.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 @click.pass_context
@@ -172,14 +174,15 @@ def run(
         old = kept.load(locked)
         request = request_of(old)
     elif resume and not cases and not strategies and kept.runs():
-        request = request_of(kept.load())
+        request = _adjusted(ctx, request_of(kept.load()), request)
     request = replace(request, strategies=strategy_words(request.strategies, plugins))
-    choice = Choice(jobs or len(os.sched_getaffinity(0)), overwrite or "always", resume)
+    choice = Choice(jobs or len(os.sched_getaffinity(0)), overwrite, resume)
     outcome = _run(request, choice, plugins, kept, quiet=quiet)
     if report_file is None:
-        markdown = reporter(plugins, "markdown")
-        outputs[kept.folder / f"{run_name(outcome)}{markdown.suffix}"] = markdown
-    _finish(outcome, outputs, None if quiet else reporter(plugins, "terminal"))
+        for writer in (reporter(plugins, name) for name in ("html", "markdown")):
+            outputs[kept.folder / f"{run_name(outcome)}{writer.suffix}"] = writer
+    screen = None if quiet else reporter(plugins, "terminal")
+    _finish(outcome, kept.exhibits, outputs, screen)
     return exit_code(outcome) if old is None else _compare(old, outcome)
 
 
@@ -190,9 +193,25 @@ def _check_locked(ctx: click.Context) -> None:
         InputError: naming the first of them.
     """
     default = click.core.ParameterSource.DEFAULT
-    for name in ("cases", "strategies", "seeds", "seed", "timeouts", "memory", "resume"):
+    words = ("cases", "strategies", "seeds", "seed", "timeouts", "memory", "resume", "overwrite")
+    for name in words:
         if ctx.get_parameter_source(name) is not default:
             raise InputError(f"--locked repeats a run as it was; {name} cannot be given beside it")
+
+
+def _adjusted(ctx: click.Context, old: Request, given: Request) -> Request:
+    """Return what a run was asked for, under the limits that are given now.
+
+    Raises:
+        InputError: for words that would make it another run.
+    """
+    default = click.core.ParameterSource.DEFAULT
+    for name in ("seeds", "seed"):
+        if ctx.get_parameter_source(name) is not default:
+            raise InputError(f"--resume alone goes on as before; {name} needs CASE or -s beside it")
+    if ctx.get_parameter_source("timeouts") is not default:
+        old = replace(old, timeout=given.timeout, timeouts=given.timeouts)
+    return old if given.memory is None else replace(old, memory=given.memory)
 
 
 def _run(request: Request, choice: Choice, plugins: Plugins, store: Store, *, quiet: bool) -> Run:
@@ -261,17 +280,18 @@ def _header(request: Request, cases: int, workers: int) -> str:
     )
 
 
-def _finish(run: Run, outputs: dict[Path, Reporter], screen: Reporter | None) -> None:
+def _finish(
+    run: Run, exhibits: object, outputs: dict[Path, Reporter], screen: Reporter | None
+) -> None:
     """Write the files, then show the ranking and where the files are."""
     written, broken = [], None
     for path, writer in outputs.items():
         try:
-            write_atomically(path, rendered(writer, run))
+            write_atomically(path, rendered(writer, run, exhibits))
             written.append(f"{writer.name}: {path}")
         except PluginError as fault:
             broken = fault
     if screen is not None:
-        click.echo()
-        click.echo("\n".join([rendered(screen, run), *written]))
+        click.echo("\n".join(["", text_of(screen, rendered(screen, run)), *written]))
     if broken is not None:
         raise broken

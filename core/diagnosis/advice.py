@@ -79,7 +79,10 @@ def _told(option: Option, labels: Sequence[str]) -> tuple[str, float]:
     told = [(label, d) for label, d in pairs if d >= _WORTH]
     if not told or len(told) == len(pairs):
         return option.text, min(option.distances)
-    names = " and ".join(dict.fromkeys(label for label, _ in told))
+    # Explanations that differ in textbook effects alone have one name.
+    names = " and ".join(dict.fromkeys(label for label, _ in told if label != labels[0]))
+    if not names:
+        return option.text, min(d for _, d in told)
     return f"{option.text} (tells {labels[0]} from {names} only)", min(d for _, d in told)
 
 

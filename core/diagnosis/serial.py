@@ -8,19 +8,24 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 import femubench
+from femubench.core.case.case import Case
 from femubench.core.diagnosis.result import Diagnosis, Verdict
+from femubench.core.diagnosis.sketch import PlaceKind, Plane, sketch_of
 from femubench.core.errors import InputError
 
 
-def diagnosis_to_json(diagnosis: Diagnosis, *, written: Path | None = None) -> dict[str, Any]:
+def diagnosis_to_json(
+    diagnosis: Diagnosis, *, written: Path | None = None, case: Case | None = None
+) -> dict[str, Any]:
     """Return a diagnosis in the JSON contract of ``bench diagnose``; no NaN, no infinity in it.
 
     Arguments:
         diagnosis: what was found; its extended model is left out.
         written: folder of the extended case, if it was written.
+        case: what was diagnosed, for the drawing of its structure.
     """
     names = [f.name for f in fields(diagnosis) if f.name != "extended"]
     tables = {name: _plain(getattr(diagnosis, name)) for name in names}
@@ -28,6 +33,7 @@ def diagnosis_to_json(diagnosis: Diagnosis, *, written: Path | None = None) -> d
         look["changes"] = [{"mode": mode, "percent": change} for mode, change in look["changes"]]
     return {
         **tables,
+        "structure": None if case is None else _plain(sketch_of(case, diagnosis)),
         "written": None if written is None else str(written),
         "version": femubench.__version__,
     }
@@ -143,6 +149,65 @@ class _GainRecord(_Record):
     cross_validated_percent: _Pair | None = None
 
 
+_Index = Annotated[int, Field(ge=0)]
+_Station = Annotated[float, Field(ge=0.0, le=1.0)]
+_Point = Annotated[list[float], Field(min_length=3, max_length=3)]
+
+
+class _JointRecord(_Record):
+    name: str
+    type: str = ""
+    xyz: _Point
+
+
+class _MemberRecord(_Record):
+    name: str
+    ends: Annotated[list[_Index], Field(min_length=2, max_length=2)]
+    elements: Annotated[int, Field(ge=1)]
+
+
+class _SensorRecord(_Record):
+    label: str
+    xyz: _Point
+    direction: str = ""
+
+
+class _SupportRecord(_Record):
+    xyz: _Point
+    fixed: list[str] = []
+
+
+class _SpanRecord(_Record):
+    member: _Index
+    start: _Station
+    end: _Station
+
+
+class _PlaceRecord(_Record):
+    place: str
+    kind: PlaceKind
+    spans: list[_SpanRecord] = []
+    points: list[_Point] = []
+
+
+class _StructureRecord(_Record):
+    plane: Plane
+    joints: list[_JointRecord]
+    members: list[_MemberRecord]
+    sensors: list[_SensorRecord] = []
+    supports: list[_SupportRecord] = []
+    places: list[_PlaceRecord] = []
+
+    @model_validator(mode="after")
+    def _point_into_the_lists(self) -> _StructureRecord:
+        if any(end >= len(self.joints) for member in self.members for end in member.ends):
+            raise ValueError("a member ends at a joint that is not in the list")
+        spans = (span for place in self.places for span in place.spans)
+        if any(span.member >= len(self.members) for span in spans):
+            raise ValueError("a place lies on a member that is not in the list")
+        return self
+
+
 class _DiagnosisRecord(_Record):
     case: str = ""
     verdict: Verdict
@@ -163,5 +228,6 @@ class _DiagnosisRecord(_Record):
     base: list[str] = []
     notes: list[str] = []
     seconds: _Number = None
+    structure: _StructureRecord | None = None
     written: str | None = None
     version: str = ""

@@ -154,10 +154,13 @@ def _plain(result: UpdateResult) -> JobOutcome:
         raise TypeError(f"update returned {type(result).__name__}, expected UpdateResult")
     if not isinstance(result.model, Model):
         raise TypeError(f"the updated model is {type(result.model).__name__}, expected Model")
+    count = int(result.parameter_count)
+    if not 0 <= count < 2**63:
+        raise ValueError(f"parameter_count is {str(count)[:20]}, expected the number of unknowns")
     return JobOutcome(
         status="ok",
         model=result.model,
-        parameter_count=int(result.parameter_count),
+        parameter_count=count,
         parameters=tuple(_parameter(asdict(item)) for item in result.parameters),
         history=tuple(_figures(item) for item in result.history),
         diagnostics=_figures(result.diagnostics),

@@ -7,6 +7,7 @@ import pickle
 import traceback
 import warnings
 from dataclasses import dataclass, replace
+from typing import Any
 
 from femubench.core.case.case import Case
 from femubench.core.errors import FemubenchError
@@ -26,12 +27,14 @@ class Verdict:
         case: the case and its `Reference`, pickled by this program.
         answer: of the strategy's worker, from `packed`; nobody has looked into it yet.
         strategy, seed: of the job.
+        exhibited: whether its exhibit is wanted too.
     """
 
     case: bytes
     answer: bytes
     strategy: str
     seed: int
+    exhibited: bool = False
 
 
 def run_strategy(job: Job) -> bytes:
@@ -40,14 +43,31 @@ def run_strategy(job: Job) -> bytes:
 
 
 def run_judge(verdict: Verdict) -> bytes:
-    """Return the result of a job as JSON; runs in a worker."""
+    """Return the result of a job and its exhibit as JSON; runs in a worker."""
     case, reference = pickle.loads(verdict.case)
     try:
         outcome = unpacked(verdict.answer)
     except AnswerError as error:
         outcome = JobOutcome("failed", str(error), traceback.format_exc())
     result = judged(case, reference, verdict.strategy, verdict.seed, outcome)
-    return json.dumps(result_to_json(result)).encode()
+    exhibit = _exhibit(case, outcome, result) if verdict.exhibited else None
+    return json.dumps({"result": result_to_json(result), "exhibit": exhibit}).encode()
+
+
+def _exhibit(case: Case, outcome: JobOutcome, result: JobResult) -> dict[str, Any] | None:
+    """Return the pictures of a result; what goes wrong with them is no fault of the result."""
+    if outcome.model is None or result.status != "ok":
+        return None
+    from femubench.core.exhibits.exhibit import exhibit_of
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = exhibit_of(case, outcome.model, outcome.parameters)
+        json.dumps(found, allow_nan=False)
+    except Exception:
+        return None
+    return found
 
 
 def judged(

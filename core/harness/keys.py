@@ -6,9 +6,9 @@ import hashlib
 import os
 import platform
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,8 @@ import femubench
 from femubench.core.case.case import Case
 from femubench.core.plugin.variants import Variant
 from femubench.core.strategy import Strategy
+
+Stamp = tuple[Path, int, int]  # a file, when it was changed, its size
 
 
 def job_key(case: Case, strategy: str, code: bytes, version: str, seed: int) -> str:
@@ -47,7 +49,7 @@ def strategy_version(strategy: Strategy) -> str:
     """
     inner = strategy.base if isinstance(strategy, Variant) else strategy
     top = type(inner).__module__.partition(".")[0]
-    return f"{_number(top)}+{_digest(top, type(inner).__module__)}"
+    return f"{_number(top)}+{_digest(tuple(_stamps(top, type(inner).__module__)))}"
 
 
 @cache
@@ -64,19 +66,30 @@ def _installed(top: str) -> str:
         return "0"
 
 
-@cache
-def _digest(top: str, module: str) -> str:
-    """Return a digest of the Python files of a package, or of the file of a lone module."""
+def _stamps(top: str, module: str) -> Iterator[Stamp]:
+    """Yield the Python files of a package, or the file of a lone module, with time and size."""
     package = sys.modules.get(top)
     folders = [Path(folder) for folder in getattr(package, "__path__", ())]
     files = sorted({file for folder in folders for file in _python_files(folder)})
     own = getattr(sys.modules.get(module), "__file__", None)
     if not files and own:
         files = [Path(own)]
-    found = hashlib.sha256()
     for file in files:
+        try:
+            found = file.stat()
+        except OSError:  # a link that leads nowhere is no source
+            yield file, 0, 0
+        else:
+            yield file, found.st_mtime_ns, found.st_size
+
+
+@lru_cache(maxsize=64)
+def _digest(stamps: tuple[Stamp, ...]) -> str:
+    """Return a digest of files; they are read once as long as they stay as they are."""
+    found = hashlib.sha256()
+    for file, _, _ in stamps:
         found.update(file.name.encode() + b"\0")
-        with suppress(OSError):  # a link that leads nowhere is no source
+        with suppress(OSError):
             found.update(file.read_bytes())
     return found.hexdigest()[:12]
 

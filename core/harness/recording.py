@@ -8,15 +8,15 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any, Literal
 
-from femubench.core.harness.results import JobResult
+from femubench.core.exhibits.exhibit import keep_stages
+from femubench.core.harness.results import DONE, JobResult
+from femubench.core.harness.schedule import Show
 from femubench.core.harness.slots import Slot
 from femubench.core.harness.store import Store
 
 Progress = Callable[[JobResult, int, int], None]
 Overwrite = Literal["always", "missing", "failed"]
 OVERWRITE: tuple[Overwrite, ...] = ("always", "missing", "failed")
-# A result, though there may be no model; everything else is a failure and no result.
-_DONE = frozenset({"ok", "not-applicable"})
 
 
 class Results:
@@ -27,15 +27,30 @@ class Results:
     ) -> None:
         self._slots, self._store, self._run, self._progress = slots, store, run, progress
         self._found: dict[int, JobResult] = {}
-        self._stored = set() if store is None else store.keys(run)
+        if store is not None:
+            keep_stages(store.exhibits, {slot.case.name: slot.case for slot in slots}.values())
+
+    @property
+    def shelf(self) -> Show | None:
+        """Return what takes exhibits; None without a store."""
+        return None if self._store is None else self.show
 
     def add(self, index: int, result: JobResult) -> None:
         """Take a result that was just computed."""
         slot = self._slots[index]
-        result = replace(result, key=slot.key, provenance=slot.provenance)
+        key, provenance = slot.key, dict(slot.provenance)
+        if slot.stale:
+            # Workers import a strategy when they need it: this may be the result of either source.
+            key, provenance["strategy"] = "", f"{provenance['strategy']}, changed during the run"
+        result = replace(result, key=key, provenance=provenance)
         if self._store is not None:
             self._store.append(self._run, result)
         self._tell(index, result)
+
+    def show(self, slot: Slot, exhibit: Mapping[str, Any]) -> None:
+        """Take the exhibit of a result that is about to come."""
+        if self._store is not None and not slot.stale:
+            self._store.exhibits.put(slot.key, exhibit)
 
     def keep(self, known: Mapping[str, JobResult]) -> list[int]:
         """Take the results that the store has, of this run or of another; return what is missing.
@@ -44,13 +59,16 @@ class Results:
             known: by the key of the job.
         """
         missing = []
+        own = store.by_key(self._run) if (store := self._store) and known else {}
         for index, slot in enumerate(self._slots):
-            result = known.get(slot.key)
+            result, before = known.get(slot.key), own.get(slot.key)
             if result is None:
                 missing.append(index)
                 continue
-            if self._store is not None and slot.key not in self._stored:
-                self._store.append(self._run, result)
+            if before is not None and before.status == result.status:
+                result = before
+            elif store is not None:
+                store.append(self._run, result)
             self._tell(index, result)
         return missing
 
@@ -68,22 +86,23 @@ def recorded(
     stack: ExitStack,
     store: Store | None,
     meta: dict[str, Any],
-    overwrite: Overwrite,
+    overwrite: Overwrite | None,
     resume: bool,
 ) -> tuple[dict[str, Any], dict[str, JobResult]]:
     """Begin a run in the store or go on with one; return its meta data and results to keep."""
     if store is None:
         return meta, {}
-    keep = "failed" if resume and overwrite == "always" else overwrite
+    keep = overwrite or ("failed" if resume else "always")
     before = store.latest_of_plan(meta["plan"]) if resume else None
     if before is not None:
         meta = {**meta, **before, "run": before["run"]}
     stack.enter_context(store.exclusive(meta["run"]))
     known = {} if keep == "always" else store.by_key()
     if before is None:
+        store.runs()  # what cannot be read is told before there is more of it
         store.begin(meta)
     if keep == "failed":
-        known = {key: item for key, item in known.items() if item.status in _DONE}
+        known = {key: item for key, item in known.items() if item.status in DONE}
     return meta, known
 
 

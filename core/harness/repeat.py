@@ -6,7 +6,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from femubench.core.harness.results import JobResult, Run
+from femubench.core.harness.serial import result_to_json
 
+# What belongs to a run, or to the past, rather than to a result.
+_VOLATILE = frozenset({"seconds", "rank", "score", "key", "provenance", "traceback", "unphysical"})
 # Figures of a result that depend on nothing but its provenance.
 _COUNTS = (
     *("rigid_body_modes", "rigid_body_modes_expected", "negative_eigenvalues"),
@@ -73,14 +76,24 @@ def _differences(old: JobResult, new: JobResult) -> Iterator[str]:
     if old.status != new.status:
         yield f"{old.status} then, {new.status} now"
         return
+    told = set()
     for block in dict.fromkeys((*old.blocks, *new.blocks)):
         first, second = (
             item.blocks[block].rms_percent if block in item.blocks else None for item in (old, new)
         )
         if first != second:
+            told.add(block)
             yield f"{block} rms {first} % then, {second} % now"
     for name in _COUNTS:
         if getattr(old, name) != getattr(new, name):
+            told.add(name)
             yield f"{name} {getattr(old, name)} then, {getattr(new, name)} now"
-    if old.parameters != new.parameters and str(old.parameters) != str(new.parameters):
-        yield "other parameter values"
+    before, after = _stable(old), _stable(new)
+    parts = [name for name in before if before[name] != after.get(name) and name not in told]
+    if parts:
+        yield f"differs in {', '.join(parts)}"
+
+
+def _stable(result: JobResult) -> dict[str, Any]:
+    """Return all of a result that should be the same again, in plain data."""
+    return {name: value for name, value in result_to_json(result).items() if name not in _VOLATILE}

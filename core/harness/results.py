@@ -8,6 +8,8 @@ from typing import Any, Literal
 
 Status = Literal["ok", "failed", "timeout", "crashed", "diverged", "not-applicable"]
 STATUSES: tuple[Status, ...] = ("ok", "failed", "timeout", "crashed", "diverged", "not-applicable")
+# A result, though there may be no model; everything else is a failure and no result.
+DONE: frozenset[Status] = frozenset({"ok", "not-applicable"})
 BLOCKS = ("used", "higher", "modified")
 
 

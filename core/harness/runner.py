@@ -33,7 +33,7 @@ def run_jobs(
     timeouts: Mapping[str, float] | None = None,
     memory: int | None = None,
     store: Store | None = None,
-    overwrite: Overwrite = "always",
+    overwrite: Overwrite | None = None,
     resume: bool = False,
     progress: Progress | None = None,
     run_seed: int = 0,
@@ -52,11 +52,10 @@ def run_jobs(
         memory: bytes that one job may take; None for an even share of the machine's.
         store: where each result goes as soon as it is there.
         overwrite: which stored results of the same jobs are computed anew: ``always`` all,
-            ``missing`` none, ``failed`` the failures.
+            ``missing`` none, ``failed`` the failures. Default: all, of a resumed run the failures.
         resume: go on with the latest stored run of these jobs.
         progress: called with (result, jobs done, jobs in all).
-        run_seed: seed of the run's own statistics.
-        request: what was asked for in plain data, kept with the run.
+        run_seed, request: seed of the run's own statistics, and what was asked for in plain data.
 
     Raises:
         InputError: for two of one name, no worker, or a run that another process works on.
@@ -79,7 +78,7 @@ def run_jobs(
         ending = stack.enter_context(ended(store, meta["run"]))
         results = Results(slots, store, meta["run"], progress)
         wanted = results.keep(known)
-        for index, result in computed(slots, wanted, references, limits, workers):
+        for index, result in computed(slots, wanted, references, limits, workers, results.shelf):
             results.add(index, result)
     return Run({**meta, **ending}, rank_results(results.in_order(), meta["reference"]))
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import pickle
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from femubench.core.case.case import Case
+from femubench.core.errors import InputError
 from femubench.core.harness.answers import AnswerError, head_of
 from femubench.core.harness.jobs import JobOutcome
 from femubench.core.harness.judging import Verdict, judged, run_judge, run_strategy
@@ -27,7 +29,9 @@ _STATUS: Mapping[How, Status] = {
     "answer-size": "crashed",
     "died": "crashed",
     "no-start": "crashed",
+    "orphaned": "crashed",
 }
+Show = Callable[[Slot, Mapping[str, Any]], None]
 _LEAST_JUDGING = 300.0  # s
 _ATTEMPTS = 3  # to start a process
 
@@ -38,8 +42,13 @@ def computed(
     references: Mapping[str, Reference],
     limits: Mapping[str, Limits],
     count: int,
+    show: Show | None = None,
 ) -> Iterator[tuple[int, JobResult]]:
-    """Yield the result of every wanted slot as it comes."""
+    """Yield the result of every wanted slot as it comes.
+
+    Arguments:
+        show: takes the exhibit of a job of the first seed, before its result comes.
+    """
 
     def result_of(index: int, outcome: JobOutcome) -> tuple[int, JobResult]:
         slot = slots[index]
@@ -53,10 +62,10 @@ def computed(
     waiting = deque(index for index in wanted if slots[index].job is not None)
     if not waiting:
         return
-    bench = _Bench(slots, references, limits)
+    bench = _Bench(slots, references, limits, show)
     with Workers[tuple[int, bytes]](count).open() as workers:
-        while waiting or bench.answers or workers.busy:
-            while workers.free and (waiting or bench.answers):
+        while waiting or bench.answers or bench.lonely or workers.busy:
+            while workers.free and bench.has_work(workers, waiting):
                 lost = bench.start(workers, waiting)
                 if lost is not None:
                     yield result_of(*lost)
@@ -76,37 +85,67 @@ class _Bench:
         slots: Sequence[Slot],
         references: Mapping[str, Reference],
         limits: Mapping[str, Limits],
+        show: Show | None,
     ) -> None:
         self._slots, self._references, self._limits = slots, references, limits
+        self._show, self._shown = show, min(slot.seed for slot in slots)
         self._cases: dict[str, bytes] = {}
         self._attempts: dict[int, int] = {}
+        self._alone: set[int] = set()
         self.answers: deque[tuple[int, bytes]] = deque()
+        # Ended by another job, or they ended others: they run last, one at a time.
+        self.lonely: deque[tuple[int, bytes]] = deque()
+
+    def has_work(self, workers: Workers[tuple[int, bytes]], waiting: deque[int]) -> bool:
+        """Tell whether there is something to start now."""
+        return bool(waiting or self.answers or (self.lonely and not workers.busy))
 
     def start(
         self, workers: Workers[tuple[int, bytes]], waiting: deque[int]
     ) -> tuple[int, JobOutcome] | None:
         """Start judging an answer or running a job; return a job that cannot be started."""
-        if self.answers:
-            index, answer = self.answers.popleft()
-            slot = self._slots[index]
-            verdict = Verdict(self._case(slot.case), answer, slot.strategy, slot.seed)
+        if self.answers or not waiting:
+            index, answer = (self.answers or self.lonely).popleft()
+        else:
+            index, answer = waiting.popleft(), b""
+        slot = self._slots[index]
+        if answer:
+            shown = self._show is not None and slot.seed == self._shown
+            verdict = Verdict(self._case(slot.case), answer, slot.strategy, slot.seed, shown)
             ending = workers.start(
                 (index, answer), run_judge, verdict, self._judging(slot.strategy)
             )
         else:
-            index = waiting.popleft()
-            slot = self._slots[index]
             ending = workers.start(
                 (index, b""), run_strategy, slot.job, self._limits[slot.strategy]
             )
-        return None if ending is None else (index, JobOutcome("crashed", ending.reason))
+        if ending is None or self._again(index, answer, waiting):
+            return None
+        return index, JobOutcome("crashed", ending.reason)
+
+    def _again(self, index: int, answer: bytes, waiting: deque[int]) -> bool:
+        """Try a task once more for which there was no process; tell whether it may be tried."""
+        self._attempts[index] = self._attempts.get(index, 0) + 1
+        if self._attempts[index] >= _ATTEMPTS:
+            return False
+        if answer:
+            self.answers.append((index, answer))
+        else:
+            waiting.append(index)
+        return True
 
     def taken(
         self, index: int, answer: bytes, ending: Ending, waiting: deque[int]
     ) -> JobResult | JobOutcome | None:
         """Return the result of a task that has ended, or its outcome; None while it goes on."""
+        if ending.how == "orphaned" and index not in self._alone:
+            self._alone.add(index)
+            self.lonely.append((index, answer))
+            return None
+        if ending.how == "no-start" and self._again(index, answer, waiting):
+            return None
         if answer:
-            return self._judgement(ending)
+            return self._judgement(self._slots[index], ending)
         if ending.how == "answer":
             try:
                 outcome = head_of(ending.answer)
@@ -116,17 +155,19 @@ class _Bench:
                 return outcome
             self.answers.append((index, ending.answer))
             return None
-        self._attempts[index] = self._attempts.get(index, 0) + 1
-        if ending.how == "no-start" and self._attempts[index] < _ATTEMPTS:
-            waiting.append(index)
-            return None
         return JobOutcome(_STATUS[ending.how], ending.reason, seconds=ending.seconds)
 
-    @staticmethod
-    def _judgement(ending: Ending) -> JobResult | JobOutcome:
+    def _judgement(self, slot: Slot, ending: Ending) -> JobResult | JobOutcome:
         if ending.how != "answer":
             return JobOutcome("failed", f"its model could not be judged: {ending.reason}")
-        return result_from_json(json.loads(ending.answer))
+        data = json.loads(ending.answer)
+        try:
+            result = result_from_json(data["result"])
+        except InputError as error:
+            return JobOutcome("failed", f"its result is out of bounds: {error}")
+        if self._show is not None and data["exhibit"] is not None:
+            self._show(slot, data["exhibit"])
+        return result
 
     def _case(self, case: Case) -> bytes:
         if case.name not in self._cases:

@@ -51,7 +51,7 @@ def result_to_json(result: JobResult) -> dict[str, Any]:
         "key": result.key,
         "provenance": dict(result.provenance),
     }
-    clean: dict[str, Any] = finite(record)
+    clean: dict[str, Any] = _encodable(finite(record))
     return clean
 
 
@@ -143,6 +143,15 @@ def finite(data: Any) -> Any:  # noqa: ANN401 - JSON data of any form
     if isinstance(data, Sequence) and not isinstance(data, str | bytes):
         return [finite(value) for value in data]
     return data
+
+
+def _encodable(data: Any) -> Any:  # noqa: ANN401 - JSON data of any form
+    """Return plain data with a question mark for every character that UTF-8 does not know."""
+    if isinstance(data, str):
+        return data.encode("utf-8", "replace").decode()
+    if isinstance(data, dict):
+        return {_encodable(key): _encodable(value) for key, value in data.items()}
+    return [_encodable(value) for value in data] if isinstance(data, list) else data
 
 
 def _numbers(item: Mapping[str, Any], names: Iterable[str]) -> dict[str, Any]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pickle
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from femubench.core.case.case import Case
@@ -24,6 +25,7 @@ class Slot:
         provenance: of its result, in plain data.
         job: what a worker is given; None where it could not be made.
         fault: why.
+        version: returns that of the strategy as its source is now.
     """
 
     case: Case
@@ -33,6 +35,12 @@ class Slot:
     provenance: Mapping[str, Any]
     job: Job | None
     fault: JobOutcome | None = None
+    version: Callable[[], str] | None = None
+
+    @property
+    def stale(self) -> bool:
+        """Tell whether the source of the strategy has changed since the key was made."""
+        return self.version is not None and self.version() != self.provenance["strategy"]
 
     def made_by(self, meta: Mapping[str, Any]) -> Slot:
         """Return the job with the whole provenance of a run's results."""
@@ -57,7 +65,8 @@ def slots_of(
                 job = None if fault else Job(*parts, words)  # type: ignore[arg-type]
                 known = code if isinstance(code, bytes) else repr(type(strategy)).encode()
                 key = job_key(case, strategy.name, known, version, seed)
-                yield Slot(case, strategy.name, seed, key, {"strategy": version}, job, fault)
+                plain, now = {"strategy": version}, partial(strategy_version, strategy)
+                yield Slot(case, strategy.name, seed, key, plain, job, fault, now)
 
 
 def _pickled(thing: object) -> bytes | JobOutcome:

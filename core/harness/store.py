@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import errno
-import fcntl
 import json
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from femubench.core.errors import InputError
+from femubench.core.exhibits.shelf import Exhibits
+from femubench.core.harness.damage import Damage
+from femubench.core.harness.locks import held, locked
 from femubench.core.harness.ranking import rank_results
-from femubench.core.harness.results import JobResult, Run
+from femubench.core.harness.results import DONE, JobResult, Run
 from femubench.core.harness.schema import LARGEST_STORE, check_extent, parse_json
 from femubench.core.harness.serial import finite, meta_from_json, result_from_json, result_to_json
 from femubench.core.reading import read_bytes
@@ -48,6 +51,11 @@ class Store:
         """Return the file that holds the records."""
         return self.folder / FILE_NAME
 
+    @cached_property
+    def exhibits(self) -> Exhibits:
+        """Return the shelf of pictures beside the records."""
+        return Exhibits(self.folder)
+
     def begin(self, meta: Mapping[str, Any]) -> None:
         """Record the start of a run; `meta` has its id under ``run``."""
         self._write({"record": "run", "run": meta["run"], "meta": dict(meta)})
@@ -71,7 +79,7 @@ class Store:
         lines, _ = self._lines()
         return tuple(line.record["run"] for line in lines if line.record["record"] == "run")
 
-    def load(self, run_id: str | None = None) -> Run:
+    def load(self, run_id: str | None = None, *, lenient: bool = False) -> Run:
         """Return a run with scores and ranks.
 
         A last line that was cut short (a crash while writing) is left out and told about in
@@ -79,36 +87,48 @@ class Store:
 
         Arguments:
             run_id: or the beginning of one; None for the latest.
+            lenient: leave out lines that are no record of this version, and tell of them in the
+                notes, instead of raising; for who only reads.
 
         Raises:
             InputError: where there is no such run, or a line is no record.
         """
         if not self.path.exists():
             raise InputError("no results", file=self.path, expected="a run stored by `bench run`")
-        lines, notes = self._lines()
-        wanted = self._find(lines, run_id)
-        meta: dict[str, Any] = {"finished": None}
+        damage = Damage(lenient)
+        lines, notes = self._lines(damage)
+        wanted = self._find(lines, run_id, damage)
+        meta: dict[str, Any] = {"run": wanted, "finished": None}
         results: dict[tuple[str, str, int], JobResult] = {}
         for line in lines:
             if line.record["run"] != wanted:
                 continue
-            if line.record["record"] == "result":
-                found = self._result(line)
-                results[found.case, found.strategy, found.seed] = found
-            else:
-                meta.update(self._meta(line))
+            with damage.told():
+                if line.record["record"] == "result":
+                    found = self._result(line)
+                    results[found.case, found.strategy, found.seed] = found
+                else:
+                    meta.update(self._meta(line))
         reference = meta.get("reference") or None
         listed = tuple(results.values())
         check_extent(meta, listed, file=self.path)
+        notes = [*notes, *damage.notes(self.path)]
         return Run({**meta, "notes": notes}, rank_results(listed, reference))
 
-    def keys(self, run_id: str) -> set[str]:
-        """Return the keys of the jobs that a run has a record of."""
-        return {item.key for run, item in self._results() if run == run_id and item.key}
+    def by_key(self, run_id: str | None = None) -> dict[str, JobResult]:
+        """Return the latest result of every job of a run, or of all, that has a key.
 
-    def by_key(self) -> dict[str, JobResult]:
-        """Return the latest result of every job of all runs that has a key."""
-        return {item.key: item for _, item in self._results() if item.key}
+        A failure after a result is no later one: what made it fail, such as a shorter time limit,
+        is not in the key.
+        """
+        found: dict[str, JobResult] = {}
+        for run, item in self._results():
+            if run_id not in (None, run):
+                continue
+            known = found.get(item.key)
+            if item.key and (known is None or item.status in DONE or known.status not in DONE):
+                found[item.key] = item
+        return found
 
     def latest_of_plan(self, plan: str) -> dict[str, Any] | None:
         """Return the meta data with which the latest run of the same jobs began."""
@@ -125,22 +145,17 @@ class Store:
         path = self.folder / f".{run_id}.lock"
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            descriptor = held(path)
+        except BlockingIOError as error:
+            what = f"another process is working on run {run_id}"
+            raise InputError(what, file=self.path, expected="one at a time") from error
         except OSError as error:
             what = f"cannot be written: {error.strerror}"
             raise InputError(what, file=self.folder, expected="a folder of yours") from error
         try:
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                raise InputError(
-                    f"another process is working on run {run_id}",
-                    file=self.path,
-                    expected="one at a time",
-                ) from error
             yield
-            path.unlink(missing_ok=True)
         finally:
+            path.unlink(missing_ok=True)
             os.close(descriptor)
 
     def _begun(self) -> list[dict[str, Any]]:
@@ -160,13 +175,17 @@ class Store:
         record = line.record.get("result")
         return result_from_json(record, file=self.path, line=line.number, key="result")
 
-    def _find(self, lines: list[_Line], run_id: str | None) -> str:
-        known = [line.record["run"] for line in lines if line.record["record"] == "run"]
+    def _find(self, lines: list[_Line], run_id: str | None, damage: Damage) -> str:
+        # Of a run whose first line is broken there may be results.
+        kinds = _KINDS if damage.lenient else ("run",)
+        begun = (line.record["run"] for line in lines if line.record["record"] in kinds)
+        known = list(dict.fromkeys(begun))
         if run_id in known:
             return str(run_id)
         matching = [name for name in known if run_id is None or name.startswith(run_id)]
         if not matching:
             what = "no run" if run_id is None else f"no run {run_id!r}"
+            what = "; ".join([what, *damage.notes(self.path)])
             latest = (
                 f"one of the {len(known)} stored, e.g. {known[-1]}" if known else "a stored run"
             )
@@ -182,19 +201,18 @@ class Store:
     def _meta(self, line: _Line) -> dict[str, Any]:
         return meta_from_json(line.record.get("meta"), file=self.path, line=line.number)
 
-    def _lines(self) -> tuple[list[_Line], list[str]]:
+    def _lines(self, damage: Damage | None = None) -> tuple[list[_Line], list[str]]:
         """Return all records and what has to be told about the file."""
+        damage = Damage(False) if damage is None else damage
         *whole, tail = read_bytes(self.path, LARGEST_STORE).split(b"\n")
-        found = [
-            _Line(number, self._record(text, number))
-            for number, text in enumerate(whole, start=1)
-            if text.strip()
-        ]
-        if not tail.strip():
+        number, broken = len(whole) + 1, bool(tail.strip()) and not _is_json(tail)
+        found = []
+        for place, text in enumerate(whole if broken else [*whole, tail], start=1):
+            with damage.told():
+                if text.strip():
+                    found.append(_Line(place, self._record(text, place)))
+        if not broken:
             return found, []
-        number = len(whole) + 1
-        if _is_json(tail):
-            return [*found, _Line(number, self._record(tail, number))], []
         return found, [f"{self.path}:{number}: the last line is cut short and was left out"]
 
     def _record(self, text: bytes, number: int) -> dict[str, Any]:
@@ -224,21 +242,11 @@ class Store:
         line = text.encode() + b"\n"
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            with _locked(self.path) as descriptor:
+            with locked(self.path) as descriptor:
                 _add(descriptor, line)
         except OSError as error:
             what = f"a record cannot be written: {error.strerror or error}"
             raise InputError(what, file=self.path, expected="a store with room") from error
-
-
-@contextmanager
-def _locked(path: Path) -> Iterator[int]:
-    descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o644)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield descriptor
-    finally:
-        os.close(descriptor)
 
 
 def _add(descriptor: int, line: bytes) -> None:

@@ -8,6 +8,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 
 import psutil
 
@@ -52,16 +53,24 @@ def descendants_memory(leader: int) -> int:
     return total
 
 
-def end_strays(mark: str, spared: frozenset[int]) -> None:
+def alive(process: int | None) -> bool:
+    """Tell whether a process runs, without taking its exit status from whoever waits for it."""
+    with suppress(psutil.Error):
+        return process is not None and psutil.Process(process).status() != psutil.STATUS_ZOMBIE
+    return False
+
+
+def end_strays(mark: str, root: Path, spared: frozenset[int]) -> None:
     """End the children of this process that were started by workers of a mark.
 
     Arguments:
         mark: value of `MARK` in the environment of the workers.
-        spared: processes of ours that carry it too.
+        root: holds the folders where they were started; for those with another environment.
+        spared: processes of ours that carry the mark too.
     """
     with suppress(psutil.Error):
         for child in psutil.Process().children():
-            if child.pid not in spared and _carries(child, mark):
+            if child.pid not in spared and _is_stray(child, mark, root):
                 for process in (child, *_below(child)):
                     end_group(process.pid)
                 with suppress(ChildProcessError):
@@ -75,11 +84,12 @@ def _below(process: psutil.Process) -> list[psutil.Process]:
         return []
 
 
-def _carries(process: psutil.Process, mark: str) -> bool:
+def _is_stray(process: psutil.Process, mark: str, root: Path) -> bool:
     with suppress(psutil.Error, OSError):
         if process.status() == psutil.STATUS_ZOMBIE:
             # Its environment is gone; a child of ours that nobody waits for is an orphan of a job
             # or a process of a caller, who keeps the right to its exit code.
             return False
-        return bool(process.environ().get(MARK) == mark)
+        marked = process.environ().get(MARK) == mark
+        return marked or Path(process.cwd()).is_relative_to(root)
     return False

@@ -11,13 +11,17 @@ from multiprocessing import connection
 from typing import Any, Generic, Literal, TypeVar
 
 from femubench.core.harness.limits import Limits, spoken_bytes
-from femubench.core.harness.strays import descendants_memory
+from femubench.core.harness.strays import alive, descendants_memory
 from femubench.core.harness.worker import LENGTH_BYTES, READY
 
 Key = TypeVar("Key")
-How = Literal["answer", "timeout", "memory", "output", "answer-size", "died", "no-start"]
+How = Literal[
+    "answer", "timeout", "memory", "output", "answer-size", "died", "no-start", "orphaned"
+]
 _START = 120.0  # s that a process may take until it is ready
 _CHUNK = 2**20
+_LOST = 255  # what multiprocessing returns where nobody is left to tell the exit code
+_LAST_BREATH = 0.2  # s between the closed files of a process and its end
 _BASE = 256 * 2**20  # bytes of a fresh worker, most of them shared with the server
 
 
@@ -48,6 +52,7 @@ class Task(Generic[Key]):
     output: connection.Connection
     limits: Limits
     scratch: str
+    server: int | None = None
     started: float = field(default_factory=time.monotonic)
     ready: float | None = None
     received: bytearray = field(default_factory=bytearray)
@@ -91,6 +96,9 @@ def progress_of(task: Task[Key], *, look: bool) -> Ending | None:
     if len(task.received) >= LENGTH_BYTES and task.length > limits.answer:
         what = f"its result is larger than {spoken_bytes(limits.answer)}"
         return Ending("answer-size", reason=what, seconds=seconds)
+    if gone and _orphaned(task):
+        what = "the process from which all workers are started was ended"
+        return Ending("orphaned", reason=what, seconds=seconds)
     if gone:
         how: How = "died" if task.ready is not None else "no-start"
         return Ending(how, reason=_death(task), seconds=seconds)
@@ -133,6 +141,17 @@ def _receive(task: Task[Key], data: bytes) -> bool:
         data = data[len(READY) :]
     task.received += data
     return len(task.received) > task.limits.answer + LENGTH_BYTES
+
+
+def _orphaned(task: Task[Key]) -> bool:
+    """Tell whether a process ended because its server did, which ends all of them."""
+    task.process.join()
+    until = time.monotonic() + _LAST_BREATH
+    while task.process.exitcode == _LOST and alive(task.server):
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.01)
+    return bool(task.process.exitcode == _LOST)
 
 
 def _death(task: Task[Key]) -> str:

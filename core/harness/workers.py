@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
+import signal
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -23,6 +24,7 @@ from femubench.core.harness.limits import Limits
 from femubench.core.harness.strays import (
     MARK,
     adopting,
+    alive,
     end_group,
     end_strays,
 )
@@ -73,7 +75,7 @@ class Workers(Generic[Key]):
                 while self._running:
                     self._close(self._running[-1])
                 self._bury(wait=True)
-                end_strays(self._mark, _ours())
+                end_strays(self._mark, self._root, _ours())
                 shutil.rmtree(self._root, ignore_errors=True)
 
     def start(
@@ -94,6 +96,8 @@ class Workers(Generic[Key]):
         arguments = (function, argument, send, printed, limits, scratch)
         process = context.Process(target=serve, args=arguments)
         try:
+            _server_mark()  # a job may have ended the server,
+            _wake_server()  # or stopped it
             process.start()
         except (OSError, EOFError) as error:
             for end in (answer, output):
@@ -104,7 +108,7 @@ class Workers(Generic[Key]):
             printed.close()
         for end in (answer, output):
             os.set_blocking(end.fileno(), False)
-        self._running.append(Task(key, process, answer, output, limits, scratch))
+        self._running.append(Task(key, process, answer, output, limits, scratch, _server()))
         return None
 
     def wait(self) -> list[tuple[Key, Ending]]:
@@ -117,6 +121,7 @@ class Workers(Generic[Key]):
         look = time.monotonic() - self._looked >= _TICK
         if look:
             self._looked = time.monotonic()
+            _wake_server()
         ended = []
         for task in tuple(self._running):
             ending = progress_of(task, look=look)
@@ -125,7 +130,7 @@ class Workers(Generic[Key]):
                 ended.append((task.key, ending))
         self._bury(wait=False)
         if look:
-            end_strays(self._mark, _ours())
+            end_strays(self._mark, self._root, _ours())
         return ended
 
     def _close(self, task: Task[Key]) -> None:
@@ -148,12 +153,11 @@ class Workers(Generic[Key]):
 
 
 def _server_mark() -> str:
-    """Return the mark of the server from which workers fork, which is started with it once."""
+    """Start the server from which workers fork where there is none; return its mark."""
     global _mark
-    context = get_context("forkserver")
-    if not _mark or not _alive():
-        _mark = secrets.token_hex(8)
-        context.set_forkserver_preload(["femubench.core.harness.preload"])
+    _mark = _mark or secrets.token_hex(8)
+    if not alive(_server()):
+        get_context("forkserver").set_forkserver_preload(["femubench.core.harness.preload"])
         with environment(**{MARK: _mark}):
             forkserver.ensure_running()
     return _mark
@@ -162,16 +166,21 @@ def _server_mark() -> str:
 _mark = ""
 
 
-def _alive() -> bool:
-    """Tell whether the server runs, without taking its exit status from multiprocessing."""
-    server = getattr(forkserver._forkserver, "_forkserver_pid", None)
-    with suppress(psutil.Error):
-        return server is not None and psutil.Process(server).status() != psutil.STATUS_ZOMBIE
-    return False
+def _wake_server() -> None:
+    """Let the server go on where a job has stopped it."""
+    server = _server()
+    with suppress(psutil.Error, ProcessLookupError):
+        if server is not None and psutil.Process(server).status() == psutil.STATUS_STOPPED:
+            os.kill(server, signal.SIGCONT)
+
+
+def _server() -> int | None:
+    """Return the process from which workers fork."""
+    server: int | None = getattr(forkserver._forkserver, "_forkserver_pid", None)
+    return server
 
 
 def _ours() -> frozenset[int]:
     """Return the processes of multiprocessing itself."""
-    server = getattr(forkserver._forkserver, "_forkserver_pid", None)
     tracker = getattr(resource_tracker._resource_tracker, "_pid", None)
-    return frozenset(pid for pid in (server, tracker) if pid is not None)
+    return frozenset(pid for pid in (_server(), tracker) if pid is not None)

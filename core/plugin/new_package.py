@@ -117,6 +117,8 @@ def _fault_of(name: str, kind: str, plugins: Plugins) -> str:
         return "it is a keyword of Python"
     if module == PROJECT:
         return "it is the name of this program"
+    if f"tests/{module}.py" in _FURTHER.get(kind, {}):
+        return "a file of the package's own tests has it"
     if module in sys.stdlib_module_names:
         return "it is a module of Python's standard library"
     if name in taken:

@@ -55,6 +55,13 @@ class Reader(Protocol):
 class Reporter(Protocol):
     """Turns stored results into a text.
 
+    A reporter may offer more than is asked here:
+
+    - ``render_with(run, exhibits) -> str``: used instead of `render` where there is a store;
+      `exhibits` is None, or has ``stage(digest of the case)`` and ``of(key of the job)``, plain
+      data to draw or None.
+    - ``render_bytes(run) -> bytes``: used instead of `render`, for a format that is no text.
+
     Attributes:
         name: the word after ``bench report --format``.
         suffix: of the file that is written, with the dot.

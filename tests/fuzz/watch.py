@@ -11,11 +11,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from femubench import reports
+
 SECONDS = 30.0  # that no small file may take; the largest mesh allowed takes some 7 s
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 _NEVER = ("os.remove", "os.rename", "os.mkdir", "os.rmdir", "os.link", "os.symlink", "os.chmod",
           "os.system", "os.exec", "os.posix_spawn", "subprocess.Popen", "socket.connect",
           "pickle.find_class", "ctypes.dlopen")  # fmt: skip
+# The templates of the page.
+_OWN = Path(reports.__file__).resolve().parent
 # A module that is imported only now is no file of the case.
 _CODE = (".py", ".pyc", ".so")
 
@@ -40,7 +44,7 @@ class Watch:
         elif event == "open" and isinstance(arguments[0], (str, bytes)):
             path = Path(os.fsdecode(arguments[0]))
             reading = not (arguments[2] or 0) & _WRITING
-            inside = path.resolve().is_relative_to(self.folder)
+            inside = any(path.resolve().is_relative_to(f) for f in (self.folder, _OWN))
             if not (reading and (inside or path.name.endswith(_CODE))):
                 self.faults.append(f"opens {path} {'' if reading else 'for writing'}")
 

@@ -226,6 +226,54 @@ class Daemon(Animal):
         return model
 
 
+class Stranger(Animal):
+    """Leaves a process behind that has nothing of its environment."""
+
+    name = "stranger"
+
+    def harm(self, model: Model) -> Model:
+        if os.fork() == 0:
+            os.setsid()
+            if os.fork() == 0:
+                os.execve(_SLEEPER[0], _SLEEPER, {})
+            os._exit(0)
+        return model
+
+
+class Regicide(Animal):
+    """Ends the process that started it, and with it all other workers."""
+
+    name = "regicide"
+    ends = ("crashed", "the process from which all workers are started was ended")
+
+    def harm(self, model: Model) -> Model:
+        os.kill(os.getppid(), signal.SIGKILL)
+        time.sleep(900.0)
+        return model
+
+
+class Babbler(Animal):
+    """Raises a text that is none in UTF-8."""
+
+    name = "babbler"
+    ends = ("failed", "ValueError: ")
+
+    def harm(self, model: Model) -> Model:
+        raise ValueError("\ud800")
+
+
+class Boaster(Animal):
+    """Says that it has fewer unknowns than none."""
+
+    name = "boaster"
+    ends = ("failed", "ValueError: parameter_count is -1")
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        return UpdateResult(model, parameter_count=-1)
+
+
 class Litterer(Animal):
     """Leaves files behind, here and in the temporary folder."""
 
@@ -312,10 +360,22 @@ class Liar(Animal):
         return model
 
 
+class Gaoler(Animal):
+    """Stops the process from which all workers are forked."""
+
+    name = "gaoler"
+    ends = ("ok", "")
+
+    def harm(self, model: Model) -> Model:
+        os.kill(os.getppid(), signal.SIGSTOP)
+        return model
+
+
 ANIMALS: tuple[type[Animal], ...] = (
     *(Segfault, Exit, EndlessLoop, DeafLoop, Sleeper, MemoryHog, MemoryHogs, Chatterbox),
     *(DiskFiller, UnpicklableError, Trojan, Vandal, Deserter, Daemon, Litterer, Lingerer),
-    *(NotFinite, Skewed, WildIndices, Colossus, Liar),
+    *(Gaoler, NotFinite, Skewed, WildIndices, Colossus, Liar),
+    *(Stranger, Regicide, Babbler, Boaster),
 )
 
 

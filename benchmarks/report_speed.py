@@ -1,0 +1,102 @@
+"""How large the page of a run is, and how long it takes to open and to sort.
+
+    python benchmarks/report_speed.py [STORE]
+
+STORE is a store with a run of everything (`bench run`), by default that of `bench report`. Prints
+the size of its page and the time until its leaderboard stands, then for a made-up run of 200
+strategies on 50 scenarios the time to sort. Needs chromium, see CONTRIBUTING.md.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import statistics
+import sys
+import tempfile
+from pathlib import Path
+
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from femubench.core.harness.store import Store
+from femubench.reports.htmls import HtmlReporter
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "toys"))
+from synthetic_run import synthetic_run
+
+REPEATS = 5
+SIZE, OPENING, SORTING = 8.0, 2.0, 200.0  # MB, s, ms: what is asked for
+KEYS = ("skill", "strategy", "seconds", "coverage", "flags", "rank")
+# From the request to the leaderboard; the figures below it are there too.
+READY = "performance.getEntriesByName('bench')[0].startTime + performance.getEntriesByName('bench')[0].duration"
+
+
+def opened(browser: Browser, file: Path) -> tuple[Page, float]:
+    """Return a page in a fresh window and the seconds until it stood."""
+    page = browser.new_context(viewport={"width": 1440, "height": 900}).new_page()
+    page.goto(file.as_uri())
+    page.wait_for_selector("html[data-ready=yes]")
+    return page, float(page.evaluate(READY)) / 1000.0
+
+
+def opening(browser: Browser, file: Path) -> float:
+    """Return the median of the seconds that the page takes to open."""
+    found = []
+    for _ in range(REPEATS):
+        page, seconds = opened(browser, file)
+        found.append(seconds)
+        page.context.close()
+    return statistics.median(found)
+
+
+def sorting(page: Page, key: str) -> tuple[float, float]:
+    """Return milliseconds of processor and of wall time until a click has sorted and laid out."""
+    session = page.context.new_cdp_session(page)
+    session.send("Performance.enable", {"timeDomain": "threadTicks"})
+
+    def busy() -> float:
+        metrics = session.send("Performance.getMetrics")["metrics"]
+        return 1000.0 * next(one["value"] for one in metrics if one["name"] == "TaskDuration")
+
+    before = busy()
+    wall = page.evaluate(
+        """(key) => {
+          const start = performance.now();
+          document.querySelector(`th[data-key=${key}] button`).click();
+          document.getElementById("board-table").getBoundingClientRect();
+          return performance.now() - start;
+        }""",
+        key,
+    )
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => setTimeout(done, 50)))")
+    return busy() - before, float(wall)
+
+
+def main(store: Path) -> None:
+    """Measure and print."""
+    exhibits = Store(store)
+    run = exhibits.load(lenient=True)
+    path = os.environ.get("FEMUBENCH_CHROMIUM") or shutil.which("chromium")
+    root = hasattr(os, "geteuid") and os.geteuid() == 0
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
+        browser = driver.chromium.launch(
+            executable_path=path, args=["--no-sandbox"] if root else []
+        )
+        whole, large = Path(folder, "whole.html"), Path(folder, "large.html")
+        whole.write_text(HtmlReporter().render_with(run, exhibits.exhibits), encoding="utf-8")
+        large.write_text(HtmlReporter().render(synthetic_run(200, 50)), encoding="utf-8")
+        print(f"{run.meta['run']}: {len(run.results)} results")
+        for name, file in (("this run", whole), ("200 strategies x 50 scenarios", large)):
+            size = file.stat().st_size / 1e6
+            print(f"{name}: {size:.2f} MB (< {SIZE}), opens in", end=" ")
+            print(f"{opening(browser, file):.2f} s (< {OPENING})")
+        page, _ = opened(browser, large)
+        page.wait_for_timeout(1500)
+        for key in KEYS:
+            processor, wall = sorting(page, key)
+            print(f"sort by {key}: {processor:.0f} ms of processor, {wall:.0f} ms (< {SORTING})")
+        browser.close()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "femubench-results"))

@@ -1,0 +1,154 @@
+"""``bench compare``: two runs side by side, and an exit code for whoever guards a strategy."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from femubench.core.cli.files import check_writable, write_atomically
+from femubench.core.cli.registry import chosen, store_folder
+from femubench.core.harness.compare_runs import compare_runs
+from femubench.core.harness.comparison import DEFAULT_THRESHOLDS, METRICS, Comparison, Threshold
+from femubench.core.harness.results import Run
+from femubench.core.harness.serial import finite, read_run
+from femubench.core.harness.store import Store
+
+FORMATS = ("terminal", "markdown", "html", "json")
+_THRESHOLD = re.compile(r"\s*(\w+)\s*>\s*([0-9][0-9.eE+-]*)\s*")
+
+
+def thresholds_of(
+    ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...]
+) -> tuple[Threshold, ...]:
+    """Return what ``--fail`` says, the default where it is not given.
+
+    Raises:
+        BadParameter: for anything but METRIC>NUMBER.
+    """
+    return tuple(_threshold(text, ctx, parameter) for text in texts) or DEFAULT_THRESHOLDS
+
+
+def _threshold(text: str, ctx: click.Context, parameter: click.Parameter) -> Threshold:
+    found = _THRESHOLD.fullmatch(text)
+    if found is not None:
+        for metric in METRICS:
+            if metric == found[1]:
+                try:
+                    most = float(found[2])
+                except ValueError:
+                    break
+                if math.isfinite(most):
+                    return Threshold(metric, most)
+    message = (
+        f"{text!r} is no threshold (expected METRIC>NUMBER, METRIC one of {', '.join(METRICS)})"
+    )
+    raise click.BadParameter(message, ctx, parameter)
+
+
+@click.command("compare")
+@click.argument("before", metavar="A")
+@click.argument("after", metavar="B")
+@click.option(
+    "-s",
+    "--strategy",
+    "strategies",
+    multiple=True,
+    metavar="STRATEGY",
+    help="This one only; repeat.",
+)
+@click.option(
+    "--fail",
+    "thresholds",
+    multiple=True,
+    metavar="METRIC>X",
+    callback=thresholds_of,
+    help="Exit with 1 where a ratio B/A exceeds X: skill, used, higher, modified, seconds; or the "
+    "number of lost results: failures. May be repeated. Default: skill>1.01 and failures>0.",
+)
+@click.option(
+    "-f",
+    "--format",
+    "form",
+    type=click.Choice(FORMATS),
+    default="terminal",
+    show_default=True,
+    help="What is printed or written.",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Write there instead of the screen.",
+)
+@click.option(
+    "--store",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help="Where the runs are. Default: $FEMUBENCH_STORE or femubench-results.",
+)
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@click.pass_context
+def compare(
+    ctx: click.Context,
+    before: str,
+    after: str,
+    strategies: tuple[str, ...],
+    thresholds: tuple[Threshold, ...],
+    form: str,
+    output: Path | None,
+    store: Path | None,
+    quiet: bool,
+) -> None:
+    """Set run B beside run A; exit with 1 where B is worse.
+
+    A and B are run ids in the store, their first letters, or files that run --json wrote.
+    """
+    if output is not None:
+        check_writable(output)
+    folder = store_folder(store)
+    runs = _find(before, folder), _find(after, folder)
+    known = dict.fromkeys(result.strategy for run in runs for result in run.results)
+    wanted = chosen("strategy", strategies, known)
+    found = compare_runs(*runs, thresholds=thresholds, strategies=wanted)
+    if output is not None or not quiet:
+        text = _writer(form)(found)
+        if output is not None:
+            write_atomically(output, text)
+        else:
+            click.echo(text)
+    if output is not None and not quiet:
+        click.echo(f"{form}: {output}")
+    ctx.exit(int(found.worse))
+
+
+def _writer(form: str) -> Callable[[Comparison], str]:
+    from femubench.reports import compare_page
+
+    if form == "json":
+        return lambda found: json.dumps(_data(found), indent=1, allow_nan=False)
+    writers: dict[str, Callable[[dict[str, Any]], str]] = {
+        "terminal": compare_page.comparison_text,
+        "markdown": compare_page.comparison_markdown,
+        "html": compare_page.comparison_html,
+    }
+    return lambda found: writers[form](_data(found))
+
+
+def _data(found: Comparison) -> dict[str, Any]:
+    data: dict[str, Any] = finite(found.to_json())
+    return data
+
+
+def _find(word: str, folder: Path) -> Run:
+    """Return a run from a file or from the store."""
+    if os.path.exists(word) and not os.path.isdir(word):
+        return read_run(Path(word))
+    return Store(folder).load(word)

@@ -1,0 +1,43 @@
+"""``bench publish``: result files of several machines as a static site."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from femubench.core.cli.files import check_can_make
+from femubench.core.cli.registry import counted
+
+
+@click.command("publish")
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.argument(
+    "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path)
+)
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+def publish(folder: Path, files: tuple[Path, ...], quiet: bool) -> None:
+    """Merge result files into a static site in DIR.
+
+    A FILE is what run --json wrote, here or on another machine. DIR is new, empty, or made by
+    publish before: then the files are added to it. One file that is not sound, and nothing is
+    written.
+    """
+    from femubench.core.harness.publishing import publish as merge
+    from femubench.reports.publish_page import pages_of
+
+    check_can_make(folder.resolve().parent)
+    done = merge(folder, files, pages_of)
+    if quiet:
+        return
+    runs, index = len(done.index["runs"]), folder / "index.html"
+    click.echo(
+        f"{counted(len(done.added), 'new run')}, {counted(runs, 'run')} and "
+        f"{counted(len(done.index['strategies']), 'strategy')} in all: {index}"
+    )
+    if done.index["conflicts"]:
+        click.echo(
+            f"bench: {counted(len(done.index['conflicts']), 'job')} with results that contradict "
+            "each other; they are flagged",
+            err=True,
+        )

@@ -1,0 +1,166 @@
+"""How much a strategy changed each element, or, where it works by entries, which of them."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from femubench.core.errors import FemubenchError
+from femubench.core.exhibits.stage import node_labels
+from femubench.core.fem.beam import stiffness_matrices
+from femubench.core.fem.structure import Structure
+from femubench.core.model import Model
+from femubench.core.typing import FloatArray
+from femubench.core.update.element_families import (
+    ElementFamily,
+    generic_family,
+    nobari_family,
+    physical_family,
+)
+from femubench.core.update.element_symmetry import Symmetry
+
+_PLAIN: tuple[Symmetry, ...] = ("half-turn", "full", "mirror", "none")
+_JOINT: tuple[Symmetry, ...] = ("none", "full")
+_TURNS = np.tile([False, False, False, True, True, True], 2)
+_MOST_DOFS = 3000  # a dense difference of more is no picture
+_CELLS = 64
+_LEVELS = 254
+_DECADES = 4.0
+_NOTHING = 1e-12  # of the stiffness itself: rounding of the assembly
+
+
+def relative_changes(
+    nominal: Model, updated: Model, parameters: Sequence[Mapping[str, Any]]
+) -> list[float | None] | None:
+    """Return |dK_e| / |K0_e| of every element of the nominal frame, (n_elements,).
+
+    Frobenius norms, rotations times the element's length, so that all entries have one unit.
+
+    Arguments:
+        nominal, updated: models of the same frame; the second may be meshed anew.
+        parameters: of the update, which tell the elements of a strategy that changes the assembled
+            matrix from a family of element matrices.
+
+    Returns None where the change is none of elements.
+    """
+    structure = nominal.structure
+    if structure is None or updated.structure is None:
+        return None
+    before = _scaled(structure, stiffness_matrices(structure.properties))
+    size = np.linalg.norm(before, axis=(1, 2))
+    after = _scaled(updated.structure, stiffness_matrices(updated.structure.properties))
+    place = {label: k for k, label in enumerate(updated.structure.labels) if label}
+    rows = [place.get(label) for label in structure.labels]
+    found = np.array(
+        [np.nan if k is None else np.linalg.norm(after[k] - before[e]) for e, k in enumerate(rows)]
+    )
+    if np.nanmax(found, initial=0.0) > _NOTHING * size.max() or _as_assembled(updated):
+        return _ratios(found, size, rows)
+    change = _from_family(structure, parameters)
+    if change is None:
+        return None
+    return _ratios(np.linalg.norm(_scaled(structure, change), axis=(1, 2)), size, rows)
+
+
+def _ratios(change: FloatArray, size: FloatArray, rows: Sequence[int | None]) -> list[float | None]:
+    return [
+        None if row is None or not norm > 0.0 else float(f"{part / norm:.4g}")
+        for part, norm, row in zip(change, size, rows, strict=True)
+    ]
+
+
+def _scaled(structure: Structure, matrices: FloatArray) -> FloatArray:
+    scale = np.where(_TURNS, 1.0 / structure.properties.length[:, None], 1.0)
+    scale = scale * structure.active_local
+    return np.asarray(scale[:, :, None] * matrices * scale[:, None, :])
+
+
+def _as_assembled(updated: Model) -> bool:
+    """Tell whether the matrix of a model is that of its own structure."""
+    assert updated.structure is not None
+    if updated.stiffness_change is not None:
+        return False
+    own = updated.structure.matrices()[1]
+    if own.shape != updated.stiffness.shape:
+        return False
+    return bool(abs(updated.stiffness - own).max() <= 1e-9 * abs(own).max())
+
+
+def _from_family(
+    structure: Structure, parameters: Sequence[Mapping[str, Any]]
+) -> FloatArray | None:
+    names = tuple(item["name"] for item in parameters)
+    after = np.array([item["after"] for item in parameters], dtype=float)
+    for family in _families(structure) if names else ():
+        if family.names == names:
+            return family.change((after - family.before) / family.scale)
+    return None
+
+
+def _families(structure: Structure) -> Iterator[ElementFamily]:
+    for make in (physical_family, nobari_family):
+        with suppress(FemubenchError):
+            yield make(structure)
+    for plain, joint, tied in product(_PLAIN, _JOINT, (False, True)):
+        with suppress(FemubenchError):
+            yield generic_family(structure, plain=plain, joint=joint, tied=tied)
+
+
+def difference_picture(nominal: Model, updated: Model) -> dict[str, Any] | None:
+    """Return |K - K0| between groups of nodes as a picture of at most 64 x 64 cells.
+
+    Rotations count times the mean distance of neighbouring nodes, so that all entries are in N/m.
+    A cell is the Frobenius norm of its block; values are levels of a logarithmic scale over four
+    decades, 0 for nothing.
+
+    Arguments:
+        nominal, updated: on the same dofs.
+
+    Returns None where nothing changed, or the models cannot be compared entry by entry.
+    """
+    size = nominal.size
+    if updated.size != size or size > _MOST_DOFS:
+        return None
+    unit = np.eye(size)
+    change = np.abs(updated.stiffness_times(unit) - nominal.stiffness_times(unit))
+    turns = np.array([name.startswith("r") for name in nominal.dofs.direction])
+    scale = np.where(turns, 1.0 / _spacing(nominal), 1.0)
+    change = scale[:, None] * change * scale
+    nodes = np.unique(nominal.dofs.node, return_inverse=True)[1]
+    count = int(nodes.max()) + 1
+    cell = nodes * min(_CELLS, count) // count
+    gather = np.zeros((int(cell.max()) + 1, size))
+    gather[cell, np.arange(size)] = 1.0
+    found = np.sqrt(gather @ np.square(change) @ gather.T)
+    own = scale[:, None] * np.abs(nominal.stiffness.toarray()) * scale
+    if not found.max() > _NOTHING * own.max():
+        return None
+    highest = float(np.log10(found.max()))
+    lowest = highest - _DECADES
+    with np.errstate(divide="ignore"):
+        share = (np.log10(found) - lowest) / _DECADES
+    levels = np.where(share > 0.0, 1 + np.round(_LEVELS * np.clip(share, 0.0, 1.0)), 0)
+    names = node_labels(nominal)
+    first = [int(np.flatnonzero(cell[np.argsort(nodes)] == k)[0]) for k in range(len(found))]
+    return {
+        "size": len(found),
+        "nodes": count,
+        "labels": [names[int(np.sort(nodes)[row])] for row in first],
+        "values": base64.b64encode(levels.astype(np.uint8).tobytes()).decode(),
+        "lowest": round(lowest, 4),
+        "highest": round(highest, 4),
+        "unit": "N/m",
+    }
+
+
+def _spacing(model: Model) -> float:
+    if model.structure is not None:
+        return float(model.structure.properties.length.mean())
+    xyz = np.unique(model.dofs.xyz, axis=0)
+    extent = float(np.linalg.norm(np.ptp(xyz, axis=0)))
+    return extent / max(len(xyz) - 1, 1) or 1.0

@@ -1,0 +1,151 @@
+"""Words and figures on the page of a diagnosis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from femubench.reports.cells import NOTHING, plain
+from femubench.reports.figures import chance, estimate, figure, signed
+
+Data = Mapping[str, Any]
+
+MEANINGS = {
+    "none": "the data show nothing that the model lacks; anything smaller than the sizes listed "
+    "below would not have shown",
+    "named": "one explanation stands alone, or all that stand share it",
+    "ambiguous": "several explanations stand, and these data cannot tell them apart",
+    "unknown": "even the best explanation leaves more than noise: something is missing that no "
+    "effect in the list describes; the causes below are a guess, not a finding",
+    "not-confirmed": "the best explanation fits the data it was found with, and does not help as "
+    "it ought to on data held back; the causes below are a guess, not a finding",
+}
+# A sign of its own for every verdict, so that colour is not needed.
+MARKS = {"none": "✓", "named": "●", "ambiguous": "?", "unknown": "✕", "not-confirmed": "!"}
+CAUSES = {
+    "named": "What is missing",
+    "ambiguous": "Candidates, among which these data cannot decide",
+    "unknown": "Best guess, which does not explain the data",
+    "not-confirmed": "Best guess, which data held back do not confirm",
+}
+GAINS = {
+    "used_percent": "used modes",
+    "held_out_percent": "held-out modes",
+    "modified_percent": "modified structure",
+    "cross_validated_percent": "used modes, each left out in turn",
+}
+INDICATORS = {
+    "force-residual": "forces that the measured shapes would need in the model",
+    "energy-error": "strain energy of the error in the constitutive relation",
+    "mdlac": "match of the frequency changes with those that a softer element would make",
+    "ecomac": "difference of measured and predicted shapes at every sensor",
+}
+_MOST_CHANGES = 6
+_NOISE, _LIMIT = 0.05, 1e-3
+_LARGEST_ODDS = 1e6
+
+
+def percent(value: float | None) -> str:
+    """Return an error in percent."""
+    return NOTHING if value is None else f"{figure(value, 3)} %"
+
+
+def times(before: float | None, after: float | None) -> str:
+    """Return by how much an error fell or rose."""
+    if before is None or after is None or min(before, after) <= 0.0:
+        return ""
+    ratio = before / after
+    if 0.95 < ratio < 1.05:
+        return "about the same"
+    return (
+        f"{figure(ratio, 2)} times smaller"
+        if ratio > 1.0
+        else f"{figure(1 / ratio, 2)} times larger"
+    )
+
+
+def adequacy(data: Data) -> tuple[str, str]:
+    """Return in two words, and in a sentence, whether what is left is noise."""
+    p = data["adequacy_p"]
+    if p is None:
+        return NOTHING, "whether it is noise was not tested"
+    said = f"noise alone leaves as much with probability {chance(p)}"
+    if p >= _NOISE:
+        return "noise", said
+    return ("a little more than noise" if p >= _LIMIT else "more than noise"), said
+
+
+def sentence(clause: str) -> str:
+    """Return a clause with a capital and a full stop."""
+    text = plain(clause)
+    return text and f"{text[0].upper()}{text[1:]}" + ("" if text[-1] in ".!?" else ".")
+
+
+def place_at(place: str) -> str:
+    """Return a place as it follows an effect."""
+    return "everywhere" if place == "all" else place
+
+
+def pair_at(rival: Data) -> str:
+    """Return effects and places of a combination, each effect beside its place."""
+    effects, places = rival["effect"].split(" + "), rival["place"].split(" + ")
+    if len(effects) != len(places):
+        effects, places = [rival["effect"]], [rival["place"]]
+    return " + ".join(map(_at, effects, places))
+
+
+def _at(effect: str, place: str) -> str:
+    words = effect.replace("-", " ")
+    if place == "all":
+        return f"{words} everywhere"
+    return f"{words} at {place}" if place else words
+
+
+def parameter_rows(cause: Data) -> list[dict[str, str]]:
+    """Return name, value with its deviation, and where the value comes from."""
+    rows = []
+    for item in cause["parameters"]:
+        value = estimate(item["value"], item["std"])
+        unit = f" {item['unit']}" if item["unit"] else ""
+        source = "textbook value, not fitted" if item["textbook"] else ""
+        rows.append(
+            {"name": item["name"], "value": f"{value}{unit}{_share(item)}", "source": source}
+        )
+    return rows
+
+
+def _share(item: Data) -> str:
+    """Return a relative change in percent."""
+    value, std = item["value"], item["std"]
+    if item["unit"] or not item["name"].startswith("change of") or value is None:
+        return ""
+    if not abs(value) < 10.0:
+        return ""
+    spread = "" if std is None else f" ± {figure(100.0 * std, 2)}"
+    return f" ({signed(100.0 * value)}{spread} %)"
+
+
+def change(item: Data) -> str:
+    """Return an effect's size in percent where it is a share of something."""
+    size = item["size"]
+    shares = ("density", "youngs-modulus", "torsion-constant", "member-mass", "member-stiffness")
+    if item["unit"] or size is None or item["effect"] not in (*shares, "local-stiffness-loss"):
+        return ""
+    return f" ({figure(100.0 * size, 2)} %)"
+
+
+def odds(separation: float | None) -> str:
+    """Return the odds that a distance in squared standard deviations stands for."""
+    if separation is None or separation < 0.0:
+        return NOTHING
+    against = math.exp(min(separation, 60.0) / 2.0)
+    return "over a million to 1" if against > _LARGEST_ODDS else f"{figure(against, 2)} to 1"
+
+
+def look_changes(look: Data) -> str:
+    """Return how the frequencies change, were it mended."""
+    known = [c for c in look["changes"] if c["percent"] is not None]
+    text = ", ".join(f"mode {c['mode']} {signed(c['percent'])} %" for c in known[:_MOST_CHANGES])
+    more = len(known) - _MOST_CHANGES
+    return f"{text} and {more} more" if more > 0 else text

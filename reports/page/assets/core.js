@@ -1,0 +1,136 @@
+"use strict";
+// The namespace that all parts of the page share: data, elements, numbers, looks, addresses.
+// Every file keeps its own names to itself in a block.
+const bench = {};
+{
+  const SVG = "http://www.w3.org/2000/svg";
+  const NOTHING = "–";
+
+  function put(node, attrs, children) {
+    for (const [name, value] of Object.entries(attrs || {})) {
+      if (value === null || value === undefined || value === false) continue;
+      if (typeof value === "function") node.addEventListener(name.replace(/^on/, ""), value);
+      else if (/^on/i.test(name)) throw new Error(`${name} takes a function`);
+      else if (name === "href" && !String(value).startsWith("#")) throw new Error("links stay on the page");
+      else if (name === "style") for (const [k, v] of Object.entries(value)) node.style.setProperty(k, v);
+      else node.setAttribute(name, value === true ? "" : String(value));
+    }
+    for (const child of children.flat(Infinity)) {
+      if (child === null || child === undefined || child === false) continue;
+      node.append(child instanceof Node ? child : document.createTextNode(String(child)));
+    }
+    return node;
+  }
+
+  // Return an element; text children become text, never markup.
+  bench.el = (tag, attrs, ...children) => put(document.createElement(tag), attrs, children);
+  bench.svg = (tag, attrs, ...children) => put(document.createElementNS(SVG, tag), attrs, children);
+
+  // Return the text of a number with some significant digits, a dash for nothing.
+  bench.number = (value, digits = 3) => {
+    if (value === null || value === undefined || !Number.isFinite(value)) return NOTHING;
+    const size = Math.abs(value);
+    if (size === 0) return "0";
+    if (size < 1e-4 || size >= 1e7) return minus(value.toExponential(Math.max(digits - 2, 0)).replace("e+", "e"));
+    const whole = Math.floor(Math.log10(Number(size.toPrecision(digits)))) + 1;
+    return minus(value.toFixed(Math.max(digits - whole, 0)));
+  };
+  bench.percent = (value, digits = 3) => unit(bench.number(value, digits), "%");
+  bench.seconds = (value) => unit(bench.number(value, value >= 0.001 ? 3 : 1), "s");
+  bench.hertz = (value) => {
+    if (value === null || value === undefined) return NOTHING;
+    return value < 0 ? `${(-value).toFixed(1)} i` : value.toFixed(1);
+  };
+  bench.count = (value) => {
+    if (value === null || value === undefined || !Number.isFinite(value)) return NOTHING;
+    return minus(Number.isInteger(value) ? String(value) : value.toFixed(1));
+  };
+  bench.plural = (n, one, many) => `${bench.count(n)} ${n === 1 ? one : many || `${one}s`}`;
+  bench.shortened = (text, width) => (text.length <= width ? text : `${text.slice(0, width - 1)}…`);
+
+  function minus(text) {
+    return text.replace(/-/g, "−");
+  }
+  function unit(text, name) {
+    return text === NOTHING ? text : `${text} ${name}`;
+  }
+
+  // Return the letter of a group: a to z, then aa, ab, ...
+  bench.letter = (n) => {
+    const last = String.fromCharCode(97 + (n % 26));
+    return n < 26 ? last : bench.letter(Math.floor(n / 26) - 1) + last;
+  };
+
+  const WORDS = {
+    ok: ["✓", "ok"],
+    failed: ["✕", "failed"],
+    diverged: ["✕", "diverged"],
+    timeout: ["✕", "ran out of time"],
+    crashed: ["✕", "crashed"],
+    "not-applicable": ["○", "not applicable"],
+    missing: ["✕", "no result"],
+  };
+  // Return how a job ended, in words, and with its sign before them.
+  bench.statusWord = (status) => (WORDS[status] || ["?", String(status)])[1];
+  bench.statusText = (status) => `${(WORDS[status] || ["?"])[0]} ${bench.statusWord(status)}`;
+
+  // Okabe and Ito's colours (the first follows the text's) with a dash pattern and a marker each, so
+  // that curves are told apart without colour.
+  const COLOURS = ["blue", "vermilion", "green", "purple", "orange", "sky", "ink", "olive"];
+  const DASHES = ["", "7 3", "2 3", "9 3 2 3", "12 4", "4 2 1 2 1 2", "1 2", "6 2 2 2 2 2"];
+  const MARKERS = ["circle", "square", "triangle", "diamond", "cross", "plus", "down", "star"];
+  bench.palette = {
+    size: 8,
+    // Return {colour, dash, marker, width} of the n-th curve of a role.
+    style(n, role = "other") {
+      if (role === "measured") return { colour: "var(--ink)", dash: "", marker: "circle", width: 2.4, hollow: true };
+      if (role === "nominal") return { colour: "var(--soft)", dash: "5 4", marker: "square", width: 1.8, hollow: true };
+      const k = n % 8;
+      return { colour: `var(--${COLOURS[k]})`, dash: DASHES[k], marker: MARKERS[k], width: 1.9, hollow: n % 16 >= 8 };
+    },
+  };
+  const PATHS = {
+    circle: (r) => `M${-r} 0a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0Z`,
+    square: (r) => `M${-r * 0.9} ${-r * 0.9}h${1.8 * r}v${1.8 * r}h${-1.8 * r}Z`,
+    triangle: (r) => `M0 ${-1.2 * r}L${1.15 * r} ${0.9 * r}H${-1.15 * r}Z`,
+    down: (r) => `M0 ${1.2 * r}L${1.15 * r} ${-0.9 * r}H${-1.15 * r}Z`,
+    diamond: (r) => `M0 ${-1.3 * r}L${1.3 * r} 0L0 ${1.3 * r}L${-1.3 * r} 0Z`,
+    cross: (r) => `M${-r} ${-r}L${r} ${r}M${-r} ${r}L${r} ${-r}`,
+    plus: (r) => `M${-1.2 * r} 0H${1.2 * r}M0 ${-1.2 * r}V${1.2 * r}`,
+    star: (r) => `M${-1.2 * r} 0H${1.2 * r}M${-0.6 * r} ${-r}L${0.6 * r} ${r}M${-0.6 * r} ${r}L${0.6 * r} ${-r}`,
+  };
+  // Return a marker at a point; the style comes from bench.palette.
+  bench.marker = (style, x, y, radius = 4) =>
+    bench.svg("path", {
+      d: PATHS[style.marker](radius),
+      transform: `translate(${x.toFixed(1)} ${y.toFixed(1)})`,
+      fill: style.hollow || /cross|plus|star/.test(style.marker) ? "var(--panel)" : style.colour,
+      stroke: style.colour,
+      "stroke-width": 1.6,
+    });
+
+  // Addresses: #board and #case/<name>, the name as a URI component.
+  bench.caseHref = (name) => `#case/${encodeURIComponent(name)}`;
+  bench.route = (hash = location.hash) => {
+    if (!hash.startsWith("#case/")) return { page: "board", name: null };
+    try {
+      return { page: "case", name: decodeURIComponent(hash.slice(6)) };
+    } catch {
+      return { page: "case", name: hash.slice(6) };
+    }
+  };
+
+  // Return a region that scrolls sideways by itself, by keyboard too.
+  bench.scroll = (label, ...children) =>
+    bench.el("div", { class: "scroll", role: "region", tabindex: "0", "aria-label": label }, children);
+
+  bench.median = (values) => {
+    if (!values.length) return null;
+    const sorted = Float64Array.from(values).sort();
+    const half = sorted.length >> 1;
+    return sorted.length % 2 ? sorted[half] : (sorted[half - 1] + sorted[half]) / 2;
+  };
+
+  const source = document.getElementById("data");
+  bench.data = source ? JSON.parse(source.textContent) : null;
+}

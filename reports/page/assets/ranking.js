@@ -1,0 +1,249 @@
+// Scores, skills and ranks of any part of a run, by the rules of docs/scoring.md. Without a filter the
+// figures are those of the run's own leaderboard.
+{
+  const RESAMPLES = 999;
+  const { data, median } = bench;
+  const all = data && data.results ? prepare() : null;
+
+  function prepare() {
+    const seeds = [...new Set([...(data.seeds || []), ...data.results.map((r) => r.seed)])].sort((a, b) => a - b);
+    const found = new Map(data.results.map((r) => [`${r.s}:${r.c}:${r.seed}`, r]));
+    const perStrategy = data.strategies.map(() => []);
+    const perCase = data.cases.map(() => []);
+    for (const result of data.results) {
+      perStrategy[result.s].push(result);
+      perCase[result.c].push(result);
+    }
+    const scored = data.cases.some((c) => has(c.reference));
+    const unchanged = data.strategies.findIndex((s) => s.name === "unchanged");
+    return { seeds, found, perStrategy, perCase, scored, unchanged };
+  }
+  function has(reference) {
+    return Boolean(reference) && Object.keys(reference).length > 0;
+  }
+  function resultAt(s, c, seed) {
+    return all.found.get(`${s}:${c}:${seed}`) || null;
+  }
+
+  // Return what a result is measured against, block by block; null where a block is not there.
+  function referenceOf(result) {
+    const { reference } = data.cases[result.c];
+    if (all.scored) return data.blocks.map((b) => (reference && b in reference ? reference[b] : null));
+    const base = all.unchanged < 0 ? null : resultAt(all.unchanged, result.c, result.seed);
+    return base ? base.rms : data.blocks.map(() => null);
+  }
+
+  // Return the logarithm of the score over the blocks whose index is listed.
+  function logScore(result, blocks, whole) {
+    const failure = Math.log(data.score_of_failure);
+    if (!result) return failure;
+    if (whole && !all.scored && result.score !== null && result.score !== undefined) return Math.log(result.score);
+    if (result.status === "not-applicable") return 0;
+    const reference = referenceOf(result);
+    const used = blocks.filter((b) => reference[b] !== null);
+    if (result.status !== "ok" || !used.length) return failure;
+    const offset = data.offset_percent;
+    let sum = 0;
+    for (const b of used) {
+      const rms = result.rms[b];
+      sum += rms === null ? failure : Math.log((rms + offset) / (reference[b] + offset));
+    }
+    return sum / used.length;
+  }
+
+  // Return the cases that count, each with its weight: the number of its blocks.
+  function gridOf(filter) {
+    const whole = filter.blocks.length === data.blocks.length;
+    const cases = [];
+    data.cases.forEach((item, c) => {
+      if (!filter.scenarios.has(item.scenario)) return;
+      const own = all.perCase[c];
+      const given = data.blocks.map((b, k) => (item.reference && b in item.reference ? k : -1)).filter((k) => k >= 0);
+      const shown = data.blocks.map((_, k) => k).filter((k) => own.some((r) => r.rms[k] !== null));
+      const most = Math.max(0, ...own.map((r) => r.rms.filter((v) => v !== null).length));
+      if (!given.length && !own.length) return;
+      const there = given.length ? given : shown;
+      const weight = whole ? Math.max(given.length || 1, most) : there.filter((k) => filter.blocks.includes(k)).length;
+      if (weight) cases.push({ c, weight, hidden: given.filter((k) => data.blocks[k] !== "used" && filter.blocks.includes(k)) });
+    });
+    return { cases, seeds: all.seeds, whole };
+  }
+
+  function weighted(logs, weights) {
+    let [sum, total] = [0, 0];
+    for (let i = 0; i < logs.length; i += 1) {
+      sum += logs[i] * weights[i];
+      total += weights[i];
+    }
+    return total ? Math.exp(sum / total) : null;
+  }
+
+  function rowOf(s, grid, filter, kept) {
+    const logs = grid.seeds.map((seed) => grid.cases.map(({ c }) => logScore(resultAt(s, c, seed), filter.blocks, grid.whole)));
+    const weights = grid.cases.map((item) => item.weight);
+    const skills = logs.map((l) => weighted(l, weights));
+    const unseen = grid.cases.filter((item) => item.hidden.length);
+    const unseenLogs = unseen.flatMap(({ c, hidden }) => grid.seeds.map((seed) => logScore(resultAt(s, c, seed), hidden, false)));
+    const results = all.perStrategy[s].filter((r) => kept.has(r.c));
+    const fine = results.filter((r) => r.status === "ok");
+    const row = {
+      index: s, strategy: data.strategies[s].name, rank: 0, skill: median(skills), skill_low: null, skill_high: null,
+      skill_unseen: weighted(unseenLogs, unseen.flatMap((item) => grid.seeds.map(() => item.hidden.length))),
+      rigid_modes_lost: sum(fine, "lost"), negative_eigenvalues: sum(fine, "negative"),
+      parameters: middle(fine, (r) => r.parameters), evaluations: middle(fine, (r) => r.evaluations),
+      seconds: middle(fine, (r) => r.seconds), ok: fine.length,
+      not_applicable: results.filter((r) => r.status === "not-applicable").length,
+      total: grid.cases.length * grid.seeds.length, unphysical: results.some((r) => r.unphysical),
+      logs, skills, weights, results, cases: grid.cases.map((item) => item.c),
+    };
+    data.blocks.forEach((b, k) => (row[`${b}_percent`] = middle(fine, (r) => r.rms[k])));
+    return row;
+  }
+  function sum(results, key) {
+    return results.reduce((total, r) => total + (r[key] || 0), 0);
+  }
+  // Return the median over cases of the median over seeds.
+  function middle(results, value) {
+    const byCase = new Map();
+    for (const r of results) {
+      const v = value(r);
+      if (v === null || v === undefined) continue;
+      if (!byCase.has(r.c)) byCase.set(r.c, []);
+      byCase.get(r.c).push(v);
+    }
+    return median([...byCase.values()].map(median));
+  }
+  // Put physical strategies first, then unphysical ones, then who never gave a model.
+  function better(a, b) {
+    const key = (r) => (r.ok + r.not_applicable === 0 ? 2 : 0) + (r.unphysical ? 1 : 0);
+    return key(a) - key(b) || a.skill - b.skill || (a.strategy < b.strategy ? -1 : 1);
+  }
+
+  function rowsOf(filter) {
+    const grid = gridOf(filter);
+    const kept = new Set(grid.cases.map((item) => item.c));
+    const rows = data.strategies.map((_, s) => s).filter((s) => filter.strategies.has(s)).map((s) => rowOf(s, grid, filter, kept));
+    if (!grid.cases.length) return [];
+    rows.sort(better).forEach((row, k) => (row.rank = k + 1));
+    return rows;
+  }
+
+  function generator(seed) {
+    let a = seed >>> 0;
+    return () => {
+      a = (a + 0x6d2b79f5) | 0;
+      let t = Math.imul(a ^ (a >>> 15), 1 | a);
+      t = (t + Math.imul(t ^ (t >>> 7), 61 | t)) ^ t;
+      return ((t ^ (t >>> 14)) >>> 0) / 4294967296;
+    };
+  }
+  function quantile(sorted, q) {
+    const at = q * (sorted.length - 1);
+    const low = Math.floor(at);
+    return sorted[low] + (at - low) * ((sorted[low + 1] ?? sorted[low]) - sorted[low]);
+  }
+  // Draw `times` resamples of n things: how often each is drawn; the same for every strategy.
+  function draws(n, times) {
+    const random = generator(20260 + n);
+    const counts = new Float64Array(n * times);
+    for (let t = 0; t < times; t += 1) for (let i = 0; i < n; i += 1) counts[t * n + Math.floor(random() * n)] += 1;
+    return counts;
+  }
+  function overCases(rows) {
+    const n = rows[0].weights.length;
+    const counts = draws(n, RESAMPLES);
+    const { weights } = rows[0];
+    const found = new Float64Array(RESAMPLES);
+    for (const row of rows) {
+      const logs = row.logs[0];
+      for (let t = 0; t < RESAMPLES; t += 1) {
+        let [top, bottom] = [0, 0];
+        for (let i = 0; i < n; i += 1) {
+          const w = counts[t * n + i] * weights[i];
+          top += w * logs[i];
+          bottom += w;
+        }
+        found[t] = top / bottom;
+      }
+      found.sort();
+      [row.skill_low, row.skill_high] = [Math.exp(quantile(found, 0.025)), Math.exp(quantile(found, 0.975))];
+    }
+  }
+  function overSeeds(rows) {
+    const n = rows[0].skills.length;
+    for (const row of rows) {
+      const random = generator(20260 + row.index);
+      const found = Float64Array.from({ length: RESAMPLES }, () => median(row.skills.map(() => row.skills[Math.floor(random() * n)])));
+      found.sort();
+      [row.skill_low, row.skill_high] = [quantile(found, 0.025), quantile(found, 0.975)];
+    }
+  }
+
+  // Fill the 95 % intervals in; returns what they are over: "seeds", "cases" or "" for none.
+  function fillIntervals(rows, filter) {
+    if (!rows.length) return "";
+    const kind = intervalKind(rows);
+    if (kind === "seeds" && isWhole(filter)) {
+      const given = new Map(data.board.map((row) => [row.strategy, row]));
+      for (const row of rows) ({ skill_low: row.skill_low, skill_high: row.skill_high } = given.get(row.strategy) || row);
+    } else if (kind === "seeds") overSeeds(rows);
+    else if (kind === "cases") overCases(rows);
+    return kind;
+  }
+  function intervalKind(rows) {
+    if (!rows.length) return "";
+    return rows[0].skills.length > 1 ? "seeds" : rows[0].weights.length > 1 ? "cases" : "";
+  }
+  // Tell whether cases and blocks are those of the whole run; the strategies change no figure.
+  function isWhole(filter) {
+    return filter.blocks.length === data.blocks.length && data.scenarios.every((s) => filter.scenarios.has(s));
+  }
+
+  // Return what differs from the run's own leaderboard by more than 1e-9 (rounded figures: 1e-3).
+  function check() {
+    const mine = new Map(rowsOf(bench.ranking.everything()).map((row) => [row.strategy, row]));
+    const exact = ["rank", "skill", "skill_unseen", "rigid_modes_lost", "negative_eigenvalues", "ok", "not_applicable", "total"];
+    const errors = data.blocks.map((b) => `${b}_percent`);
+    return data.board.flatMap((row) =>
+      [...exact, ...errors, "parameters", "evaluations", "seconds"].flatMap((key) => {
+        const [a, b] = [row[key] ?? null, (mine.get(row.strategy) || {})[key] ?? null];
+        const room = key === "seconds" ? 1e-3 : 1e-9;
+        const same = a === b || (a !== null && b !== null && Math.abs(a - b) <= room * Math.max(1, Math.abs(a)));
+        return same ? [] : [`${row.strategy}: ${key} is ${b}, the run says ${a}`];
+      }),
+    );
+  }
+
+  // Return every (case, block) with the rms error of each strategy, median over seeds: what a strategy
+  // without model leaves open is null, and "not applicable" leaves the nominal error.
+  function problems(rows, filter) {
+    return gridOf(filter).cases.flatMap(({ c }) =>
+      filter.blocks.map((b) => ({ c, b, errors: rows.map((row) => errorOf(row.index, c, b)) })).filter((p) => p.errors.some((e) => e !== null)),
+    );
+  }
+  function errorOf(s, c, b) {
+    const values = all.seeds.map((seed) => {
+      const result = resultAt(s, c, seed);
+      if (!result) return Infinity;
+      const v = result.status === "not-applicable" ? referenceOf(result)[b] : result.status === "ok" ? result.rms[b] : null;
+      return v === null || v === undefined ? Infinity : v;
+    });
+    const value = median(values);
+    return Number.isFinite(value) ? value : null;
+  }
+
+  bench.ranking = {
+    rows: rowsOf,
+    intervals: fillIntervals,
+    intervalKind,
+    isWhole,
+    problems,
+    check,
+    // Return the filter that lets everything through.
+    everything: () => ({
+      scenarios: new Set(data.scenarios),
+      blocks: data.blocks.map((_, k) => k),
+      strategies: new Set(data.strategies.map((_, s) => s)),
+    }),
+  };
+}

@@ -1,0 +1,234 @@
+"""What the page of a run is made of, in plain data for JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any, Protocol
+
+from femubench import OFFSET_PERCENT, SCORE_OF_FAILURE, JobResult, Run, leaderboard, rank_results
+from femubench.reports.cells import plain
+from femubench.reports.page.papers import papers_of
+from femubench.reports.page.rounding import clean, plain_data, rounded
+from femubench.reports.page.statistics import Statistics, statistics
+from femubench.reports.summary import (
+    cases_of,
+    first_seed,
+    header,
+    measured_modes,
+    notes_of,
+    seeds_of,
+    strategies_of,
+)
+
+VERSION = 1
+BLOCKS = ("used", "higher", "modified")
+# Bytes of the details of all results together; a page has to open in a moment.
+MOST_DETAILS = 6_000_000
+_LONGEST_REASON = 500
+
+
+class Exhibits(Protocol):
+    """What can be drawn of a run; either is None where nothing is known."""
+
+    def stage(self, digest: str) -> Mapping[str, Any] | None:
+        """Return the structure of a case with what was measured on it."""
+        ...
+
+    def of(self, key: str) -> Mapping[str, Any] | None:
+        """Return shapes, receptances and changes of a job's model."""
+        ...
+
+
+def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
+    """Return everything that the page of a run shows.
+
+    Errors, scores and skills are those of the run to the last digit; other numbers are rounded.
+
+    Arguments:
+        exhibits: what the store has to draw.
+    """
+    run = Run(run.meta, rank_results(run.results, run.meta.get("reference") or None))
+    cases, strategies = cases_of(run), strategies_of(run)
+    board = leaderboard(run)
+    listed = [_case(run, case, exhibits) for case in cases]
+    details, left_out = _details(run, cases, strategies, exhibits)
+    drawn = getattr(exhibits, "notes", ()) if exhibits is not None else ()
+    return {
+        "version": VERSION,
+        "run": plain(run.meta.get("run", "")),
+        "header": [list(item) for item in header(run)],
+        "notes": [*notes_of(run), *(plain(note) for note in drawn), *left_out],
+        "blocks": list(BLOCKS),
+        "offset_percent": OFFSET_PERCENT,
+        "score_of_failure": SCORE_OF_FAILURE,
+        "seeds": seeds_of(run),
+        "scenarios": list(dict.fromkeys(_scenario(case) for case in cases)),
+        "strategies": _strategies(run, board.to_dict("records")),
+        "cases": listed,
+        "results": [
+            _result(found, cases.index(found.case), strategies.index(found.strategy))
+            for found in run.results
+        ],
+        "board": [
+            {str(key): clean(value) for key, value in row.items()}
+            for row in board.to_dict("records")
+        ],
+        "statistics": _statistics(statistics(run, board)),
+        "details": details,
+        "papers": papers_of(run),
+    }
+
+
+def _scenario(case: str) -> str:
+    return case.partition("/")[0]
+
+
+def _strategies(run: Run, board: Iterable[Mapping[Any, Any]]) -> list[dict[str, Any]]:
+    """Return the strategies with what they cite, their version and how many unknowns they had."""
+    citations = run.meta.get("citations") or {}
+    counts = {row["strategy"]: row["parameters"] for row in board}
+    versions: dict[str, str] = {}
+    for result in run.results:
+        version = result.provenance.get("strategy")
+        if version is not None:
+            versions.setdefault(result.strategy, plain(version))
+    return [
+        {
+            "name": name,
+            "citation": citations.get(name, ""),
+            "version": versions.get(name, ""),
+            "parameters": clean(counts.get(name)),
+        }
+        for name in strategies_of(run)
+    ]
+
+
+def _case(run: Run, case: str, exhibits: Exhibits | None) -> dict[str, Any]:
+    about = (run.meta.get("cases") or {}).get(case) or {}
+    digest = about.get("digest")
+    stage = exhibits.stage(digest) if exhibits is not None and isinstance(digest, str) else None
+    reference = (run.meta.get("reference") or {}).get(case) or {}
+    measured = [
+        {"mode": mode.number, "block": block, "hz": rounded(mode.measured_hz, 7)}
+        for block, mode in measured_modes(run, case)
+    ]
+    return {
+        "name": case,
+        "scenario": _scenario(case),
+        "title": about.get("title") or "",
+        "reference": {name: reference[name] for name in BLOCKS if name in reference},
+        "stage": plain_data(stage),
+        "tables": {"measured": measured},
+    }
+
+
+def _result(result: JobResult, case: int, strategy: int) -> dict[str, Any]:
+    blocks = [result.blocks.get(name) for name in BLOCKS]
+    lost = (result.rigid_body_modes_expected or 0) - (result.rigid_body_modes or 0)
+    return {
+        "c": case,
+        "s": strategy,
+        "seed": result.seed,
+        "status": result.status,
+        "reason": _short(plain(result.reason)),
+        "score": clean(result.score),
+        "rms": [None if block is None else clean(block.rms_percent) for block in blocks],
+        "seconds": rounded(result.seconds, 4),
+        "parameters": result.parameter_count,
+        "evaluations": result.evaluations,
+        "lost": max(lost, 0) if result.status == "ok" else 0,
+        "negative": result.negative_eigenvalues or 0,
+        "unphysical": result.unphysical,
+        "mac": [None if block is None else rounded(block.mean_mac, 5) for block in blocks],
+    }
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _LONGEST_REASON else f"{text[: _LONGEST_REASON - 1]}…"
+
+
+def _statistics(found: Statistics) -> dict[str, Any]:
+    friedman = found.friedman
+    return {
+        "friedman": None
+        if friedman is None
+        else {
+            "chi2": rounded(friedman.chi2, 6),
+            "p": rounded(friedman.p, 4),
+            "cases": friedman.cases,
+            "strategies": friedman.strategies,
+        },
+        "pairs": [[i, j, rounded(p, 4)] for i, j, p in found.pairs],
+        "groups": [list(group) for group in found.groups],
+        "note": found.note,
+    }
+
+
+def _details(
+    run: Run, cases: list[str], strategies: list[str], exhibits: Exhibits | None
+) -> tuple[dict[str, Any], list[str]]:
+    """Return the details of the first seed's results, the best ones first, and what is missing."""
+    seed, room = first_seed(run), MOST_DETAILS
+    shown = [result for result in run.results if result.seed == seed and result.status == "ok"]
+    found: dict[str, Any] = {}
+    undrawn = full = 0
+    for result in sorted(shown, key=lambda result: result.rank or 0):
+        exhibit = exhibits.of(result.key) if exhibits is not None and result.key else None
+        entry = {**_detail(result), "exhibit": plain_data(exhibit)}
+        size = len(json.dumps(entry))
+        if size > room and exhibit is not None:
+            entry["exhibit"] = exhibit = None
+            size = len(json.dumps(entry))
+        if size > room:
+            full += 1
+            continue
+        undrawn += exhibit is None
+        room -= size
+        found[f"{cases.index(result.case)}:{strategies.index(result.strategy)}"] = entry
+    notes = []
+    if undrawn and undrawn == len(shown):
+        notes.append("no shapes, receptances and element changes to draw come with these results")
+    elif undrawn:
+        notes.append(
+            f"{undrawn} of {len(shown)} models of seed {seed} have no shapes, receptances and "
+            "changes to draw: they are not in the store, or there was no room for them"
+        )
+    if full:
+        notes.append(
+            f"{full} of {len(shown)} models of seed {seed} are without modes, history and "
+            "parameters, to keep the page small; those with the best scores have them"
+        )
+    return found, notes
+
+
+def _detail(result: JobResult) -> dict[str, Any]:
+    return {
+        "modes": [
+            {
+                "mode": mode.number,
+                "block": name,
+                "modification": mode.modification,
+                "measured_hz": rounded(mode.measured_hz, 7),
+                "predicted_hz": rounded(mode.predicted_hz, 7),
+                "mac": rounded(mode.mac, 5),
+            }
+            for name, block in result.blocks.items()
+            for mode in block.modes
+        ],
+        "history": [_numbers(step) for step in result.history],
+        "parameters": [_parameter(item) for item in result.parameters],
+        "diagnostics": _numbers(result.diagnostics),
+    }
+
+
+def _numbers(named: Mapping[str, float]) -> dict[str, Any]:
+    return {name: rounded(value, 5) for name, value in named.items()}
+
+
+def _parameter(item: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "name": plain(item.get("name", "")),
+        **{name: rounded(item.get(name), 6) for name in ("before", "after", "std")},
+        "unit": plain(item.get("unit") or ""),
+    }

@@ -1,0 +1,264 @@
+"""`bench compare`: ratios, evidence, thresholds, exit codes, and what a name cannot do."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+from femubench.core.cli.main import bench
+from femubench.core.errors import InputError
+from femubench.core.harness.compare_runs import compare_runs
+from femubench.core.harness.comparison import METRICS, Threshold
+from femubench.core.harness.evidence import evidence_of
+from femubench.core.harness.runner import run_jobs
+from femubench.core.harness.serial import run_from_json, run_to_json
+from femubench.core.harness.store import Store
+from femubench.reports.compare_page import comparison_html, comparison_markdown, comparison_text
+
+sys.path.insert(0, str(Path(__file__).parent / "toys"))
+import harness_toys as toys
+from run_edits import called, failed, moved, renamed, scaled
+
+Data = dict[str, Any]
+HOSTILE = "<script>alert(1)</script>\x1b[2J|`x`"
+
+
+@pytest.fixture(scope="module")
+def data() -> Data:
+    cases = [toys.tiny_case(), toys.tiny_case("other/corner", 80.0e9)]
+    run = run_jobs(cases, [toys.Unchanged(), toys.Softer()], jobs=2)
+    made: Data = json.loads(json.dumps(run_to_json(run)))
+    assert {result["status"] for result in made["results"]} == {"ok"}
+    return made
+
+
+def compared(a: Data, b: Data, **options: Any) -> Data:
+    return json.loads(  # type: ignore[no-any-return]
+        json.dumps(compare_runs(run_from_json(a), run_from_json(b), **options).to_json())
+    )
+
+
+def row(found: Data, strategy: str, scenario: str | None = None) -> Data:
+    rows = [r for r in found["rows"] if (r["strategy"], r["scenario"]) == (strategy, scenario)]
+    assert len(rows) == 1
+    return dict(rows[0]["values"])
+
+
+def called_with(tmp_path: Path, a: Data, b: Data, *options: str) -> Result:
+    for name, run in (("a.json", a), ("b.json", b)):
+        (tmp_path / name).write_text(json.dumps(run))
+    files = [str(tmp_path / "a.json"), str(tmp_path / "b.json")]
+    return CliRunner().invoke(bench, ["compare", *files, *options])
+
+
+def test_a_run_is_no_worse_than_itself(data: Data, tmp_path: Path) -> None:
+    found = compared(data, data)
+    assert not found["worse"]
+    assert found["jobs"] == 4
+    for strategy in ("unchanged", "softer"):
+        values = row(found, strategy)
+        assert [values[name] for name in METRICS] == [1.0] * 5 + [0.0]
+    assert {item["verdict"] for item in found["evidence"]} == {"same"}
+    answer = called_with(tmp_path, data, data)
+    assert answer.exit_code == 0
+    assert "B is not worse than A" in " ".join(answer.output.split())
+    assert "nothing differs" in answer.output
+
+
+def test_ratios_by_block_and_scenario_are_those_of_the_errors(data: Data) -> None:
+    worse = scaled(data, "softer", 1.5)
+    found = compared(data, worse)
+    for scenario, case in (("corner", "corner"), ("other", "other/corner")):
+        old = next(r for r in data["results"] if (r["strategy"], r["case"]) == ("softer", case))
+        values = row(found, "softer", scenario)
+        ratios = []
+        for block in ("used", "higher", "modified"):
+            rms = old[block]["rms_percent"]
+            ratios.append((1.5 * rms + 0.05) / (rms + 0.05))
+            assert values[block] == pytest.approx(ratios[-1], rel=1e-12)
+        assert values["skill"] == pytest.approx(math.prod(ratios) ** (1 / 3), rel=1e-12)
+    assert row(found, "unchanged")["skill"] == 1.0
+    assert found["worse"]
+    assert {item["strategy"] for item in found["excesses"]} == {"softer"}
+    assert {item["scenario"] for item in found["excesses"]} == {None, "corner", "other"}
+
+
+def test_evidence_needs_six_pairs_that_differ() -> None:
+    few, many, mixed = [1.1] * 5, [1.1, 1.2, 1.3, 1.05, 1.15, 1.4, 1.01, 1.2], [0.5, 2.0] * 5
+    found = {item.strategy: item for item in evidence_of({"few": few, "many": many})}
+    assert (found["few"].verdict, found["few"].p, found["few"].low) == ("too few pairs", None, None)
+    assert found["many"].verdict == "worse"
+    assert found["many"].p == pytest.approx(2 / 2**8)
+    low, high, ratio = found["many"].low, found["many"].high, found["many"].ratio
+    assert low is not None
+    assert high is not None
+    assert ratio is not None
+    assert 1.0 < low < ratio < high
+    better = evidence_of({"many": [1.0 / value for value in many], "mixed": mixed, "none": []})
+    assert [item.verdict for item in better] == ["better", "no difference shown", "too few pairs"]
+    # Holm: the smallest of two p is doubled.
+    assert better[0].p == pytest.approx(4 / 2**8)
+    # What two machines round differently is no difference.
+    assert evidence_of({"a": [1.0 + 1e-9 * k for k in range(1, 20)]})[0].verdict == "same"
+
+
+def test_what_ended_otherwise_comes_first(data: Data, tmp_path: Path) -> None:
+    broken = failed(data, "softer")
+    found = compared(data, broken)
+    assert [(c["kind"], c["before"], c["after"]) for c in found["changes"]] == [
+        ("lost", "ok", "failed")
+    ] * 2
+    assert row(found, "softer")["failures"] == 2.0
+    assert row(found, "softer")["used"] is None
+    assert row(found, "softer")["skill"] > 10.0
+    text = called_with(tmp_path, data, broken)
+    assert text.exit_code == 1
+    assert text.output.index("Ended otherwise") < text.output.index("strategy  ")
+    mended = compared(broken, data)
+    assert {c["kind"] for c in mended["changes"]} == {"gained"}
+    assert not mended["worse"]
+    # A failure whose reference is not known is one nevertheless.
+    bare = [{**run, "meta": {**run["meta"], "reference": {}}} for run in (data, broken)]
+    assert row(compared(*bare), "softer")["failures"] == 2.0
+
+
+def test_a_model_that_became_unphysical_is_a_lost_result(data: Data) -> None:
+    after = json.loads(json.dumps(data))
+    for result in after["results"]:
+        if result["strategy"] == "softer":
+            result["negative_eigenvalues"] = 2
+    found = compared(data, after)
+    assert {(c["kind"], c["after"]) for c in found["changes"]} == {("lost", "unphysical")}
+    assert "2 eigenvalues < 0" in found["changes"][0]["reason"]
+    assert found["worse"]
+
+
+def test_only_jobs_of_both_are_compared(data: Data) -> None:
+    less = json.loads(json.dumps(data))
+    less["results"] = [r for r in less["results"] if r["case"] == "corner"]
+    found = compared(data, less)
+    assert found["jobs"] == 2
+    assert {job["case"] for job in found["only_before"]} == {"other/corner"}
+    assert found["only_after"] == []
+    assert {job["case"] for job in compared(less, data)["only_after"]} == {"other/corner"}
+    changed = moved(data, "corner", "4567")
+    found = compared(data, changed)
+    assert {job["case"] for job in found["other_cases"]} == {"corner"}
+    assert found["jobs"] == 2
+    assert any(line.startswith("case corner: 0123 then") for line in found["environment"])
+    with pytest.raises(InputError, match="no job in common"):
+        compared(less, changed)
+
+
+@pytest.mark.parametrize(
+    ("options", "code"),
+    [
+        ([], 1),
+        (["--fail", "skill>1.6"], 0),
+        (["--fail", "skill>1.6", "--fail", " used > 1.2 "], 1),
+        (["--fail", "higher>1.2"], 1),
+        (["--fail", "modified>1.2"], 1),
+        (["--fail", "failures>0"], 0),
+        (["--fail", "seconds>0.9"], 1),
+        (["--fail", "seconds>1"], 0),
+        (["-s", "unchanged"], 0),
+        (["-s", "softer"], 1),
+    ],
+)
+def test_thresholds_decide_the_exit_code(
+    data: Data, tmp_path: Path, options: list[str], code: int
+) -> None:
+    answer = called_with(tmp_path, data, scaled(data, "softer", 1.5), *options, "-q")
+    assert (answer.exit_code, answer.output) == (code, "")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--fail", "rank>1"], "'rank>1' is no threshold"),
+        (["--fail", "skill<1"], "METRIC>NUMBER"),
+        (["--fail", "skill>1e999"], "METRIC>NUMBER"),
+        (["--fail", "skill>1e"], "METRIC>NUMBER"),
+        (["-s", "softr"], "no strategy 'softr'; did you mean 'softer'"),
+        (["-f", "pdf"], "'pdf'"),
+    ],
+)
+def test_wrong_options(data: Data, tmp_path: Path, options: list[str], message: str) -> None:
+    answer = called_with(tmp_path, data, data, *options)
+    assert answer.exit_code == 2
+    assert message.lower() in answer.stderr.lower()
+
+
+def test_wrong_files(data: Data, tmp_path: Path) -> None:
+    worse = json.loads(json.dumps(data))
+    worse["results"][1]["seconds"] = -1
+    answer = called_with(tmp_path, data, worse)
+    assert answer.exit_code == 2
+    assert "b.json: results[1].seconds" in answer.stderr
+    missing = CliRunner().invoke(bench, ["compare", "a", "b", "--store", str(tmp_path / "no")])
+    assert missing.exit_code == 2
+    strange = json.loads(json.dumps(data))
+    strange["meta"] |= {"versions": [1], "machine": "mine"}
+    assert called_with(tmp_path, data, strange).exit_code == 0
+
+
+def test_runs_of_a_store_by_their_first_letters(tmp_path: Path) -> None:
+    store, case = Store(tmp_path / "store"), toys.tiny_case()
+    for _ in range(2):
+        run_jobs([case], [toys.Softer()], jobs=1, store=store)
+    a, b = store.runs()
+    options = ["--store", str(tmp_path / "store"), "--format", "json"]
+    answer = CliRunner().invoke(bench, ["compare", a, b, *options])
+    assert answer.exit_code == 0
+    found = json.loads(answer.output)
+    assert (found["schema"], found["before"], found["after"]) == (1, a, b)
+    assert found["evidence"][0]["verdict"] == "same"
+
+
+@pytest.mark.parametrize("form", ["terminal", "markdown", "html", "json"])
+def test_a_file_in_every_format(data: Data, tmp_path: Path, form: str) -> None:
+    path = tmp_path / "out"
+    answer = called_with(tmp_path, data, failed(data, "softer"), "-f", form, "-o", str(path))
+    assert answer.exit_code == 1
+    assert answer.output == f"{form}: {path}\n"
+    assert "softer" in path.read_text()
+    assert called_with(tmp_path, data, data, "-o", str(tmp_path / "no" / "x")).exit_code == 2
+
+
+def test_hostile_names_are_text(data: Data) -> None:
+    a = renamed(data, "softer", HOSTILE)
+    b = called(failed(a, HOSTILE), HOSTILE, cpu=HOSTILE)
+    b["results"][0]["reason"] = HOSTILE
+    found = compared(a, b)
+    html = comparison_html(found)
+    assert "<script" not in html
+    assert "&lt;script&gt;alert(1)" in html
+    assert 'http-equiv="Content-Security-Policy" content="default-src \'none\'' in html
+    assert "http" not in re.sub("http-equiv", "", html)
+    for text in (html, comparison_markdown(found), comparison_text(found)):
+        assert "\x1b" not in text
+    assert "<script" not in comparison_markdown(found)
+    tables = [line for line in comparison_markdown(found).splitlines() if line.startswith("| ")]
+    assert len({re.sub(r"\\\|", "", line).count("|") for line in tables}) <= 3
+
+
+def test_the_screen_is_80_columns_wide(data: Data) -> None:
+    long = renamed(scaled(data, "softer", 1.5), "softer", "strategy-with-a-long-name:option=1")
+    found = compared(renamed(data, "softer", "strategy-with-a-long-name:option=1"), long)
+    assert max(map(len, comparison_text(found).splitlines())) <= 80
+
+
+def test_a_threshold_that_nothing_is_held_against_is_told(data: Data) -> None:
+    bare = json.loads(json.dumps(data))
+    for result in bare["results"]:
+        result["higher"] = None
+    found = compared(bare, bare, thresholds=[Threshold("higher", 1.1)])
+    assert found["untested"] == ["higher"]
+    assert "nothing was held against" in comparison_text(found)

@@ -1,0 +1,284 @@
+"""The page of a diagnosis: what stands on it, in which order, and that nothing of the data runs."""
+
+from __future__ import annotations
+
+import re
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from femubench.core.cli.main import bench
+from femubench.core.diagnosis.result import Rival
+from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
+from femubench.core.diagnosis.sketch import Sketch, sketch_of
+from femubench.core.errors import InputError
+from femubench.reports.diagnosis_charts import Row, dots
+from femubench.reports.diagnosis_map import Spot, structure_map
+from femubench.reports.diagnosis_page import diagnosis_html
+from femubench.reports.diagnosis_words import odds, times
+
+sys.path.insert(0, str(Path(__file__).parent / "toys"))
+import diagnosis_toys as toys
+import harness_toys
+
+VERDICTS = ("named", "none", "unknown", "ambiguous", "not-confirmed")
+STRUCTURE: dict[str, Any] = {
+    "plane": "in-plane",
+    "joints": [
+        {"name": "J1", "type": "L", "xyz": [0.0, 0.0, 0.0]},
+        {"name": "J3", "type": "T", "xyz": [1.0, 0.0, 0.5]},
+    ],
+    "members": [{"name": "beam", "ends": [0, 1], "elements": 4}],
+    "sensors": [{"label": "p2", "xyz": [0.5, 0.0, 0.25], "direction": "-z"}],
+    "supports": [{"xyz": [0.0, 0.0, 0.0], "fixed": ["x", "z"]}],
+    "places": [
+        {"place": "type:T", "kind": "joint", "spans": [], "points": [[1.0, 0.0, 0.5]]},
+        {"place": "all", "kind": "all", "spans": [], "points": []},
+        {
+            "place": "beam@J1",
+            "kind": "end",
+            "spans": [{"member": 0, "start": 0.0, "end": 0.125}],
+            "points": [],
+        },
+    ],
+}
+
+
+class Page(HTMLParser):
+    """Tags with their attributes, ids and the text of a page, styles and scripts left out."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.ids: list[str] = []
+        self.words: list[str] = []
+        self._open = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self._open = tag
+        self.words.append(" " if tag == "td" else "")
+        self.tags.append((tag, dict(attrs)))
+        self.ids += [value for name, value in attrs if name == "id" and value]
+
+    def handle_data(self, data: str) -> None:
+        if self._open not in ("style", "script"):
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return " ".join("".join(self.words).split())
+
+
+def data_of(verdict: Any = "named", **changes: Any) -> dict[str, Any]:
+    data = diagnosis_to_json(toys.made(verdict, **changes))
+    return diagnosis_from_json({**data, "structure": STRUCTURE})
+
+
+def page_of(data: dict[str, Any]) -> Page:
+    return Page(diagnosis_html(data))
+
+
+class TestPage:
+    def test_the_sentence_is_the_heading(self) -> None:
+        text = diagnosis_html(data_of())
+        assert text.startswith("<!DOCTYPE html>")
+        assert "<h1>The T joints rotate, 94.2\N{NO-BREAK SPACE}% sure.</h1>" in text
+        assert text.index("<h1>") < text.index("<h2")
+
+    def test_order_and_content(self) -> None:
+        text = page_of(data_of()).text
+        parts = [
+            "named: one explanation stands alone",
+            "What it gains",
+            "used modes before 4.25 % after 0.125 % 34 times smaller",
+            "held-out modes before 3.4 % after 0.75 %",
+            "How well it fits",
+            "+12.3 → -0.2",
+            "9201 before, 55.25 after, 61 data. What is left is noise: noise alone leaves as much "
+            "with probability 61.4 %",
+            "Where it is",
+            "J1 1.00",
+            "What is missing",
+            "joint rotation at type:T 94.2 %",
+            "bending 31000 ± 1200 N m/rad",
+            "weigh the structure 140 σ² odds over a million to 1",
+            "joint offset at type:T 3.1 % 812.5 10.4",
+            "torsion constant everywhere + added mass at J3",
+            "added mass J3 0.0123 kg",
+            "ecomac",
+            "Mended (torsion-constant): mode 1 -3.2 %.",
+            "Mode 9 found no partner.",
+        ]
+        found = [text.find(part) for part in parts]
+        assert -1 not in found, parts[found.index(-1)]
+        assert found == sorted(found)
+
+    @pytest.mark.parametrize("verdict", VERDICTS)
+    def test_every_verdict(self, verdict: str) -> None:
+        page = page_of(data_of(verdict))
+        assert f"{verdict}: " in page.text
+        assert len(page.ids) == len(set(page.ids))
+        assert ("not a finding" in page.text) == (verdict in ("unknown", "not-confirmed"))
+        assert ("What is missing" in page.text) == (verdict == "named")
+        assert ("No place stands out" in page.text) == (verdict == "none")
+
+    def test_nothing_is_fetched(self) -> None:
+        text = diagnosis_html(data_of())
+        assert "default-src 'none'" in text
+        assert not re.search(r"https?:|url\(|@import|innerHTML|\bsrc=", text)
+        assert all(name != "link" for name, _ in Page(text).tags)
+
+    def test_hostile_names(self) -> None:
+        joints = [{**joint, "name": toys.NASTY} for joint in STRUCTURE["joints"]]
+        sensors = [{**STRUCTURE["sensors"][0], "label": toys.NASTY, "direction": toys.NASTY}]
+        changes = {"joints": joints, "sensors": sensors}
+        data = diagnosis_to_json(toys.nasty())
+        data = diagnosis_from_json({**data, "structure": {**STRUCTURE, **changes}})
+        text = diagnosis_html(data)
+        page = Page(text)
+        assert [name for name, _ in page.tags].count("script") == 1
+        assert "<script>alert" not in text
+        assert not any(key.startswith("on") for _, attributes in page.tags for key in attributes)
+        assert not {"\x1b", "\u202e", "\x07"} & set(text)
+        assert "alert(1)" in page.text
+        assert "nan" not in re.sub(r"<style>.*?</style>", "", text, flags=re.DOTALL).lower()
+
+    def test_without_geometry(self) -> None:
+        """Files of earlier versions hold none."""
+        data = diagnosis_to_json(toys.made())
+        data.pop("structure")
+        text = page_of(diagnosis_from_json(data)).text
+        assert "no drawing" in text
+        assert "J1 1.00" in text
+
+    def test_nothing_to_tell(self) -> None:
+        names = ("rivals", "advice", "smallest_visible", "residuals", "looks", "locations", "notes")
+        text = page_of(data_of("none", **dict.fromkeys(names, ()))).text
+        for heading in ("Rivals", "next", "smallest that", "plain look", "Classical", "Notes"):
+            assert heading not in text
+
+    def test_numbers_that_are_missing(self) -> None:
+        data = data_of()
+        data["gain"]["used_percent"] = [None, 1.0]
+        data |= {"adequacy_p": None, "nothing": None, "seconds": None, "chi2": [None, None]}
+        for row in (*data["rivals"], *data["locations"], *data["causes"], *data["advice"]):
+            for key in ("probability", "value", "separation", "delta_chi2", "angle"):
+                if key in row:
+                    row[key] = None
+        assert "None" not in page_of(data).text
+
+    def test_tables_can_be_sorted_by_number(self) -> None:
+        rivals = (Rival("a", "all", 1e5, 0.5, 3.0), Rival("b", "J1", 9.0, 0.25))
+        text = diagnosis_html(data_of(rivals=rivals))
+        assert 'data-value="100000.0"' in text
+        assert 'data-value="0.25"' in text
+
+
+class TestDrawings:
+    def test_dots_lie_in_the_band_or_out_of_it(self) -> None:
+        rows = [Row("1", -1.9, 0.0), Row("2", 2.1, 400.0), Row("3", None, None)]
+        svg = str(dots(rows, one_sided=False, name="Residuals", anchor="a"))
+        left, wide = (
+            float(v) for v in re.findall(r'<rect x="([\d.]+)".*?width="([\d.]+)"', svg)[0]
+        )
+        first, second = (float(v) for v in re.findall(r'<circle cx="([\d.]+)"', svg))
+        assert left < first < left + wide < second
+        assert svg.count("<polygon") == 2
+        assert "– → –" in svg
+
+    def test_dots_of_any_size(self) -> None:
+        svg = str(dots([Row("1", 1e300, -1e300)], one_sided=False, name="r", anchor="a"))
+        assert all(abs(float(v)) < 1e4 for v in re.findall(r'x[12]="([^"]+)"', svg))
+
+    @pytest.mark.parametrize("plane", ["in-plane", "out-of-plane", "3d", "matrices"])
+    def test_places_are_found(self, plane: str) -> None:
+        words = ("all", "type:T", "beam@J1", "beam/2", "beam", "J1", "p2", "nowhere", "beam/9")
+        spots = [Spot(word, 0.5, "1") for word in words]
+        drawn = structure_map(
+            {**STRUCTURE, "plane": plane}, spots, name="Map", says="All.", anchor="m"
+        )
+        groups = re.findall(r'<g data-at="(\d)">(.*?)</g>', str(drawn))
+        shown = {words[int(at)] for at, inner in groups if 'class="spot' in inner}
+        assert shown == set(words) - {"all", "nowhere", "beam/9"}
+        assert 'class="everywhere"' in str(drawn)
+
+    @pytest.mark.parametrize("xyz", [[0.0, 0.0, 0.0], [1e308, -1e308, 1e308]])
+    def test_no_extent_no_drawing(self, xyz: list[float]) -> None:
+        joints = [{"name": "a", "type": "", "xyz": xyz}] * 2
+        joints += [{"name": "b", "type": "", "xyz": [-v for v in xyz]}]
+        bare = {**STRUCTURE, "joints": joints, "sensors": []}
+        assert structure_map(bare, [], name="Map", says="", anchor="m") is None
+
+
+class TestSketch:
+    def test_places_of_a_case(self) -> None:
+        case = harness_toys.tiny_case()
+        frame = case.model.frame_structure.frame
+        member, joint = frame.members[0], frame.joints[0]
+        words = ["all", joint.name, member.name, f"{member.name}/1", f"{member.name}@0.25:z"]
+        rivals = tuple(Rival("a", word, 1.0, 0.1) for word in [*words, "no such place"])
+        sketch = sketch_of(case, toys.made("none", rivals=rivals))
+        assert isinstance(sketch, Sketch)
+        kinds = {place.place: place.kind for place in sketch.places}
+        assert [kinds[word] for word in words] == ["all", "joint", "member", "element", "point"]
+        assert kinds["no such place"] == "elsewhere"
+        data = diagnosis_to_json(toys.made("none", rivals=rivals), case=case)
+        assert diagnosis_from_json(data) == data
+        assert [m["name"] for m in data["structure"]["members"]] == [m.name for m in frame.members]
+
+    @pytest.mark.parametrize(
+        ("change", "key"),
+        [
+            ({"members": [{"name": "m", "ends": [0, 2], "elements": 1}]}, "structure"),
+            ({"members": []}, "structure"),
+            ({"plane": "flat"}, "structure.plane"),
+            ({"joints": [{"name": "a", "xyz": [0.0, 1.0]}]}, "structure.joints[0].xyz"),
+        ],
+    )
+    def test_what_is_wrong_is_named(self, change: dict[str, Any], key: str) -> None:
+        data = diagnosis_to_json(toys.made())
+        with pytest.raises(InputError) as caught:
+            diagnosis_from_json({**data, "structure": {**STRUCTURE, **change}})
+        assert caught.value.key == key
+
+
+class TestCommand:
+    def test_writes_page_and_markdown(self, tmp_path: Path) -> None:
+        for name, start in (("a.html", "<!DOCTYPE html>"), ("a.MD", "# Diagnosis of frame")):
+            file = tmp_path / name
+            words = ["diagnose", "frame", "--no-pairs", "-q", "--report", str(file)]
+            words += ["--effects", "shear-deformation,joint-rotation"]
+            done = CliRunner().invoke(bench, words)
+            assert (done.exit_code, done.stdout) == (0, "")
+            assert file.read_text(encoding="utf-8").startswith(start)
+
+    def test_a_suffix_that_says_nothing(self, tmp_path: Path) -> None:
+        words = ["diagnose", "frame", "--report", str(tmp_path / "a.pdf")]
+        done = CliRunner().invoke(bench, words)
+        assert done.exit_code == 2
+        assert ".html or .md" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("pair", "text"),
+    [
+        ((4.0, 2.0), "2 times smaller"),
+        ((2.0, 4.0), "2 times larger"),
+        ((1.0, 1.01), "about the same"),
+        ((None, 1.0), ""),
+        ((0.0, 1.0), ""),
+    ],
+)
+def test_times(pair: tuple[float | None, float | None], text: str) -> None:
+    assert times(*pair) == text
+
+
+def test_odds() -> None:
+    assert odds(10.0) == "150 to 1"
+    assert odds(1e300) == "over a million to 1"
+    assert odds(None) == "–"

@@ -1,0 +1,188 @@
+"""What is kept of a result for drawing: does it show what the model does?"""
+
+from __future__ import annotations
+
+import base64
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from femubench.core.case.case import Case
+from femubench.core.case.reader import read_case
+from femubench.core.exhibits import stage
+from femubench.core.exhibits.element_change import relative_changes
+from femubench.core.exhibits.exhibit import exhibit_of, frequency_axis, measured_receptances
+from femubench.core.exhibits.shelf import FOLDER, Exhibits
+from femubench.core.exhibits.stage import stage_of
+from femubench.core.harness.scoring import score_model
+from femubench.core.modal.eigen import solve_modes
+from femubench.core.plugin.loader import load_plugins
+from femubench.core.strategy import UpdateResult
+from femubench.scenarios import HERE
+
+STRATEGIES = load_plugins().strategies
+KEY = "0123456789abcdef"
+
+
+@pytest.fixture(scope="module")
+def cases() -> dict[str, Case]:
+    return {name: read_case(HERE / name) for name in ("frame", "hframe", "frame-solid")}
+
+
+def updated(case: Case, strategy: str) -> UpdateResult:
+    data = case.used_measurement(0)
+    return STRATEGIES[strategy].update(case.model, data, np.random.default_rng(0))
+
+
+def shown(case: Case, strategy: str) -> dict[str, Any]:
+    result = updated(case, strategy)
+    found = exhibit_of(case, result.model, [asdict(item) for item in result.parameters])
+    assert found is not None
+    return found
+
+
+def peaks(hz: list[float], level: list[float]) -> list[float]:
+    inner = range(1, len(level) - 1)
+    return [hz[i] for i in inner if level[i - 1] < level[i] > level[i + 1]]
+
+
+def test_a_stage_is_the_structure_and_what_was_measured(cases: dict[str, Case]) -> None:
+    found = stage_of(cases["hframe"])
+    assert found is not None
+    assert (found["plane"], len(found["nodes"]), len(found["elements"])) == ("in-plane", 65, 64)
+    assert [joint["type"] for joint in found["joints"]].count("T") == 2
+    assert sum(mass["kg"] for mass in found["masses"]) == pytest.approx(0.1024)
+    assert [mode["block"] for mode in found["measured"]] == ["used"] * 5 + ["higher"] * 2
+    assert all(
+        max(abs(x) for x in mode["shape"] if x is not None) == 1.0 for mode in found["measured"]
+    )
+    assert found["drive"] in {sensor["label"] for sensor in found["sensors"]}
+    for i, j in found["elements"]:
+        assert np.linalg.norm(np.subtract(found["nodes"][i], found["nodes"][j])) < 0.06
+
+
+def test_a_factor_on_elements_is_the_change_of_these_elements(cases: dict[str, Case]) -> None:
+    case = cases["hframe"]
+    result = updated(case, "global")
+    (factor,) = (item.after for item in result.parameters)
+    found = relative_changes(case.model, result.model, ())
+    assert found is not None
+    # EI changes, EA does not: the change is less than that of the factor.
+    assert 0.0 < max(x for x in found if x is not None) <= abs(factor - 1.0) + 1e-12
+    still = relative_changes(case.model, updated(case, "unchanged").model, ())
+    assert still == [0.0] * 64
+
+
+def test_elements_of_families_are_recovered_from_the_parameters(cases: dict[str, Case]) -> None:
+    from femubench.core.fem.beam import stiffness_matrices
+
+    case = cases["frame"]
+    result = updated(case, "physical")
+    found = relative_changes(case.model, result.model, [asdict(item) for item in result.parameters])
+    assert found is not None
+    ratios = {item.name: item.after / item.before for item in result.parameters}
+    structure = case.model.frame_structure
+    for label, value in zip(structure.labels, found, strict=True):
+        changes = sorted(abs(ratios[f"{key} {label}"] - 1.0) for key in ("EI", "GJ"))
+        assert value is not None
+        assert changes[0] - 1e-4 <= value <= changes[1] + 1e-4
+    assert len(stiffness_matrices(structure.properties)) == len(found)
+
+
+def test_matrix_methods_have_a_difference_instead(cases: dict[str, Case]) -> None:
+    found = shown(cases["frame"], "baruch")
+    assert found["elements"] is None
+    picture = found["difference"]
+    levels = np.frombuffer(base64.b64decode(picture["values"]), np.uint8)
+    levels = levels.reshape(picture["size"], picture["size"])
+    assert levels.max() == 255
+    assert np.array_equal(levels, levels.T)
+    assert picture["highest"] - picture["lowest"] == pytest.approx(4.0)
+    assert np.mean(levels > 0) > 0.9  # spread all over, as the paper says
+    assert shown(cases["frame"], "unchanged")["difference"] is None
+
+
+def test_modes_mac_and_receptances_are_those_of_the_model(cases: dict[str, Case]) -> None:
+    case = cases["frame-solid"]
+    result = updated(case, "generic-ls")
+    found = exhibit_of(case, result.model)
+    assert found is not None
+    frequencies = solve_modes(result.model).elastic.natural_frequencies
+    hz = [mode["hz"] for mode in found["modes"]]
+    assert np.allclose(hz, frequencies[: len(hz)])
+    blocks = score_model(case, result.model)
+    for pair in (*blocks["used"].modes, *blocks["higher"].modes):
+        partner = next(mode for mode in found["modes"] if mode["paired"] == pair.number)
+        assert partner["hz"] == pytest.approx(pair.predicted_hz)
+        row = found["mac"]["values"][found["mac"]["rows"].index(pair.number)]
+        assert row[hz.index(partner["hz"])] == pytest.approx(pair.mac, abs=1e-3)
+    assert all(np.abs(mode["shape"]).max() == pytest.approx(1.0) for mode in found["modes"])
+    axis = frequency_axis(case).tolist()
+    step = axis[1] - axis[0]
+    tops = peaks(axis, found["receptance"][""])
+    assert min(abs(top - hz[0]) for top in tops) <= step
+    assert set(found["receptance"]) == {"", "mass and spring at 6"}
+
+
+def test_the_measured_receptance_peaks_at_the_measured_frequencies(
+    cases: dict[str, Case],
+) -> None:
+    case = cases["frame"]
+    found = measured_receptances(case)
+    step = found["hz"][1] - found["hz"][0]
+    tops = peaks(found["hz"], found["measured"][""])
+    for frequency in case.measurement.frequencies[:3]:
+        assert min(abs(top - frequency) for top in tops) <= step
+    assert "nominal model" in found["note"]
+
+
+def test_what_is_too_large_is_not_drawn(
+    cases: dict[str, Case], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stage, "MOST_NODES", 10)
+    assert stage_of(cases["frame"]) is None
+
+
+class TestShelf:
+    def test_what_is_put_is_found(self, cases: dict[str, Case], tmp_path: Path) -> None:
+        exhibits = Exhibits(tmp_path)
+        put = {
+            **(stage_of(cases["frame"]) or {}),
+            "receptance": measured_receptances(cases["frame"]),
+            "nominal": None,
+        }
+        exhibits.put_stage(KEY * 4, put)
+        exhibits.put(KEY, shown(cases["frame"], "baruch"))
+        again = Exhibits(tmp_path)
+        assert again.stage(KEY * 4) == json.loads(json.dumps(put))
+        found = again.of(KEY)
+        assert found is not None
+        assert found["modes"] == json.loads(json.dumps(shown(cases["frame"], "baruch")["modes"]))
+        assert again.notes == []
+        assert again.of("f" * 16) is None
+
+    @pytest.mark.parametrize(
+        "text", ["", "{", "[]", '{"modes": 3}', '{"modes": [], "mac": {"rows": ["x"]}}', "\0"]
+    )
+    def test_what_is_broken_is_left_out_and_told(self, text: str, tmp_path: Path) -> None:
+        (tmp_path / FOLDER).mkdir()
+        (tmp_path / FOLDER / f"{KEY}.json").write_text(text)
+        exhibits = Exhibits(tmp_path)
+        assert exhibits.of(KEY) is None
+        assert len(exhibits.notes) == 1
+        assert "\n" not in exhibits.notes[0]
+
+    @pytest.mark.parametrize("key", ["../../etc/passwd", "case-../x", "", "A" * 16, "a/b"])
+    def test_names_are_keys_and_nothing_else(self, key: str, tmp_path: Path) -> None:
+        exhibits = Exhibits(tmp_path / "store")
+        exhibits.put(key, {})
+        assert exhibits.of(key) is None
+        assert list(tmp_path.iterdir()) == []
+
+    def test_a_store_without_room_does_without(self, tmp_path: Path) -> None:
+        (tmp_path / "store").write_text("")
+        Exhibits(tmp_path / "store").put(KEY, {"modes": []})

@@ -1,0 +1,155 @@
+"""A run that nobody made: many strategies on many scenarios, to see how reports cope."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from femubench import Block, JobResult, PairedMode, Run, rank_results
+
+BLOCKS = ("used", "higher", "modified")
+MODES = {"used": (1, 2, 3), "higher": (4, 5), "modified": (1, 2)}
+CHANGE = "mass at 6"
+CASES_IN_A_SCENARIO = 2  # of every tenth scenario; the others have a case of their own
+
+
+def synthetic_run(
+    strategies: int = 200,
+    scenarios: int = 50,
+    seeds: int = 1,
+    *,
+    names: Sequence[str] = (),
+    failing: float = 0.03,
+    random_seed: int = 20260101,
+) -> Run:
+    """Return a run with scores and ranks; the same arguments give the same run.
+
+    Strategies get worse with their number, more or less. Some jobs fail, some do
+    not apply, some models are unphysical; `unchanged` is the last strategy.
+
+    Arguments:
+        strategies, scenarios, seeds: how many of each.
+        names: of the first strategies, instead of ``strategy-000`` and so on.
+        failing: share of the jobs without a model.
+        random_seed: of everything that is drawn.
+    """
+    random = np.random.default_rng(random_seed)
+    named = [*names, *(f"strategy-{n:03d}" for n in range(len(names), strategies - 1)), "unchanged"]
+    cases = case_names(scenarios)
+    reference = {case: _nominal(random, number) for number, case in enumerate(cases)}
+    skills = np.geomspace(0.05, 1.5, len(named))
+    drawn = tuple(range(1, seeds + 1)) if seeds > 1 else (0,)
+    results = [
+        _result(random, case, name, seed, reference[case], 1.0 if name == "unchanged" else skill)
+        if name == "unchanged" or random.random() >= failing
+        else _failure(random, case, name, seed)
+        for case in cases
+        for name, skill in zip(named, skills, strict=True)
+        for seed in drawn
+    ]
+    meta = {
+        "run": "20260101T000000Z-5e7e71",
+        "started": "2026-01-01T00:00:00+00:00",
+        "finished": "2026-01-01T01:00:00+00:00",
+        "seed": 0,
+        "seeds": list(drawn),
+        "jobs": 2,
+        "timeout": 600.0,
+        "versions": {"python": "3.11.0", "femubench": "0.1.0"},
+        "machine": {"platform": "Linux", "cpu": "none", "cpu_count": 2},
+        "cases": {
+            case: {"title": f"Structure {case}", "digest": f"{n:064d}"}
+            for n, case in enumerate(cases)
+        },
+        "strategies": named,
+        "citations": {name: f"A. Author (2001), {name}" for name in named},
+        "reference": reference,
+        "notes": [],
+    }
+    return Run(meta, rank_results(results, reference))
+
+
+def case_names(scenarios: int) -> list[str]:
+    """Return all cases: ``scenario-01``, or ``scenario-00/a`` and ``scenario-00/b``."""
+    return [
+        name
+        for number in range(scenarios)
+        for name in (
+            [f"scenario-{number:02d}/{part}" for part in "ab"[:CASES_IN_A_SCENARIO]]
+            if number % 10 == 0
+            else [f"scenario-{number:02d}"]
+        )
+    ]
+
+
+def _nominal(random: np.random.Generator, number: int) -> dict[str, float]:
+    """Return the errors of the nominal model; every fourth case has no design change."""
+    blocks = BLOCKS[:2] if number % 4 == 3 else BLOCKS
+    return {name: float(random.uniform(3.0, 12.0)) for name in blocks}
+
+
+def _result(
+    random: np.random.Generator,
+    case: str,
+    strategy: str,
+    seed: int,
+    nominal: dict[str, float],
+    skill: float,
+) -> JobResult:
+    still = strategy == "unchanged"
+    factor = 1.0 if still else skill * random.lognormal(0.0, 0.6)
+    negative = 0 if still else int(skill > 1.0 and random.random() < 0.1)
+    return JobResult(
+        case=case,
+        strategy=strategy,
+        seed=seed,
+        status="ok",
+        seconds=float(random.lognormal(-2.0, 1.0)),
+        blocks={name: _block(random, name, rms * factor) for name, rms in nominal.items()},
+        rigid_body_modes=3,
+        rigid_body_modes_expected=3,
+        negative_eigenvalues=negative,
+        parameter_count=0 if still else int(random.integers(1, 140)),
+        evaluations=1 if still else int(random.integers(1, 100)),
+        parameters=() if still else _parameters(random),
+        history=() if still else tuple({"residual": 0.5**n} for n in range(6)),
+        diagnostics={"converged": 1.0},
+    )
+
+
+def _block(random: np.random.Generator, name: str, percent: float) -> Block:
+    numbers = MODES[name]
+    shares = random.standard_normal(len(numbers))
+    errors = shares * percent / 100.0 / math.sqrt(float(np.mean(shares**2)))
+    change = CHANGE if name == "modified" else None
+    modes = tuple(
+        PairedMode(
+            n, 100.0 * n, 100.0 * n * (1.0 + float(e)), float(random.uniform(0.9, 1)), change
+        )
+        for n, e in zip(numbers, errors, strict=True)
+    )
+    macs = [mode.mac for mode in modes if mode.mac is not None]
+    return Block(percent, sum(macs) / len(macs), modes)
+
+
+def _parameters(random: np.random.Generator) -> tuple[dict[str, object], ...]:
+    return tuple(
+        {
+            "name": name,
+            "before": before,
+            "after": before * float(random.uniform(0.8, 1.2)),
+            "unit": "N m2",
+            "std": 0.01 * before,
+        }
+        for name, before in (("EI left", 1337.0), ("GJ left", 1005.0))
+    )
+
+
+def _failure(random: np.random.Generator, case: str, strategy: str, seed: int) -> JobResult:
+    failed = JobResult(case, strategy, seed, "failed", "stiffness: measured 3e-2, allowed 1e-8")
+    if random.random() < 0.5:
+        return replace(failed, status="not-applicable", reason="the model has no joints")
+    return failed
