@@ -114,7 +114,7 @@
     const width = canvas.clientWidth;
     const ratio = window.devicePixelRatio || 1;
     const labels = spec.labels.map((label) => clipped(String(label), 13));
-    const left = 16 + 6.8 * Math.max(...labels.map((label) => label.length));
+    const left = 16 + 7.2 * Math.max(...labels.map((label) => label.length));
     const top = 36;
     const right = 78;
     const side = Math.max(width - left - right, 40);

@@ -1,0 +1,133 @@
+"""Pages in a real browser: Debian's chromium, driven by playwright, which downloads nothing."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from femubench import Run
+from femubench.core.cli.main import bench
+from femubench.core.harness.serial import read_run
+
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+STRATEGIES = ("unchanged", "baruch", "generic-ls", "local", "nobari", "kabe")
+CASES = ("frame", "hframe", "frame-solid")
+WIDE, NARROW = (1440, 900), (390, 844)
+
+
+@dataclass(frozen=True)
+class Real:
+    """A real run: its results, and the pages that the command line makes of them.
+
+    Arguments:
+        run: the results as `bench run --json` wrote them.
+        json_file, page: that file, and the report.
+        store: with the exhibits.
+    """
+
+    run: Run
+    json_file: Path
+    page: Path
+    store: Path
+
+
+@dataclass
+class View:
+    """A page in the browser with everything that it said, asked for and showed by itself."""
+
+    page: Page
+    messages: list[str] = field(default_factory=list)
+    requests: list[str] = field(default_factory=list)
+    dialogs: list[str] = field(default_factory=list)
+
+    def assert_quiet(self, *files: Path) -> None:
+        """Nothing was said, nothing but the files was asked for, nothing popped up."""
+        assert self.messages == []
+        assert self.dialogs == []
+        own = {path.resolve().as_uri() for path in files}
+        asked = {url.partition("#")[0] for url in self.requests if not url.startswith("data:")}
+        assert asked == own
+
+
+def chromium() -> str:
+    """Return the path of the browser: of FEMUBENCH_CHROMIUM, or the first that is installed."""
+    found = os.environ.get("FEMUBENCH_CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), "")
+    if not found or not os.access(found, os.X_OK):
+        pytest.fail(
+            "the tests of the pages need a browser: apt install chromium, or name one in "
+            f"FEMUBENCH_CHROMIUM (looked for {found or ', '.join(NAMES)})",
+            pytrace=False,
+        )
+    return found
+
+
+def call(*arguments: object, code: int = 0) -> str:
+    """Call the command line; return what it printed."""
+    answer = CliRunner().invoke(bench, [str(argument) for argument in arguments])
+    assert answer.exit_code == code, answer.output
+    return answer.output
+
+
+@pytest.fixture(scope="session")
+def command() -> Callable[..., str]:
+    return call
+
+
+@pytest.fixture(scope="session")
+def real(tmp_path_factory: pytest.TempPathFactory) -> Real:
+    """Run some strategies, of which one fails and two are unphysical, and report."""
+    folder = tmp_path_factory.mktemp("real")
+    store, json_file = folder / "store", folder / "run.json"
+    wanted = [word for name in STRATEGIES for word in ("-s", name)]
+    call("run", *CASES, *wanted, "-q", "--store", store, "--json", json_file, code=1)
+    call("report", "-f", "html", "-o", folder, "--store", store)
+    (page,) = folder.glob("*.html")
+    return Real(read_run(json_file), json_file, page, store)
+
+
+# Not for the whole session: its event loop would be in the way of tests elsewhere.
+@pytest.fixture(scope="module")
+def browser(real: Real) -> Iterator[Browser]:
+    """Start the browser, after the run: its processes must not inherit the browser's pipes."""
+    path = chromium()
+    with sync_playwright() as driver:
+        started = driver.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield started
+        started.close()
+
+
+@pytest.fixture
+def view(browser: Browser) -> Iterator[Callable[..., View]]:
+    """Return what opens a file in a fresh window."""
+    windows = []
+
+    def opened(
+        file: Path, at: str = "", *, size: tuple[int, int] = WIDE, still: bool = True, **more: Any
+    ) -> View:
+        window = browser.new_context(
+            viewport={"width": size[0], "height": size[1]},
+            reduced_motion="reduce" if still else "no-preference",
+            **more,
+        )
+        windows.append(window)
+        window.set_default_timeout(10_000)
+        found = View(window.new_page())
+        page = found.page
+        page.on("console", lambda message: found.messages.append(message.text))
+        page.on("pageerror", lambda error: found.messages.append(str(error)))
+        page.on("request", lambda request: found.requests.append(request.url))
+        page.on("dialog", lambda dialog: (found.dialogs.append(dialog.message), dialog.dismiss()))
+        page.goto(file.resolve().as_uri() + at)
+        return found
+
+    yield opened
+    for window in windows:
+        window.close()

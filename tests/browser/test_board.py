@@ -1,0 +1,209 @@
+"""The leaderboard of a real run: opens from disk, sorts, filters, tells the run's figures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page
+
+from femubench import Run, leaderboard, rank_results
+
+BLOCKS = ("used", "higher", "modified")
+ROUNDED = {"seconds": 1e-3}  # figures that the page holds with fewer digits
+KEYS = (
+    *("rank", "skill", "skill_unseen", "used_percent", "higher_percent", "modified_percent"),
+    *("parameters", "seconds"),
+)
+
+
+@pytest.fixture
+def page(view: Callable[..., Any], real: Any) -> Iterator[Page]:
+    opened = view(real.page)
+    opened.page.wait_for_selector("html[data-ready=yes]")
+    yield opened.page
+    opened.assert_quiet(real.page)
+
+
+def part(
+    run: Run,
+    *,
+    cases: Collection[str] | None = None,
+    blocks: Collection[str] = BLOCKS,
+    strategies: Collection[str] | None = None,
+) -> Run:
+    """Return the run as if there were nothing but these."""
+
+    def kept(name: str) -> bool:
+        return cases is None or name in cases
+
+    reference = {
+        case: {block: value for block, value in errors.items() if block in blocks}
+        for case, errors in run.meta["reference"].items()
+        if kept(case)
+    }
+    names = [n for n in run.meta["strategies"] if strategies is None or n in strategies]
+    results = [
+        replace(result, blocks={k: v for k, v in result.blocks.items() if k in blocks})
+        for result in run.results
+        if kept(result.case) and result.strategy in names
+    ]
+    meta = {**run.meta, "reference": reference, "strategies": names}
+    meta["cases"] = {name: about for name, about in run.meta["cases"].items() if kept(name)}
+    return Run(meta, rank_results(results, reference))
+
+
+def shown(page: Page) -> dict[str, dict[str, float | None]]:
+    """Return the figures in the cells of the table, by strategy from the top down."""
+    rows = page.evaluate(
+        """() => {
+          const all = (path) => [...document.querySelectorAll(`#board-table ${path}`)];
+          const keys = all("thead th").map((th) => th.dataset.key);
+          return all("tr[data-strategy]").map((tr) => {
+            const figures = [...tr.children].flatMap((td, k) =>
+              !td.hidden && td.dataset.value !== undefined ? [[keys[k], td.dataset.value]] : []);
+            const flags = tr.querySelector("[data-lost]").dataset;
+            const { ok, total } = tr.querySelector("[data-ok]").dataset;
+            return [tr.dataset.strategy, [...figures, ["ok", ok], ["total", total],
+              ["rigid_modes_lost", flags.lost], ["negative_eigenvalues", flags.negative]]];
+          });
+        }"""
+    )
+    return {name: {k: float(v) if v else None for k, v in figures} for name, figures in rows}
+
+
+def assert_shows(page: Page, run: Run, *, without: Collection[str] = ()) -> None:
+    """The table is the leaderboard of the run, row for row."""
+    found, board = shown(page), leaderboard(run).to_dict("records")
+    assert list(found) == [row["strategy"] for row in board]
+    for row in board:
+        ours = found[row["strategy"]]
+        expected = {*KEYS, "ok", "total", "rigid_modes_lost", "negative_eigenvalues"} - {*without}
+        assert set(ours) == expected
+        for key in expected:
+            value = None if row[key] is None or row[key] != row[key] else row[key]
+            room = ROUNDED.get(key, 1e-9)
+            assert ours[key] == (value if value is None else pytest.approx(value, rel=room)), key
+
+
+def order(page: Page) -> list[str]:
+    return list(shown(page))
+
+
+def tick(page: Page, menu: str, *off: str) -> None:
+    """Open a menu of the filters and take the ticks away."""
+    page.click(f"details.menu[data-filter={menu}] > summary")
+    for name in off:
+        page.locator(f"details.menu[data-filter={menu}]").get_by_label(name, exact=True).uncheck()
+    page.keyboard.press("Escape")
+
+
+def test_opens_from_disk_and_is_the_leaderboard(page: Page, real: Any) -> None:
+    assert page.evaluate("bench.board.check()") == []
+    assert_shows(page, real.run)
+    assert page.title().startswith("Leaderboard")
+    assert page.locator("#facts").inner_text().find(real.run.meta["run"]) >= 0
+    for row in leaderboard(real.run).to_dict("records"):
+        data = page.locator(f"tr[data-strategy='{row['strategy']}'] .range")
+        low, high = (float(data.get_attribute(f"data-{end}") or "nan") for end in ("low", "high"))
+        assert low <= row["skill"] * (1 + 1e-9)
+        assert high >= row["skill"] * (1 - 1e-9)
+    assert page.locator("tr[data-strategy=nobari] .flags").inner_text().startswith("▲")
+    assert "1 failed" in page.locator("tr[data-strategy=kabe] .coverage").inner_text()
+
+
+def test_every_number_of_the_json_is_in_the_page(page: Page, real: Any) -> None:
+    found = page.evaluate("bench.data")
+    cases, strategies = ([item["name"] for item in found[key]] for key in ("cases", "strategies"))
+    ours_by_job = {(cases[r["c"]], strategies[r["s"]], r["seed"]): r for r in found["results"]}
+    stored = json.loads(real.json_file.read_text())["results"]
+    assert len(ours_by_job) == len(stored)
+    for theirs in stored:
+        ours = ours_by_job[theirs["case"], theirs["strategy"], theirs["seed"]]
+        rms = [theirs[name] and theirs[name]["rms_percent"] for name in BLOCKS]
+        assert (ours["rms"], ours["score"]) == (rms, theirs["score"])
+        assert ours["seconds"] == pytest.approx(theirs["seconds"], rel=1e-3)
+
+
+def test_sorts_by_mouse_and_keyboard(page: Page) -> None:
+    skill = {name: row["skill"] for name, row in shown(page).items()}
+    rising = sorted(skill, key=lambda name: skill[name] or 0.0)
+    assert order(page) != rising  # unphysical ones stand below
+    head = page.locator("th[data-key=skill]")
+    head.locator("button").click()
+    assert (order(page), head.get_attribute("aria-sort")) == (rising, "ascending")
+    head.locator("button").focus()
+    page.keyboard.press("Enter")
+    assert (order(page), head.get_attribute("aria-sort")) == (rising[::-1], "descending")
+    name = page.locator("th[data-key=strategy]")
+    name.locator("button").focus()
+    page.keyboard.press("Space")
+    assert order(page) == sorted(skill)
+    assert name.get_attribute("aria-sort") == "ascending"
+    assert head.get_attribute("aria-sort") is None
+
+
+def test_a_strategy_opens_case_by_case(page: Page) -> None:
+    row = page.locator("tr[data-strategy=kabe]")
+    button = row.locator(".expand")
+    button.focus()
+    page.keyboard.press("Enter")
+    assert button.get_attribute("aria-expanded") == "true"
+    text = page.locator(f"#{button.get_attribute('aria-controls')}").inner_text()
+    assert "failed: used modes reproduced" in text
+    page.keyboard.press("Enter")
+    assert button.get_attribute("aria-expanded") == "false"
+
+
+def test_filter_of_scenarios(page: Page, real: Any) -> None:
+    tick(page, "scenarios", "hframe")
+    assert_shows(page, part(real.run, cases=["frame", "frame-solid"]))
+    assert "2 of 3 cases" in page.locator(".status").inner_text()
+    tick(page, "scenarios", "frame")
+    assert_shows(page, part(real.run, cases=["frame-solid"]))
+    page.click("#reset")
+    assert_shows(page, real.run)
+
+
+@pytest.mark.parametrize("off", [("modified",), ("used", "modified"), ("higher",)])
+def test_filter_of_blocks(page: Page, real: Any, off: tuple[str, ...]) -> None:
+    tick(page, "blocks", *off)
+    kept = [name for name in BLOCKS if name not in off]
+    assert_shows(page, part(real.run, blocks=kept), without=[f"{name}_percent" for name in off])
+
+
+def test_filter_of_strategies(page: Page, real: Any) -> None:
+    tick(page, "strategies", "baruch", "nobari")
+    kept = [n for n in real.run.meta["strategies"] if n not in ("baruch", "nobari")]
+    assert_shows(page, part(real.run, strategies=kept))
+    page.click("#reset")
+    page.fill("#find", "AL")
+    assert order(page) == ["local"]
+    page.fill("#find", "no such one")
+    assert "Nothing to show" in page.locator("#board-table").inner_text()
+
+
+def test_all_filters_at_once(page: Page, real: Any) -> None:
+    tick(page, "scenarios", "frame")
+    tick(page, "blocks", "used")
+    tick(page, "strategies", "unchanged", "kabe")
+    kept = [n for n in real.run.meta["strategies"] if n not in ("unchanged", "kabe")]
+    whole = part(
+        real.run, cases=["hframe", "frame-solid"], blocks=["higher", "modified"], strategies=kept
+    )
+    assert_shows(page, whole, without=["used_percent"])
+
+
+def test_charts_tell_their_values_by_keyboard(page: Page) -> None:
+    plot = page.locator(".plot").first
+    readout = page.locator("figure.chart", has=plot).locator(".readout").first
+    before = readout.inner_text()
+    plot.focus()
+    page.keyboard.press("ArrowRight")
+    first = readout.inner_text()
+    page.keyboard.press("ArrowRight")
+    assert before != first != readout.inner_text()
+    assert "factor" in first

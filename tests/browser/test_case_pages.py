@@ -1,0 +1,281 @@
+"""The case pages of a real run: structure view, frequencies, receptances, and their addresses."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page
+
+from femubench import Run
+from femubench.core.harness.store import Store
+from femubench.reports.htmls import HtmlReporter
+
+VIEW, TOLD = ".case-structure canvas.case-view", ".case-structure .case-told"
+PIXELS = f"document.querySelector('{VIEW}').toDataURL()"
+
+
+@pytest.fixture
+def shown(view: Callable[..., Any], real: Any) -> Iterator[Callable[..., Page]]:
+    """Return what opens the page of a case."""
+    opened = []
+
+    def opening(case: str, **options: Any) -> Page:
+        found = view(real.page, f"#case/{case}", **options)
+        opened.append(found)
+        found.page.wait_for_selector("html[data-ready=yes]")
+        found.page.wait_for_selector(".case-title")
+        return found.page  # type: ignore[no-any-return]
+
+    yield opening
+    for found in opened:
+        found.assert_quiet(real.page)
+
+
+def drawn(page: Page) -> str:
+    """Return the picture of the structure, once a frame has been drawn."""
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    found: str = page.evaluate(PIXELS)
+    return found
+
+
+def told(page: Page) -> str:
+    return page.locator(TOLD).inner_text()
+
+
+@pytest.mark.parametrize("case", ["frame", "hframe", "frame-solid"])
+def test_frequencies_are_those_of_the_json(
+    shown: Callable[..., Page], real: Any, case: str
+) -> None:
+    page = shown(case)
+    rows = page.evaluate(
+        """() => {
+          const table = document.querySelector(".case-frequencies");
+          const printed = (th) => th.querySelector(".case-mark")?.textContent === "as printed";
+          const heads = [...table.querySelectorAll("thead th")].map(
+            (th) => (printed(th) ? "printed " : "") + th.firstChild.textContent);
+          return [...table.querySelectorAll("tbody tr")].map((tr) => [...tr.children])
+            .filter((cells) => cells.length === heads.length)
+            .map((cells) => Object.fromEntries(cells.map((td, k) => [heads[k], td.textContent])));
+        }"""
+    )
+    results = [
+        result
+        for result in json.loads(real.json_file.read_text())["results"]
+        if result["case"] == case and result["status"] == "ok"
+    ]
+    assert len(results) == (5 if case == "hframe" else 6)
+    rms = iter([row for row in rows if row["Mode"] == "rms, %"])
+    modes = iter([row for row in rows if row["Mode"] != "rms, %"])
+    count = 0
+    for block in ("used", "higher", "modified"):
+        if results[0][block] is None:
+            continue
+        row = next(rms)
+        for result in results:
+            value, text = result[block]["rms_percent"], row[result["strategy"]]
+            assert (
+                (text == "<0.001")
+                if value < 0.001
+                else float(text) == pytest.approx(value, rel=6e-3)
+            )
+        for k, mode in enumerate(results[0][block]["modes"]):
+            row = next(modes)
+            assert float(row["Measured"]) == pytest.approx(mode["measured_hz"], abs=0.0501)
+            for result in results:
+                ours, text = result[block]["modes"][k]["predicted_hz"], row[result["strategy"]]
+                assert (
+                    text == "none"
+                    if ours is None
+                    else float(text) == pytest.approx(ours, abs=0.0501)
+                )
+                count += 1
+    assert next(modes, None) is next(rms, None) is None
+    assert count >= 5 * len(results)
+    printed = {name for row in rows for name in row if name.startswith("printed ")}
+    assert bool(printed) == (case != "frame-solid")
+
+
+def test_the_papers_column_stands_beside_ours(shown: Callable[..., Page]) -> None:
+    page = shown("frame")
+    row = page.locator(".case-frequencies tbody tr", has_text="861.5").inner_text().split()
+    assert "911.3" in row  # as the paper has it
+    assert "911.1" in row
+
+
+def test_more_of_the_table_on_request(shown: Callable[..., Page]) -> None:
+    page = shown("frame")
+    table = page.locator(".case-frequencies")
+    columns = table.locator("thead th").count()
+    page.get_by_label("Errors in %").check()
+    assert table.locator(".case-under").first.inner_text().endswith("%")
+    page.get_by_label("MAC", exact=True).check()
+    assert "MAC" in table.locator(".case-under", has_text="MAC").first.inner_text()
+    page.get_by_label("A and B alone").check()
+    assert table.locator("thead th").count() < columns
+    page.get_by_label("Strategy A").select_option("baruch")
+    assert "baruch" in table.locator("thead").inner_text()
+
+
+def test_modes_and_strategies_can_be_picked(shown: Callable[..., Page]) -> None:
+    page = shown("frame-solid")
+    page.get_by_label("Strategy", exact=True).select_option("unchanged")
+    first, text = drawn(page), told(page)
+    assert text.startswith("Mode 1 (used): measured 231.41 Hz, unchanged 264.")
+    mode = page.get_by_label("Mode", exact=True)
+    mode.select_option(index=1)
+    second = drawn(page)
+    assert second != first
+    assert told(page).startswith("Mode 2 (used)")
+    page.get_by_label("Strategy", exact=True).select_option("generic-ls")
+    assert drawn(page) != second
+    assert "generic-ls" in told(page)
+    # After a design change there are frequencies and arrows.
+    changed = page.locator("optgroup[label*='mass and spring at 6'] option").first
+    mode.select_option(value=changed.get_attribute("value"))
+    assert "generic-ls 150.9" in told(page) or "generic-ls 151" in told(page)
+    assert told(page).endswith("its shape is not stored")
+
+
+def test_the_structure_is_turned_by_keys_and_mouse(shown: Callable[..., Page]) -> None:
+    page = shown("hframe")
+    seen = [drawn(page)]
+    page.focus(VIEW)
+    for key in ("ArrowLeft", "ArrowUp", "+", "-", "-", "ArrowRight", "ArrowDown"):
+        page.keyboard.press(key)
+        seen.append(drawn(page))
+        assert seen[-1] != seen[-2], key
+    page.keyboard.press("r")
+    assert drawn(page) == seen[0]
+    page.keyboard.press("n")
+    assert told(page).startswith("Mode 2 (used)")
+    page.keyboard.press("p")
+    page.keyboard.press("p")
+    assert not told(page).startswith(("Mode 1 ", "Mode 2 "))
+    page.keyboard.press("n")
+    assert drawn(page) == seen[0]
+    page.locator(VIEW).scroll_into_view_if_needed()
+    box = page.locator(VIEW).bounding_box()
+    assert box is not None
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 60, y + 20, steps=3)
+    page.mouse.up()
+    assert drawn(page) != seen[0]
+    page.get_by_role("button", name="Reset the view").click()
+    assert drawn(page) == seen[0]
+    page.get_by_label("Sensors").check()
+    assert drawn(page) != seen[0]
+
+
+def test_the_mode_moves_until_it_is_paused(shown: Callable[..., Page]) -> None:
+    page = shown("frame", still=False)
+    page.locator(VIEW).scroll_into_view_if_needed()
+    button = page.locator(".case-play")
+    assert button.inner_text() == "Pause"
+    first = drawn(page)
+    page.wait_for_function("(first) => " + PIXELS + " !== first", arg=first)
+    page.focus(VIEW)
+    page.keyboard.press("Space")
+    assert button.inner_text() == "Play"
+    still = drawn(page)
+    page.wait_for_timeout(150)
+    assert drawn(page) == still
+    button.click()
+    page.wait_for_function("(still) => " + PIXELS + " !== still", arg=still)
+
+
+def test_nothing_moves_by_itself_for_who_wants_it_still(shown: Callable[..., Page]) -> None:
+    page = shown("frame")
+    page.locator(VIEW).scroll_into_view_if_needed()
+    assert page.locator(".case-play").inner_text() == "Play"
+    first = drawn(page)
+    page.wait_for_timeout(150)
+    assert drawn(page) == first
+
+
+def test_receptances_before_and_after_the_change(shown: Callable[..., Page]) -> None:
+    page = shown("frame-solid")
+    charts = page.locator("figure.chart", has_text="Receptance, dB re 1 m/N")
+    assert charts.count() == 2
+    assert "mass and spring at 6" in charts.nth(1).locator("figcaption").inner_text()
+    for chart in charts.all():
+        assert "Frequency, Hz" in chart.locator("svg.canvas").text_content()
+        legend = chart.locator(".legend").inner_text()
+        assert all(name in legend for name in ("measured", "local", "unchanged"))
+        lines = [path.get_attribute("d") or "" for path in chart.locator("path.curve").all()]
+        assert len(set(lines)) == 3
+        assert all(len(line) > 1000 for line in lines)
+    section = page.locator("section.case-section", has=charts.first)
+    assert "damping ratio of 0.0" in section.inner_text()
+
+
+def test_the_nominal_model_is_shown_where_unchanged_did_not_run(
+    view: Callable[..., Any], real: Any, tmp_path: Path
+) -> None:
+    run, path = real.run, tmp_path / "local.html"
+    alone = Run(
+        {**run.meta, "strategies": ["local"]},
+        tuple(result for result in run.results if result.strategy == "local"),
+    )
+    exhibits = Store(real.store).exhibits
+    path.write_text(HtmlReporter().render_with(alone, exhibits), encoding="utf-8")
+    found = view(path, "#case/frame-solid")
+    page = found.page
+    page.wait_for_selector(".case-title")
+    for legend in page.locator("figure.chart", has_text="Receptance,").locator(".legend").all():
+        assert legend.inner_text().split("\n") == ["measured", "local", "nominal model"]
+    page.get_by_label("Strategy", exact=True).select_option("nominal model")
+    assert "nominal model 264.48 Hz" in told(page)
+    found.assert_quiet(path)
+
+
+def test_changes_of_the_stiffness(shown: Callable[..., Page]) -> None:
+    page = shown("frame")
+    section = page.locator("section.case-section", has_text="Change of the stiffness").last
+    page.get_by_label("Strategy A").select_option("generic-ls")
+    assert "Largest changes: rung-middle/" in section.locator(".case-told").first.inner_text()
+    assert section.locator("svg.case-map line.case-stroke").count() == 28
+    page.get_by_label("Strategy A").select_option("baruch")
+    picture = section.locator("canvas.case-matrix")
+    picture.focus()
+    page.keyboard.press("ArrowDown")
+    page.keyboard.press("ArrowRight")
+    assert "N/m" in section.locator(".case-told").first.inner_text()
+    assert section.locator(".case-list li").count() == 5
+
+
+def test_a_page_without_pictures_says_so(
+    view: Callable[..., Any], real: Any, tmp_path: Path
+) -> None:
+    bare = tmp_path / "bare.html"
+    bare.write_text(HtmlReporter().render(real.run), encoding="utf-8")
+    found = view(bare, "#case/frame")
+    found.page.wait_for_selector(".case-title")
+    text = found.page.locator("main").inner_text()
+    assert "Pictures are not stored with this run." in text
+    assert found.page.locator("canvas").count() == 0
+    assert found.page.locator(".case-frequencies").count() == 1
+    found.assert_quiet(bare)
+
+
+def test_addresses_lead_to_pages_and_back(shown: Callable[..., Page]) -> None:
+    page = shown("hframe")
+    assert "H-frame" in page.locator("h1").inner_text()
+    page.locator("#pages a", has_text="frame-solid").click()
+    page.wait_for_function("document.title.startsWith('frame-solid')")
+    assert page.evaluate("location.hash") == "#case/frame-solid"
+    assert page.evaluate("document.activeElement.tagName") == "H1"
+    assert page.locator("#pages a[aria-current=page]").inner_text() == "frame-solid"
+    page.go_back()
+    page.wait_for_function("document.title.startsWith('hframe')")
+    page.evaluate("location.hash = '#board'")
+    page.wait_for_selector("#board-table")
+    page.go_back()
+    page.wait_for_function("document.title.startsWith('hframe')")
+    page.evaluate("location.hash = '#case/%E0%A4%A'")
+    page.wait_for_function("document.querySelector('h1').textContent === 'Nothing to show'")
