@@ -637,6 +637,8 @@ def test_progress_only_where_someone_watches(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
     with progress.progress_bar(quiet=True) as report:
         assert report is None
+    with progress.waiting("looking"), progress.waiting("not", quiet=True):
+        pass
     with progress.progress_bar() as report:
         assert report is not None
         report(JobResult("[red]case", "strategy", 0, "ok"), 1, 2)

@@ -17,6 +17,7 @@ from femubench.core.cli.files import (
     make_folder,
     write_atomically,
 )
+from femubench.core.cli.progress import waiting
 from femubench.core.cli.registry import chosen, plugins_for
 from femubench.core.errors import FemubenchError, InputError, NotApplicable
 
@@ -118,7 +119,8 @@ def diagnose(
     read = _one_case(case, plugins)
     if tolerance is not None:
         read = replace(read, tolerance=tolerance)
-    found = _diagnosed(read, names, plugins, pairs=not no_pairs)
+    with waiting(f"looking for what {read.name} lacks", quiet=quiet):
+        found = _diagnosed(read, names, plugins, pairs=not no_pairs)
     fault = _extended(read, found, output)
     written = output if output is not None and fault is None and _has_model(found) else None
     data = diagnosis_to_json(found, written=written, case=read)

@@ -1,4 +1,4 @@
-"""A progress bar on stderr, only where someone watches."""
+"""Progress on stderr, only where someone watches."""
 
 from __future__ import annotations
 
@@ -41,3 +41,27 @@ def progress_bar(*, quiet: bool = False) -> Iterator[Progress | None]:
             bar.update(task, completed=done, total=total, description=f"{label:36}")
 
         yield advance
+
+
+@contextmanager
+def waiting(what: str, *, quiet: bool = False) -> Iterator[None]:
+    """Show what is being done and for how long, where stderr is a terminal.
+
+    Arguments:
+        what: a clause such as ``looking for causes``.
+        quiet: show nothing.
+    """
+    if quiet or not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+    from rich.progress import Progress as Bar, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}", markup=False),
+        TimeElapsedColumn(),
+    )
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+        bar.add_task(what, total=None)
+        yield

@@ -16,6 +16,7 @@ from femubench.core.cli.files import (
     make_folder,
     write_atomically,
 )
+from femubench.core.cli.progress import waiting
 from femubench.core.cli.registry import chosen, counted, plugins_for, wrapped
 
 if TYPE_CHECKING:
@@ -75,7 +76,8 @@ def reproduce(
         check_writable(json_file)
     if output is not None:
         check_can_make(output)
-    studies = _studies(papers, plugins_for(ctx))
+    with waiting(f"recomputing {' and '.join(papers)}", quiet=quiet):
+        studies = _studies(papers, plugins_for(ctx))
     if json_file is not None and json_file != SCREEN:
         write_atomically(json_file, _json(studies))
     written = _write(studies, output) if output is not None else ""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
-from femubench.core.case.case import Case
+from femubench.core.case.case import Case, Modification
 from femubench.core.exhibits.element_change import difference_picture, relative_changes
 from femubench.core.exhibits.shelf import Exhibits
 from femubench.core.exhibits.stage import (
@@ -31,6 +31,8 @@ from femubench.core.model import Model
 from femubench.core.typing import FloatArray
 
 MOST_MODES = 12
+MOST_CHANGED = 8  # of one modification
+_SHAPE_DECIMALS = 3  # of the largest component
 _ABOVE = 1.2  # modes up to this times the highest measured frequency are shown
 _POINTS = 400
 _DAMPING = 0.005  # where none was measured
@@ -78,17 +80,45 @@ def _modes(case: Case, model: Model) -> dict[str, Any]:
     motion = node_motions(model, case.model, elastic.shapes[:, shown])
     largest = np.abs(motion).max(axis=(0, 1), initial=0.0)
     motion = motion / np.where(largest > 0.0, largest, 1.0)
+    own = [
+        {
+            "hz": float(frequencies[k]),
+            "paired": number.get(k),
+            "modification": None,
+            "shape": motion[..., j].round(_SHAPE_DECIMALS).tolist(),
+        }
+        for j, k in enumerate(shown)
+    ]
     return {
-        "modes": [
-            {"hz": float(frequencies[k]), "paired": number.get(k), "shape": rounded(motion[..., j])}
-            for j, k in enumerate(shown)
-        ],
+        "modes": own
+        + [mode for change in case.modifications for mode in _changed(case, model, change)],
         "mac": {
             "rows": list(tested.numbers),
             "columns": [float(frequencies[k]) for k in shown],
             "values": rounded(mac(tested.shapes, at_sensors[:, shown])),
         },
     }
+
+
+def _changed(case: Case, model: Model, change: Modification) -> Iterator[dict[str, Any]]:
+    """Yield the modes of a modified structure that belong to measured ones."""
+    changed = model.attach(change.masses, change.springs)
+    elastic, data = modes_of(changed).elastic, change.measurement
+    at_sensors = np.asarray(changed.observe(data.sensors) @ elastic.shapes)
+    partner = pair_modes(
+        data.frequencies, data.shapes, elastic.natural_frequencies, at_sensors
+    ).index
+    pairs = [(n, int(k)) for n, k in zip(data.numbers, partner, strict=True) if k >= 0]
+    pairs = pairs[:MOST_CHANGED]
+    motion = node_motions(changed, case.model, elastic.shapes[:, [k for _, k in pairs]])
+    largest = np.abs(motion).max(axis=(0, 1), initial=0.0)
+    for j, (number, k) in enumerate(pairs):
+        yield {
+            "hz": float(elastic.natural_frequencies[k]),
+            "paired": number,
+            "modification": change.name,
+            "shape": (motion[..., j] / (largest[j] or 1.0)).round(_SHAPE_DECIMALS).tolist(),
+        }
 
 
 def frequency_axis(case: Case) -> FloatArray:

@@ -78,6 +78,7 @@ class _Receptance(_Part):
 class _Mode(_Part):
     hz: float
     paired: int | None = None
+    modification: str | None = Field(default=None, max_length=500)
     shape: list[Row] = Field(max_length=_MOST)
 
 
@@ -98,7 +99,7 @@ class _Difference(_Part):
 
 
 class _Exhibit(_Part):
-    modes: list[_Mode] = Field(max_length=100)
+    modes: list[_Mode] = Field(max_length=2000)
     mac: _Mac
     receptance: dict[str, list[Number]] = {}
     elements: Row | None = Field(default=None, max_length=_MOST)
