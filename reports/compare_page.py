@@ -14,6 +14,7 @@ from femubench.reports.terminal import WIDTH, aligned_table
 
 _RATIOS = ("skill", "used", "higher", "modified", "seconds")
 _NAME = 26
+_BLANK = "\u2800"  # stands for an indent until the table is made, which strips all white space
 _MOST_LINES = 20
 _FOREST = (0.0, 560.0)  # where the axis of the drawing begins and ends
 _LEGEND = (
@@ -38,14 +39,13 @@ def comparison_text(data: Mapping[str, Any]) -> str:
     parts = [_wrapped(f"A {plain(data['before'])}, B {plain(data['after'])}: {headline(data)}")]
     parts += _listed("Ended otherwise", [_change(item) for item in data["changes"]])
     parts += _listed("Beyond a threshold", [_excess(item) for item in data["excesses"]])
-    # aligned_table strips ends alone, so an indent stands as no-break spaces until it is done.
     rows = [
-        [shortened(cells[0] if cells[1] == "all" else f"\u00a0\u00a0{cells[1]}", _NAME), *cells[2:]]
+        [shortened(cells[0] if cells[1] == "all" else 2 * _BLANK + cells[1], _NAME), *cells[2:]]
         for cells in map(_cells, _telling(data["rows"]))
     ]
     heads = ("strategy", "jobs", "skill", "used", "high.", "mod.", "s", "lost")
     board = aligned_table(rows, heads, ("left", *("right",) * 7))
-    parts.append(board.replace("\u00a0", " "))
+    parts.append(board.replace(_BLANK, " "))
     parts.append(_wrapped(_LEGEND + " Scenarios where nothing differs are left out."))
     titles = ("strategy", "pairs", "differ", "ratio", "95 % interval", "p", "B is")
     lines = [[shortened(row[0], 18), *row[1:]] for row in map(_proof, data["evidence"])]

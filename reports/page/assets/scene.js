@@ -160,7 +160,7 @@
       label(scene, `${bench.heat.scientific(spring.stiffness)} N/m`, flat ? [from[0], from[1] + 26] : tip, colours.ink, true);
     }
     for (const support of stage.supports) {
-      const [x, y] = project(stage.nodes[support.node]);
+      const [x, y] = project(support.xyz);
       pen.fillStyle = colours.attached;
       pen.beginPath();
       pen.moveTo(x, y);
