@@ -150,7 +150,7 @@ class _View:
 
 
 def _projection(
-    plane: str, points: Iterable[Sequence[float]]
+    plane: str, points: Sequence[Sequence[float]]
 ) -> tuple[Callable[[Sequence[float]], Flat], tuple[tuple[str, Flat], ...]]:
     """Return a plan or an elevation of what lies in a plane, else a view from above the corner."""
     sides = [max(column) - min(column) for column in zip(*points, strict=True)]
@@ -163,6 +163,10 @@ def _projection(
         a, b = pair
         return lambda p: (p[a], p[b]), (("xyz"[a], (1.0, 0.0)), ("xyz"[b], (0.0, 1.0)))
     c, s, up = math.cos(_TURN), math.sin(_TURN), math.sin(_TILT)
+    # From the corner that sees the structure wider, so that fewer members hide each other.
+    across = [[c * p[0] + side * s * p[1] for p in points] for side in (1.0, -1.0)]
+    if max(across[1]) - min(across[1]) > 1.01 * (max(across[0]) - min(across[0])):
+        s = -s
 
     def seen(p: Sequence[float]) -> Flat:
         depth = -s * p[0] + c * p[1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -179,12 +180,50 @@ class TestShelf:
         assert len(exhibits.notes) == 1
         assert "\n" not in exhibits.notes[0]
 
+    @pytest.mark.parametrize(
+        ("key", "value"),
+        [
+            ("elements", [[0, 10_000]] * 28),
+            ("nodes", [[0.0, 0.0]] * 27),
+            ("element_labels", []),
+            ("joints", [{"name": "1", "node": -1}]),
+            ("sensors", []),
+        ],
+    )
+    def test_a_stage_that_contradicts_itself_is_left_out(
+        self, key: str, value: object, cases: dict[str, Case], tmp_path: Path
+    ) -> None:
+        exhibits = Exhibits(tmp_path)
+        exhibits.put_stage(KEY * 4, {**(stage_of(cases["frame"]) or {}), key: value})
+        assert exhibits.stage(KEY * 4) is None
+        assert len(exhibits.notes) == 1
+
+    @pytest.mark.parametrize("part", ["values", "labels"])
+    def test_a_difference_that_contradicts_itself_is_left_out(
+        self, part: str, cases: dict[str, Case], tmp_path: Path
+    ) -> None:
+        found = shown(cases["frame"], "baruch")
+        found["difference"][part] = found["difference"][part][:-4]
+        exhibits = Exhibits(tmp_path)
+        exhibits.put(KEY, found)
+        assert exhibits.of(KEY) is None
+
     @pytest.mark.parametrize("key", ["../../etc/passwd", "case-../x", "", "A" * 16, "a/b"])
     def test_names_are_keys_and_nothing_else(self, key: str, tmp_path: Path) -> None:
         exhibits = Exhibits(tmp_path / "store")
         exhibits.put(key, {})
         assert exhibits.of(key) is None
         assert list(tmp_path.iterdir()) == []
+
+    def test_what_a_killed_process_left_is_removed(self, tmp_path: Path) -> None:
+        folder = tmp_path / FOLDER
+        folder.mkdir()
+        for name in (f".{KEY}.abc", f".{KEY}.new", f"{KEY}.json"):
+            (folder / name).write_text("{}")
+        os.utime(folder / f".{KEY}.abc", (0.0, 0.0))
+        os.utime(folder / f"{KEY}.json", (0.0, 0.0))
+        Exhibits(tmp_path).tidy()
+        assert sorted(p.name for p in folder.iterdir()) == [f".{KEY}.new", f"{KEY}.json"]
 
     def test_a_store_without_room_does_without(self, tmp_path: Path) -> None:
         (tmp_path / "store").write_text("")

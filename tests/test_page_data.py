@@ -120,18 +120,24 @@ class TestNumbers:
             notes = ("one.json: a picture was left out",)
 
             def stage(self, digest: str) -> dict[str, Any] | None:
-                return {"digest": digest}
+                return {"digest": digest, "nodes": [1], "elements": []}
 
             def of(self, key: str) -> dict[str, Any] | None:
-                return {"key": key, "odd": math.inf} if key == "k" else None
+                modes = [{"shape": [0] * (1 if key == "k" else 2)}]
+                return {"key": key, "odd": math.inf, "modes": modes}
 
         result = replace(SMALL.results[0], key="k", seed=1)
-        run = Run(SMALL.meta, (result, *SMALL.results[1:]))
+        run = Run(SMALL.meta, (result,))
         found = data_in(HtmlReporter().render_with(run, Shelf()))
         case = found["cases"][0]
-        assert case["stage"] == {"digest": SMALL.meta["cases"][case["name"]]["digest"]}
-        assert found["details"]["0:0"]["exhibit"] == {"key": "k", "odd": None}
+        assert case["stage"]["digest"] == SMALL.meta["cases"][case["name"]]["digest"]
+        own = {"key": "k", "odd": None, "modes": [{"shape": [0]}]}
+        assert found["details"]["0:0"]["exhibit"] == own
         assert "one.json: a picture was left out" in found["notes"]
+        # The shape is on two nodes, the structure has one.
+        run = Run(SMALL.meta, (replace(result, key="other"),))
+        found = data_in(HtmlReporter().render_with(run, Shelf()))
+        assert found["details"]["0:0"]["exhibit"] is None
 
 
 class TestStatistics:

@@ -206,6 +206,16 @@ def test_of_two_the_worse_counts_and_a_timeout_contradicts_nobody(data: Data, si
     assert site.strategy("unchanged")["versions"][0]["failures"] == 0
 
 
+def test_a_liars_own_nominal_errors_do_not_make_it_count(data: Data, site: Site) -> None:
+    liar = called(scaled(data, "softer", 0.01), "liar", 3, cpu="liar")
+    for blocks in liar["meta"]["reference"].values():
+        blocks |= dict.fromkeys(blocks, 0.0)
+    site.add(called(data, "first", 1), liar)
+    true = next(r for r in data["results"] if r["strategy"] == "softer")
+    row = site.strategy("softer")["versions"][0]["cases"][0]
+    assert row["used_percent"] == true["used"]["rms_percent"]
+
+
 def test_a_run_that_was_resumed_replaces_its_first_part(data: Data, site: Site) -> None:
     part = json.loads(json.dumps(data))
     part["results"] = part["results"][:3]

@@ -175,6 +175,7 @@ def measured_receptances(case: Case) -> dict[str, Any]:
         return {}
     tested = case.measurement.select((*case.used, *case.held_out))
     measured = {"": _stand_in(case, case.model, tested, drive)}
+    alone = ", ".join(map(str, _unpaired(case.model, tested)))
     for change in case.modifications:
         changed = case.model.attach(change.masses, change.springs)
         measured[change.name] = _stand_in(case, changed, change.measurement, drive)
@@ -183,8 +184,17 @@ def measured_receptances(case: Case) -> dict[str, Any]:
         "damping": damping_of(case),
         "measured": {name: level for name, level in measured.items() if level is not None},
         "note": "Made of the measured modes; scaled to mass, and completed by rigid-body and "
-        "higher modes, with the nominal model.",
+        "higher modes, with the nominal model."
+        + (f" Measured modes without a partner there are not in it: {alone}." if alone else ""),
     }
+
+
+def _unpaired(model: Model, data: Measurement) -> list[int]:
+    """Return the numbers of the measured modes that no mode of a model belongs to."""
+    elastic = modes_of(model).elastic
+    at_sensors = np.asarray(model.observe(data.sensors) @ elastic.shapes)
+    found = pair_modes(data.frequencies, data.shapes, elastic.natural_frequencies, at_sensors)
+    return [number for number, k in zip(data.numbers, found.index, strict=True) if k < 0]
 
 
 def _stand_in(case: Case, nominal: Model, data: Measurement, drive: Sensors) -> list[float] | None:
@@ -222,6 +232,7 @@ def keep_stages(exhibits: Exhibits, cases: Iterable[Case]) -> None:
         exhibits: of the store.
         cases: those of a run.
     """
+    exhibits.tidy()
     for case in cases:
         if exhibits.has_stage(case.digest):
             continue

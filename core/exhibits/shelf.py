@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import re
 import tempfile
-from collections.abc import Mapping
+import time
+from collections.abc import Iterable, Mapping, Sized
 from contextlib import suppress
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from femubench.core.errors import InputError
 from femubench.core.harness.schema import parse_json
@@ -21,9 +23,12 @@ FOLDER = "exhibits"
 MOST_BYTES = 4 * 2**20
 _KEY = re.compile(r"[0-9a-f]{8,64}")
 _MOST = 20_000
+_STALE = 60.0  # s; a file is written in a fraction of one
 
 Number = float | None
 Row = list[Number]
+_Ends = Annotated[list[int], Field(min_length=2, max_length=2)]
+_Point = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
 class _Part(BaseModel):
@@ -32,8 +37,8 @@ class _Part(BaseModel):
 
 class _Sensor(_Part):
     label: str = Field(max_length=500)
-    xyz: list[float] = Field(min_length=3, max_length=3)
-    axis: list[float] = Field(min_length=3, max_length=3)
+    xyz: _Point
+    axis: _Point
     rotation: bool = False
 
 
@@ -52,19 +57,19 @@ class _Joint(_Part):
 
 
 class _Lump(_Part):
-    xyz: list[float] = Field(min_length=3, max_length=3)
+    xyz: _Point
     kg: float
 
 
 class _Spring(_Part):
-    xyz: list[float] = Field(min_length=3, max_length=3)
-    axis: list[float] = Field(min_length=3, max_length=3)
+    xyz: _Point
+    axis: _Point
     rotation: bool = False
     stiffness: float
 
 
 class _Support(_Part):
-    xyz: list[float] = Field(min_length=3, max_length=3)
+    xyz: _Point
     fixed: list[str] = Field(max_length=6)
 
 
@@ -79,13 +84,20 @@ class _Mode(_Part):
     hz: float
     paired: int | None = None
     modification: str | None = Field(default=None, max_length=500)
-    shape: list[Row] = Field(max_length=_MOST)
+    shape: list[_Point] = Field(max_length=_MOST)
 
 
 class _Mac(_Part):
     rows: list[int] = Field(max_length=1000)
     columns: list[float] = Field(max_length=100)
     values: list[Row] = Field(max_length=1000)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _same(self.values, self.rows)
+        for row in self.values:
+            _same(row, self.columns)
+        return self
 
 
 class _Difference(_Part):
@@ -96,6 +108,12 @@ class _Difference(_Part):
     lowest: float
     highest: float
     unit: str = Field(max_length=10)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _same(self.labels, range(self.size))
+        _same(base64.b64decode(self.values, validate=True), range(self.size**2))
+        return self
 
 
 class _Exhibit(_Part):
@@ -108,8 +126,8 @@ class _Exhibit(_Part):
 
 class _Stage(_Part):
     plane: Literal["out-of-plane", "in-plane", "3d", "matrices"]
-    nodes: list[list[float]] = Field(max_length=_MOST)
-    elements: list[list[int]] = Field(max_length=_MOST)
+    nodes: list[_Point] = Field(max_length=_MOST)
+    elements: list[_Ends] = Field(max_length=_MOST)
     element_labels: list[str] = Field(max_length=_MOST)
     member_of: list[int] = Field(max_length=_MOST)
     members: list[str] = Field(max_length=_MOST)
@@ -122,6 +140,26 @@ class _Stage(_Part):
     drive: str | None = None
     receptance: _Receptance = _Receptance()
     nominal: _Exhibit | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        nodes = {end for ends in self.elements for end in ends}
+        _within([*nodes, *(joint.node for joint in self.joints)], self.nodes)
+        _same(self.element_labels, self.elements)
+        _same(self.member_of, self.elements)
+        for mode in self.measured:
+            _same(mode.shape, self.sensors)
+        return self
+
+
+def _same(one: Sized, other: Sized) -> None:
+    if len(one) != len(other):
+        raise ValueError(f"{len(one)} entries instead of {len(other)}")
+
+
+def _within(places: Iterable[int], listed: Sized) -> None:
+    if not all(0 <= place < len(listed) for place in places):
+        raise ValueError("a place that is not there")
 
 
 _P = TypeVar("_P", bound=_Part)
@@ -145,6 +183,13 @@ class Exhibits:
     def stage(self, digest: str) -> dict[str, Any] | None:
         """Return the stage of a case by the digest of its files; None likewise."""
         return self._read(f"case-{digest[:32]}", _Stage)
+
+    def tidy(self) -> None:
+        """Remove what a killed process left half-written."""
+        for part in self._folder.glob(".*.*"):
+            with suppress(OSError):
+                if time.time() - part.stat().st_mtime > _STALE:
+                    part.unlink()
 
     def has_stage(self, digest: str) -> bool:
         """Tell whether there is a stage of a case, or can be none."""

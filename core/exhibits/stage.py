@@ -87,14 +87,17 @@ def node_motions(model: Model, nominal: Model, shapes: FloatArray) -> FloatArray
 
 
 def drive_sensor(case: Case) -> str | None:
-    """Return the sensor at which all used modes can be seen best; None without shapes."""
-    shapes = np.abs(case.measurement.select(case.used).shapes)
-    if shapes.size == 0 or not np.isfinite(shapes).any():
+    """Return the displacement sensor that sees all used modes best; None without shapes."""
+    sensors = case.measurement.sensors
+    moves = np.flatnonzero(["r" not in direction for direction in sensors.directions])
+    shapes = np.abs(case.measurement.select(case.used).shapes)[moves]
+    shapes = shapes[:, np.isfinite(shapes).any(axis=0)]
+    if shapes.size == 0:
         return None
     with np.errstate(divide="ignore", invalid="ignore"):
         seen = np.log(shapes / np.nanmax(shapes, axis=0)).sum(axis=1)
     best = int(np.argmax(np.where(np.isfinite(seen), seen, -np.inf)))
-    return case.measurement.sensors.labels[best]
+    return sensors.labels[int(moves[best])]
 
 
 def measured_blocks(case: Case) -> list[tuple[str, str | None, Measurement]]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from femubench.core.harness.ranking import OFFSET_PERCENT
+from femubench.core.harness.ranking import OFFSET_PERCENT, score_of
 from femubench.core.harness.results import JobResult
 from femubench.core.harness.submissions import Submission
 
+# Nominal errors by block, of a case by its name and digest.
+References = Mapping[tuple[str, str], Mapping[str, float]]
 # Two machines round differently, and an ill-conditioned update magnifies it.
 _AGREES = 1e-3
 # These say what a machine could bear, not what the job gives.
@@ -40,13 +42,15 @@ class Finding:
         return len({machine_of(run) for run in self.runs})
 
 
-def findings_of(submissions: Iterable[Submission]) -> list[Finding]:
+def findings_of(submissions: Iterable[Submission], references: References) -> list[Finding]:
     """Return one finding for every job, in the order of case, strategy, seed and key.
 
     Of contradicting results that counts on which most machines agree, of equals the worst.
 
     Arguments:
         submissions: oldest first.
+        references: that the worst is found with. Those of a run could make its own result look
+            worse than it is, and so let it count.
     """
     groups: dict[tuple[str, str, int, str], list[Finding]] = {}
     for item in submissions:
@@ -60,7 +64,7 @@ def findings_of(submissions: Iterable[Submission]) -> list[Finding]:
                     break
             else:
                 listed.append(Finding(result, (item,)))
-    return [_settled(groups[job]) for job in sorted(groups)]
+    return [_settled(groups[job], references) for job in sorted(groups)]
 
 
 def agree(first: JobResult, second: JobResult) -> bool:
@@ -86,14 +90,15 @@ def _whole_key(result: JobResult) -> str:
     return "\0".join((result.key, *map(str, told)))
 
 
-def _settled(found: Sequence[Finding]) -> Finding:
+def _settled(found: Sequence[Finding], references: References) -> Finding:
     sound = [item for item in found if item.result.status not in _NO_RESULT] or list(found)
     if all(item.result.status in _NO_RESULT for item in found):
         sound = [replace(found[0], runs=tuple(run for item in found for run in item.runs))]
-    first, *rest = sorted(sound, key=_order)
+
+    def order(item: Finding) -> tuple[int, float, str]:
+        result = item.result
+        case = result.case, str(result.provenance["case"])
+        return -item.machines, -score_of(result, references[case]), item.runs[0].name
+
+    first, *rest = sorted(sound, key=order)
     return replace(first, others=tuple(rest))
-
-
-def _order(item: Finding) -> tuple[int, float, str]:
-    score = item.result.score
-    return -item.machines, 0.0 if score is None else -score, item.runs[0].name

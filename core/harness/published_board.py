@@ -6,12 +6,10 @@ import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from femubench.core.harness.agreement import Finding, findings_of, machine_of
+from femubench.core.harness.agreement import Finding, References, findings_of, machine_of
 from femubench.core.harness.ranking import geometric_mean, score_of
 from femubench.core.harness.results import BLOCKS, DONE
 from femubench.core.harness.submissions import SCHEMA, Submission, slug
-
-References = Mapping[tuple[str, str], Mapping[str, float]]
 
 
 class _Version(NamedTuple):
@@ -28,9 +26,9 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
     Arguments:
         submissions: oldest first.
     """
-    findings = findings_of(submissions)
-    current = {name: case["digest"] for item in submissions for name, case in _cases(item).items()}
     references = _references(submissions)
+    findings = findings_of(submissions, references)
+    current = {name: case["digest"] for item in submissions for name, case in _cases(item).items()}
     versions = _versions(findings)
     latest = {version.strategy: version for version in versions}  # the last one stays
     ranked = _ranked(latest.values(), versions, current)

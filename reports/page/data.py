@@ -52,7 +52,8 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
     cases, strategies = cases_of(run), strategies_of(run)
     board = leaderboard(run)
     listed = [_case(run, case, exhibits) for case in cases]
-    details, left_out = _details(run, cases, strategies, exhibits)
+    stages = {case["name"]: case["stage"] for case in listed}
+    details, left_out = _details(run, strategies, stages, exhibits)
     drawn = getattr(exhibits, "notes", ()) if exhibits is not None else ()
     return {
         "version": VERSION,
@@ -108,6 +109,8 @@ def _case(run: Run, case: str, exhibits: Exhibits | None) -> dict[str, Any]:
     about = (run.meta.get("cases") or {}).get(case) or {}
     digest = about.get("digest")
     stage = exhibits.stage(digest) if exhibits is not None and isinstance(digest, str) else None
+    if stage is not None:
+        stage = {**stage, "nominal": _fitting(stage.get("nominal"), stage)}
     reference = (run.meta.get("reference") or {}).get(case) or {}
     measured = [
         {"mode": mode.number, "block": block, "hz": rounded(mode.measured_hz, 7)}
@@ -166,15 +169,19 @@ def _statistics(found: Statistics) -> dict[str, Any]:
 
 
 def _details(
-    run: Run, cases: list[str], strategies: list[str], exhibits: Exhibits | None
+    run: Run,
+    strategies: list[str],
+    stages: Mapping[str, Mapping[str, Any] | None],
+    exhibits: Exhibits | None,
 ) -> tuple[dict[str, Any], list[str]]:
     """Return the details of the first seed's results, the best ones first, and what is missing."""
-    seed, room = first_seed(run), MOST_DETAILS
+    seed, room, cases = first_seed(run), MOST_DETAILS, list(stages)
     shown = [result for result in run.results if result.seed == seed and result.status == "ok"]
     found: dict[str, Any] = {}
     undrawn = full = 0
     for result in sorted(shown, key=lambda result: result.rank or 0):
         exhibit = exhibits.of(result.key) if exhibits is not None and result.key else None
+        exhibit = _fitting(exhibit, stages[result.case])
         entry = {**_detail(result), "exhibit": plain_data(exhibit)}
         size = len(json.dumps(entry))
         if size > room and exhibit is not None:
@@ -200,6 +207,18 @@ def _details(
             "parameters, to keep the page small; those with the best scores have them"
         )
     return found, notes
+
+
+def _fitting(
+    exhibit: Mapping[str, Any] | None, stage: Mapping[str, Any] | None
+) -> Mapping[str, Any] | None:
+    """Return an exhibit if it is one of the structure of a stage, None otherwise."""
+    if exhibit is None or stage is None:
+        return exhibit
+    nodes, elements = len(stage["nodes"]), len(stage["elements"])
+    changes = exhibit.get("elements")
+    whole = all(len(mode["shape"]) == nodes for mode in exhibit["modes"])
+    return exhibit if whole and (changes is None or len(changes) == elements) else None
 
 
 def _detail(result: JobResult) -> dict[str, Any]:

@@ -235,6 +235,31 @@ def test_the_nominal_model_is_shown_where_unchanged_did_not_run(
     found.assert_quiet(path)
 
 
+def test_supports_and_rotations_are_drawn_as_what_they_are(
+    view: Callable[..., Any], command: Callable[..., str], tmp_path: Path
+) -> None:
+    case, store = tmp_path / "case", tmp_path / "store"
+    command("init", case)
+    sensors, modes = case / "sensors.csv", case / "modes.csv"
+    sensors.write_text(sensors.read_text().rstrip() + "\nturn,B,ry\n")
+    first, *lines = modes.read_text().splitlines()
+    modes.write_text("\n".join([f"{first},turn", *(f"{line},5.0" for line in lines)]) + "\n")
+    options = ("--seeds", "2", "--seed", "4", "-s", "unchanged", "-s", "global")
+    command("run", case, *options, "-q", "--store", store)
+    (path,) = store.glob("*.html")
+    found = view(path, "#case/portal")
+    page = found.page
+    page.wait_for_selector(".case-title")
+    whole = drawn(page)
+    page.get_by_label("Attachments").uncheck()
+    assert drawn(page) != whole
+    assert "seed 5 is shown, one of 2 draws" in page.locator(".case-facts").inner_text()
+    assert "At the drive sensor turn" not in page.locator("main").inner_text()
+    page.goto(path.resolve().as_uri() + "#board")
+    assert set(page.locator("#board-table td.letters").all_inner_texts()) == {"–"}
+    found.assert_quiet(path)
+
+
 def test_changes_of_the_stiffness(shown: Callable[..., Page]) -> None:
     page = shown("frame")
     section = page.locator("section.case-section", has_text="Change of the stiffness").last

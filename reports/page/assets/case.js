@@ -9,10 +9,13 @@
   };
   const HISTORY_CHARTS = 4;
 
+  /** Return the lowest seed that there is a result of, the one that the details are of. */
+  const firstSeed = () => bench.data.results.reduce((least, { seed }) => Math.min(least, seed), Infinity);
+
   /** Return what the run holds of every strategy on a case (first seed), the best first. */
   const entriesOf = (c) => {
     const { data } = bench;
-    const seed = data.seeds[0];
+    const seed = firstSeed();
     return data.results.filter((result) => result.c === c && result.seed === seed).map((result) => {
       const detail = data.details[`${c}:${result.s}`] ?? null;
       return { name: data.strategies[result.s].name, s: result.s, result, detail, ok: result.status === "ok" && detail !== null,
@@ -33,6 +36,8 @@
       const changed = count("modified") ? `, ${count("modified")} after a design change` : "";
       facts.push(["Measured", `${count("used")} modes used, ${count("higher")} higher ones held out${changed}; ${stage.sensors.length} sensors`]);
     }
+    const { seeds } = bench.data;
+    if (seeds.length > 1 || seeds[0] > 0) facts.push(["Noise", `seed ${firstSeed()} is shown, one of ${bench.plural(seeds.length, "draw")}; the strategies were given the measured modes with noise`]);
     const reference = Object.entries(item.reference ?? {}).map(([block, rms]) => `${block} ${bench.number(rms, 3)} %`);
     if (reference.length) facts.push(["Nominal model", `rms frequency error ${reference.join(", ")}`]);
     return bench.el("dl", { class: "case-facts" }, facts.map(([name, text]) => [bench.el("dt", {}, name), bench.el("dd", {}, String(text))]));

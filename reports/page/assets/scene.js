@@ -40,15 +40,15 @@
   /** Return the motion of a located point in a shape. */
   const motion = (shape, [i, j, share]) => add(shape[i].map((part) => part * (1 - share)), shape[j], share);
 
-  /** Return what the sensors read of a shape. */
+  /** Return what the sensors read of a shape; null for rotations, which shapes do not have. */
   const readings = (stage, shape) =>
-    stage.sensors.map((sensor) => dot(motion(shape, locate(stage, sensor)), sensor.axis));
+    stage.sensors.map((sensor) => (sensor.rotation ? null : dot(motion(shape, locate(stage, sensor)), sensor.axis)));
 
   /** Return the factor that brings measured readings nearest to predicted ones, and their MAC. */
   const match = (measured, predicted) => {
     let [mm, mp, pp] = [0, 0, 0];
     measured.forEach((value, i) => {
-      if (value === null) return;
+      if (value === null || predicted[i] === null) return;
       mm += value * value;
       mp += value * predicted[i];
       pp += predicted[i] * predicted[i];
@@ -72,7 +72,7 @@
   /** Return the scale at which the structure, as it is first seen, fills the canvas with its shapes. */
   const fit = (view, frame, stage, reach, width, height) => {
     const { project } = projection({ ...view, zoom: 1, fit: 1 }, frame, width, height);
-    const axes = [...new Map(stage.sensors.map(({ axis }) => [axis.map(Math.abs).join(), axis])).values()];
+    const axes = [...new Map(stage.sensors.filter(({ rotation }) => !rotation).map(({ axis }) => [axis.map(Math.abs).join(), axis])).values()];
     const moved = (node) => axes.flatMap((axis) => [add(node, axis, reach), add(node, axis, -reach)]);
     const points = stage.nodes.flatMap((node) => [node, ...moved(node)]).map(project);
     const half = (k, size) => Math.max(...points.map((p) => Math.abs(p[k] - size / 2)), 1);
@@ -197,7 +197,7 @@
     const { pen, stage, project, colours, arrows, reach, where } = scene;
     if (!arrows || !scene.show.measured) return;
     stage.sensors.forEach((sensor, i) => {
-      if (arrows[i] === null) return;
+      if (arrows[i] === null || sensor.rotation) return;
       const tip = project(add(sensor.xyz, sensor.axis, arrows[i] * reach));
       pen.strokeStyle = pen.fillStyle = colours.measured;
       pen.lineWidth = 2;
@@ -229,7 +229,7 @@
       pen.lineWidth = 1.5;
       pen.strokeRect(x - 2.5, y - 2.5, 5, 5);
       if (!show.sensors) return;
-      if (!scene.arrows) arrow(pen, where[i], project(add(sensor.xyz, sensor.axis, 0.09 * scene.frame.radius)));
+      if (!scene.arrows && !sensor.rotation) arrow(pen, where[i], project(add(sensor.xyz, sensor.axis, 0.09 * scene.frame.radius)));
       label(scene, sensor.label, where[i], colours.measured);
     });
   };
