@@ -33,6 +33,7 @@ from femubench.reports.diagnosis_words import (
     times,
 )
 from femubench.reports.figures import chance, figure, signed
+from femubench.reports.templating import templates
 
 Data = Mapping[str, Any]
 
@@ -42,16 +43,8 @@ _LEAST = 0.005  # what two decimals show
 
 def diagnosis_html(data: Data) -> str:
     """Return a diagnosis as a document that needs nothing but itself; it reads without scripts."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    room = Environment(
-        loader=PackageLoader("femubench.reports", "page/assets"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=_shown,
-    )
+    room = templates("page/assets", finalize=_shown)
     page = room.get_template("diagnosis.html")
     return page.render(
         style=_asset("diagnosis.css"),

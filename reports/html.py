@@ -8,6 +8,7 @@ from typing import Any
 from femubench.reports.blocks import Block, Drawing, Items, Section, Table
 from femubench.reports.cells import plain
 from femubench.reports.svg import embedded
+from femubench.reports.templating import templates
 
 _TEMPLATE = "report.html"
 
@@ -20,15 +21,8 @@ def to_html(sections: Iterable[Section], *, title: str, heading: str) -> str:
         title: in the title bar.
         heading: at the top, the line that matters most.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    room = Environment(
-        loader=PackageLoader("femubench.reports"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    room = templates("templates")
     numbered = list(_numbered(sections))
     found = room.get_template(_TEMPLATE)
     return found.render(title=plain(title), heading=plain(heading), sections=numbered)

@@ -8,6 +8,8 @@ from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
+from femubench.reports.templating import templates
+
 if TYPE_CHECKING:
     from jinja2 import Environment
 
@@ -15,16 +17,9 @@ if TYPE_CHECKING:
 @cache
 def environment() -> Environment:
     """Return the templates, with style, script and content security policy as globals."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
-    room = Environment(
-        loader=PackageLoader("femubench.reports", "page/assets"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    room = templates("page/assets")
     style, script = asset("site.css"), asset("site.js")
     # Nothing but this very style and this very script may take effect, whatever a name smuggles in.
     policy = f"default-src 'none'; base-uri 'none'; form-action 'none'; style-src {_hash(style)}"

@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from femubench import Bars, Curves, MatrixImage, Place, StructureMap, Workbench, receptance
+from femubench import (
+    Bars,
+    Curves,
+    MatrixImage,
+    Place,
+    StructureMap,
+    Workbench,
+    receptance,
+    stiffness_difference,
+)
 from femubench.core.case.reader import read_case
 from femubench.core.fem.frame import GroundSpring, PointMass
 from femubench.core.modal.eigen import solve_modes
@@ -16,7 +25,6 @@ from femubench.papers.frame.causes import CAUSES, JOINTS, TORSION, Ladder, best_
 from femubench.papers.frame.changes import (
     SOLUTIONS,
     change_figures,
-    difference_matrix,
     element_kinds,
     recovered_change,
     relative_change,
@@ -116,7 +124,7 @@ def test_finding_gives_tables_figures_and_sentences(bench: Workbench) -> None:
 def test_difference_matrix_is_symmetric_and_in_one_unit(bench: Workbench) -> None:
     model = bench.cases["frame"].model
     updated = bench.update("frame", "baruch").model
-    change = difference_matrix(model, updated)
+    change = stiffness_difference(model, updated)
     np.testing.assert_allclose(change, change.T, atol=1e-9 * np.abs(change).max())
     assert updated.stiffness_change is not None
     length = model.frame_structure.properties.length.mean()

@@ -40,6 +40,7 @@ _NAMES = {
         "Diverged FemubenchError InputError ModelError NotApplicable PluginError "
         "SelfCheckFailed StrategyFailure"
     ),
+    "exhibits.element_change": "element_norms stiffness_difference",
     "figure": "Bars Curve Curves Figure MatrixImage StructureMap",
     "fem.beam": (
         "BeamProperties coupling_matrices eccentric_mass_parts mass_matrices stiffness_matrices"
@@ -144,6 +145,9 @@ if TYPE_CHECKING:
         Diverged as Diverged, FemubenchError as FemubenchError, InputError as InputError,
         ModelError as ModelError, NotApplicable as NotApplicable, PluginError as PluginError,
         SelfCheckFailed as SelfCheckFailed, StrategyFailure as StrategyFailure,
+    )
+    from femubench.core.exhibits.element_change import (
+        element_norms as element_norms, stiffness_difference as stiffness_difference,
     )
     from femubench.core.figure import (
         Bars as Bars, Curve as Curve, Curves as Curves, Figure as Figure,

@@ -19,6 +19,7 @@ from femubench.core.diagnosis.places import (
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame, Place
+from femubench.core.fem.mesh import place_xyz
 from femubench.core.measurement import Sensors
 from femubench.core.model import Geometry
 
@@ -117,7 +118,9 @@ def sketch_of(case: Case, diagnosis: Diagnosis) -> Sketch:
             for m in frame.members
         ),
         sensors=sensors,
-        supports=tuple(SketchSupport(_xyz(frame, s.at), tuple(s.fixed)) for s in frame.supports),
+        supports=tuple(
+            SketchSupport(_point(place_xyz(frame, s.at)), tuple(s.fixed)) for s in frame.supports
+        ),
         places=tuple(_place(frame, word) for word in words),
     )
 
@@ -157,20 +160,13 @@ def _point(xyz: Iterable[float]) -> Point:
     return x, y, z
 
 
-def _xyz(frame: Frame, at: Place) -> Point:
-    if at.joint is not None:
-        return _point(frame.corners[frame.joint_index[at.joint]])
-    first, last = frame.corners[frame.member_ends[frame.member_index[at.member or ""]]]
-    return _point(first + (at.s or 0.0) * (last - first))
-
-
 def _place(frame: Frame, word: str) -> SketchPlace:
     head, _ = split_direction(word)
     if head == ALL:
         return SketchPlace(word, "all")
     joints = joints_of(frame, head)
     if joints:
-        points = tuple(_xyz(frame, Place(joint=name)) for name in joints)
+        points = tuple(_point(place_xyz(frame, Place(joint=name))) for name in joints)
         return SketchPlace(word, "joint", points=points)
     if head in frame.member_index:
         return SketchPlace(word, "member", (SketchSpan(frame.member_index[head], 0.0, 1.0),))
@@ -204,9 +200,9 @@ def _ends(frame: Frame, word: str, head: str) -> SketchPlace:
 
 
 def _at(frame: Frame, word: str, head: str) -> SketchPlace:
-    return SketchPlace(word, "point", points=(_xyz(frame, point_of(frame, head)),))
+    return SketchPlace(word, "point", points=(_point(place_xyz(frame, point_of(frame, head))),))
 
 
 def _pair(frame: Frame, word: str, head: str) -> SketchPlace:
-    points = tuple(_xyz(frame, Place(joint=name)) for name in pair_of(frame, head))
+    points = tuple(_point(place_xyz(frame, Place(joint=name))) for name in pair_of(frame, head))
     return SketchPlace(word, "pair", points=points)

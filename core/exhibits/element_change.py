@@ -64,7 +64,7 @@ def relative_changes(
     change = _from_family(structure, parameters)
     if change is None:
         return None
-    return _ratios(np.linalg.norm(_scaled(structure, change), axis=(1, 2)), size, rows)
+    return _ratios(element_norms(structure, change), size, rows)
 
 
 def _ratios(change: FloatArray, size: FloatArray, rows: Sequence[int | None]) -> list[float | None]:
@@ -72,6 +72,16 @@ def _ratios(change: FloatArray, size: FloatArray, rows: Sequence[int | None]) ->
         None if row is None or not norm > 0.0 else float(f"{part / norm:.4g}")
         for part, norm, row in zip(change, size, rows, strict=True)
     ]
+
+
+def element_norms(structure: Structure, matrices: FloatArray) -> FloatArray:
+    """Return Frobenius norms of local element matrices, rotations times the length, (n,).
+
+    Arguments:
+        structure: whose elements they belong to.
+        matrices: (n, 12, 12).
+    """
+    return np.asarray(np.linalg.norm(_scaled(structure, matrices), axis=(1, 2)))
 
 
 def _scaled(structure: Structure, matrices: FloatArray) -> FloatArray:
@@ -98,7 +108,7 @@ def _from_family(
     after = np.array([item["after"] for item in parameters], dtype=float)
     for family in _families(structure) if names else ():
         if family.names == names:
-            return family.change((after - family.before) / family.scale)
+            return family.change(family.relative(after))
     return None
 
 
@@ -126,11 +136,8 @@ def difference_picture(nominal: Model, updated: Model) -> dict[str, Any] | None:
     size = nominal.size
     if updated.size != size or size > _MOST_DOFS:
         return None
-    unit = np.eye(size)
-    change = np.abs(updated.stiffness_times(unit) - nominal.stiffness_times(unit))
-    turns = np.array([name.startswith("r") for name in nominal.dofs.direction])
-    scale = np.where(turns, 1.0 / _spacing(nominal), 1.0)
-    change = scale[:, None] * change * scale
+    change = np.abs(stiffness_difference(nominal, updated))
+    scale = _one_unit(nominal)
     nodes = np.unique(nominal.dofs.node, return_inverse=True)[1]
     count = int(nodes.max()) + 1
     cell = nodes * min(_CELLS, count) // count
@@ -156,6 +163,22 @@ def difference_picture(nominal: Model, updated: Model) -> dict[str, Any] | None:
         "highest": round(highest, 4),
         "unit": "N/m",
     }
+
+
+def stiffness_difference(nominal: Model, updated: Model) -> FloatArray:
+    """Return K0 - K with rotations times the mean element length: all entries in N/m, (n, n).
+
+    Arguments:
+        nominal, updated: small models on the same dofs.
+    """
+    scale, unit = _one_unit(nominal), np.eye(nominal.size)
+    change = nominal.stiffness_times(unit) - updated.stiffness_times(unit)
+    return np.asarray(scale[:, None] * change * scale)
+
+
+def _one_unit(model: Model) -> FloatArray:
+    turns = np.array([name.startswith("r") for name in model.dofs.direction])
+    return np.where(turns, 1.0 / _spacing(model), 1.0)
 
 
 def _spacing(model: Model) -> float:

@@ -24,7 +24,7 @@ from femubench.core.exhibits.stage import (
 from femubench.core.measurement import Measurement, Sensors
 from femubench.core.modal.correlation import mac, modal_scale_factor
 from femubench.core.modal.eigen import Modes
-from femubench.core.modal.frf import receptance
+from femubench.core.modal.frf import modal_sum, receptance
 from femubench.core.modal.kept import modes_of
 from femubench.core.modal.pairing import pair_modes
 from femubench.core.model import Model
@@ -214,15 +214,13 @@ def _stand_in(case: Case, nominal: Model, data: Measurement, drive: Sensors) -> 
         if partner < 0 or not np.isfinite(shape[row]):
             continue
         own = elastic[partner]
-        seen = np.isfinite(shape)
-        scale = modal_scale_factor(at_sensors[seen, own], shape[seen])
+        there = np.isfinite(shape)
+        scale = modal_scale_factor(at_sensors[there, own], shape[there])
         readings[own] = float(np.real(scale).item()) * shape[row]
         eigenvalues[own] = data.eigenvalues[k]
-    omega = 2.0 * np.pi * frequency_axis(case)[:, None]
-    ratio = damping_of(case)
-    root = np.sqrt(np.abs(eigenvalues))
-    dynamic = eigenvalues - omega**2 + 2j * ratio * root * omega
-    return _level((readings**2 / dynamic).sum(axis=1))
+    seen = readings[None]
+    values = modal_sum(eigenvalues, seen, seen, frequency_axis(case), damping_of(case))
+    return _level(values[:, 0, 0])
 
 
 def keep_stages(exhibits: Exhibits, cases: Iterable[Case]) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from femubench.core.case.case import Case
+from femubench.core.fem.mesh import place_xyz
 from femubench.core.fem.structure import Structure
 from femubench.core.measurement import Measurement, Sensors
 from femubench.core.model import Model
@@ -171,11 +172,11 @@ def _frame_parts(structure: Structure) -> dict[str, Any]:
             for k, joint in enumerate(frame.joints)
         ],
         "masses": [
-            {"xyz": rounded(_point(structure, mass.at)), "kg": mass.mass} for mass in frame.masses
+            {"xyz": rounded(place_xyz(frame, mass.at)), "kg": mass.mass} for mass in frame.masses
         ],
         "springs": [
             {
-                "xyz": rounded(_point(structure, spring.at)),
+                "xyz": rounded(place_xyz(frame, spring.at)),
                 "axis": [float(name == spring.direction.lstrip("+-")[-1]) for name in "xyz"],
                 "rotation": "r" in spring.direction,
                 "stiffness": spring.stiffness,
@@ -183,19 +184,10 @@ def _frame_parts(structure: Structure) -> dict[str, Any]:
             for spring in frame.springs
         ],
         "supports": [
-            {"xyz": rounded(_point(structure, support.at)), "fixed": list(support.fixed)}
+            {"xyz": rounded(place_xyz(frame, support.at)), "fixed": list(support.fixed)}
             for support in frame.supports
         ],
     }
-
-
-def _point(structure: Structure, at: Any) -> FloatArray:  # noqa: ANN401 - a Place
-    frame = structure.frame
-    if at.joint is not None:
-        return np.array(frame.joint(at.joint).xyz)
-    member = frame.members[frame.member_index[at.member]]
-    start, stop = (np.array(frame.joint(name).xyz) for name in member.ends)
-    return np.asarray(start + at.s * (stop - start))
 
 
 def highest_measured(case: Case) -> float:

@@ -29,11 +29,32 @@ def receptance(
 
     Source: Ewins (2000), Modal Testing, (2.45): sum of phi_i phi_j / (lambda - w^2 + 2 i z w_r w).
     """
-    omega = 2.0 * np.pi * np.asarray(frequencies)[:, None]
     ratio = np.broadcast_to(np.nan_to_num(np.asarray(damping, dtype=float)), len(modes))
-    root = np.sqrt(np.abs(modes.eigenvalues))
-    dynamic = modes.eigenvalues - omega**2 + 2j * ratio * root * omega
+    out, into = response @ modes.shapes, excitation @ modes.shapes
+    return modal_sum(modes.eigenvalues, out, into, frequencies, ratio)
+
+
+def modal_sum(
+    eigenvalues: FloatArray,
+    out: FloatArray,
+    into: FloatArray,
+    frequencies: FloatArray,
+    damping: FloatArray | float,
+) -> FloatArray:
+    """Return the receptance of modes that are known at the readings alone.
+
+    Arguments:
+        eigenvalues: in rad^2/s^2, (m,).
+        out, into: mass-normalised shapes at responses and forces, (n_response, m), (n_force, m).
+        frequencies: in Hz, (n_f,).
+        damping: viscous damping ratio of every mode, or of all.
+
+    Raises:
+        ModelError: at the very frequency of an undamped mode.
+    """
+    omega = 2.0 * np.pi * np.asarray(frequencies)[:, None]
+    root = np.sqrt(np.abs(eigenvalues))
+    dynamic = eigenvalues - omega**2 + 2j * damping * root * omega
     if not dynamic.all():
         raise ModelError("the receptance is infinite at a frequency of an undamped mode")
-    out, into = response @ modes.shapes, excitation @ modes.shapes
     return np.asarray(np.einsum("im,fm,jm->fij", out, 1.0 / dynamic, into))

@@ -62,6 +62,10 @@ class ElementFamily:
         """Return the parameters that belong to the relative changes x, (n_unknowns,)."""
         return self.before + self.scale * x
 
+    def relative(self, values: FloatArray) -> FloatArray:
+        """Return the relative changes that belong to parameters, the inverse of `values`."""
+        return np.asarray((values - self.before) / self.scale)
+
     def spread(self, x: FloatArray) -> FloatArray:
         """Return the unknowns of every element and pattern, zero where there is none."""
         return np.asarray(np.append(x, 0.0)[self.columns])

@@ -14,13 +14,14 @@ from femubench import (
     StructureMap,
     UpdateResult,
     Workbench,
+    element_norms,
     generic_family,
+    stiffness_difference,
     stiffness_matrices,
 )
 
 CASE = "frame"
 SOLUTIONS = {"least squares": "generic-ls", "adjusted": "generic-adjusted"}
-_TURNS = np.tile([False, False, False, True, True, True], 2)
 
 
 def change_figures(bench: Workbench) -> tuple[Figure, ...]:
@@ -37,19 +38,6 @@ def change_figures(bench: Workbench) -> tuple[Figure, ...]:
     )
 
 
-def difference_matrix(model: Model, updated: Model) -> FloatArray:
-    """Return K0 - K on the dofs w, L dw/dx, L theta, all entries in N/m, (n, n).
-
-    L is the mean element length: elements of sides and rungs are not equally long.
-    """
-    length = float(model.frame_structure.properties.length.mean())
-    turns = np.array([direction.startswith("r") for direction in model.dofs.direction])
-    scale = np.where(turns, 1.0 / length, 1.0)
-    unit = np.eye(model.size)
-    change = model.stiffness_times(unit) - updated.stiffness_times(unit)
-    return np.asarray(scale[:, None] * change * scale)
-
-
 def recovered_change(family: ElementFamily, result: UpdateResult) -> FloatArray:
     """Return the change of the local element matrices from the parameters, (n_elements, 12, 12).
 
@@ -59,7 +47,7 @@ def recovered_change(family: ElementFamily, result: UpdateResult) -> FloatArray:
     """
     assert family.names == tuple(p.name for p in result.parameters)
     after = np.array([p.after for p in result.parameters])
-    return family.change((after - family.before) / family.scale)
+    return family.change(family.relative(after))
 
 
 def relative_change(structure: Structure, change: FloatArray) -> FloatArray:
@@ -70,15 +58,11 @@ def relative_change(structure: Structure, change: FloatArray) -> FloatArray:
         change: of the local element matrices, (n, 12, 12).
     """
     nominal = stiffness_matrices(structure.properties)
-    scale = np.where(_TURNS, 1.0 / structure.properties.length[:, None], 1.0)
-    scale = scale * structure.active_local
-    weights = scale[:, :, None] * scale[:, None, :]
-    size = np.linalg.norm(weights * nominal, axis=(1, 2))
-    return np.asarray(np.linalg.norm(weights * change, axis=(1, 2)) / size)
+    return element_norms(structure, change) / element_norms(structure, nominal)
 
 
 def _matrix_figure(model: Model, updated: Model) -> MatrixImage:
-    change = difference_matrix(model, updated)
+    change = stiffness_difference(model, updated)
     zero = model.stiffness.toarray() == 0.0
     outside = float(np.sum(change[zero] ** 2) / np.sum(change**2))
     frame, nodes = model.frame_structure.frame, model.dofs.node
