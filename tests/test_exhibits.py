@@ -227,4 +227,7 @@ class TestShelf:
 
     def test_a_store_without_room_does_without(self, tmp_path: Path) -> None:
         (tmp_path / "store").write_text("")
-        Exhibits(tmp_path / "store").put(KEY, {"modes": []})
+        exhibits = Exhibits(tmp_path / "store")
+        exhibits.put(KEY, {"modes": []})
+        assert exhibits.of(KEY) is None
+        assert (tmp_path / "store").read_text() == ""

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
-import os
 import re
-import tempfile
 import time
 from collections.abc import Iterable, Mapping, Sized
 from contextlib import suppress
@@ -18,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from femubench.core.errors import InputError
 from femubench.core.harness.schema import parse_json
 from femubench.core.reading import read_text
+from femubench.core.writing import write_atomically
 
 FOLDER = "exhibits"
 MOST_BYTES = 4 * 2**20
@@ -230,12 +229,4 @@ class Exhibits:
             if len(text) > MOST_BYTES:
                 return
             self._folder.mkdir(parents=True, exist_ok=True)
-            handle, part = tempfile.mkstemp(dir=self._folder, prefix=f".{name}.")
-            try:
-                with os.fdopen(handle, "w", encoding="utf-8") as stream:
-                    stream.write(text)
-                Path(part).chmod(0o644)
-                Path(part).replace(path)
-            except BaseException:
-                Path(part).unlink(missing_ok=True)
-                raise
+            write_atomically(path, text)
