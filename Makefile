@@ -7,8 +7,6 @@ ARGS ?=
 
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
-# Folders too: their time changes when a file is added or removed.
-SOURCES := pyproject.toml $(shell find core papers plugins reports scenarios -not -path '*/__pycache__*')
 
 .PHONY: run test bench sweep fuzz format clean
 .DELETE_ON_ERROR:
@@ -46,15 +44,11 @@ $(BIN)/python:
 	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \
 		echo "Python's venv is missing; on Debian: apt install python3-venv"; exit 1; }
 
-# pip builds inside the source folder: a file that was deleted would live on in build/.
-$(VENV)/.installed: $(SOURCES) | $(BIN)/python
-	rm -rf build *.egg-info
-	$(PIP) install --quiet .
-	rm -rf build *.egg-info
+# Installed by link: a change of a source file needs no other install, one of the dependencies does.
+$(VENV)/.installed: pyproject.toml | $(BIN)/python
+	$(PIP) install --quiet -e .
 	touch $@
 
-$(VENV)/.installed-test: $(SOURCES) | $(BIN)/python
-	rm -rf build *.egg-info
-	$(PIP) install --quiet '.[test]'
-	rm -rf build *.egg-info
+$(VENV)/.installed-test: pyproject.toml | $(BIN)/python
+	$(PIP) install --quiet -e '.[test]'
 	touch $@ $(VENV)/.installed

@@ -15,10 +15,9 @@ LONGEST_FILE, LONGEST_FUNCTION = 300, 60
 
 
 def name_of(path: Path) -> str:
-    """Return the dotted name of a source file; `core/api` is `femubench` itself."""
+    """Return the dotted name of a source file."""
     parts = path.relative_to(ROOT).with_suffix("").parts
-    parts = parts[:-1] if parts[-1] == "__init__" else parts
-    return ".".join(("femubench", *(parts[2:] if parts[:2] == ("core", "api") else parts)))
+    return ".".join(("femubench", *(parts[:-1] if parts[-1] == "__init__" else parts)))
 
 
 def imports_of(path: Path) -> Iterator[str]:
@@ -70,7 +69,6 @@ def test_the_rule_itself_tells_right_from_wrong() -> None:
     assert not may_import("femubench.reports.markdown", "femubench.scenarios")
     assert not may_import("femubench.core.model", "femubench.plugins")
     assert may_import("femubench.core.cli.run", "femubench.reports")
-    assert name_of(ROOT / "core" / "api" / "__init__.py") == "femubench"
     assert name_of(ROOT / "core" / "cli" / "run.py") == "femubench.core.cli.run"
 
 
