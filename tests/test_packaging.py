@@ -34,12 +34,12 @@ def test_every_data_file_is_in_the_wheel() -> None:
     taken: set[Path] = set()
     for package, globs in SETUPTOOLS["package-data"].items():
         for glob in globs:
-            matches = {path for path in folder_of(package).glob(glob) if path.is_file()}
+            matches = {p.resolve() for p in folder_of(package).resolve().glob(glob) if p.is_file()}
             assert matches, f"{package}: {glob} matches no file"
             taken |= matches
     rooms = ("core", "papers", "plugins", "reports", "scenarios")
     data = {
-        path
+        path.resolve()
         for room in rooms
         for path in (ROOT / room).rglob("*")
         if path.is_file() and path.suffix not in (".py", ".pyc")
