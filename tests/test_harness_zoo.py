@@ -11,15 +11,14 @@ from typing import Any
 
 import pytest
 
-from femubench.core.harness import runner
-from femubench.core.harness.jobs import JobOutcome
-from femubench.core.harness.limits import MIB, Limits
-from femubench.core.harness.results import JobResult, Run
-from femubench.core.harness.runner import run_jobs
-from femubench.core.harness.schedule import _Bench
-from femubench.core.harness.serial import result_from_json, result_to_json
-from femubench.core.harness.slots import Slot
-from femubench.core.harness.task import Ending
+from femubench.core.run import runner
+from femubench.core.run.jobs import JobOutcome
+from femubench.core.run.limits import MIB, Limits
+from femubench.core.run.runner import run_jobs
+from femubench.core.run.schedule import Slot, _Bench
+from femubench.core.run.workers import Ending
+from femubench.core.schema.records import result_from_json, result_to_json
+from femubench.core.schema.results import JobResult, Run
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys

@@ -16,7 +16,7 @@ from femubench.core.cli.plugins import plugins
 from femubench.core.plugin import hookspecs
 from femubench.core.plugin.loader import HOOKS
 from femubench.core.plugin.new_package import KINDS
-from femubench.core.strategy import CAPABILITIES
+from femubench.core.update.strategy import CAPABILITIES
 
 DOCS = Path(__file__).parents[1] / "docs"
 TEXT = (DOCS / "plugins.md").read_text(encoding="utf-8")

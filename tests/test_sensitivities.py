@@ -18,6 +18,7 @@ from femubench.core.fem.frame import (
     RigidEnd,
     Support,
 )
+from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import QUANTITIES, Parameter, derivatives, present_value
 from femubench.core.fem.sections import rectangular_tube
 from femubench.core.fem.structure import Structure
@@ -27,7 +28,6 @@ from femubench.core.modal.sensitivity import (
     frequency_sensitivities,
     shape_sensitivities,
 )
-from femubench.core.model import Model
 
 STEP = 1e-5
 ELASTIC = 4

@@ -23,7 +23,7 @@ def publish(folder: Path, files: tuple[Path, ...], quiet: bool) -> None:
     publish before: then the files are added to it. One file that is not sound, and nothing is
     written.
     """
-    from femubench.core.harness.publishing import publish as merge
+    from femubench.core.publish.publishing import publish as merge
     from femubench.reports.publish_page import pages_of
 
     check_can_make(folder.resolve().parent)

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import ACTIVE, Brace, Frame, Oscillator
 from femubench.core.fem.kinematics import point_rows
-from femubench.core.measurement import DIRECTIONS
+from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 if TYPE_CHECKING:

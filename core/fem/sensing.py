@@ -9,7 +9,7 @@ import scipy.sparse as sp
 
 from femubench.core.fem.kinematics import point_rows
 from femubench.core.fem.mesh import SAME_STATION, locate
-from femubench.core.measurement import Sensors
+from femubench.core.fem.sensors import Sensors
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 if TYPE_CHECKING:

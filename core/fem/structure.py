@@ -27,7 +27,7 @@ from femubench.core.fem.nominal import factored_properties, nominal_properties
 from femubench.core.fem.parameters import Parameter, apply_values
 from femubench.core.fem.preload import preload_stiffness
 from femubench.core.fem.sensing import sensor_rows
-from femubench.core.measurement import DIRECTIONS, Sensors
+from femubench.core.fem.sensors import DIRECTIONS, Sensors
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 

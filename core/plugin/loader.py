@@ -20,7 +20,7 @@ from femubench.core.plugin import hookspecs
 from femubench.core.plugin.markers import PROJECT
 from femubench.core.plugin.roles import Effect, Reader, Reporter, Scenario
 from femubench.core.plugin.validation import CHECKS, did_you_mean
-from femubench.core.strategy import Strategy
+from femubench.core.update.strategy import Strategy
 
 PREFIX = f"{PROJECT}_"
 HOOKS = tuple(PREFIX + kind for kind in CHECKS)
