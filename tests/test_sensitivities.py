@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from femubench.core.fem.derivatives import derivatives, present_value
 from femubench.core.fem.frame import (
     Frame,
     Joint,
@@ -19,7 +20,7 @@ from femubench.core.fem.frame import (
     Support,
 )
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import QUANTITIES, Parameter, derivatives, present_value
+from femubench.core.fem.parameters import QUANTITIES, Parameter
 from femubench.core.fem.sections import rectangular_tube
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import Modes, solve_modes

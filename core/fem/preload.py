@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
@@ -33,12 +33,12 @@ from femubench.core.fem.beam import (
     rigid_transform,
     stiffness_matrices,
 )
+from femubench.core.fem.elastic_stiffness import elastic_stiffness
 from femubench.core.fem.frame import ACTIVE, Frame, Support
 from femubench.core.fem.kinematics import build_kinematics, rigid_motions
+from femubench.core.fem.meshed_frame import MeshedFrame
+from femubench.core.fem.nominal import meshed
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
-
-if TYPE_CHECKING:
-    from femubench.core.fem.structure import Structure
 
 _IN_PLANE = ("x", "y", "rz")  # of a frame that moves out of plane
 _HELD = 1e-9
@@ -85,7 +85,7 @@ class Statics:
         free: the dofs but those that stop the rigid motions, where nothing reacts.
     """
 
-    structure: Structure
+    structure: MeshedFrame
     stiffness: FloatArray
     factor: Any
     free: IntArray
@@ -161,20 +161,20 @@ class Statics:
         return StressState(ends[:, 6:9], ends[:, 9:], outer[:, 0], outer[:, 1], stiffness * stretch)
 
 
-def statics_of(structure: Structure) -> Statics:
+def statics_of(structure: MeshedFrame) -> Statics:
     """Return the statics of the frame as it is described, kept with the structure.
 
     Raises:
         ModelError: when the frame is a mechanism in its plane.
     """
     if "statics" not in structure.kept:
-        source = type(structure).build(structure.frame) if structure.changes else structure
+        source = meshed(structure.frame) if structure.changes else structure
         structure.kept["statics"] = _prepare(source)
     statics: Statics = structure.kept["statics"]
     return statics
 
 
-def _prepare(structure: Structure) -> Statics:
+def _prepare(structure: MeshedFrame) -> Statics:
     frame = replace(structure.frame, oscillators=())
     directions = ACTIVE[frame.plane]
     if frame.plane == "out-of-plane":
@@ -186,7 +186,7 @@ def _prepare(structure: Structure) -> Statics:
     kinematics = build_kinematics(frame, structure.mesh, directions)
     flat_structure = replace(structure, frame=frame, kinematics=kinematics)
     free = _free(flat_structure)
-    matrix = sp.csc_array(flat_structure.elastic_stiffness())[free][:, free]
+    matrix = sp.csc_array(elastic_stiffness(flat_structure))[free][:, free]
     try:
         factor = splu(sp.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0)
     except RuntimeError:
@@ -201,7 +201,7 @@ def _clamps(frame: Frame) -> tuple[Support, ...]:
     return tuple(Support(s.at, _IN_PLANE) for s in frame.supports if set(s.fixed) == whole)
 
 
-def _free(structure: Structure) -> IntArray:
+def _free(structure: MeshedFrame) -> IntArray:
     """Return the dofs that are left when as few as possible stop the rigid motions."""
     kinematics, xyz = structure.kinematics, structure.mesh.xyz
     centre, size = xyz.mean(axis=0), max(float(np.ptp(xyz, axis=0).max()), 1e-12)
@@ -222,7 +222,7 @@ def _free(structure: Structure) -> IntArray:
 _AT_ONCE = 20000  # elements whose matrices are held, all states together
 
 
-def preload_stiffness(structure: Structure, member: str, force: float) -> SparseArray:
+def preload_stiffness(structure: MeshedFrame, member: str, force: float) -> SparseArray:
     """Return the geometric stiffness of one preload on the free dofs, sparse (n, n), N/m, N, N m.
 
     It is linear in the force. The state of stress is that of the frame as it is described:
@@ -240,7 +240,7 @@ def preload_stiffness(structure: Structure, member: str, force: float) -> Sparse
     return force * preload_stiffnesses(structure, [member])[0]
 
 
-def preload_stiffnesses(structure: Structure, members: Sequence[str]) -> tuple[SparseArray, ...]:
+def preload_stiffnesses(structure: MeshedFrame, members: Sequence[str]) -> tuple[SparseArray, ...]:
     """Return the geometric stiffness of a preload of 1 N in each of some members.
 
     Arguments:
@@ -270,7 +270,7 @@ def preload_stiffnesses(structure: Structure, members: Sequence[str]) -> tuple[S
     return tuple(found)
 
 
-def _geometric(structure: Structure, states: Sequence[StressState]) -> FloatArray:
+def _geometric(structure: MeshedFrame, states: Sequence[StressState]) -> FloatArray:
     """Return the geometric matrices of all elements in all states, (n_states, n, 12, 12)."""
     if not states:
         return np.zeros((0, len(structure.mesh.ends), 12, 12))
@@ -279,7 +279,7 @@ def _geometric(structure: Structure, states: Sequence[StressState]) -> FloatArra
     return geometric_matrices(structure, together).reshape(len(states), -1, 12, 12)
 
 
-def redundant_members(structure: Structure) -> tuple[str, ...]:
+def redundant_members(structure: MeshedFrame) -> tuple[str, ...]:
     """Return the members whose lack of fit the rest of the frame resists, in the frame's order."""
     try:
         resisting = statics_of(structure).resisting()
@@ -306,7 +306,7 @@ def _turned(force: FloatArray, line: FloatArray) -> FloatArray:
     return np.asarray(_symmetric(force[:, :, None] * line[:, None, :]) - work * np.eye(3))
 
 
-def geometric_matrices(structure: Structure, state: StressState) -> FloatArray:
+def geometric_matrices(structure: MeshedFrame, state: StressState) -> FloatArray:
     """Return the local geometric stiffness matrices of the elements, (s n, 12, 12).
 
     Arguments:
@@ -356,7 +356,7 @@ def _density(
     return _symmetric(mixed) + back @ turned @ rotation + wagner
 
 
-def _connections(structure: Structure, state: StressState) -> tuple[SparseArray, FloatArray]:
+def _connections(structure: MeshedFrame, state: StressState) -> tuple[SparseArray, FloatArray]:
     """Return motions of base and hanging node of the joint springs, and their forms.
 
     A spring behind a rigid arm is the same as a beam of one point: u' dx is the relative
@@ -374,7 +374,7 @@ def _connections(structure: Structure, state: StressState) -> tuple[SparseArray,
     return structure.kinematics.transform[rows], _symmetric(blocks)
 
 
-def _braces(structure: Structure, state: StressState) -> tuple[SparseArray, FloatArray]:
+def _braces(structure: MeshedFrame, state: StressState) -> tuple[SparseArray, FloatArray]:
     """Return relative motions of the ends of the braces, and their forms."""
     unit, length = brace_lines(structure.frame)
     across = np.eye(3) - unit[:, :, None] * unit[:, None, :]
