@@ -14,6 +14,7 @@ from scipy.special import log_ndtr
 
 from femubench.core.inference.fit import Problem, State, signed_hz
 from femubench.core.inference.modal_basis import Space
+from femubench.core.inference.noise import marginal
 from femubench.core.inference.projection import Projection
 from femubench.core.typing import FloatArray
 
@@ -170,7 +171,7 @@ def screen(
     top = max(problem.space.rigid + len(base.partner), int(base.partner.max(initial=-1)) + 1)
     residuals, still = _residuals(problem, projections, top), base.residual
     if yielding is not None:
-        residuals, still = _eased(residuals, yielding), _eased(still, yielding)
+        residuals, still = marginal(residuals, yielding), marginal(still, yielding)
     return interpolated(projections, residuals, still)
 
 
@@ -191,18 +192,11 @@ def likely(
     if not projections:
         return []
     both = np.concatenate([item.residuals for item in screened]) + (state.residual - still)
-    eased = _eased(both, state.jacobian), _eased(state.residual, state.jacobian)
-    rows = interpolated(projections, *eased)
+    seen = marginal(both, state.jacobian), marginal(state.residual, state.jacobian)
+    rows = interpolated(projections, *seen)
     promising = [row for row in rows if state.chi2 - row.cost > least]
     promising.sort(key=lambda row: row.cost)
     return [row.projection for row in promising[:_LIKELY]]
-
-
-def _eased(residuals: FloatArray, slopes: FloatArray) -> FloatArray:
-    """Return residuals whose squares are those after the best linear move within a prior."""
-    along, size, _ = np.linalg.svd(slopes, full_matrices=False)
-    taken = 1.0 - 1.0 / np.sqrt(1.0 + np.square(size))
-    return np.asarray(residuals - (residuals @ along * taken) @ along.T)
 
 
 def _residuals(problem: Problem, projections: Sequence[Projection], top: int) -> FloatArray:

@@ -40,3 +40,18 @@ class Noise:
     def whiten(self, rows: FloatArray) -> FloatArray:
         """Return vectors along the last axis in units of the noise, same shape."""
         return np.asarray(rows @ self._inverse.T)
+
+
+def marginal(rows: FloatArray, slopes: FloatArray) -> FloatArray:
+    """Return vectors in units of noise and linear causes together: (I + J J')^(-1/2) times each.
+
+    The squares of marginal residuals are what is left after the best move of the causes within
+    their standard normal prior.
+
+    Arguments:
+        rows: residuals or slopes in units of the noise along the last axis, (..., n_data).
+        slopes: J, the derivatives of the data by the causes, (n_data, k).
+    """
+    along, size, _ = np.linalg.svd(slopes, full_matrices=False)
+    taken = 1.0 - 1.0 / np.sqrt(1.0 + np.square(size))
+    return np.asarray(rows - (rows @ along * taken) @ along.T)

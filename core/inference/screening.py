@@ -17,6 +17,7 @@ from femubench.core.fem.model import Model
 from femubench.core.inference.fit import Fit, Problem, State, fit, state_at
 from femubench.core.inference.grid_search import Screened, screen
 from femubench.core.inference.hypothesis import Hypothesis
+from femubench.core.inference.noise import marginal
 from femubench.core.inference.projection import Projection, Projector
 from femubench.core.inference.static_response import LargeProblem, enriched, magnitudes
 from femubench.core.typing import FloatArray
@@ -140,40 +141,24 @@ def _ranked(local: _Local, state: State, hypotheses: Sequence[Hypothesis]) -> It
         state: of the model with or without causes.
         hypotheses: of the same model.
     """
-    ease = _Easing(state)
+    residual = marginal(state.residual, state.jacobian)
     for start in range(0, len(hypotheses), _CHUNK):
         chunk = hypotheses[start : start + _CHUNK]
         grids, factors = zip(*(_directions(hypothesis) for hypothesis in chunk), strict=True)
         pairs = zip(chunk, factors, strict=True)
         found = [_first_order(local, state, hypothesis, own) for hypothesis, own in pairs]
         forces = np.moveaxis(np.concatenate([force for force, _ in found]), 0, 2)
-        moves = ease(state.rows(forces, np.concatenate([mass for _, mass in found])))
+        slopes = state.rows(forces, np.concatenate([mass for _, mass in found]))
+        moves = marginal(state.problem.noise.whiten(slopes.T), state.jacobian).T
         size = np.square(moves).sum(axis=0)
         prior = np.concatenate([np.square(grid).sum(axis=1) for grid in grids])
-        along = np.maximum(ease.residual @ moves, 0.0)
+        along = np.maximum(residual @ moves, 0.0)
         gain = np.square(along) / (size + _SLACK * prior + 1e-30)
         visible = np.sqrt(size / (prior + 1e-30))
         ends = np.cumsum([len(grid) for grid in grids])[:-1]
         both = zip(chunk, np.split(gain, ends), np.split(visible, ends), strict=True)
         for hypothesis, own, seen in both:
             yield Ranked(hypothesis, float(own.max()), float(seen.max()))
-
-
-class _Easing:
-    """Residuals and slopes in units of the noise, the causes of a state free to move."""
-
-    def __init__(self, state: State) -> None:
-        self.state = state
-        self.along, size, _ = np.linalg.svd(state.jacobian, full_matrices=False)
-        self.taken = 1.0 - 1.0 / np.sqrt(1.0 + np.square(size))
-        self.residual = self._eased(state.residual[:, None])[:, 0]
-
-    def __call__(self, slopes: FloatArray) -> FloatArray:
-        """Return slopes, (n_data, p), in these units."""
-        return self._eased(self.state.problem.noise.whiten(slopes.T).T)
-
-    def _eased(self, columns: FloatArray) -> FloatArray:
-        return np.asarray(columns - self.along @ (self.taken[:, None] * (self.along.T @ columns)))
 
 
 class _Local:
