@@ -13,6 +13,7 @@ import shutil
 import signal
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -293,7 +294,7 @@ class Workers(Generic[Key]):
         """Start what the workers need, and leave no process and no file behind."""
         self._root = scratch_root()
         self._mark = _server_mark()
-        with adopting():
+        with adopting(), _server_awake():
             try:
                 yield self
             finally:
@@ -321,8 +322,7 @@ class Workers(Generic[Key]):
         arguments = (function, argument, send, printed, limits, scratch)
         process = context.Process(target=serve, args=arguments)
         try:
-            _server_mark()  # a job may have ended the server,
-            _wake_server()  # or stopped it
+            _server_mark()  # a job may have ended the server
             process.start()
         except (OSError, EOFError) as error:
             for end in (answer, output):
@@ -346,7 +346,6 @@ class Workers(Generic[Key]):
         look = time.monotonic() - self._looked >= _TICK
         if look:
             self._looked = time.monotonic()
-            _wake_server()
         ended = []
         for task in tuple(self._running):
             ending = progress_of(task, look=look)
@@ -391,8 +390,25 @@ def _server_mark() -> str:
 _mark = ""
 
 
+@contextmanager
+def _server_awake() -> Iterator[None]:
+    """Let the server go on whenever a job stops it, even while a start waits for its answer."""
+    done = threading.Event()
+
+    def watch() -> None:
+        while not done.wait(_TICK):
+            _wake_server()
+
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield
+    finally:
+        done.set()
+        watcher.join()
+
+
 def _wake_server() -> None:
-    """Let the server go on where a job has stopped it."""
     server = _server()
     with suppress(psutil.Error, ProcessLookupError):
         if server is not None and psutil.Process(server).status() == psutil.STATUS_STOPPED:
