@@ -6,8 +6,15 @@ so that ``import femubench`` costs nothing.
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+if not os.path.isdir(os.path.join(os.path.dirname(__file__), "core")):
+    raise ImportError(
+        "femubench/core is no link to the folder core: clone once more with "
+        "`git clone -c core.symlinks=true` (on Windows, in developer mode)"
+    )
 
 __version__ = "0.1.0"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
@@ -12,6 +12,7 @@ import numpy as np
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
+from femubench.core.plugin.roles import Effect
 
 Scaling = Literal["linear", "exponential", "compliance"]
 
@@ -76,7 +77,7 @@ class EffectParameter:
         return max(low, -6.0), min(high, 6.0)
 
 
-class FrameEffect(ABC):
+class FrameEffect(Effect):
     """Base class of effects on frames: override `places`, `parameters` and `frame`.
 
     Attributes:
