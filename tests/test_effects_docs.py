@@ -21,7 +21,7 @@ from femubench.plugins.effects import femubench_effects
 
 TEXT = (Path(__file__).parents[1] / "docs" / "effects.md").read_text(encoding="utf-8")
 THERE, WRITES = "## What there is", "### What each writes and what it is confused with"
-EFFECTS: dict[str, Any] = {effect.name: effect() for effect in femubench_effects()}
+EFFECTS: dict[str, Any] = {name: load_plugins().effects[name] for name in femubench_effects()}
 RATIOS = ("ratio", "multiple")
 
 FrameBuilder = Callable[..., Frame]

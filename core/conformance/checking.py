@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
 from femubench.core.conformance import (
+    SECONDS,
     effect_checks,
     other_checks,
     result_checks,
@@ -15,7 +16,6 @@ from femubench.core.conformance import (
 )
 from femubench.core.conformance.kit import (
     CHECKS,
-    SECONDS,
     Bench,
     Check,
     Role,
@@ -124,12 +124,12 @@ def to_json(subject: Subject, found: Sequence[Finding]) -> dict[str, Any]:
     }
 
 
-def _of_role(role: Role, plugins: Plugins) -> dict[str, Any]:
-    by_role: dict[Role, dict[str, Any]] = {
-        "strategy": {**plugins.strategies},
-        "effect": {**plugins.effects},
-        "reader": {**plugins.readers},
-        "scenario": {**plugins.scenarios},
+def _of_role(role: Role, plugins: Plugins) -> Mapping[str, Any]:
+    by_role: dict[Role, Mapping[str, Any]] = {
+        "strategy": plugins.strategies,
+        "effect": plugins.effects,
+        "reader": plugins.readers,
+        "scenario": plugins.scenarios,
     }
     return by_role[role]
 

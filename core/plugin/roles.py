@@ -58,7 +58,7 @@ class Reporter(Protocol):
     A reporter may offer more than is asked here:
 
     - ``render_with(run, exhibits) -> str``: used instead of `render` where there is a store;
-      `exhibits` is None, or has ``stage(digest of the case)`` and ``of(key of the job)``, plain
+      `exhibits` is None, or has ``case(digest)`` of a case and ``of(key of the job)``, plain
       data to draw or None.
     - ``render_bytes(run) -> bytes``: used instead of `render`, for a format that is no text.
 

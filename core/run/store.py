@@ -13,8 +13,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from femubench.core.drawing.files import Exhibits
 from femubench.core.errors import InputError
-from femubench.core.exhibits.shelf import Exhibits
 from femubench.core.files import read_bytes
 from femubench.core.schema.records import (
     LARGEST_STORE,

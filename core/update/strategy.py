@@ -5,12 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
+if TYPE_CHECKING:
+    import numpy as np
 
-from femubench.core.fem.model import Model
-from femubench.core.modal.measurement import Measurement
+    from femubench.core.fem.model import Model
+    from femubench.core.modal.measurement import Measurement
 
 CAPABILITIES = ("shapes", "elements", "geometry", "joints")
 
