@@ -11,7 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 ROOMS = ("core", "papers", "plugins", "reports", "scenarios")
 FILES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
-LONGEST_FILE, LONGEST_FUNCTION = 300, 60
+LONGEST_FILE, LONGEST_FUNCTION = 500, 60
 
 
 def name_of(path: Path) -> str:

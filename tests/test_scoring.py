@@ -217,9 +217,10 @@ def test_ranks_go_by_physics_then_score_then_name() -> None:
     assert [item.score for item in rank_results(ranked)] == [item.score for item in ranked]
 
 
-def test_without_reference_the_result_of_unchanged_serves() -> None:
+def test_without_reference_the_result_of_the_baseline_serves() -> None:
     ranked = rank_results(
-        [result("unchanged", rms=2.0), result("good", rms=1.0), result("x", case="b")]
+        [result("still", rms=2.0), result("good", rms=1.0), result("x", case="b")],
+        baseline="still",
     )
     assert [item.score for item in ranked] == pytest.approx([1.0, 1.05 / 2.05, 10.0])
 

@@ -14,6 +14,7 @@ import femubench
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.sketch import PlaceKind, Plane, sketch_of
+from femubench.core.effect.words import Wording
 from femubench.core.errors import InputError
 from femubench.core.schema.diagnosis import Verdict
 
@@ -86,6 +87,7 @@ class _ParameterRecord(_Record):
     std: _Number
     unit: str
     textbook: bool = False
+    wording: Wording = "value"
 
 
 class _CauseRecord(_Record):
@@ -114,6 +116,7 @@ class _VisibleRecord(_Record):
     place: str = ""
     size: _Number
     unit: str
+    wording: Wording = "value"
 
 
 class _ResidualRecord(_Record):
