@@ -45,6 +45,8 @@ _NAMES = {
         "member_labels member_length pair_of point_of "
         "point_places split_direction type_place type_places"
     ),
+    "effect.sizes": "Site Size",
+    "effect.words": "Reading",
     "errors": (
         "Diverged FemubenchError InputError ModelError "
         "NotApplicable PluginError SelfCheckFailed StrategyFailure"
@@ -67,11 +69,12 @@ _NAMES = {
     "fem.model": "LowRank Model",
     "fem.parameters": "Parameter",
     "fem.preload": "preload_stiffness preload_stiffnesses redundant_members",
-    "fem.sections": "Section constant_kappa rectangular_tube round_tube solid_rectangle",
+    "fem.sections": "Section bredt constant_kappa rectangular_tube round_tube solid_rectangle",
     "fem.sensors": "Sensors",
     "fem.structure": "Structure",
     "inference.examine": "Examination examine",
     "inference.posterior": "Explanation",
+    "look.modes": "Seen",
     "modal.complex_modes": "real_modes",
     "modal.correlation": "auto_mac mac modal_scale_factor",
     "modal.eigen": "Modes solve_modes",
@@ -91,6 +94,7 @@ _NAMES = {
     "run.frames": "modes_frame results_frame run_from_json run_to_json",
     "run.runner": "run_jobs",
     "run.store": "Store",
+    "schema.diagnosis": "LookWarning",
     "schema.results": "Block JobResult PairedMode Run",
     "score.leaderboard": "leaderboard",
     "score.ranking": "OFFSET_PERCENT SCORE_OF_FAILURE TIE rank_results ranked",
@@ -185,6 +189,8 @@ if TYPE_CHECKING:
         type_place as type_place,
         type_places as type_places,
     )
+    from femubench.core.effect.sizes import Site as Site, Size as Size
+    from femubench.core.effect.words import Reading as Reading
     from femubench.core.errors import (
         Diverged as Diverged,
         FemubenchError as FemubenchError,
@@ -242,6 +248,7 @@ if TYPE_CHECKING:
     )
     from femubench.core.fem.sections import (
         Section as Section,
+        bredt as bredt,
         constant_kappa as constant_kappa,
         rectangular_tube as rectangular_tube,
         round_tube as round_tube,
@@ -251,6 +258,7 @@ if TYPE_CHECKING:
     from femubench.core.fem.structure import Structure as Structure
     from femubench.core.inference.examine import Examination as Examination, examine as examine
     from femubench.core.inference.posterior import Explanation as Explanation
+    from femubench.core.look.modes import Seen as Seen
     from femubench.core.modal.complex_modes import real_modes as real_modes
     from femubench.core.modal.correlation import (
         auto_mac as auto_mac,
@@ -306,6 +314,7 @@ if TYPE_CHECKING:
     )
     from femubench.core.run.runner import run_jobs as run_jobs
     from femubench.core.run.store import Store as Store
+    from femubench.core.schema.diagnosis import LookWarning as LookWarning
     from femubench.core.schema.results import (
         Block as Block,
         JobResult as JobResult,

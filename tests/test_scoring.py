@@ -247,9 +247,10 @@ def test_ties_are_transitive_and_end_at_a_gap() -> None:
     assert tiers == [(1, "y"), (2, "x")]
 
 
-def test_without_reference_the_result_of_unchanged_serves() -> None:
+def test_without_reference_the_result_of_the_baseline_serves() -> None:
     found = rank_results(
-        [result("unchanged", rms=2.0), result("good", rms=1.0), result("x", case="b")]
+        [result("still", rms=2.0), result("good", rms=1.0), result("x", case="b")],
+        baseline="still",
     )
     assert [item.score for item in found] == pytest.approx([1.0, 1.05 / 2.05, 10.0])
 

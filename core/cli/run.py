@@ -152,8 +152,8 @@ def run(
 ) -> int:
     """Run strategies on cases and rank them.
 
-    A CASE is a scenario (bench scenarios list), one case of it such as design-change/PART, or a
-    folder with a case.toml. Without any, all built-in scenarios run.
+    A CASE is a scenario (bench scenarios list), one case of it as SCENARIO/PART, or a folder
+    with a case.toml. Without any, all built-in scenarios run.
     """
     plugins = plugins_for(ctx)
     if strict_plugins and plugins.broken:

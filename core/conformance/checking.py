@@ -30,7 +30,6 @@ from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import did_you_mean
 from femubench.core.plugin.variants import strategy_of
 
-REFERENCE = "physical"
 # Importing them fills the list.
 _SOURCES = (strategy_checks, survival_checks, result_checks, effect_checks, other_checks)
 
@@ -150,6 +149,7 @@ def _bench(
     seconds: float,
 ) -> Bench:
     if role == "strategy":
-        reference = plugins.strategies.get(REFERENCE)
+        named = plugins.strategies.values()
+        reference = next((s for s in named if getattr(s, "yardstick", False)), None)
         return Bench(item, reference=reference, cases=cases, seconds=seconds)
     return Bench(item, helpers=tuple(plugins.readers.values()), seconds=seconds)

@@ -15,6 +15,7 @@ import femubench
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.drawing.places import PlacedWireframe, placed_wireframe
+from femubench.core.effect.words import Wording
 from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
 from femubench.core.schema.diagnosis import Verdict
@@ -97,6 +98,7 @@ class _ParameterRecord(_Record):
     std: _Number
     unit: str
     textbook: bool = False
+    wording: Wording = "value"
 
 
 class _CauseRecord(_Record):
@@ -125,6 +127,7 @@ class _VisibleRecord(_Record):
     place: str = ""
     size: _Number
     unit: str
+    wording: Wording = "value"
 
 
 class _ResidualRecord(_Record):

@@ -186,7 +186,7 @@ class Store:
         listed = tuple(results.values())
         check_extent(meta, listed, file=self.path)
         notes = [*notes, *damage.notes(self.path)]
-        return Run({**meta, "notes": notes}, rank_results(listed, reference))
+        return Run({**meta, "notes": notes}, rank_results(listed, reference, meta.get("baseline")))
 
     def by_key(self, run_id: str | None = None) -> dict[str, JobResult]:
         """Return the latest result of every job of a run, or of all, that has a key.

@@ -70,7 +70,7 @@ def leaderboard(run: Run) -> pd.DataFrame:
 
     grid = _Grid.of(run)
     seed = int(run.meta.get("seed", 0))
-    scored = rank_results(run.results, run.meta.get("reference") or None)
+    scored = rank_results(run.results, run.meta.get("reference") or None, run.meta.get("baseline"))
     names = list(run.meta.get("strategies", ()))
     names += sorted({result.strategy for result in scored} - set(names))
     reference = run.meta.get("reference") or {}

@@ -20,7 +20,7 @@ _Item = TypeVar("_Item")
 
 
 def score_of(result: JobResult, reference: Mapping[str, float]) -> float:
-    """Return the geometric mean over blocks of (rms + 0.05 %) / (rms of `unchanged` + 0.05 %).
+    """Return the geometric mean over blocks of (rms + 0.05 %) / (nominal rms + 0.05 %).
 
     A job without a model scores 10. Where a strategy is not applicable the model stays as it
     was, which scores 1.
@@ -76,7 +76,9 @@ def ranked(
 
 
 def rank_results(
-    results: Iterable[JobResult], reference: Mapping[str, Mapping[str, float]] | None = None
+    results: Iterable[JobResult],
+    reference: Mapping[str, Mapping[str, float]] | None = None,
+    baseline: str | None = None,
 ) -> tuple[JobResult, ...]:
     """Return the results with their ranks within case and seed, and scores where missing.
 
@@ -87,10 +89,15 @@ def rank_results(
         results: in any order, which is kept.
         reference: from case to the nominal rms errors by block; scores are computed anew from
             them. None keeps the scores that the results have; one that has none scores against
-            the result of `unchanged` in the same case and seed, or 10 where there is none.
+            the result of the baseline in the same case and seed, or 10 where there is none.
+        baseline: name of the strategy that leaves the model as it is, where one ran.
     """
     listed = tuple(results)
-    given = _of_unchanged(listed) if reference is None else {}
+    given = {
+        (item.case, item.seed): {name: block.rms_percent for name, block in item.blocks.items()}
+        for item in listed
+        if reference is None and item.strategy == baseline
+    }
     scored = []
     for result in listed:
         if reference is not None:
@@ -109,14 +116,6 @@ def rank_results(
         for rank, result in ranked(group, _order)
     }
     return tuple(replace(r, rank=ranks[r.case, r.seed, r.strategy]) for r in scored)
-
-
-def _of_unchanged(results: Iterable[JobResult]) -> dict[tuple[str, int], dict[str, float]]:
-    return {
-        (result.case, result.seed): {name: b.rms_percent for name, b in result.blocks.items()}
-        for result in results
-        if result.strategy == "unchanged"
-    }
 
 
 def _order(result: JobResult) -> tuple[tuple[bool, bool], float, str]:

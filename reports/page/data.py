@@ -56,7 +56,8 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
     Arguments:
         exhibits: what the store has to draw.
     """
-    run = Run(run.meta, rank_results(run.results, run.meta.get("reference") or None))
+    reference, baseline = run.meta.get("reference") or None, run.meta.get("baseline")
+    run = Run(run.meta, rank_results(run.results, reference, baseline))
     cases, strategies = cases_of(run), strategies_of(run)
     board = leaderboard(run)
     listed = [_case(run, case, exhibits) for case in cases]
@@ -74,6 +75,7 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
         "tie": TIE,
         "seeds": seeds_of(run),
         "scenarios": list(dict.fromkeys(_scenario(case) for case in cases)),
+        "baseline": baseline,
         "strategies": _strategies(run, board.to_dict("records")),
         "cases": listed,
         "results": [

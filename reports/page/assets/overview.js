@@ -8,7 +8,7 @@
   // Return the share of problems within a factor of the best, strategy by strategy.
   function profile(rows, filter) {
     const shown = rows.slice(0, MOST_CURVES);
-    const nominal = rows.find((row) => row.strategy === "unchanged");
+    const nominal = rows.find((row) => row.strategy === data.baseline);
     if (nominal && !shown.includes(nominal)) shown.splice(-1, 1, nominal);
     const problems = bench.ranking.problems(rows, filter);
     if (!problems.length) return null;
@@ -32,7 +32,7 @@
         if (tau <= end && !(own[i + 1] <= tau * (1 + 1e-9))) push(tau, i + 1);
       });
       if (x[x.length - 1] < end) push(end, own.filter((tau) => tau <= end).length);
-      return { label: row.strategy, x, y, role: row.strategy === "unchanged" ? "nominal" : "other" };
+      return { label: row.strategy, x, y, role: row.strategy === data.baseline ? "nominal" : "other" };
     });
     const left = rows.length > shown.length ? ` Shown: the ${shown.length - (nominal && rows.indexOf(nominal) >= MOST_CURVES ? 1 : 0)} best${nominal ? " and the nominal model" : ""}; filter the strategies to see others.` : "";
     return bench.charts.profile({

@@ -15,8 +15,8 @@
       perCase[result.c].push(result);
     }
     const scored = data.cases.some((c) => has(c.reference));
-    const unchanged = data.strategies.findIndex((s) => s.name === "unchanged");
-    return { seeds, found, perStrategy, perCase, scored, unchanged };
+    const baseline = data.strategies.findIndex((s) => s.name === data.baseline);
+    return { seeds, found, perStrategy, perCase, scored, baseline };
   }
   function has(reference) {
     return Boolean(reference) && Object.keys(reference).length > 0;
@@ -29,7 +29,7 @@
   function referenceOf(result) {
     const { reference } = data.cases[result.c];
     if (all.scored) return data.blocks.map((b) => (reference && b in reference ? reference[b] : null));
-    const base = all.unchanged < 0 ? null : resultAt(all.unchanged, result.c, result.seed);
+    const base = all.baseline < 0 ? null : resultAt(all.baseline, result.c, result.seed);
     return base ? base.rms : data.blocks.map(() => null);
   }
 
