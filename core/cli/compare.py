@@ -124,10 +124,10 @@ def compare(
     store: Path | None,
     quiet: bool,
 ) -> None:
-    """Set run B beside run A, or two strategies side by side; exit with 1 where B is worse.
+    """Set run B beside run A; exit with 1 where B is worse.
 
-    A and B are run ids in the store, their first letters, or files that run --json wrote. Two
-    variants of one strategy, one in each run, are compared with each other.
+    A and B are run ids in the store, their first letters, or files that run --json wrote. With
+    --of X --with Y strategy Y of B is set beside strategy X of A, or both are taken from A.
     """
     if (first is None) != (second is None) or (strategies and first is not None):
         raise click.UsageError("--of and --with belong together, without --strategy", ctx)
