@@ -22,7 +22,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 TUTORIAL = ROOT / "docs" / "tutorial.md"
-ROOMS = ("core", "papers", "plugins", "reports", "scenarios")
+ROOMS = ("core", "femubench", "papers", "plugins", "reports", "scenarios")
 ALL_TIME = 540.0  # s, for a machine that hangs; nothing is said about how long it takes
 CACHES = shutil.ignore_patterns("__pycache__", "*.egg-info")
 
@@ -122,7 +122,7 @@ def shell(tmp_path: Path) -> Iterator[Shell]:
     sources = tmp_path / "femubench"
     for room in ROOMS:
         # A copy: pip leaves its build folders in the tree that it installs.
-        shutil.copytree(ROOT / room, sources / room, ignore=CACHES)
+        shutil.copytree(ROOT / room, sources / room, symlinks=True, ignore=CACHES)
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, sources)
     tools = tmp_path / "tools"
