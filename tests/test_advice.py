@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -148,14 +147,3 @@ class TestGroups:
         assert nothing is not None
         bare = advise(symmetric, [above, plain], [nothing, fits[1]], tolerance=0.0)
         assert bare[0].separation > 50.0
-
-    def test_quick_enough(self, symmetric: Model) -> None:
-        truth = JointRotation().extend(symmetric, "A", [3000.0])
-        problem = posed(symmetric, truth, [JointRotation()])
-        fits = [fitted(problem, JointRotation(), place) for place in ("A", "C", "D", "F")]
-        spent = []
-        for _ in range(3):
-            begin = time.perf_counter()
-            advised(symmetric, problem, fits)
-            spent.append(time.perf_counter() - begin)
-        assert min(spent) < 0.15
