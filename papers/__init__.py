@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from femubench import Study, Workbench
+from femubench.reproduction import Study, Workbench
 
 # Slug: the cases that a re-run works with.
 PAPERS = {

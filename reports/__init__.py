@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from femubench import Reporter, hookimpl
+from femubench import hookimpl
 from femubench.reports.csvs import CsvReporter, ModesCsvReporter
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.jsons import JsonReporter
 from femubench.reports.markdown import MarkdownReporter
 from femubench.reports.parquets import ParquetReporter
 from femubench.reports.terminal import TerminalReporter
+from femubench.results import Reporter
 
 
 @hookimpl

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femubench import Bars, Curves, Figure, FloatArray, MatrixImage, StructureMap
+from femubench.fem import FloatArray
+from femubench.reproduction import Bars, Curves, Figure, MatrixImage, StructureMap
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

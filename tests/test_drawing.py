@@ -12,8 +12,8 @@ import matplotlib
 import numpy as np
 import pytest
 
-from femubench import Bars, Curve, Curves, Figure, MatrixImage, StructureMap
 from femubench.reports.drawing import STYLES, drawn, figure_canvas
+from femubench.reproduction import Bars, Curve, Curves, Figure, MatrixImage, StructureMap
 
 AWKWARD = 'a < b & "c" $x_1$ $'
 X = np.linspace(0.0, 1100.0, 50)

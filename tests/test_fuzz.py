@@ -17,11 +17,12 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from femubench import FemubenchError, Store, read_case
+from femubench import FemubenchError, read_case
 from femubench.core.cli.main import bench
 from femubench.core.schema.records import read_run
 from femubench.plugins.readers import femubench_readers
 from femubench.reports import femubench_reporters
+from femubench.results import Store
 
 sys.path.insert(0, str(Path(__file__).parent / "fuzz"))
 from mutations import changed_json, edits, json_edits, mutated

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from femubench import Run, leaderboard, read_case, run_jobs
+from femubench import Run, read_case
 from femubench.core.plugin.loader import load_plugins
+from femubench.results import leaderboard, run_jobs
 
 pytestmark = pytest.mark.sweep
 SEEDS = tuple(range(1, 11))

@@ -14,6 +14,7 @@ from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.inference.fit import Problem, State, state_at
 from femubench.core.inference.hypothesis import Hypothesis, hypotheses_of
+from femubench.core.inference.mesh_error import mesh_bias
 from femubench.core.inference.modal_basis import Space, scatter_terms
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.posterior import LIKELY_NOTHING, Explanation, Posterior
@@ -21,7 +22,6 @@ from femubench.core.inference.residuals import Data
 from femubench.core.inference.screening import with_shortlist
 from femubench.core.inference.search import Found, Search, adequacy
 from femubench.core.inference.static_response import Basis, placed
-from femubench.core.inference.mesh_error import mesh_bias
 from femubench.core.modal.eigen import Modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.plugin.roles import Effect

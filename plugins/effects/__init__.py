@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from femubench import Effect, hookimpl
+from femubench import hookimpl
+from femubench.effect import Effect
 
 
 @hookimpl

@@ -9,13 +9,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
-    Brace,
+from femubench import Model
+from femubench.effect import (
     Change,
     EffectParameter,
-    Frame,
     FrameEffect,
-    Model,
     RowOperator,
     Term,
     elongation_row,
@@ -23,6 +21,7 @@ from femubench import (
     pair_of,
     proportional,
 )
+from femubench.fem import Brace, Frame
 
 _SHARE = 0.01  # of the mean EA / L of the members
 _MOST = 300

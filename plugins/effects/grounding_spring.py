@@ -8,13 +8,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
+from femubench import Model
+from femubench.effect import (
     Change,
     EffectParameter,
-    Frame,
     FrameEffect,
-    GroundSpring,
-    Model,
     RowOperator,
     Term,
     directed_places,
@@ -25,6 +23,7 @@ from femubench import (
     total_mass,
     translation_rows,
 )
+from femubench.fem import Frame, GroundSpring
 
 _SHARE = 0.01  # of the squared lowest elastic frequency
 

@@ -6,20 +6,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-from femubench import (
+from femubench import Model
+from femubench.effect import (
     Change,
     EffectParameter,
-    Frame,
     FrameEffect,
-    Model,
-    Place,
-    PointMass,
     joints_of,
     mass_term,
     proportional,
     total_mass,
     type_places,
 )
+from femubench.fem import Frame, Place, PointMass
 
 _SHARE = 0.02  # of the structure's mass, over all joints
 

@@ -6,21 +6,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-from femubench import (
+from femubench import Model
+from femubench.effect import (
     Change,
     EffectParameter,
     ElementOperator,
-    Factor,
-    Frame,
     FrameEffect,
-    Model,
     Term,
     element_labels,
     elements_of,
     once_for,
     proportional,
-    stiffness_matrices,
 )
+from femubench.fem import Factor, Frame, stiffness_matrices
 
 
 class LocalStiffnessLoss(FrameEffect):

@@ -8,18 +8,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
+from femubench import Model
+from femubench.effect import (
     Change,
     EffectParameter,
     ElementOperator,
-    Frame,
     FrameEffect,
-    Model,
     Term,
     elements_of,
-    mass_matrices,
     proportional,
 )
+from femubench.fem import Frame, mass_matrices
 
 
 class RotaryInertia(FrameEffect):

@@ -8,17 +8,19 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
+from femubench import Model
+from femubench.effect import (
     Change,
     EffectParameter,
     ElementOperator,
-    Frame,
     FrameEffect,
-    Model,
-    Section,
     Term,
     elements_of,
     proportional,
+)
+from femubench.fem import (
+    Frame,
+    Section,
     rectangular_tube,
     round_tube,
     solid_rectangle,
