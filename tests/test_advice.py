@@ -11,14 +11,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from femubench import (
-    Frame,
-    Model,
-)
+from femubench import Model
 from femubench.core.advise.advice import advise
 from femubench.core.inference.fit import fit
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.residuals import Data
+from femubench.fem import Frame
 from femubench.plugins.effects.density import Density
 from femubench.plugins.effects.joint_rotation import JointRotation
 from femubench.plugins.effects.shear_deformation import ShearDeformation

@@ -12,13 +12,15 @@ import pytest
 import scipy.linalg as la
 from scipy import integrate, optimize
 
-from femubench import FloatArray, Frame, Model, total_mass
+from femubench import Model
 from femubench.core.challenge.structures import structure_named
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.inference.fit import Fit, Problem, State, bounds_of, fit, log_evidence, state_at
 from femubench.core.inference.modal_basis import solve_pencil
 from femubench.core.inference.projection import Projection
 from femubench.core.modal.eigen import natural_shift, solve_dense
+from femubench.effect import total_mass
+from femubench.fem import FloatArray, Frame
 
 sys.path.insert(0, str(Path(__file__).parent))
 from diagnosis_problems import (

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import threadpoolctl
 
-from femubench import Measurement, Model, Sensors, pair_modes, read_case, sensitivity_update
+from femubench import Measurement, Model, Sensors, read_case
 from femubench.core.challenge.measuring import Seen, record
 from femubench.core.challenge.structures import structure_named
 from femubench.core.inference.residuals import Data
@@ -22,7 +22,9 @@ from femubench.core.modal.eigen import Modes, counted_evaluations, solve_modes
 from femubench.core.ties import alike, by_probability, in_order, least
 from femubench.core.update import residuals
 from femubench.core.update.unknowns import global_stiffness
+from femubench.modal import pair_modes
 from femubench.scenarios import HERE
+from femubench.update import sensitivity_update
 
 CASES = ("frame", "frame-solid", "frame-beam", "hframe", "hframe-solid")
 
