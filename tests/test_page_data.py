@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from scipy.stats import wilcoxon
 
-from femubench import Run
 from femubench.papers.printed import printed
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.markdown import MarkdownReporter
@@ -25,7 +24,15 @@ from femubench.reports.page.document import SCRIPTS, STYLES, asset, embedded_jso
 from femubench.reports.page.papers import papers_of
 from femubench.reports.page.rounding import plain_data, rounded
 from femubench.reports.page.statistics import Statistics, scores_of, statistics
-from femubench.results import Block, JobResult, PairedMode, leaderboard, rank_results, run_to_json
+from femubench.results import (
+    Block,
+    JobResult,
+    PairedMode,
+    Run,
+    leaderboard,
+    rank_results,
+    run_to_json,
+)
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 

@@ -16,7 +16,7 @@ from femubench.core.cli.plugins import plugins
 from femubench.core.plugin import hookspecs
 from femubench.core.plugin.loader import HOOKS
 from femubench.core.plugin.new_package import KINDS
-from femubench.core.update.strategy import CAPABILITIES
+from femubench.core.roles import CAPABILITIES
 from femubench.effect import Effect, FrameEffect
 from femubench.results import Reporter
 

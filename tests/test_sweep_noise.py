@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from femubench import Run, read_case
+from femubench import read_case
 from femubench.core.plugin.loader import load_plugins
-from femubench.results import leaderboard, run_jobs
+from femubench.results import Run, leaderboard, run_jobs
 
 pytestmark = pytest.mark.sweep
 SEEDS = tuple(range(1, 11))

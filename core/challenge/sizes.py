@@ -10,9 +10,9 @@ import numpy as np
 
 from femubench.core.challenge.measuring import Seen
 from femubench.core.challenge.structures import Specimen
-from femubench.core.effect.frame_effect import EffectParameter
 from femubench.core.fem.frame import Frame, Member
 from femubench.core.fem.mesh import member_axes
+from femubench.core.roles import EffectParameter
 
 
 @dataclass(frozen=True)

@@ -2,59 +2,29 @@
 
 from __future__ import annotations
 
-import json
-import math
-import os
-import re
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import click
 
-from femubench.core.cli.files import check_writable, write_atomically
-from femubench.core.cli.registry import chosen, store_folder
-from femubench.core.run.store import Store
-from femubench.core.schema.records import finite, read_run
-from femubench.core.schema.results import Run
-from femubench.core.score.comparison import (
-    DEFAULT_THRESHOLDS,
-    METRICS,
-    Comparison,
-    Threshold,
-    compare_runs,
-)
-
-FORMATS = ("terminal", "markdown", "html", "json")
-_THRESHOLD = re.compile(r"\s*(\w+)\s*>\s*([0-9][0-9.eE+-]*)\s*")
+from femubench.core.errors import InputError
+from femubench.core.files import check_writable, write_atomically
+from femubench.core.library.compare import compare as side_by_side, threshold_of
+from femubench.core.library.report import SUFFIXES, rendering
+from femubench.core.score.comparison import Threshold
 
 
 def thresholds_of(
     ctx: click.Context, parameter: click.Parameter, texts: tuple[str, ...]
 ) -> tuple[Threshold, ...]:
-    """Return what ``--fail`` says, the default where it is not given.
+    """Return what ``--fail`` says.
 
     Raises:
         BadParameter: for anything but METRIC>NUMBER.
     """
-    return tuple(_threshold(text, ctx, parameter) for text in texts) or DEFAULT_THRESHOLDS
-
-
-def _threshold(text: str, ctx: click.Context, parameter: click.Parameter) -> Threshold:
-    found = _THRESHOLD.fullmatch(text)
-    if found is not None:
-        for metric in METRICS:
-            if metric == found[1]:
-                try:
-                    most = float(found[2])
-                except ValueError:
-                    break
-                if math.isfinite(most):
-                    return Threshold(metric, most)
-    message = (
-        f"{text!r} is no threshold (expected METRIC>NUMBER, METRIC one of {', '.join(METRICS)})"
-    )
-    raise click.BadParameter(message, ctx, parameter)
+    try:
+        return tuple(map(threshold_of, texts))
+    except InputError as fault:
+        raise click.BadParameter(str(fault), ctx, parameter) from fault
 
 
 @click.command("compare")
@@ -81,7 +51,7 @@ def _threshold(text: str, ctx: click.Context, parameter: click.Parameter) -> Thr
     "-f",
     "--format",
     "form",
-    type=click.Choice(FORMATS),
+    type=click.Choice(tuple(SUFFIXES)),
     default="terminal",
     show_default=True,
     help="What is printed or written.",
@@ -118,42 +88,11 @@ def compare(
     """
     if output is not None:
         check_writable(output)
-    folder = store_folder(store)
-    runs = _find(before, folder), _find(after, folder)
-    known = dict.fromkeys(result.strategy for run in runs for result in run.results)
-    wanted = chosen("strategy", strategies, known)
-    found = compare_runs(*runs, thresholds=thresholds, strategies=wanted)
-    if output is not None or not quiet:
-        text = _writer(form)(found)
-        if output is not None:
-            write_atomically(output, text)
-        else:
-            click.echo(text)
+    found = side_by_side(before, after, strategies=strategies, fail=thresholds, store=store)
+    if output is not None:
+        write_atomically(output, rendering(found, form))
+    elif not quiet:
+        click.echo(rendering(found, form))
     if output is not None and not quiet:
         click.echo(f"{form}: {output}")
     ctx.exit(int(found.worse))
-
-
-def _writer(form: str) -> Callable[[Comparison], str]:
-    from femubench.reports import compare_page
-
-    if form == "json":
-        return lambda found: json.dumps(_data(found), indent=1, allow_nan=False)
-    writers: dict[str, Callable[[dict[str, Any]], str]] = {
-        "terminal": compare_page.comparison_text,
-        "markdown": compare_page.comparison_markdown,
-        "html": compare_page.comparison_html,
-    }
-    return lambda found: writers[form](_data(found))
-
-
-def _data(found: Comparison) -> dict[str, Any]:
-    data: dict[str, Any] = finite(found.to_json())
-    return data
-
-
-def _find(word: str, folder: Path) -> Run:
-    """Return a run from a file or from the store."""
-    if os.path.exists(word) and not os.path.isdir(word):
-        return read_run(Path(word))
-    return Store(folder).load(word)

@@ -9,12 +9,13 @@ from typing import Any
 
 import click
 
-from femubench.core.cli.cases import read_cases
-from femubench.core.cli.files import check_writable, write_atomically
-from femubench.core.cli.registry import counted, plugins_for
+from femubench.core.cli.registry import plugins_for
 from femubench.core.conformance.checking import Finding, counts, findings, subjects, to_json
 from femubench.core.conformance.kit import SECONDS
 from femubench.core.conformance.problems import of_case
+from femubench.core.display import counted
+from femubench.core.files import check_writable, write_atomically
+from femubench.core.library.cases import read_cases
 
 FILE = click.Path(path_type=Path, dir_okay=False)
 _WORDS = {"pass": "pass", "fail": "FAIL", "warn": "warn", "not-applicable": "-"}

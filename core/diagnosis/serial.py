@@ -28,7 +28,7 @@ def diagnosis_to_json(
         written: folder of the extended case, if it was written.
         case: what was diagnosed, for the drawing of its structure.
     """
-    names = [f.name for f in fields(diagnosis) if f.name != "extended"]
+    names = [f.name for f in fields(diagnosis) if f.name not in ("extended", "subject")]
     tables = {name: _plain(getattr(diagnosis, name)) for name in names}
     for look in tables["looks"]:
         look["changes"] = [{"mode": mode, "percent": change} for mode, change in look["changes"]]

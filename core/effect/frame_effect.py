@@ -5,15 +5,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
-
-Scaling = Literal["linear", "exponential", "compliance"]
+from femubench.core.roles import Scaling
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,8 @@ import pluggy
 from femubench.core.errors import PluginError
 from femubench.core.plugin import hookspecs
 from femubench.core.plugin.markers import PROJECT
-from femubench.core.plugin.roles import Effect, Reader, Reporter, Scenario
 from femubench.core.plugin.validation import CHECKS, did_you_mean
-from femubench.core.update.strategy import Strategy
+from femubench.core.roles import Effect, Reader, Reporter, Scenario, Strategy
 
 PREFIX = f"{PROJECT}_"
 HOOKS = tuple(PREFIX + kind for kind in CHECKS)

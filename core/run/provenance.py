@@ -19,8 +19,8 @@ from typing import Any
 import femubench
 from femubench.core.case.case import Case
 from femubench.core.plugin.variants import Variant
+from femubench.core.roles import Strategy
 from femubench.core.score.scoring import Reference
-from femubench.core.update.strategy import Strategy
 
 Stamp = tuple[Path, int, int]  # a file, when it was changed, its size
 

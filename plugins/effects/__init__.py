@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from femubench import hookimpl
-from femubench.effect import Effect
+from femubench.effect import FrameEffect
 
 
 @hookimpl
-def femubench_effects() -> tuple[type[Effect], ...]:
+def femubench_effects() -> tuple[type[FrameEffect], ...]:
     """Return the effects, those of the whole structure first."""
     from femubench.plugins.effects.added_mass import AddedMass
     from femubench.plugins.effects.amplitude_dependent_stiffness import AmplitudeDependentStiffness

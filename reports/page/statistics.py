@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femubench import Run
 from femubench.fem import FloatArray
 from femubench.reports.summary import cases_of, seeds_of, strategies_of
-from femubench.results import SCORE_OF_FAILURE
+from femubench.results import SCORE_OF_FAILURE, Run
 
 if TYPE_CHECKING:
     import pandas as pd
