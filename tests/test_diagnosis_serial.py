@@ -56,6 +56,7 @@ class TestJson:
             "std": 1200.0,
             "unit": "N m/rad",
             "textbook": False,
+            "wording": "value",
         }
         assert data["causes"][0]["parameters"][1]["std"] is None
         assert (data["causes"][0]["effect"], data["causes"][0]["place"]) == (
@@ -67,7 +68,13 @@ class TestJson:
         assert data["rivals"][1]["angle"] is None
         assert data["advice"][0] == {"measurement": "weigh the structure", "separation": 140.25}
         assert data["smallest_visible"] == [
-            {"effect": "added-mass", "place": "J3", "size": 0.0123, "unit": "kg"}
+            {
+                "effect": "added-mass",
+                "place": "J3",
+                "size": 0.0123,
+                "unit": "kg",
+                "wording": "value",
+            }
         ]
         assert data["gain"] == {
             "used_percent": [4.25, 0.125],

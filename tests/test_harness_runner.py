@@ -117,6 +117,7 @@ def test_every_way_a_job_can_end(
 def test_results_come_in_order_with_scores_and_ranks(everything: dict[str, Any]) -> None:
     run = everything["run"]
     assert [item.strategy for item in run.results] == run.meta["strategies"]
+    assert run.meta["baseline"] == "unchanged"
     found = {item.strategy: item for item in run.results}
     assert found["unchanged"].score == pytest.approx(1.0, abs=1e-12)
     assert found["unchanged"].rigid_body_modes == 3

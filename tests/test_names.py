@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+from femubench.core.conformance.checking import subjects
 from femubench.core.plugin.loader import Plugins, load_plugins
 
 ROOT = Path(__file__).parents[1]
@@ -56,3 +57,14 @@ def test_the_search_itself_finds_names() -> None:
     names = {"kabe-rigid", "frame", "density", "unchanged"}
     text = "x = 'unchanged'\nkind = \"frame\"\nlike kabe-rigid, said\ny = `frame`\nnot-kabe-rigid-2"
     assert list(found_in(text, names)) == [(1, "unchanged"), (3, "kabe-rigid"), (4, "frame")]
+
+
+def test_baseline_and_yardstick_are_roles_that_one_strategy_each_has() -> None:
+    plugins = load_plugins()
+    found = plugins.strategies.values()
+    assert [s.name for s in found if s.baseline] == ["unchanged"]
+    assert [s.name for s in found if s.yardstick] == ["physical"]
+    (subject,) = subjects("berman", plugins)
+    assert subject.bench.reference is plugins.strategies["physical"]
+    other = Plugins(strategies={"berman": plugins.strategies["berman"]})
+    assert subjects("berman", other)[0].bench.reference is None

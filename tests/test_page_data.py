@@ -69,6 +69,7 @@ class TestNumbers:
         """Read from the page itself, to the last digit."""
         found, stored = data_in(HtmlReporter().render(SMALL)), run_to_json(SMALL)["results"]
         assert len(found["results"]) == len(stored)
+        assert found["baseline"] == SMALL.meta["baseline"]
         for ours, theirs in zip(found["results"], stored, strict=True):
             assert found["cases"][ours["c"]]["name"] == theirs["case"]
             assert found["strategies"][ours["s"]]["name"] == theirs["strategy"]
