@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -123,10 +124,10 @@ class Dense(Good):
 
 
 class Locked(Good):
-    """Hold something that cannot be pickled."""
+    """Hold something that no other process can be given."""
 
     def __init__(self) -> None:
-        self.key = lambda: 1
+        self.key = threading.Lock()
 
 
 class _Trap:
