@@ -26,19 +26,22 @@ def alike(one: float, other: float) -> bool:
     return bool(abs(one - other) <= _margin(other))
 
 
-def in_order(items: Iterable[T], figure: Callable[[T], float]) -> list[T]:
+def in_order(
+    items: Iterable[T], figure: Callable[[T], float], absolute: float = _ABSOLUTE
+) -> list[T]:
     """Return items by ascending figure, those that tie with the first of a run as they came.
 
     Arguments:
         items: in the order that decides ties, such as that of effects and places.
         figure: a cost, or minus a log evidence.
+        absolute: difference that counts as rounding.
     """
     given = list(items)
     figures = np.array([figure(item) for item in given], dtype=float)
     result: list[T] = []
     run: list[int] = []
     for i in np.argsort(figures, kind="stable"):
-        if run and not figures[i] <= figures[run[0]] + _margin(figures[run[0]]):
+        if run and not figures[i] <= figures[run[0]] + _margin(figures[run[0]], absolute):
             result += [given[j] for j in sorted(run)]
             run = []
         run.append(int(i))

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 import threadpoolctl
 
-from femubench import Measurement, Model, Sensors, read_case
+from femubench import Measurement, Model, Sensors, diagnose, read_case
+from femubench.core.challenge.draw import draw_case
 from femubench.core.challenge.measuring import Seen, record
 from femubench.core.challenge.structures import structure_named
 from femubench.core.inference.residuals import Data
@@ -134,6 +135,14 @@ def test_a_drawn_shape_has_one_sign() -> None:
         seen = Seen(np.array([50.0]), raw, 1.0)
         found.append(record(seen, specimen, "A", 1, np.random.default_rng(1)).shapes)
     np.testing.assert_allclose(*found, atol=1e-9)
+
+
+def test_mirrored_places_are_said_to_tie() -> None:
+    """Frequencies alone cannot tell one leg of a table from the next."""
+    said = diagnose(draw_case(4004, "C", structure="table").case)
+    places = [cause.place for cause in said.causes if cause.effect == "member-mass"]
+    assert places == ["leg-2"]
+    assert "member-mass at leg-2 fits exactly as well at leg-3." in said.notes
 
 
 def test_frequencies_alone_pair_in_order() -> None:

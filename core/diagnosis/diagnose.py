@@ -146,7 +146,7 @@ def _written(
         locations=(*evidence_rows(examination), *locate(case.model, used)),
         base=best.base.names if named else (),
         extended=model if named else case.model,
-        notes=_notes(examination, proof, best),
+        notes=_notes(examination, proof, best, [e for e, _ in shown]),
         seconds=time.perf_counter() - begin,
         subject=case,
     )
@@ -164,8 +164,7 @@ def _group_causes(posterior: Posterior, options: Iterable[Iterable[Cause]]) -> l
     for cause in (cause for option in options for cause in option):
         likely = cause.probability * posterior.inclusion(cause.effect)
         found.setdefault(cause.effect, replace(cause, probability=likely))
-    fitted_first = sorted(found.values(), key=lambda c: all(p.textbook for p in c.parameters))
-    return in_order(fitted_first, lambda cause: -cause.probability)
+    return in_order(found.values(), lambda cause: 1.0 - cause.probability, 1e-9)
 
 
 def _reason(decision: Decision) -> str:
@@ -190,7 +189,9 @@ def _advice(examination: Examination, group: Sequence[Explanation]) -> tuple[Adv
     return advise(examination.model, problems, fits, tolerance=examination.tolerance)
 
 
-def _notes(examination: Examination, proof: _Proof, best: Explanation) -> tuple[str, ...]:
+def _notes(
+    examination: Examination, proof: _Proof, best: Explanation, shown: Sequence[Explanation]
+) -> tuple[str, ...]:
     notes = []
     if proof.crossed:
         notes.append(
@@ -204,8 +205,10 @@ def _notes(examination: Examination, proof: _Proof, best: Explanation) -> tuple[
             f"The extended model takes {' and '.join(unearned)} at the textbook value too: "
             "these data neither ask for it nor speak against it."
         )
-    if tied := tied_places(examination.posterior, best):
-        notes.append(f"These data cannot tell {best.place} from {' or '.join(tied)} at all.")
+    for e in shown:
+        if tied := tied_places(examination.posterior, e):
+            name = " + ".join(e.searched)
+            notes.append(f"{name} at {e.place} fits exactly as well at {' or at '.join(tied)}.")
     cautions = (getattr(part.hypothesis.effect, "caution", "") for part in best.parts)
     notes += dict.fromkeys(caution for caution in cautions if caution)
     if isinstance(examination.problem, LargeProblem) and best.parts:
