@@ -130,7 +130,7 @@ class TestNumbers:
             notes = ("one.json: a picture was left out",)
 
             def case(self, digest: str) -> dict[str, Any] | None:
-                return {"digest": digest, "nodes": [1], "elements": []}
+                return {"digest": digest, "nodes": [[0.0, 0.0, 0.0]], "elements": []}
 
             def of(self, key: str) -> dict[str, Any] | None:
                 modes = [{"shape": [0] * (1 if key == "k" else 2)}]

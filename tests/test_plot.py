@@ -353,7 +353,7 @@ def test_names_stand_apart_and_hold_nothing_that_cannot_be_shown() -> None:
     boxes = [text.get_window_extent() for text in ax.texts]
     assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[k + 1 :])
     assert ax.texts[2].get_text().isprintable()
-    assert len(ax.texts[2].get_text()) <= 40
+    assert len(ax.texts[2].get_text()) <= 22
 
 
 def test_colours_of_a_themed_drawing_have_one_name_each() -> None:

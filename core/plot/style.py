@@ -55,6 +55,7 @@ _SETTINGS: dict[str, Any] = {
     "svg.fonttype": "none",
     "hatch.linewidth": 0.7,
 }
+_LONGEST = 22  # letters of a name beside a point
 _WIDTH, _HEIGHT = 0.31, 0.62  # half of a letter, of its size
 _SIDES = np.array([[np.cos(a), np.sin(a)] for a in np.arange(8) * np.pi / 4.0])
 
@@ -165,7 +166,7 @@ def place_names(
     blocked = at if avoid is None else np.vstack([at, scale * ax.transData.transform(avoid)])
     middle = at.mean(axis=0) if len(at) else 0.0
     corners = np.array([[0, 0], [-1, -1], [-1, 1], [1, -1], [1, 1], [-0.5, 0], [0.5, 0]])
-    for point, here, name in zip(points, at, map(name_of, names), strict=True):
+    for point, here, name in zip(points, at, (name_of(n, _LONGEST) for n in names), strict=True):
         half = np.array([_WIDTH * len(name) + 0.2, _HEIGHT]) * size
         sides = _SIDES[np.argsort(-_SIDES @ (here - middle), kind="stable")]
         offsets = np.rint(sides) * half + 0.55 * size * sides

@@ -41,6 +41,8 @@ def svg(
     with report_style(name), warnings.catch_warnings():
         # Letters that the font lacks are drawn by the reader's font.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        # Names that are too long for the drawing stand beside it.
+        warnings.filterwarnings("ignore", message="constrained_layout not applied")
         ax = own_axes(None, size)
         draw(ax=ax)
         metadata = dict.fromkeys(("Creator", "Date", "Format", "Type"))

@@ -132,9 +132,19 @@ def _case(run: Run, case: str, exhibits: Exhibits | None) -> dict[str, Any]:
         "scenario": _scenario(case),
         "title": about.get("title") or "",
         "reference": {name: reference[name] for name in BLOCKS if name in reference},
-        "stage": plain_data(stage),
+        "stage": plain_data(None if stage is None else _with_short_points(stage)),
         "tables": {"measured": measured},
     }
+
+
+def _with_short_points(stage: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the structure of a case with four digits of every coordinate."""
+    found = {**stage, "nodes": [[rounded(v, 4) for v in xyz] for xyz in stage.get("nodes", ())]}
+    for name in {"joints", "sensors", "masses", "springs", "supports"} & set(stage):
+        found[name] = [
+            {**item, "xyz": [rounded(v, 4) for v in item["xyz"]]} for item in stage[name]
+        ]
+    return found
 
 
 def _result(result: JobResult, case: int, strategy: int) -> dict[str, Any]:
