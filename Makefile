@@ -8,7 +8,7 @@ ARGS ?=
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
-.PHONY: run test bench sweep fuzz format clean
+.PHONY: run test docs bench sweep fuzz format clean
 .DELETE_ON_ERROR:
 
 run: $(VENV)/.installed
@@ -20,6 +20,10 @@ test: $(VENV)/.installed-test
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy -p femubench
 	$(BIN)/pytest $(ARGS)
+
+docs: $(VENV)/.installed-test
+	$(BIN)/sphinx-build -q -E -W --keep-going -c docs -b html . build/site $(ARGS)
+	@echo "build/site/index.html"
 
 bench: $(VENV)/.installed-test
 	$(BIN)/pytest benchmarks -o addopts="--import-mode=importlib -ra" --benchmark-only $(ARGS)
@@ -35,7 +39,7 @@ format: $(VENV)/.installed-test
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .benchmarks .hypothesis
+	rm -rf $(VENV) build dist docs/api *.egg-info .mypy_cache .ruff_cache .pytest_cache .benchmarks .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
