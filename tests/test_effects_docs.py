@@ -20,7 +20,7 @@ from femubench.core.plugin.loader import load_plugins
 from femubench.plugins.effects import femubench_effects
 
 TEXT = (Path(__file__).parents[1] / "docs" / "effects.md").read_text(encoding="utf-8")
-THERE, WRITES = "## What there is", "### What each writes and what it is confused with"
+THERE, WRITES = "## The catalogue", "### Keys written, and possible confusions"
 EFFECTS: dict[str, Any] = {effect.name: effect() for effect in femubench_effects()}
 RATIOS = ("ratio", "multiple")
 
