@@ -159,7 +159,14 @@ class TestPage:
     def test_nothing_to_tell(self) -> None:
         names = ("rivals", "advice", "smallest_visible", "residuals", "looks", "locations", "notes")
         text = page_of(data_of("none", **dict.fromkeys(names, ()))).text
-        for heading in ("Rivals", "next", "smallest that", "Plausibility checks", "Classical", "Notes"):
+        for heading in (
+            "Rivals",
+            "next",
+            "smallest that",
+            "Plausibility checks",
+            "Classical",
+            "Notes",
+        ):
             assert heading not in text
 
     def test_numbers_that_are_missing(self) -> None:

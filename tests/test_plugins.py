@@ -134,7 +134,7 @@ def test_third_party_cannot_take_a_builtin_name(site: Path) -> None:
         ("raise RuntimeError('no licence')", "RuntimeError: no licence"),
         ("raise SystemExit", "SystemExit"),
         ("yield Nothing\n        raise OSError('half way')", "OSError: half way"),
-        ("return [object()]", "a object is no subclass of femubench.Strategy"),
+        ("return [object()]", "a object is not a subclass of femubench.Strategy"),
         ("return [Strategy]", "class Strategy does not override update()"),
     ],
 )
@@ -154,7 +154,7 @@ def test_one_bad_entry_leaves_the_others(site: Path) -> None:
     plugins = from_site(site)
     assert list(plugins.strategies) == ["fine"]
     assert [fault.message for fault in plugins.broken] == [
-        "class int is no subclass of femubench.Strategy",
+        "class int is not a subclass of femubench.Strategy",
         "the name 'fine' is taken by another of the strategies",
     ]
 
@@ -266,7 +266,7 @@ def test_other_roles_are_checked(tmp_path: Path) -> None:
         check_scenario(Scenario("s", "t", {"other": tmp_path}))
     with pytest.raises(PluginError, match="not a mapping"):
         check_scenario(Scenario("s", "t", {}))
-    with pytest.raises(PluginError, match=r"no pathlib\.Path"):
+    with pytest.raises(PluginError, match=r"not a pathlib\.Path"):
         check_scenario(Scenario("s", "t", {"s": str(tmp_path)}))  # type: ignore[dict-item]
     with pytest.raises(PluginError, match=r"no femubench\.Scenario"):
         check_scenario({"name": "s"})

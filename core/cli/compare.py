@@ -61,7 +61,7 @@ def _threshold(text: str, ctx: click.Context, parameter: click.Parameter) -> Thr
     "strategies",
     multiple=True,
     metavar="STRATEGY",
-    help="This one only; repeat.",
+    help="Compare this strategy only; may be repeated.",
 )
 @click.option(
     "--fail",
@@ -69,7 +69,7 @@ def _threshold(text: str, ctx: click.Context, parameter: click.Parameter) -> Thr
     multiple=True,
     metavar="METRIC>X",
     callback=thresholds_of,
-    help="Exit with 1 where a ratio B/A exceeds X: skill, used, higher, modified, seconds; or the "
+    help="Exit with 1 if a ratio B/A exceeds X: skill, used, higher, modified, seconds; or the "
     "number of lost results: failures. May be repeated. Default: skill>1.01 and failures>0.",
 )
 @click.option(
@@ -107,7 +107,7 @@ def compare(
     store: Path | None,
     quiet: bool,
 ) -> None:
-    """Set run B beside run A; exit with 1 where B is worse.
+    """Compare run B with run A; exit with 1 if B is worse.
 
     A and B are run ids in the store, their first letters, or files that run --json wrote.
     """

@@ -29,7 +29,7 @@ VERBS = {
     "report": ("femubench.core.cli.report", "Write a report on a stored run."),
     "compare": (
         "femubench.core.cli.compare",
-        "Set run B beside run A; exit with 1 where B is worse.",
+        "Compare run B with run A; exit with 1 if B is worse.",
     ),
     "publish": ("femubench.core.cli.publish", "Merge result files into a static site in DIR."),
     "diagnose": ("femubench.core.cli.diagnose", "Find what a model lacks, and extend it."),
@@ -43,7 +43,7 @@ VERBS = {
     ),
     "challenge": (
         "femubench.core.cli.challenge",
-        "Write blind cases with a hidden fault, and judge answers.",
+        "Write blind cases with a hidden fault, and score answers.",
     ),
     "scenarios": ("femubench.core.cli.scenarios", "List the built-in scenarios, or show one."),
     "plugins": ("femubench.core.cli.plugins", "List, show and check plugins, or write a new one."),

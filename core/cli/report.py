@@ -48,7 +48,8 @@ class _Found:
     "formats",
     multiple=True,
     metavar="FORMAT",
-    help="terminal, html, md, csv, parquet, json or a plugin's; several with commas. "
+    help="terminal, html, md, csv, modes-csv, parquet, json or a plugin's; several "
+    "separated by commas. "
     "Default: terminal.",
 )
 @click.option("--open", "opened", is_flag=True, help="Write the HTML page and open it.")
@@ -78,7 +79,7 @@ def report(
 
     RUN is a run id in the store, its first letters, or a file that run --json or diagnose --json
     wrote. Without it, the last run of the store. Lines of a store that cannot be read are left
-    out, and told.
+    out and reported.
     """
     plugins = plugins_for(ctx)
     words = list(dict.fromkeys([*_words(formats), *([_PAGE] if opened else [])])) or ["terminal"]

@@ -70,7 +70,7 @@ def text_of(found: Reporter, content: str | bytes) -> str:
         InputError: for a format that is no text.
     """
     if isinstance(content, bytes):
-        raise InputError(f"format {found.name} is no text", expected="a file")
+        raise InputError(f"format {found.name} is not a text format", expected="a file")
     return content
 
 

@@ -25,7 +25,7 @@ def check_strategy(offered: object) -> Strategy:
     """
     strategy = _instance(offered)
     if not isinstance(strategy, Strategy):
-        raise PluginError(f"{_label(offered)} is no subclass of femubench.Strategy")
+        raise PluginError(f"{_label(offered)} is not a subclass of femubench.Strategy")
     _check_name(strategy, offered)
     if not _is_text(getattr(strategy, "citation", None)):
         raise PluginError(f"{_label(offered)}: citation is missing (author, year, title, equation)")
@@ -48,7 +48,7 @@ def check_scenario(offered: object) -> Scenario:
         PluginError: when it is no Scenario or its cases are misnamed.
     """
     if not isinstance(offered, Scenario):
-        raise PluginError(f"{_label(offered)} is no femubench.Scenario")
+        raise PluginError(f"{_label(offered)} is not a femubench.Scenario")
     _check_name(offered, offered)
     if not isinstance(offered.cases, Mapping) or not offered.cases:
         raise PluginError(f"scenario {offered.name!r}: cases is not a mapping of names to folders")
@@ -60,7 +60,9 @@ def check_scenario(offered: object) -> Scenario:
                 f"'{offered.name}' nor '{offered.name}/PART'"
             )
         if not isinstance(folder, Path):
-            raise PluginError(f"scenario {offered.name!r}: folder of {name!r} is no pathlib.Path")
+            raise PluginError(
+                f"scenario {offered.name!r}: folder of {name!r} is not a pathlib.Path"
+            )
     return offered
 
 
@@ -154,7 +156,7 @@ def _check_name(filled: object, offered: object) -> None:
 def _check_members(filled: object, offered: object, role: str, methods: tuple[str, ...]) -> None:
     for method in methods:
         if not callable(getattr(filled, method, None)):
-            raise PluginError(f"{_label(offered)} is no femubench.{role}: {method}() is missing")
+            raise PluginError(f"{_label(offered)} is not a femubench.{role}: {method}() is missing")
 
 
 def _is_text(value: object) -> bool:
