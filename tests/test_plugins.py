@@ -268,7 +268,7 @@ def test_other_roles_are_checked(tmp_path: Path) -> None:
         check_scenario(Scenario("s", "t", {}))
     with pytest.raises(PluginError, match=r"not a pathlib\.Path"):
         check_scenario(Scenario("s", "t", {"s": str(tmp_path)}))  # type: ignore[dict-item]
-    with pytest.raises(PluginError, match=r"no femubench\.Scenario"):
+    with pytest.raises(PluginError, match=r"not a femubench\.Scenario"):
         check_scenario({"name": "s"})
     with pytest.raises(PluginError, match=r"suffix '\.UNV'"):
         check_reader(variant(Unit, suffixes=(".UNV",)))

@@ -69,7 +69,7 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
     "--jobs",
     type=click.IntRange(1),
     metavar="N",
-    help="Number of worker processes. Default: one a core.",
+    help="Number of worker processes. Default: one per core.",
 )
 @click.option(
     "--seeds",
