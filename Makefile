@@ -8,6 +8,11 @@ ARGS ?=
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
+ifeq ($(wildcard femubench/core/__init__.py),)
+$(error femubench/core is no link to the folder core: clone once more with \
+  `git clone -c core.symlinks=true` (on Windows, in developer mode))
+endif
+
 .PHONY: run test docs bench sweep fuzz format clean
 .DELETE_ON_ERROR:
 
@@ -19,6 +24,7 @@ test: $(VENV)/.installed-test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy -p femubench
+	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/pytest $(ARGS)
 
 docs: $(VENV)/.installed-test
@@ -39,7 +45,7 @@ format: $(VENV)/.installed-test
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf $(VENV) build dist docs/api *.egg-info .mypy_cache .ruff_cache .pytest_cache .benchmarks .hypothesis
+	rm -rf $(VENV) build dist docs/api *.egg-info .mypy_cache .ruff_cache .pytest_cache .benchmarks .coverage .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from femubench.core.harness.store import Store
+from femubench.core.run.store import Store
 from femubench.reports.htmls import HtmlReporter
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "toys"))

@@ -12,12 +12,12 @@ from femubench.core.case.case import Case
 from femubench.core.challenge.draw import draw_case
 from femubench.core.challenge.truth import Hidden
 from femubench.core.diagnosis.diagnose import diagnose, registered
-from femubench.core.diagnosis.exact import raw_residual
-from femubench.core.diagnosis.examine import posed
-from femubench.core.diagnosis.hypothesis import Hypothesis, hypotheses_of
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import FemubenchError
-from femubench.core.model import Model
+from femubench.core.fem.model import Model
+from femubench.core.inference.examine import posed
+from femubench.core.inference.extended_model import raw_residual
+from femubench.core.inference.hypothesis import Hypothesis, hypotheses_of
 
 _MAGNITUDES = (0.3, 1.0, 2.5)  # deviations of the prior
 _SEED = 19

@@ -8,10 +8,10 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from femubench.core.fem.frame import Frame, GroundSpring, Place, PointMass
+from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.modal import eigen
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.model import Model
 
 Refined = Callable[[int], Frame]
 

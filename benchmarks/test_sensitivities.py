@@ -7,10 +7,10 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 from femubench.core.case.case import Case
+from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Parameter
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities, shape_sensitivities
-from femubench.core.model import Model
 from femubench.core.typing import FloatArray
 
 MODES = slice(3, 8)

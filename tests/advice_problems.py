@@ -12,23 +12,17 @@ from femubench import (
     Sensors,
     solve_modes,
 )
-from femubench.core.diagnosis.advice import advise
-from femubench.core.diagnosis.advice_options import Group, options_for
-from femubench.core.diagnosis.advice_outlook import (
-    Outlook,
-    Points,
-    outlook_of,
-)
-from femubench.core.diagnosis.advice_points import (
-    points_of,
-)
-from femubench.core.diagnosis.data import Data, Noise
-from femubench.core.diagnosis.fit import Fit, Problem, fit
-from femubench.core.diagnosis.hypothesis import hypotheses_of
-from femubench.core.diagnosis.projection import Projection
-from femubench.core.diagnosis.result import Advice
-from femubench.core.diagnosis.space import nominal_space
+from femubench.core.advise.advice import Group, advise, options_for
+from femubench.core.advise.point_attachments import points_of
+from femubench.core.advise.prediction import Outlook, Points, outlook_of
+from femubench.core.inference.fit import Fit, Problem, fit
+from femubench.core.inference.hypothesis import hypotheses_of
+from femubench.core.inference.modal_basis import nominal_space
+from femubench.core.inference.noise import Noise
+from femubench.core.inference.projection import Projection
+from femubench.core.inference.residuals import Data
 from femubench.core.plugin.roles import Effect
+from femubench.core.schema.diagnosis import Advice
 
 STD = 0.002
 

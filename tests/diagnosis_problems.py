@@ -11,13 +11,14 @@ import numpy as np
 
 from femubench import Case, FloatArray, Frame, Measurement, Model, Sensors, solve_modes, total_mass
 from femubench.core.case.modes import NO_SENSORS
-from femubench.core.diagnosis.data import Data, Noise
-from femubench.core.diagnosis.examine import posed
-from femubench.core.diagnosis.fit import Problem
-from femubench.core.diagnosis.hypothesis import hypotheses_of
-from femubench.core.diagnosis.projection import Projection
-from femubench.core.diagnosis.space import nominal_space
 from femubench.core.fem.frame import ACTIVE
+from femubench.core.inference.examine import posed
+from femubench.core.inference.fit import Problem
+from femubench.core.inference.hypothesis import hypotheses_of
+from femubench.core.inference.modal_basis import nominal_space
+from femubench.core.inference.noise import Noise
+from femubench.core.inference.projection import Projection
+from femubench.core.inference.residuals import Data
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.roles import Effect
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from femubench.core.diagnosis.look_modes import elastic_modes
-from femubench.core.diagnosis.result import LookWarning
 from femubench.core.fem.frame import Frame
-from femubench.core.measurement import Measurement, Sensors
-from femubench.core.model import Model
+from femubench.core.fem.model import Model
+from femubench.core.fem.sensors import Sensors
+from femubench.core.modal.frequency_changes import elastic_modes
+from femubench.core.modal.measurement import Measurement
+from femubench.core.schema.diagnosis import LookWarning
 
 
 def midpoints(frame: Frame) -> Sensors:

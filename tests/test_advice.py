@@ -16,9 +16,10 @@ from femubench import (
     Frame,
     Model,
 )
-from femubench.core.diagnosis.advice import advise
-from femubench.core.diagnosis.data import Data, Noise
-from femubench.core.diagnosis.fit import fit
+from femubench.core.advise.advice import advise
+from femubench.core.inference.fit import fit
+from femubench.core.inference.noise import Noise
+from femubench.core.inference.residuals import Data
 from femubench.plugins.effects.density import Density
 from femubench.plugins.effects.joint_rotation import JointRotation
 from femubench.plugins.effects.shear_deformation import ShearDeformation

@@ -24,21 +24,13 @@ from femubench import (
     solve_modes,
     translation_rows,
 )
+from femubench.core.advise import point_attachments as advice_points
+from femubench.core.advise.advice import aligned
+from femubench.core.advise.point_attachments import antiresonances, loaded_frequencies
+from femubench.core.advise.prediction import Outlook, Points, Predicted, distance
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.diagnosis import advice_points
-from femubench.core.diagnosis.advice_options import aligned
-from femubench.core.diagnosis.advice_outlook import (
-    Outlook,
-    Points,
-    Predicted,
-    distance,
-)
-from femubench.core.diagnosis.advice_points import (
-    antiresonances,
-    loaded_frequencies,
-)
-from femubench.core.diagnosis.fit import Fit, fit, state_at
-from femubench.core.model import Dofs
+from femubench.core.fem.model import Dofs
+from femubench.core.inference.fit import Fit, fit, state_at
 from femubench.plugins.effects.added_mass import AddedMass
 from femubench.plugins.effects.attached_oscillator import AttachedOscillator
 from femubench.plugins.effects.grounding_spring import GroundingSpring

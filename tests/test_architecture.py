@@ -49,7 +49,7 @@ def may_import(importer: str, imported: str) -> bool:
     if within(importer, "femubench.scenarios"):
         return within(imported, "femubench.scenarios")
     if within(importer, "femubench.reports"):
-        return within(imported, "femubench.reports", "femubench.core.harness.results")
+        return within(imported, "femubench.reports", "femubench.core.schema.results")
     # core and the facade
     return within(imported, "femubench.core") and not within(imported, "femubench.core.cli")
 
@@ -63,11 +63,11 @@ def test_imports_keep_to_the_rooms(path: Path) -> None:
 def test_the_rule_itself_tells_right_from_wrong() -> None:
     assert may_import("femubench.plugins.strategies.baruch", "femubench")
     assert may_import("femubench.plugins.strategies.baruch", "femubench.plugins.strategies.tools")
-    assert not may_import("femubench.plugins.strategies.baruch", "femubench.core.model")
-    assert not may_import("femubench.core.harness.runner", "femubench.reports.terminal")
-    assert not may_import("femubench.core.harness.runner", "femubench.core.cli.main")
+    assert not may_import("femubench.plugins.strategies.baruch", "femubench.core.fem.model")
+    assert not may_import("femubench.core.run.runner", "femubench.reports.terminal")
+    assert not may_import("femubench.core.run.runner", "femubench.core.cli.main")
     assert not may_import("femubench.reports.markdown", "femubench.scenarios")
-    assert not may_import("femubench.core.model", "femubench.plugins")
+    assert not may_import("femubench.core.fem.model", "femubench.plugins")
     assert may_import("femubench.core.cli.run", "femubench.reports")
     assert name_of(ROOT / "core" / "cli" / "run.py") == "femubench.core.cli.run"
 

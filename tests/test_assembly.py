@@ -20,11 +20,11 @@ from femubench.core.fem.frame import (
     Place,
     PointMass,
 )
+from femubench.core.fem.model import Model
 from femubench.core.fem.sections import Section, constant_kappa
+from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
-from femubench.core.measurement import Sensors
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.model import Model
 from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]

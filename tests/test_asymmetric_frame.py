@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from femubench.core.fem.frame import Frame, Place, PointMass
+from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Parameter
-from femubench.core.measurement import Sensors
+from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.correlation import mac
 from femubench.core.modal.eigen import Modes, solve_modes
 from femubench.core.modal.expansion import expand_by_rotation, procrustes_rotation, same_length
 from femubench.core.modal.pairing import pair_modes
-from femubench.core.model import Model
 from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]

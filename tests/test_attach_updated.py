@@ -18,12 +18,12 @@ from femubench.core.fem.frame import (
     Place,
     PointMass,
 )
+from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.sections import Section, constant_kappa
+from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
-from femubench.core.measurement import Sensors
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.model import LowRank, Model
 
 FrameBuilder = Callable[..., Frame]
 OBLONG = Section(A=4e-4, Iy=3e-8, Iz=1.2e-8, J=1e-8, Jp=4.2e-8, kappa=constant_kappa(0.45))

@@ -20,10 +20,10 @@ from femubench.core.fem.frame import (
     RigidEnd,
     Support,
 )
+from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.model import Model
 from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]

@@ -16,9 +16,9 @@ from femubench.core.fem.beam import (
     stiffness_matrices,
 )
 from femubench.core.fem.frame import Frame, Joint, Material, Member, Place, Support
+from femubench.core.fem.model import Model
 from femubench.core.fem.sections import Section, constant_kappa
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.model import Model
 from femubench.core.typing import FloatArray
 
 LENGTH = 0.7

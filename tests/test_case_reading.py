@@ -14,8 +14,8 @@ from pydantic import BaseModel
 
 from femubench import Case, InputError, read_case, real_modes, solve_modes
 from femubench.core.case.example import write_example
+from femubench.core.case.faults import key_lines, line_of
 from femubench.core.case.schema import CaseSpec
-from femubench.core.case.toml_lines import key_lines, line_of
 from femubench.core.cli.init import init
 from femubench.core.fem.frame import Frame, GroundSpring, JointSpring, Place, PointMass, RigidEnd
 from femubench.core.fem.sections import rectangular_tube

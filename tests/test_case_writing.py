@@ -36,10 +36,11 @@ from femubench.core.fem.frame import (
     RigidEnd,
     Support,
 )
+from femubench.core.fem.model import LowRank
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.sections import Section, constant_kappa, rectangular_tube, round_tube
-from femubench.core.measurement import Measurement, Sensors
-from femubench.core.model import LowRank
+from femubench.core.fem.sensors import Sensors
+from femubench.core.modal.measurement import Measurement
 
 HERE = Path(__file__).parent
 CASES = HERE / "cases"

@@ -14,12 +14,11 @@ from click.testing import CliRunner, Result
 
 from femubench.core.cli.main import bench
 from femubench.core.errors import InputError
-from femubench.core.harness.compare_runs import compare_runs
-from femubench.core.harness.comparison import METRICS, Threshold
-from femubench.core.harness.evidence import evidence_of
-from femubench.core.harness.runner import run_jobs
-from femubench.core.harness.serial import run_from_json, run_to_json
-from femubench.core.harness.store import Store
+from femubench.core.run.runner import run_jobs
+from femubench.core.run.store import Store
+from femubench.core.schema.records import run_from_json, run_to_json
+from femubench.core.score.comparison import METRICS, Threshold, compare_runs
+from femubench.core.score.statistics import evidence_of
 from femubench.reports.compare_page import comparison_html, comparison_markdown, comparison_text
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))

@@ -16,13 +16,13 @@ from femubench.core.fem.frame import (
     Place,
     PointMass,
 )
+from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import (
     condense_massless,
     dense_matrices,
     solve_dense,
     solve_modes,
 )
-from femubench.core.model import Model
 from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]

@@ -29,9 +29,9 @@ from femubench.core.conformance.kit import Bench, Role
 from femubench.core.conformance.place_words import known_place
 from femubench.core.conformance.problems import PROBLEMS, problem
 from femubench.core.errors import InputError
-from femubench.core.harness.limits import MIB
-from femubench.core.harness.task import Ending
 from femubench.core.plugin.loader import load_plugins
+from femubench.core.run.limits import MIB
+from femubench.core.run.workers import Ending
 
 ROOT = Path(__file__).parents[1]
 DANGEROUS = (

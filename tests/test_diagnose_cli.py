@@ -21,9 +21,9 @@ from femubench.core.cli.main import bench
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.serial import diagnosis_from_json
 from femubench.core.errors import InputError, NotApplicable
-from femubench.core.harness.scoring import frequency_error, score_model
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
+from femubench.core.score.scoring import frequency_error, score_model
 from femubench.reports.diagnosis import diagnosis_markdown, diagnosis_text
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))

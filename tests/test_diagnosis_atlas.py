@@ -10,8 +10,8 @@ import pytest
 
 from femubench import Model
 from femubench.core.challenge.structures import structure_named
-from femubench.core.diagnosis.atlas import Screened, screen
-from femubench.core.diagnosis.fit import Fit, Problem, fit, state_at
+from femubench.core.inference.fit import Fit, Problem, fit, state_at
+from femubench.core.inference.grid_search import Screened, screen
 
 sys.path.insert(0, str(Path(__file__).parent))
 from diagnosis_problems import (

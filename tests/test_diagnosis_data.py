@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from femubench import FloatArray, Frame, Measurement, Model, NotApplicable, Sensors, solve_modes
-from femubench.core.diagnosis.data import Data, Noise
-from femubench.core.diagnosis.examine import posed
-from femubench.core.diagnosis.fit import state_at
 from femubench.core.fem.frame import Factor, GroundSpring, Place
 from femubench.core.fem.structure import Structure
+from femubench.core.inference.examine import posed
+from femubench.core.inference.fit import state_at
+from femubench.core.inference.noise import Noise
+from femubench.core.inference.residuals import Data
 
 sys.path.insert(0, str(Path(__file__).parent))
 from diagnosis_problems import (

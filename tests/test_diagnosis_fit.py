@@ -14,18 +14,10 @@ from scipy import integrate, optimize
 
 from femubench import FloatArray, Frame, Model, total_mass
 from femubench.core.challenge.structures import structure_named
-from femubench.core.diagnosis.fit import (
-    Fit,
-    Problem,
-    State,
-    bounds_of,
-    fit,
-    log_evidence,
-    state_at,
-)
-from femubench.core.diagnosis.projection import Projection
-from femubench.core.diagnosis.space import solve_pencil
 from femubench.core.fem.frame import ACTIVE
+from femubench.core.inference.fit import Fit, Problem, State, bounds_of, fit, log_evidence, state_at
+from femubench.core.inference.modal_basis import solve_pencil
+from femubench.core.inference.projection import Projection
 from femubench.core.modal.eigen import solve_dense
 
 sys.path.insert(0, str(Path(__file__).parent))

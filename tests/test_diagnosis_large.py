@@ -15,18 +15,19 @@ from numpy.testing import assert_allclose
 from femubench import Effect, Frame, Measurement, Model, Sensors, solve_modes
 from femubench.core.case.case import Case
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.diagnosis.data import Data, Noise
 from femubench.core.diagnosis.diagnose import diagnose
-from femubench.core.diagnosis.exact import departure, extended, raw_residual
-from femubench.core.diagnosis.examine import Examination, examine
-from femubench.core.diagnosis.fit import Problem, state_at
-from femubench.core.diagnosis.hypothesis import Hypothesis, hypotheses_of
-from femubench.core.diagnosis.large import Basis, LargeProblem, enriched, placed
-from femubench.core.diagnosis.projection import Projection, Projector
-from femubench.core.diagnosis.shortlist import with_shortlist
 from femubench.core.fem.frame import GroundSpring, Joint, Material, Member, Place, Support
+from femubench.core.fem.model import Dofs
 from femubench.core.fem.sections import rectangular_tube
-from femubench.core.model import Dofs
+from femubench.core.inference.examine import Examination, examine
+from femubench.core.inference.extended_model import departure, extended, raw_residual
+from femubench.core.inference.fit import Problem, state_at
+from femubench.core.inference.hypothesis import Hypothesis, hypotheses_of
+from femubench.core.inference.noise import Noise
+from femubench.core.inference.projection import Projection, Projector
+from femubench.core.inference.residuals import Data
+from femubench.core.inference.screening import with_shortlist
+from femubench.core.inference.static_response import Basis, LargeProblem, enriched, placed
 from femubench.plugins.effects.added_mass import AddedMass
 from femubench.plugins.effects.attached_oscillator import AttachedOscillator
 from femubench.plugins.effects.grounding_spring import GroundingSpring

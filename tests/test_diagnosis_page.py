@@ -12,10 +12,10 @@ import pytest
 from click.testing import CliRunner
 
 from femubench.core.cli.main import bench
-from femubench.core.diagnosis.result import Rival
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
 from femubench.core.diagnosis.sketch import Sketch, sketch_of
 from femubench.core.errors import InputError
+from femubench.core.schema.diagnosis import Rival
 from femubench.reports.diagnosis_charts import Row, dots
 from femubench.reports.diagnosis_map import Spot, structure_map
 from femubench.reports.diagnosis_page import diagnosis_html

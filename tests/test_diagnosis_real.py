@@ -10,7 +10,7 @@ import pytest
 
 import femubench.scenarios
 from femubench import Case, Diagnosis, diagnose, read_case
-from femubench.core.harness.scoring import score_model
+from femubench.core.score.scoring import score_model
 
 HELD_OUT_HFRAME = (911.64, 979.89)  # Hz
 # The larger of the two takes as long as all the rest.

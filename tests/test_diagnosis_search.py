@@ -15,18 +15,18 @@ import pytest
 
 from femubench import EffectParameter, Frame, FrameEffect, Model, PointMass
 from femubench.core.challenge.structures import structure_named
-from femubench.core.diagnosis.exact import agreed, extended, raw_residual
-from femubench.core.diagnosis.examine import examine
-from femubench.core.diagnosis.explanation import (
+from femubench.core.fem.frame import Place
+from femubench.core.inference.examine import examine
+from femubench.core.inference.extended_model import agreed, extended, raw_residual
+from femubench.core.inference.fit import fit, state_at
+from femubench.core.inference.hypothesis import hypotheses_of
+from femubench.core.inference.posterior import Posterior
+from femubench.core.inference.prior import (
     PRIOR_BEYOND_TEXTBOOK,
     PRIOR_OF_COUNT,
-    Posterior,
     log_prior,
     textbook_bases,
 )
-from femubench.core.diagnosis.fit import fit, state_at
-from femubench.core.diagnosis.hypothesis import hypotheses_of
-from femubench.core.fem.frame import Place
 
 sys.path.insert(0, str(Path(__file__).parent))
 from diagnosis_problems import catalogue, effects_named, measured, part_at, problem_of

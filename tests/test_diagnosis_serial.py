@@ -16,9 +16,10 @@ import numpy as np
 import pytest
 
 import femubench
-from femubench.core.diagnosis.result import Diagnosis, Gain, Rival
+from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
 from femubench.core.errors import InputError
+from femubench.core.schema.diagnosis import Gain, Rival
 from femubench.reports.diagnosis import diagnosis_markdown, diagnosis_text, summary_lines
 from femubench.reports.figures import chance
 

@@ -24,9 +24,6 @@ from femubench import (
 )
 from femubench.core.case.modes import NO_SENSORS
 from femubench.core.challenge.structures import structure_named
-from femubench.core.diagnosis.adequacy import adequacy
-from femubench.core.diagnosis.data import Data
-from femubench.core.diagnosis.explanation import Posterior
 from femubench.core.diagnosis.verdict import (
     angle_between,
     causes_of,
@@ -34,6 +31,9 @@ from femubench.core.diagnosis.verdict import (
     inseparable,
     mostly_common,
 )
+from femubench.core.inference.posterior import Posterior
+from femubench.core.inference.residuals import Data
+from femubench.core.inference.search import adequacy
 
 sys.path.insert(0, str(Path(__file__).parent))
 from diagnosis_problems import case_of, catalogue, effects_named, measured

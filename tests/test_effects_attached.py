@@ -31,8 +31,8 @@ from femubench import (
     translation_rows,
 )
 from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.fem.model import Dofs
 from femubench.core.modal.eigen import counted_evaluations, solve_dense
-from femubench.core.model import Dofs
 from femubench.plugins.effects.added_mass import AddedMass
 from femubench.plugins.effects.amplitude_dependent_stiffness import AmplitudeDependentStiffness
 from femubench.plugins.effects.attached_oscillator import AttachedOscillator

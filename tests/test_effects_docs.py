@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from femubench import Frame, Model, member_length, solve_modes
-from femubench.core.diagnosis.hypothesis import hypotheses_of
+from femubench.core.inference.hypothesis import hypotheses_of
 from femubench.core.plugin.loader import load_plugins
 from femubench.plugins.effects import femubench_effects
 

@@ -37,9 +37,9 @@ from femubench import (
     type_place,
 )
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.diagnosis.places import match, pair_of
+from femubench.core.effect.places import match, pair_of
 from femubench.core.fem.frame import Coupling, Factor
-from femubench.core.model import Dofs, LowRank
+from femubench.core.fem.model import Dofs, LowRank
 from femubench.plugins.effects.density import Density
 from femubench.plugins.effects.joint_offset import JointOffset
 from femubench.plugins.effects.joint_rotation import JointRotation

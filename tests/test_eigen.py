@@ -19,6 +19,7 @@ from femubench.core.fem.frame import (
     Place,
     PointMass,
 )
+from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.sections import round_tube
 from femubench.core.modal.eigen import (
     counted_evaluations,
@@ -26,7 +27,6 @@ from femubench.core.modal.eigen import (
     solve_dense,
     solve_modes,
 )
-from femubench.core.model import LowRank, Model
 from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]

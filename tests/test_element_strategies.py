@@ -23,34 +23,35 @@ from femubench.core.fem.frame import (
     RigidEnd,
     Support,
 )
+from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.sections import rectangular_tube
+from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
-from femubench.core.measurement import Measurement, Sensors
 from femubench.core.modal.eigen import solve_modes
+from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.rigid import rigid_modes_of
-from femubench.core.model import Model
 from femubench.core.update.element_families import (
-    generic_family,
-    nobari_family,
-    physical_family,
-    scaled_strain_vectors,
-)
-from femubench.core.update.element_symmetry import (
     end_swap_signs,
     free_terms,
+    generic_family,
     half_turn,
     mid_plane_mirror,
+    nobari_family,
     operations_of,
+    physical_family,
+    scaled_strain_vectors,
     strain_mode_signs,
 )
 from femubench.core.update.equation_error import (
+    FLOOR,
     equations,
+    nearest_positive,
     rigid_basis,
+    smallest_core_eigenvalue,
     solve_least_change,
     updated,
 )
-from femubench.core.update.positive import FLOOR, nearest_positive, smallest_core_eigenvalue
 from femubench.core.update.quasi import QuasiModes, quasi_measured_modes
 from femubench.plugins.strategies.generic_adjusted import GenericAdjusted
 from femubench.plugins.strategies.generic_ls import GenericLS

@@ -19,10 +19,10 @@ from femubench.core.exhibits.element_change import relative_changes
 from femubench.core.exhibits.exhibit import exhibit_of, frequency_axis, measured_receptances
 from femubench.core.exhibits.shelf import FOLDER, Exhibits
 from femubench.core.exhibits.stage import stage_of
-from femubench.core.harness.scoring import score_model
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.strategy import UpdateResult
+from femubench.core.score.scoring import score_model
+from femubench.core.update.strategy import UpdateResult
 from femubench.scenarios import HERE
 
 STRATEGIES = load_plugins().strategies

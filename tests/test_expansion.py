@@ -11,7 +11,8 @@ from scipy.stats import ortho_group
 
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.frame import Frame
-from femubench.core.measurement import Sensors
+from femubench.core.fem.model import Model
+from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.expansion import (
     expand_by_dynamics,
@@ -21,7 +22,6 @@ from femubench.core.modal.expansion import (
     procrustes_rotation,
     same_length,
 )
-from femubench.core.model import Model
 from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]

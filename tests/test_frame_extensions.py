@@ -35,12 +35,12 @@ from femubench.core.fem.frame import (
     Preload,
     Support,
 )
+from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.parameters import QUANTITIES, Parameter
 from femubench.core.fem.sections import Section, constant_kappa
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
-from femubench.core.model import LowRank, Model
 from femubench.core.typing import FloatArray
 from femubench.core.update.residuals import total_mass
 

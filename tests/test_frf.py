@@ -10,10 +10,10 @@ import pytest
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame, Place, Support
-from femubench.core.measurement import Sensors
+from femubench.core.fem.model import Model
+from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.frf import receptance
-from femubench.core.model import Model
 
 FrameBuilder = Callable[..., Frame]
 POINTS = Sensors(

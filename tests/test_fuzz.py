@@ -19,7 +19,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from femubench import FemubenchError, Store, read_case
 from femubench.core.cli.main import bench
-from femubench.core.harness.serial import read_run
+from femubench.core.schema.records import read_run
 from femubench.plugins.readers import femubench_readers
 from femubench.reports import femubench_reporters
 

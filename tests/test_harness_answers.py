@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from femubench.core.harness import answers
-from femubench.core.harness.answers import AnswerError, head_of, packed, unpacked
-from femubench.core.harness.jobs import JobOutcome
-from femubench.core.model import Model
+from femubench.core.fem.model import Model
+from femubench.core.run import answers
+from femubench.core.run.answers import AnswerError, head_of, packed, unpacked
+from femubench.core.run.jobs import JobOutcome
 from femubench.plugins.effects import femubench_effects
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
@@ -139,8 +139,8 @@ def test_what_is_no_outcome_is_refused_in_one_line(data: bytes, says: str) -> No
 def test_the_reader_knows_no_function_of_other_rooms() -> None:
     reader = answers._ModelReader.__new__(answers._ModelReader)
     for module, name in (
-        ("femubench.core.model", "np"),
-        ("femubench.core.model", "replace"),
+        ("femubench.core.fem.model", "np"),
+        ("femubench.core.fem.model", "replace"),
         ("femubench.core.fem.frame", "nothing"),
         ("femubench.core.case.reader", "read_case"),
         ("numpy", "load"),

@@ -13,15 +13,15 @@ import pytest
 import scipy.sparse as sp
 
 from femubench.core.errors import StrategyFailure
-from femubench.core.harness.answers import head_of
-from femubench.core.harness.checks import check_model
-from femubench.core.harness.jobs import Job, execute, missing_capability, seed_words
-from femubench.core.harness.judging import run_strategy
-from femubench.core.harness.worker import environment
-from femubench.core.measurement import Measurement
-from femubench.core.model import LowRank, Model
-from femubench.core.strategy import Strategy
+from femubench.core.fem.model import LowRank, Model
+from femubench.core.modal.measurement import Measurement
+from femubench.core.run.answers import head_of
+from femubench.core.run.jobs import Job, execute, missing_capability, seed_words
+from femubench.core.run.judging import run_strategy
+from femubench.core.run.model_checks import check_model
+from femubench.core.run.worker import environment
 from femubench.core.typing import SparseArray
+from femubench.core.update.strategy import Strategy
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys

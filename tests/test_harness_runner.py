@@ -13,15 +13,15 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from femubench.core.errors import InputError
-from femubench.core.harness import workers
-from femubench.core.harness.jobs import JobOutcome
-from femubench.core.harness.judging import judged
-from femubench.core.harness.results import JobResult
-from femubench.core.harness.runner import run_jobs
-from femubench.core.harness.scoring import leaderboard, reference_of, score_model
-from femubench.core.harness.store import Store
-from femubench.core.measurement import Measurement
-from femubench.core.model import Model
+from femubench.core.fem.model import Model
+from femubench.core.modal.measurement import Measurement
+from femubench.core.run import workers
+from femubench.core.run.jobs import JobOutcome
+from femubench.core.run.judging import judged
+from femubench.core.run.runner import run_jobs
+from femubench.core.run.store import Store
+from femubench.core.schema.results import JobResult
+from femubench.core.score.scoring import leaderboard, reference_of, score_model
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 from typing import Never

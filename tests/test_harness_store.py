@@ -18,11 +18,11 @@ import numpy as np
 import pytest
 
 from femubench.core.errors import InputError
-from femubench.core.harness.frames import modes_frame, results_frame, run_from_json, run_to_json
-from femubench.core.harness.meta import git_commit, new_run_id, versions
-from femubench.core.harness.ranking import rank_results
-from femubench.core.harness.results import Block, JobResult, PairedMode, Run
-from femubench.core.harness.store import Store
+from femubench.core.run.frames import modes_frame, results_frame, run_from_json, run_to_json
+from femubench.core.run.provenance import git_commit, new_run_id, versions
+from femubench.core.run.store import Store
+from femubench.core.schema.results import Block, JobResult, PairedMode, Run
+from femubench.core.score.ranking import rank_results
 
 MODES = (
     PairedMode(1, 100.0, 103.0, 0.99),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -11,15 +13,14 @@ from typing import Any
 
 import pytest
 
-from femubench.core.harness import runner
-from femubench.core.harness.jobs import JobOutcome
-from femubench.core.harness.limits import MIB, Limits
-from femubench.core.harness.results import JobResult, Run
-from femubench.core.harness.runner import run_jobs
-from femubench.core.harness.schedule import _Bench
-from femubench.core.harness.serial import result_from_json, result_to_json
-from femubench.core.harness.slots import Slot
-from femubench.core.harness.task import Ending
+from femubench.core.run import runner, workers
+from femubench.core.run.jobs import JobOutcome
+from femubench.core.run.limits import MIB, Limits
+from femubench.core.run.runner import run_jobs
+from femubench.core.run.schedule import Slot, _Bench
+from femubench.core.run.workers import Ending
+from femubench.core.schema.records import result_from_json, result_to_json
+from femubench.core.schema.results import JobResult, Run
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
@@ -90,3 +91,27 @@ def test_a_judgement_out_of_bounds_ends_its_job_alone() -> None:
 def test_nothing_is_left_behind(runs: dict[str, Run]) -> None:
     assert runs["wild"].results
     assert list(zoo.leftovers()) == []
+
+
+def test_a_server_that_is_stopped_while_a_worker_starts_goes_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A job may stop the server between the last look at it and the start of the next job."""
+    running = workers._server_mark
+
+    def stopped() -> str:
+        mark = running()
+        server = workers._server()
+        assert server is not None
+        os.kill(server, signal.SIGSTOP)
+        return mark
+
+    with workers.Workers[int](1).open() as pool:
+        monkeypatch.setattr(workers, "_server_mark", stopped)
+        assert pool.start(1, bytes, b"still here", Limits(60.0)) is None
+        ended: list[tuple[int, Ending]] = []
+        while not ended:
+            ended = pool.wait()
+    assert [(key, ending.how, ending.answer) for key, ending in ended] == [
+        (1, "answer", b"still here")
+    ]

@@ -14,8 +14,8 @@ import pytest
 
 from femubench.core.case.case import Case
 from femubench.core.case.reader import read_case
+from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.model import Model
 
 HERE = Path(__file__).parent
 FOLDERS = ("ladder-out-of-plane", "gable-in-plane")

@@ -10,14 +10,15 @@ import pytest
 import scipy.linalg as la
 
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.diagnosis.localisation import locate
-from femubench.core.diagnosis.locate_expansion import Comparison, expand
-from femubench.core.diagnosis.result import LocationRow
 from femubench.core.fem.frame import Factor, Frame, JointSpring, Place, PointMass
+from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Parameter
-from femubench.core.measurement import Measurement, Sensors
+from femubench.core.fem.sensors import Sensors
+from femubench.core.look.localisation import locate
+from femubench.core.look.shape_expansion import Comparison, expand
 from femubench.core.modal.eigen import dense_matrices, solve_modes
-from femubench.core.model import Model
+from femubench.core.modal.measurement import Measurement
+from femubench.core.schema.diagnosis import LocationRow
 
 FrameBuilder = Callable[..., Frame]
 ELEMENTS = 4

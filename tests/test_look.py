@@ -10,12 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femubench.core.diagnosis.attachment_rows import total_mass
-from femubench.core.diagnosis.look import look, mesh_bias
-from femubench.core.diagnosis.look_modes import elastic_modes
-from femubench.core.diagnosis.look_sections import estimated_torsion_constant, is_round
-from femubench.core.diagnosis.result import LookWarning
+from femubench.core.effect.attachments import total_mass
 from femubench.core.fem.frame import Frame, Material
+from femubench.core.fem.model import Model
 from femubench.core.fem.sections import (
     Section,
     constant_kappa,
@@ -23,8 +20,11 @@ from femubench.core.fem.sections import (
     round_tube,
     solid_rectangle,
 )
-from femubench.core.measurement import Sensors
-from femubench.core.model import Model
+from femubench.core.fem.sensors import Sensors
+from femubench.core.look.look import look, mesh_bias
+from femubench.core.look.sections import estimated_torsion_constant, is_round
+from femubench.core.modal.frequency_changes import elastic_modes
+from femubench.core.schema.diagnosis import LookWarning
 from femubench.core.typing import FloatArray
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femubench.core.diagnosis.attachment_rows import total_mass
-from femubench.core.diagnosis.look import look, mesh_bias
-from femubench.core.diagnosis.look_mesh import refined
-from femubench.core.diagnosis.look_modes import elastic_modes
+from femubench.core.effect.attachments import total_mass
 from femubench.core.fem.frame import Factor, Frame, Place, PointMass, Preload
+from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.structure import Structure
-from femubench.core.model import Model
+from femubench.core.inference.mesh_error import refined
+from femubench.core.look.look import look, mesh_bias
+from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.typing import FloatArray
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -98,5 +98,5 @@ def test_elements_out_of_proportion_are_found(ladder: FrameBuilder) -> None:
 def test_no_mesh_bias_of_a_model_that_is_too_large(
     ladder: FrameBuilder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("femubench.core.diagnosis.look_mesh.SOLVED_LIMIT", 80)
+    monkeypatch.setattr("femubench.core.look.mesh.SOLVED_LIMIT", 80)
     assert mesh_bias(Model.of(ladder()), 5) is None

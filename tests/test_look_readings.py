@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femubench.core.diagnosis.look import look
 from femubench.core.fem.frame import Factor, Frame, Place, PointMass
-from femubench.core.measurement import Sensors
-from femubench.core.model import Model
+from femubench.core.fem.model import Model
+from femubench.core.fem.sensors import Sensors
+from femubench.core.look.look import look
 
 sys.path.insert(0, str(Path(__file__).parent))
 from look_checks import measured, midpoints, texts

@@ -31,9 +31,8 @@ from femubench.core.modal.pairing import pair_modes
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.update import entries as entry_update
 from femubench.core.update.dynamic import expand_measured_shapes, expand_one_by_dynamics
-from femubench.core.update.least_change import null_space, smallest_change
-from femubench.core.update.lowrank import total_change
-from femubench.core.update.pattern import EntryPattern
+from femubench.core.update.entries import EntryPattern, null_space, smallest_change
+from femubench.core.update.low_rank import total_change
 from femubench.core.update.promise import measure_residuals
 from femubench.core.update.quasi import QuasiModes, quasi_measured_modes
 from femubench.plugins.strategies import baruch, berman

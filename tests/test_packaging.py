@@ -18,36 +18,6 @@ PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 SETUPTOOLS = PYPROJECT["tool"]["setuptools"]
 
 
-def folder_of(package: str) -> Path:
-    """Return where the source of a package lies: through the links of `femubench/`."""
-    return ROOT.joinpath(*package.split("."))
-
-
-def test_every_package_has_an_init() -> None:
-    """A folder without one is silently absent from the wheel."""
-    rooms = ("core", "papers", "plugins", "reports", "scenarios")
-    for folder in {path.parent for room in rooms for path in (ROOT / room).rglob("*.py")}:
-        assert (folder / "__init__.py").is_file(), folder
-
-
-def test_every_data_file_is_in_the_wheel() -> None:
-    """What is no Python file must match a glob of package-data, from the package's folder."""
-    taken: set[Path] = set()
-    for package, globs in SETUPTOOLS["package-data"].items():
-        for glob in globs:
-            matches = {p.resolve() for p in folder_of(package).resolve().glob(glob) if p.is_file()}
-            assert matches, f"{package}: {glob} matches no file"
-            taken |= matches
-    rooms = ("core", "papers", "plugins", "reports", "scenarios")
-    data = {
-        path.resolve()
-        for room in rooms
-        for path in (ROOT / room).rglob("*")
-        if path.is_file() and path.suffix not in (".py", ".pyc")
-    }
-    assert data <= taken
-
-
 def test_version_stands_in_one_place() -> None:
     assert "version" in PYPROJECT["project"]["dynamic"]
     assert SETUPTOOLS["dynamic"]["version"] == {"attr": "femubench.__version__"}

@@ -17,8 +17,8 @@ from femubench import (
 )
 from femubench.core.case.reader import read_case
 from femubench.core.fem.frame import GroundSpring, PointMass
+from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.model import Model
 from femubench.core.plugin.loader import load_plugins
 from femubench.papers import PAPERS
 from femubench.papers.frame.causes import CAUSES, JOINTS, TORSION, Ladder, best_factor, shares_of

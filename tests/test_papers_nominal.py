@@ -9,8 +9,8 @@ import pytest
 import scipy.sparse as sp
 
 from femubench.core.fem.frame import Frame, JointSpring, RigidEnd
+from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.model import Model
 from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]

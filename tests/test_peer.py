@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 from femubench.core.fem.frame import Frame, Place, PointMass, Support
+from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.model import Model
 
 Peer = Callable[[dict[str, Any]], list[float]]
 

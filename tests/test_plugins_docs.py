@@ -14,9 +14,9 @@ import pytest
 from femubench import Effect, FrameEffect, Reader, Reporter, Scenario, Strategy, UpdateResult
 from femubench.core.cli.plugins import plugins
 from femubench.core.plugin import hookspecs
-from femubench.core.plugin.loader import HOOKS
-from femubench.core.plugin.new_package import KINDS
-from femubench.core.strategy import CAPABILITIES
+from femubench.core.plugin.loader import HOOKS, load_plugins
+from femubench.core.plugin.new_package import KINDS, write_package
+from femubench.core.update.strategy import CAPABILITIES
 
 DOCS = Path(__file__).parents[1] / "docs"
 TEXT = (DOCS / "plugins.md").read_text(encoding="utf-8")
@@ -80,6 +80,13 @@ def test_every_kind_and_command_is_told() -> None:
     for name in plugins.list_commands(None):  # type: ignore[arg-type]
         assert f"| `bench plugins {name}" in TEXT
         assert f"bench plugins {name}" in (DOCS / "commands.md").read_text(encoding="utf-8")
+
+
+def test_timing_is_shown_as_the_template_has_it(tmp_path: Path) -> None:
+    write_package("my-method", "strategy", tmp_path, load_plugins([]))
+    written = (tmp_path / "my-method" / "tests" / "test_speed.py").read_text(encoding="utf-8")
+    (shown,) = re.findall(r"```python\n(.*?)```", section("How long it takes"), re.DOTALL)
+    assert written.endswith(shown)
 
 
 def test_links_lead_somewhere() -> None:

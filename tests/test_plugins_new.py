@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import os
 import re
 import shutil
@@ -34,11 +35,12 @@ def invoke(*words: str | Path) -> Result:
 
 @pytest.fixture(scope="module")
 def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with one package of each kind."""
+    """Return a folder with one package of each kind, all installed."""
     folder = tmp_path_factory.mktemp("packages")
     for kind in KINDS:
         result = invoke("plugins", "new", f"my-{kind}", "--kind", kind, "--output", folder)
         assert (result.exit_code, result.stderr) == (0, "")
+        installed(folder / f"my-{kind}")
     return folder
 
 
@@ -65,18 +67,11 @@ def python(
     )
 
 
-def pytest_of(package: Path) -> subprocess.CompletedProcess[str]:
-    words = (
-        "-m",
-        "pytest",
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "--rootdir",
-        package,
-        package / "tests",
-    )
-    return python(*words, packages=[package], cwd=package)
+def pytest_of(package: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """Run a package's tests; unless `words` say else, without taking times."""
+    command = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir", package)
+    chosen = words or ("--benchmark-disable",)
+    return python(*command, *chosen, package / "tests", packages=[package], cwd=package)
 
 
 @pytest.fixture
@@ -108,6 +103,44 @@ def test_its_tests_fail_when_the_plugin_is_wrong(copy: Path, old: str, new: str)
     source.write_text(text.replace(old, new), encoding="utf-8")
     result = pytest_of(copy)
     assert result.returncode == 1, result.stdout + result.stderr
+
+
+def test_strategy_is_timed_beside_others(packages: Path) -> None:
+    brief = ("--benchmark-max-time=0.05", "--benchmark-min-rounds=2", "--benchmark-only")
+    result = pytest_of(packages / "my-strategy", *brief)
+    assert result.returncode == 0, result.stdout + result.stderr
+    table, _, multiples = result.stdout.partition("median time of an update on frame")
+    rows = re.findall(r"^test_speed\[(.+?)\] ", table, re.MULTILINE)
+    assert sorted(rows) == ["my-strategy", "physical", "unchanged"]
+    listed = re.findall(r"^(\S+) +([\d.e-]+) ms +([\d.e+-]+)$", multiples, re.MULTILINE)
+    assert [name for name, _, _ in listed] == ["my-strategy", "physical", "unchanged"]
+    own = float(listed[0][1])
+    for _, time, multiple in listed:
+        assert float(multiple) == pytest.approx(float(time) / own, rel=0.02)
+
+
+def test_strategy_is_not_timed_without_pytest_benchmark(packages: Path) -> None:
+    result = pytest_of(packages / "my-strategy", "-p", "no:benchmark", "-rs")
+    assert result.returncode == 0, result.stdout + result.stderr
+    (line,) = [line for line in result.stdout.splitlines() if line.startswith("SKIPPED")]
+    assert line.startswith("SKIPPED [3] tests/test_speed.py")
+    assert line.endswith("strategy_speed needs pytest-benchmark: pip install pytest-benchmark")
+
+
+def test_pyright_finds_nothing(packages: Path) -> None:
+    """An editor follows every name of femubench, and the types of a package fit its roles."""
+    roots = [
+        {"root": str(root), "extraPaths": [str(SITE), str(root / "src"), str(root / "tests")]}
+        for root in sorted(packages.iterdir())
+    ]
+    settings = packages / "pyrightconfig.json"
+    text = json.dumps({"typeCheckingMode": "basic", "executionEnvironments": roots})
+    settings.write_text(text, encoding="utf-8")
+    command = ("-m", "pyright", "--pythonpath", sys.executable, "--project", settings)
+    result = python(*command, packages=[], cwd=packages)
+    settings.unlink()
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "0 errors, 0 warnings" in result.stdout
 
 
 @pytest.mark.parametrize("copy", ["scenario"], indirect=True)
@@ -143,8 +176,6 @@ class TestInstalled:
     def bench_with(self, packages: Path, tmp_path: Path) -> Any:
         def run(kinds: Iterable[str], *words: str | Path) -> subprocess.CompletedProcess[str]:
             found = [packages / f"my-{kind}" for kind in kinds]
-            for package in found:
-                installed(package)
             return python("-m", "femubench.core.cli.main", *words, packages=found, cwd=tmp_path)
 
         return run

@@ -24,15 +24,20 @@ from femubench.core.fem.frame import (
     RigidEnd,
     Support,
 )
+from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Parameter
-from femubench.core.fem.preload import geometric_matrices, preload_stiffness, redundant_members
+from femubench.core.fem.preload import (
+    StressState,
+    geometric_matrices,
+    preload_stiffness,
+    redundant_members,
+    statics_of,
+)
 from femubench.core.fem.sections import Section, rectangular_tube
-from femubench.core.fem.statics import StressState, statics_of
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
-from femubench.core.model import Model
 
 STEEL = Material(210e9, 0.3, 7850.0)
 SECTION = Section(A=4e-4, Iy=3e-9, Iz=5e-8, J=2e-9, Jp=5.3e-8)

@@ -15,10 +15,10 @@ from click.testing import CliRunner, Result
 
 from femubench import leaderboard
 from femubench.core.cli.main import bench
-from femubench.core.harness import publishing
-from femubench.core.harness.runner import run_jobs
-from femubench.core.harness.serial import read_run, run_from_json, run_to_json
-from femubench.core.harness.submissions import slug
+from femubench.core.publish import publishing
+from femubench.core.publish.submissions import slug
+from femubench.core.run.runner import run_jobs
+from femubench.core.schema.records import read_run, run_from_json, run_to_json
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys

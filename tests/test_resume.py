@@ -17,11 +17,11 @@ from typing import Any
 import pytest
 
 from femubench.core.errors import InputError
-from femubench.core.harness import keys, locks, slots
-from femubench.core.harness.repeat import environment_differences, result_differences
-from femubench.core.harness.results import JobResult, Run
-from femubench.core.harness.runner import run_jobs
-from femubench.core.harness.store import Store
+from femubench.core.run import provenance as keys, schedule as slots, store as locks
+from femubench.core.run.runner import run_jobs
+from femubench.core.run.store import Store
+from femubench.core.schema.results import JobResult, Run
+from femubench.core.score.repeatability import environment_differences, result_differences
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
@@ -33,7 +33,7 @@ CASE = toys.tiny_case()
 
 def stable(run: Run) -> dict[tuple[str, str, int], dict[str, Any]]:
     """What of a run does not depend on when and how often it was interrupted."""
-    from femubench.core.harness.serial import result_to_json
+    from femubench.core.schema.records import result_to_json
 
     volatile = {"seconds", "rank", "score"}
     return {
@@ -203,7 +203,7 @@ def test_options_and_source_of_a_strategy_belong_to_its_version(tmp_path: Path) 
 
 _VERSION = """
 import lone
-from femubench.core.harness.keys import strategy_version
+from femubench.core.run.provenance import strategy_version
 from femubench import Strategy
 print(strategy_version(type("S", (Strategy,), {"__module__": "lone", "update": print})()))
 """
@@ -281,8 +281,8 @@ _RUN = """
 import sys
 sys.path.insert(0, {toys!r})
 import harness_toys as toys
-from femubench.core.harness.runner import run_jobs
-from femubench.core.harness.store import Store
+from femubench.core.run.runner import run_jobs
+from femubench.core.run.store import Store
 
 if __name__ == "__main__":
     strategies = [toys.Unchanged(), toys.Softer()]

@@ -15,7 +15,8 @@ from femubench.core.fem.frame import (
     Place,
     Support,
 )
-from femubench.core.measurement import DIRECTIONS
+from femubench.core.fem.model import Dofs, LowRank, Model
+from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.modal.eigen import (
     dense_matrices,
     solve_dense,
@@ -23,7 +24,6 @@ from femubench.core.modal.eigen import (
     zero_tolerance,
 )
 from femubench.core.modal.rigid import rigid_body_vectors, rigid_modes_of
-from femubench.core.model import Dofs, LowRank, Model
 from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]

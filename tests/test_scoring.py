@@ -12,9 +12,12 @@ import numpy as np
 import pytest
 
 from femubench.core.case.case import Case
-from femubench.core.harness.ranking import score_of
-from femubench.core.harness.results import Block, JobResult, PairedMode, Run, Status
-from femubench.core.harness.scoring import (
+from femubench.core.fem.model import LowRank, Model
+from femubench.core.modal import eigen
+from femubench.core.modal.eigen import solve_modes
+from femubench.core.schema.results import Block, JobResult, PairedMode, Run, Status
+from femubench.core.score.ranking import score_of
+from femubench.core.score.scoring import (
     Reference,
     frequency_error,
     judge,
@@ -24,9 +27,6 @@ from femubench.core.harness.scoring import (
     reference_of,
     score_model,
 )
-from femubench.core.modal import eigen
-from femubench.core.modal.eigen import solve_modes
-from femubench.core.model import LowRank, Model
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
@@ -159,7 +159,7 @@ def test_a_large_model_offers_as_many_modes_as_a_small_one(
     fine = Model.of(toys.frame(40, 77.0e9))
     dense = score_model(case, fine)
     monkeypatch.setattr(eigen, "DENSE_LIMIT", 50)
-    monkeypatch.setattr("femubench.core.harness.scoring.DENSE_LIMIT", 50)
+    monkeypatch.setattr("femubench.core.score.scoring.DENSE_LIMIT", 50)
     sparse = score_model(case, fine)
     for name, block in dense.items():
         assert sparse[name].rms_percent == pytest.approx(block.rms_percent, rel=1e-6)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from femubench.core.fem.derivatives import derivatives, present_value
 from femubench.core.fem.frame import (
     Frame,
     Joint,
@@ -18,7 +19,8 @@ from femubench.core.fem.frame import (
     RigidEnd,
     Support,
 )
-from femubench.core.fem.parameters import QUANTITIES, Parameter, derivatives, present_value
+from femubench.core.fem.model import Model
+from femubench.core.fem.parameters import QUANTITIES, Parameter
 from femubench.core.fem.sections import rectangular_tube
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import Modes, solve_modes
@@ -27,7 +29,6 @@ from femubench.core.modal.sensitivity import (
     frequency_sensitivities,
     shape_sensitivities,
 )
-from femubench.core.model import Model
 
 STEP = 1e-5
 ELASTIC = 4

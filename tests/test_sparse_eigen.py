@@ -21,11 +21,11 @@ from femubench.core.fem.frame import (
     PointMass,
     Support,
 )
+from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.sections import round_tube
 from femubench.core.modal import eigen
 from femubench.core.modal.eigen import dense_matrices, solve_dense, solve_modes
 from femubench.core.modal.sparse_eigen import ShiftedModel, lowest_eigenpairs
-from femubench.core.model import LowRank, Model
 from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]

@@ -120,10 +120,10 @@ class Shell:
 def shell(tmp_path: Path) -> Iterator[Shell]:
     """Return a shell beside a copy of the sources, with python3 and without our own packages."""
     sources = tmp_path / "femubench"
-    for room in ROOMS:
+    for room in ("femubench", *ROOMS):
         # A copy: pip leaves its build folders in the tree that it installs.
-        shutil.copytree(ROOT / room, sources / room, ignore=CACHES)
-    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copytree(ROOT / room, sources / room, symlinks=True, ignore=CACHES)
+    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, sources)
     tools = tmp_path / "tools"
     tools.mkdir()

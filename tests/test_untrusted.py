@@ -18,11 +18,11 @@ from click.testing import CliRunner
 
 import femubench
 from femubench import InputError, read_case
-from femubench.core.case import files, matrix_text
+from femubench.core.case import files, matrices as matrix_text
 from femubench.core.case.files import LARGEST_FILE, LARGEST_TEXT
 from femubench.core.cli.main import bench
-from femubench.core.harness import schema
-from femubench.core.harness.serial import meta_from_json, read_run, run_from_json
+from femubench.core.schema import records as schema
+from femubench.core.schema.records import meta_from_json, read_run, run_from_json
 from femubench.plugins.readers.universal import UniversalReader
 from femubench.reports.cells import plain
 from femubench.reports.markdown import escape
@@ -344,11 +344,10 @@ def test_a_name_neither_breaks_the_screen_nor_the_document(tmp_path: Path) -> No
 
 # Only what this program has written itself goes through pickle: see each reason.
 TRUSTED = {
-    "core/harness/slots.py": "writes jobs for its own workers",
-    "core/harness/jobs.py": "a worker reads the job that the parent has written",
-    "core/harness/schedule.py": "writes cases for the process that judges",
-    "core/harness/judging.py": "reads the case that the parent has written",
-    "core/harness/answers.py": "writes a model; reads it by a reader of a few classes alone",
+    "core/run/jobs.py": "a worker reads the job that the parent has written",
+    "core/run/schedule.py": "writes jobs for its own workers and cases for the process that judges",
+    "core/run/judging.py": "reads the case that the parent has written",
+    "core/run/answers.py": "writes a model; reads it by a reader of a few classes alone",
     "core/conformance": "asks whether a strategy can be pickled, which is a rule of the contract",
 }
 CODE = {"pickle", "cPickle", "_pickle", "dill", "cloudpickle", "joblib", "marshal", "shelve",

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from femubench.core.fem.frame import GroundSpring, PointMass
-from femubench.core.measurement import Measurement
-from femubench.core.model import Model
+from femubench.core.fem.model import Model
+from femubench.core.modal.measurement import Measurement
 
 TOLERANCE = 0.005
 

@@ -14,9 +14,9 @@ from femubench.core.case.schema import CaseSpec, FrameSpec, parse_spec
 from femubench.core.case.tables import read_sensors
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Frame, JointSpring
-from femubench.core.measurement import Sensors
+from femubench.core.fem.model import Model
+from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.model import Model
 
 _ELEMENTS = 40  # a member, in the model that stands for the real frame
 _CORNER = 4.0e5  # N m/rad, its corners

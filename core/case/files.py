@@ -7,10 +7,10 @@ import os
 import posixpath
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
-from femubench.core import reading
+from femubench.core import files as reading
 from femubench.core.case.faults import Misfit
 from femubench.core.errors import InputError
-from femubench.core.reading import MIB
+from femubench.core.files import MIB
 
 LARGEST_CASE = 16 * MIB  # bytes of case.toml
 LARGEST_TEXT = 64 * MIB  # of a table

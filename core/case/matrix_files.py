@@ -11,15 +11,15 @@ import scipy.io
 import scipy.sparse as sp
 
 from femubench.core.case.faults import Fault
-from femubench.core.case.naming import Keys
+from femubench.core.case.frame_keys import Keys
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.table_text import csv_bytes, number
 from femubench.core.fem.frame import Place
 from femubench.core.fem.kinematics import node_at
 from femubench.core.fem.mesh import SAME_STATION
+from femubench.core.fem.model import LowRank, Model
+from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.fem.structure import Structure
-from femubench.core.measurement import DIRECTIONS
-from femubench.core.model import LowRank, Model
 from femubench.core.typing import IntArray, SparseArray
 
 Files = dict[str, bytes]

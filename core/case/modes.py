@@ -8,12 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from femubench.core.case.faults import Misfit, WrongDirection
-from femubench.core.case.fields import SMALLEST
 from femubench.core.case.frames import Site
+from femubench.core.case.schema import SMALLEST
 from femubench.core.case.tables import RESERVED, Complex, Row, Table, read_table
 from femubench.core.errors import InputError
-from femubench.core.measurement import DIRECTIONS, Measurement, Sensors
+from femubench.core.fem.sensors import DIRECTIONS, Sensors
 from femubench.core.modal.complex_modes import real_modes
+from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray
 
 FREQUENCY_STD = 0.005  # of the frequency, where the table gives none

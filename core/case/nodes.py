@@ -16,8 +16,8 @@ from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import GroundSpring, Place, PointMass, Vector
 from femubench.core.fem.kinematics import rigid_arm
 from femubench.core.fem.mesh import ON_MEMBER
-from femubench.core.measurement import DIRECTIONS, Sensors
-from femubench.core.model import Dofs
+from femubench.core.fem.model import Dofs
+from femubench.core.fem.sensors import DIRECTIONS, Sensors
 from femubench.core.typing import FloatArray, SparseArray
 
 _MOST_DOFS = 1_000_000

@@ -13,7 +13,15 @@ from pydantic import ValidationError
 
 from femubench.core.case.case import Case, Modification
 from femubench.core.case.checks import check_unique
-from femubench.core.case.faults import Fault, KeyPath, at_key, dotted, first_fault
+from femubench.core.case.faults import (
+    Fault,
+    KeyPath,
+    at_key,
+    dotted,
+    first_fault,
+    key_lines,
+    line_of,
+)
 from femubench.core.case.files import LARGEST_CASE, CaseFiles, read_text
 from femubench.core.case.frames import FrameSite, Site, frame_of, ground_springs, point_masses
 from femubench.core.case.matrices import matrix_model, reader_of, reading_with
@@ -27,10 +35,10 @@ from femubench.core.case.modes import (
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.schema import CaseSpec, FrameSpec, ModificationSpec, parse_spec
 from femubench.core.case.tables import read_sensors
-from femubench.core.case.toml_lines import key_lines, line_of
 from femubench.core.errors import InputError, ModelError
-from femubench.core.measurement import Measurement, Sensors
-from femubench.core.model import Model
+from femubench.core.fem.model import Model
+from femubench.core.fem.sensors import Sensors
+from femubench.core.modal.measurement import Measurement
 from femubench.core.plugin.roles import Reader
 
 _TABLES = (".csv", ".txt")

@@ -13,10 +13,11 @@ import numpy as np
 import tomlkit
 from tomlkit.items import Item, Table
 
-from femubench.core.case.fields import LARGEST, SMALLEST
+from femubench.core.case.frame_keys import Keys
 from femubench.core.case.modes import with_default_std
-from femubench.core.case.naming import Keys
-from femubench.core.measurement import Measurement, Sensors
+from femubench.core.case.schema import LARGEST, SMALLEST
+from femubench.core.fem.sensors import Sensors
+from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray
 
 _SHAPE_STD = 0.015

@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 from femubench.core.case.faults import Misfit, WrongDirection
-from femubench.core.case.fields import LARGEST
 from femubench.core.case.files import read_text
 from femubench.core.case.frames import Site
+from femubench.core.case.schema import LARGEST
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Place, Vector
-from femubench.core.measurement import DIRECTIONS, Sensors
+from femubench.core.fem.sensors import DIRECTIONS, Sensors
 
 _MOST_ROWS, _MOST_COLUMNS, _MOST_CELLS = 1_000_000, 50_000, 10_000_000
 _MOST_SENSORS = 50_000

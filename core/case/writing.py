@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Sequence
-from dataclasses import replace
+import secrets
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import fields, replace
 from pathlib import Path
 
+import numpy as np
+
 from femubench.core.case.case import TOLERANCE, Case, Modification
-from femubench.core.case.described import described_frame
 from femubench.core.case.faults import Fault, dotted
 from femubench.core.case.files import CASE_FILE
+from femubench.core.case.frame_keys import (
+    Keys,
+    Known,
+    described_frame,
+    frame_keys,
+    keys_of,
+    known_from,
+)
 from femubench.core.case.matrix_files import (
     Files,
     frame_files,
@@ -20,20 +33,117 @@ from femubench.core.case.matrix_files import (
     matrices_of,
     matrix_keys,
 )
-from femubench.core.case.naming import Keys, Known, known_from
-from femubench.core.case.new_folder import new_folder
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.case.read_back import alike, check_written, refused
-from femubench.core.case.spec_of import frame_keys, keys_of
-from femubench.core.case.table_text import (
-    common_share,
-    modes_csv,
-    sensors_csv,
-    toml_bytes,
-)
-from femubench.core.errors import ModelError
+from femubench.core.case.reader import read_case
+from femubench.core.case.table_text import common_share, modes_csv, sensors_csv, toml_bytes
+from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import Frame
-from femubench.core.model import Model
+from femubench.core.fem.model import Model
+from femubench.core.modal.measurement import Measurement
+from femubench.core.typing import SparseArray
+
+
+@contextmanager
+def new_folder(folder: Path) -> Iterator[Path]:
+    """Give a folder beside the wanted one that takes its place when all went well.
+
+    Raises:
+        InputError: when the wanted folder holds anything, or nothing can be written there.
+    """
+    made: list[Path] = []
+    fresh = folder.parent / f".{folder.name}.{os.getpid()}-{secrets.token_hex(4)}"
+    try:
+        if os.path.lexists(folder) and not (folder.is_dir() and not any(folder.iterdir())):
+            what = "is not empty" if folder.is_dir() else "is no folder"
+            raise InputError(what, file=folder, expected="a new or an empty folder")
+        above = [path for path in (folder.parent, *folder.parent.parents) if not path.exists()]
+        for path in reversed(above):
+            path.mkdir()
+            made.append(path)
+        fresh.mkdir()
+        yield fresh
+        fresh.rename(folder)
+        made.clear()
+    except OSError as error:
+        what = f"cannot be written: {error.strerror}"
+        raise InputError(what, file=folder, expected="a folder that can be written") from None
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
+        for path in reversed(made):
+            with suppress(OSError):
+                path.rmdir()
+
+
+_SAME_MATRIX = 1e-9  # of the diagonal: far above rounding, far below any change that matters
+
+
+def check_written(fresh: Path, folder: Path, wanted: Case) -> None:
+    """Check that the folder reads back to the case.
+
+    Raises:
+        InputError: when it cannot be read, or says something else.
+    """
+    try:
+        back = read_case(fresh)
+    except InputError as error:
+        what = error.what.replace(str(fresh), str(folder))
+        raise refused(folder, what, error.key, error.expected) from None
+    model = wanted.model
+    mass, stiffness = matrices_of(model)
+    same_matrices = alike(mass, back.model.mass, _SAME_MATRIX) and alike(
+        stiffness, back.model.stiffness, _SAME_MATRIX
+    )
+    if not same_matrices:
+        what = "no keys of a frame give the matrices of this model"
+        raise refused(folder, what, "model", "parameters that keys can say")
+    for part in ("name", "title", "source", "used", "held_out", "band", "tolerance"):
+        if getattr(back, part) != getattr(wanted, part):
+            what = f"{getattr(wanted, part)!r} does not read back"
+            raise refused(folder, what, part, f"not {getattr(back, part)!r}")
+    pairs = [(wanted.measurement, back.measurement)]
+    pairs += [
+        (one.measurement, other.measurement)
+        for one, other in zip(wanted.modifications, back.modifications, strict=True)
+    ]
+    for one, other in pairs:
+        column = _differing(one, other)
+        if column is not None:
+            what = f"the {column.replace('_', ' ')} of a measurement does not read back"
+            raise refused(folder, what, "measurement", "finite numbers within their bounds")
+
+
+def _differing(one: Measurement, other: Measurement) -> str | None:
+    """Return a field in which two measurements differ."""
+    for f in fields(Measurement):
+        first, second = getattr(one, f.name), getattr(other, f.name)
+        if f.name == "sensors":
+            same = first.labels == second.labels
+            same = same and np.array_equal(first.xyz, second.xyz)
+            same = same and np.array_equal(first.axes, second.axes)
+        elif f.name == "shape_std":  # of what was not measured it means nothing
+            first = np.where(np.isnan(first) & np.isnan(one.shapes), second, first)
+            same = np.array_equal(first, second, equal_nan=True)
+        elif isinstance(first, np.ndarray):
+            same = np.array_equal(first, second, equal_nan=True)
+        else:
+            same = first == second
+        if not same:
+            return f.name
+    return None
+
+
+def alike(one: SparseArray, other: SparseArray, tolerance: float = 1e-12) -> bool:
+    """Tell whether two symmetric matrices agree, entry by entry, to a share of their diagonals."""
+    if one.shape != other.shape:
+        return False
+    apart = (one - other).tocoo()
+    size = np.sqrt(np.abs(one.diagonal()))
+    return bool(np.all(np.abs(apart.data) <= tolerance * size[apart.row] * size[apart.col]))
+
+
+def refused(folder: Path, what: str, key: str | None, expected: str | None) -> InputError:
+    """Return the error of a case that no folder can hold."""
+    return InputError(f"cannot be written: {what}", file=folder, key=key, expected=expected)
 
 
 def write_case(

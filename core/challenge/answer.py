@@ -8,8 +8,9 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from femubench.core.challenge.sealed import read_small
-from femubench.core.diagnosis.result import Diagnosis, Verdict
+from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import InputError
+from femubench.core.schema.diagnosis import Verdict
 
 _LARGEST = 4 * 2**20  # bytes
 _AND = " + "

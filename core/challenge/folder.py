@@ -12,8 +12,7 @@ import numpy as np
 from femubench.core.case.reader import read_case
 from femubench.core.case.writing import write_case
 from femubench.core.challenge.answer import read_answer
-from femubench.core.challenge.candidates import Effects
-from femubench.core.challenge.draw import draw_case, registered_effects
+from femubench.core.challenge.draw import Effects, draw_case, registered_effects
 from femubench.core.challenge.score import Judgement, judge_answer
 from femubench.core.challenge.sealed import SEALED_FILE, read_sealed, seal
 from femubench.core.challenge.truth import HIDDEN, DataKind, Hidden, Truth

@@ -11,12 +11,13 @@ import scipy.sparse as sp
 from femubench.core.case.modes import NO_SENSORS, with_default_std
 from femubench.core.challenge.structures import Specimen, sensors_on
 from femubench.core.challenge.truth import DataKind
-from femubench.core.diagnosis.data import Data
 from femubench.core.errors import ModelError
 from femubench.core.fem.kinematics import node_at
-from femubench.core.measurement import DIRECTIONS, Measurement
+from femubench.core.fem.model import Model
+from femubench.core.fem.sensors import DIRECTIONS
+from femubench.core.inference.residuals import Data
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.model import Model
+from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray, SparseArray
 from femubench.core.update.residuals import total_mass
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from femubench.core.challenge.answer import Answer, AnswerCause
 from femubench.core.challenge.structures import structure_named
 from femubench.core.challenge.truth import TrueCause, Truth
-from femubench.core.diagnosis.places import match
+from femubench.core.effect.places import match
 from femubench.core.fem.frame import Frame
 
 TOO_SMALL = 12.0  # of chi-square: what lowers it by less cannot be seen

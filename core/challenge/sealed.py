@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from femubench.core.challenge.truth import Truth
 from femubench.core.errors import InputError
-from femubench.core.reading import read_bytes
+from femubench.core.files import read_bytes
 
 SEALED_FILE = "truth.sealed"
 _FORMAT = "femubench-sealed-1"

@@ -10,7 +10,7 @@ import numpy as np
 
 from femubench.core.challenge.measuring import Seen
 from femubench.core.challenge.structures import Specimen
-from femubench.core.diagnosis.effect import EffectParameter
+from femubench.core.effect.frame_effect import EffectParameter
 from femubench.core.fem.frame import Frame, Member
 from femubench.core.fem.mesh import member_axes
 

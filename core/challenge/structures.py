@@ -20,9 +20,9 @@ from femubench.core.fem.frame import (
     Support,
     Vector,
 )
+from femubench.core.fem.model import Model
 from femubench.core.fem.sections import rectangular_tube
-from femubench.core.measurement import Sensors
-from femubench.core.model import Model
+from femubench.core.fem.sensors import Sensors
 
 ALUMINIUM = Material(E=70e9, nu=0.33, rho=2700.0)
 STEEL = Material(E=207e9, nu=0.3, rho=7850.0)

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from femubench.core.diagnosis.effect import FrameEffect
+from femubench.core.effect.frame_effect import FrameEffect
 from femubench.core.fem.frame import Factor, Frame
 
 DataKind = Literal["A", "B", "C"]

@@ -8,16 +8,16 @@ import numpy as np
 
 from femubench.core.case.case import Case
 from femubench.core.challenge.truth import TrueCause, Truth
-from femubench.core.diagnosis.effect import FrameEffect
-from femubench.core.diagnosis.exact import agreed
-from femubench.core.diagnosis.examine import posed
-from femubench.core.diagnosis.fit import Problem, fit
-from femubench.core.diagnosis.hypothesis import hypotheses_of
-from femubench.core.diagnosis.projection import Projection
-from femubench.core.diagnosis.search import Search
+from femubench.core.effect.frame_effect import FrameEffect
 from femubench.core.errors import ModelError
-from femubench.core.measurement import Measurement
-from femubench.core.model import Model
+from femubench.core.fem.model import Model
+from femubench.core.inference.examine import posed
+from femubench.core.inference.extended_model import agreed
+from femubench.core.inference.fit import Problem, fit
+from femubench.core.inference.hypothesis import hypotheses_of
+from femubench.core.inference.projection import Projection
+from femubench.core.inference.search import Search
+from femubench.core.modal.measurement import Measurement
 from femubench.core.plugin.roles import Effect
 
 

@@ -14,11 +14,16 @@ import click
 
 from femubench.core.cli.files import check_writable, write_atomically
 from femubench.core.cli.registry import chosen, store_folder
-from femubench.core.harness.compare_runs import compare_runs
-from femubench.core.harness.comparison import DEFAULT_THRESHOLDS, METRICS, Comparison, Threshold
-from femubench.core.harness.results import Run
-from femubench.core.harness.serial import finite, read_run
-from femubench.core.harness.store import Store
+from femubench.core.run.store import Store
+from femubench.core.schema.records import finite, read_run
+from femubench.core.schema.results import Run
+from femubench.core.score.comparison import (
+    DEFAULT_THRESHOLDS,
+    METRICS,
+    Comparison,
+    Threshold,
+    compare_runs,
+)
 
 FORMATS = ("terminal", "markdown", "html", "json")
 _THRESHOLD = re.compile(r"\s*(\w+)\s*>\s*([0-9][0-9.eE+-]*)\s*")

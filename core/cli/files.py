@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from femubench.core.errors import InputError
-from femubench.core.writing import write_atomically as write_atomically
+from femubench.core.files import write_atomically as write_atomically
 
 
 def check_writable(path: Path) -> None:

@@ -12,7 +12,7 @@ from femubench.core.plugin.loader import LoadedPlugin, Plugins
 from femubench.core.plugin.roles import Effect, Reader, Reporter, Scenario
 from femubench.core.plugin.validation import CHECKS
 from femubench.core.plugin.variants import options_of
-from femubench.core.strategy import Strategy
+from femubench.core.update.strategy import Strategy
 
 Row = tuple[str, str]
 

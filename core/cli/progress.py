@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from femubench.core.harness.results import JobResult
+from femubench.core.schema.results import JobResult
 
 Progress = Callable[[JobResult, int, int], None]
 

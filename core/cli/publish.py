@@ -22,7 +22,7 @@ def publish(folder: Path, files: tuple[Path, ...], quiet: bool) -> None:
     A FILE is written by run --json, here or on another machine. DIR is new, empty, or written by
     an earlier publish, and then the files are added. If one file is invalid, nothing is written.
     """
-    from femubench.core.harness.publishing import publish as merge
+    from femubench.core.publish.publishing import publish as merge
     from femubench.reports.publish_page import pages_of
 
     check_can_make(folder.resolve().parent)

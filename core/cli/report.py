@@ -19,10 +19,10 @@ from femubench.core.cli.reporting import (
     run_name,
     text_of,
 )
-from femubench.core.harness.results import Run
-from femubench.core.harness.serial import read_run
-from femubench.core.harness.store import Store
 from femubench.core.plugin.roles import Reporter
+from femubench.core.run.store import Store
+from femubench.core.schema.records import read_run
+from femubench.core.schema.results import Run
 
 FOLDER = click.Path(path_type=Path, file_okay=False)
 _PAGE = "html"

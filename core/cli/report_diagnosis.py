@@ -11,8 +11,8 @@ import click
 
 from femubench.core.cli.files import check_writable, make_folder, write_atomically
 from femubench.core.errors import InputError
-from femubench.core.harness.schema import parse_json
-from femubench.core.reading import read_bytes
+from femubench.core.files import read_bytes
+from femubench.core.schema.records import parse_json
 
 MOST_BYTES = 64 * 2**20
 _KEYS = frozenset({"verdict", "causes", "rivals", "smallest_visible"})

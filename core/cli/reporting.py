@@ -7,9 +7,9 @@ from pathlib import Path
 
 from femubench.core.cli.registry import unknown
 from femubench.core.errors import FemubenchError, InputError, PluginError
-from femubench.core.harness.results import Run
 from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.roles import Reporter
+from femubench.core.schema.results import Run
 
 # A strategy that a case has no room for is no failure.
 FINE = frozenset({"ok", "not-applicable"})

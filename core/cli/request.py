@@ -11,8 +11,8 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from femubench.core.cli.registry import chosen
 from femubench.core.errors import InputError
-from femubench.core.harness.results import Run
 from femubench.core.plugin.loader import Plugins
+from femubench.core.schema.results import Run
 
 DEFAULT_TIMEOUT = 600.0  # s
 _Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]

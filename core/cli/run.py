@@ -31,14 +31,14 @@ from femubench.core.cli.request import (
     strategy_words,
 )
 from femubench.core.errors import InputError, PluginError
-from femubench.core.harness.recording import Overwrite
-from femubench.core.harness.repeat import environment_differences, result_differences
-from femubench.core.harness.results import Run
-from femubench.core.harness.runner import run_jobs
-from femubench.core.harness.store import Store
 from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.roles import Reporter
 from femubench.core.plugin.variants import strategy_of
+from femubench.core.run.recording import Overwrite
+from femubench.core.run.runner import run_jobs
+from femubench.core.run.store import Store
+from femubench.core.schema.results import Run
+from femubench.core.score.repeatability import environment_differences, result_differences
 
 
 @dataclass(frozen=True)

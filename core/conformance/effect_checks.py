@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from femubench.core.conformance.fingerprints import fingerprint, first_difference
 from femubench.core.conformance.kit import (
     Bench,
     Verdict,
@@ -16,16 +17,15 @@ from femubench.core.conformance.kit import (
     warned,
 )
 from femubench.core.conformance.place_words import known_place
-from femubench.core.conformance.prints import fingerprint, first_difference
 from femubench.core.conformance.problems import PLAIN, problem
 from femubench.core.conformance.results import Given, finite as finite_entries, symmetric
 from femubench.core.conformance.strategy_checks import own_doc
-from femubench.core.diagnosis.effect import EffectParameter
+from femubench.core.effect.frame_effect import EffectParameter
 from femubench.core.errors import NotApplicable
+from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.model import Model
 from femubench.core.plugin.roles import Effect
-from femubench.core.strategy import UpdateResult
+from femubench.core.update.strategy import UpdateResult
 
 _PROBLEMS = (
     PLAIN, "grounded frame in plane", "grounded frame in space", "free frame out of plane",

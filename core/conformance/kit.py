@@ -12,11 +12,10 @@ from typing import Any, Literal
 
 from femubench.core.conformance.problems import PLAIN, Problem, problem
 from femubench.core.conformance.trial import Observation, Trial, observation_of, run_trial
-from femubench.core.harness.jobs import one_line
-from femubench.core.harness.limits import MIB, Limits
-from femubench.core.harness.task import Ending
-from femubench.core.harness.workers import Workers
-from femubench.core.strategy import Strategy
+from femubench.core.run.jobs import one_line
+from femubench.core.run.limits import MIB, Limits
+from femubench.core.run.workers import Ending, Workers
+from femubench.core.update.strategy import Strategy
 
 Status = Literal["pass", "fail", "warn", "not-applicable"]
 Role = Literal["strategy", "effect", "reader", "scenario"]

@@ -12,9 +12,9 @@ from femubench.core.case.case import Case
 from femubench.core.case.reader import read_case
 from femubench.core.conformance.kit import Bench, Verdict, check, failed, not_applicable, passed
 from femubench.core.errors import FemubenchError, InputError
-from femubench.core.harness.jobs import one_line
-from femubench.core.harness.scoring import reference_of
 from femubench.core.plugin.roles import Reader, Scenario
+from femubench.core.run.jobs import one_line
+from femubench.core.score.scoring import reference_of
 
 _UNSENT = "not looked at: it cannot be sent to a worker"
 _BYTES = 4096

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.fem.frame import Frame
-from femubench.core.measurement import DIRECTIONS
-from femubench.core.model import Model
+from femubench.core.fem.model import Model
+from femubench.core.fem.sensors import DIRECTIONS
 
 
 def known_place(model: Model, place: str) -> bool:

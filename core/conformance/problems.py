@@ -22,10 +22,11 @@ from femubench.core.fem.frame import (
     PointMass,
     Support,
 )
+from femubench.core.fem.model import Model
 from femubench.core.fem.sections import rectangular_tube
-from femubench.core.measurement import Measurement, Sensors
+from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.model import Model
+from femubench.core.modal.measurement import Measurement
 
 NOMINAL_E, TRUE_E = 72.0e9, 69.0e9  # Pa
 ELEMENTS, FINER = 2, 6  # of a member; the truth has three times as many

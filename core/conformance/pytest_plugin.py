@@ -1,11 +1,13 @@
-"""A pytest plugin: ``pytest --femubench my-method`` adds one test for every conformance check.
+"""A pytest plugin: ``--femubench my-method`` adds the conformance checks; a fixture takes times.
 
-Nothing but pytest is imported until that option is given.
+Nothing but pytest is imported until the option or the fixture is used.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -13,8 +15,11 @@ import pytest
 if TYPE_CHECKING:
     from femubench.core.conformance.checking import Subject
     from femubench.core.conformance.kit import Check
+    from femubench.core.update.strategy import UpdateResult
 
 _WARNINGS = pytest.StashKey[list[str]]()
+# Case: strategy: median in s, the strategies in the order in which they were timed.
+_TIMES = pytest.StashKey[dict[str, dict[str, float]]]()
 
 
 class ConformanceError(Exception):
@@ -38,6 +43,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         metavar="SECONDS",
         help="What one trial of a check may take. Default: 60.",
     )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Offer the fixture, which depends on another only where that is installed."""
+    timer = config.pluginmanager.hasplugin("benchmark")
+    config.pluginmanager.register(_Speed() if timer else _NoSpeed(), "femubench-speed")
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -70,6 +81,7 @@ def pytest_collection_modifyitems(
             items.extend(node.collect())
 
 
+@pytest.hookimpl(trylast=True)
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:  # noqa: ANN401
     """Show what is no failure but should be known."""
     lines = config.stash.get(_WARNINGS, [])
@@ -77,6 +89,74 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         terminalreporter.section("femubench warnings")
         for line in lines:
             terminalreporter.line(line)
+    for case, times in config.stash.get(_TIMES, {}).items():
+        first, of_first = next(iter(times.items()))
+        terminalreporter.section(f"median time of an update on {case}, as a multiple of {first}")
+        for strategy, seconds in times.items():
+            multiple = seconds / of_first
+            terminalreporter.line(f"{strategy:24} {1e3 * seconds:9.3g} ms {multiple:9.3g}")
+
+
+class _Speed:
+    """The fixture where there is pytest-benchmark."""
+
+    @pytest.fixture
+    def strategy_speed(
+        self,
+        benchmark: Any,  # noqa: ANN401 - pytest-benchmark is untyped
+        pytestconfig: pytest.Config,
+    ) -> Callable[[str, str], UpdateResult]:
+        """Time `update` with pytest-benchmark: ``strategy_speed("my-method", "frame")``.
+
+        The arguments are those of ``bench run``: a strategy, with options where wanted, and a case
+        by its name or folder. Times on one case share a group, so that one table compares them;
+        below it stands the multiple of the median of the strategy that was timed first.
+        """
+        times = pytestconfig.stash.setdefault(_TIMES, {})
+        return partial(_timed, benchmark, times)
+
+
+class _NoSpeed:
+    """The fixture where there is none."""
+
+    @pytest.fixture
+    def strategy_speed(self) -> None:
+        """Skip the test."""
+        pytest.skip("strategy_speed needs pytest-benchmark: pip install pytest-benchmark")
+
+
+def _timed(
+    benchmark: Any,  # noqa: ANN401 - pytest-benchmark is untyped
+    times: dict[str, dict[str, float]],
+    strategy: str,
+    case: str,
+) -> UpdateResult:
+    """Return what the strategy gives; its time goes into the table of the benchmark."""
+    import numpy as np
+    from threadpoolctl import threadpool_limits
+
+    from femubench.core.case.reader import read_case
+    from femubench.core.errors import NotApplicable
+    from femubench.core.plugin.loader import load_plugins
+    from femubench.core.plugin.variants import strategy_of
+
+    plugins = load_plugins()
+    update = strategy_of(strategy, plugins.strategies).update
+    folders = {k: v for each in plugins.scenarios.values() for k, v in each.cases.items()}
+    readers = tuple(plugins.readers.values())
+    read = read_case(folders.get(case, Path(case)), readers=readers, installed=case in folders)
+    given = read.used_measurement()
+    benchmark.group = f"update on {case}"
+    try:
+        with threadpool_limits(1):  # as `bench run` does
+            result: UpdateResult = benchmark(
+                lambda: update(read.model, given, np.random.default_rng(0))
+            )
+    except NotApplicable as reason:
+        pytest.skip(f"{strategy} on {case}: {reason}")
+    if benchmark.stats is not None:  # --benchmark-disable calls once and takes no time
+        times.setdefault(case, {})[strategy] = benchmark.stats.stats.median
+    return result
 
 
 class _Kit(pytest.Collector):

@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from femubench.core.conformance.prints import fingerprint, first_difference
+from femubench.core.conformance.fingerprints import fingerprint, first_difference
 from femubench.core.conformance.problems import Problem
 from femubench.core.errors import FemubenchError
-from femubench.core.harness.answers import head_of, packed, unpacked
-from femubench.core.harness.checks import check_model
-from femubench.core.harness.jobs import JobOutcome, one_line
-from femubench.core.harness.scoring import frequency_error, predict_block
+from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal.eigen import solve_modes, zero_tolerance
 from femubench.core.modal.rigid import rigid_modes_of
-from femubench.core.model import LowRank, Model
-from femubench.core.strategy import ParameterEstimate, UpdateResult
+from femubench.core.run.answers import head_of, packed, unpacked
+from femubench.core.run.jobs import JobOutcome, one_line
+from femubench.core.run.model_checks import check_model
+from femubench.core.score.scoring import frequency_error, predict_block
+from femubench.core.update.strategy import ParameterEstimate, UpdateResult
 
 USED_MODES = 1e-6
 _RIGID = 1e-6  # of the first elastic eigenvalue

@@ -8,6 +8,7 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
+from femubench.core.conformance.fingerprints import first_difference
 from femubench.core.conformance.kit import (
     Bench,
     Verdict,
@@ -18,13 +19,12 @@ from femubench.core.conformance.kit import (
     passed,
     warned,
 )
-from femubench.core.conformance.looking import FREE, of_results, with_results
-from femubench.core.conformance.prints import first_difference
 from femubench.core.conformance.problems import PLAIN
+from femubench.core.conformance.result_checks import FREE, of_results, with_results
 from femubench.core.conformance.results import PROMISES
-from femubench.core.harness.limits import spoken_bytes
 from femubench.core.plugin.variants import Variant
-from femubench.core.strategy import CAPABILITIES, Strategy
+from femubench.core.run.limits import spoken_bytes
+from femubench.core.update.strategy import CAPABILITIES, Strategy
 
 _MUCH = 100.0  # times what the reference takes
 _LEAST_SECONDS, _LEAST_BYTES = 1e-3, 1e4  # below which a ratio says nothing

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from femubench.core.conformance.kit import Bench, Verdict, check, not_applicable
-from femubench.core.conformance.looking import (
+from femubench.core.conformance.problems import PLAIN
+from femubench.core.conformance.result_checks import (
     FREE,
     MASSLESS,
     MISSING,
@@ -12,7 +13,6 @@ from femubench.core.conformance.looking import (
     runs,
     survives,
 )
-from femubench.core.conformance.problems import PLAIN
 
 
 @check(

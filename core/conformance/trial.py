@@ -14,15 +14,15 @@ from typing import Literal
 
 import numpy as np
 
-from femubench.core.conformance.prints import fingerprint, first_difference, global_state
+from femubench.core.conformance.fingerprints import fingerprint, first_difference, global_state
 from femubench.core.conformance.problems import Problem
 from femubench.core.conformance.results import Given, faults_of
 from femubench.core.errors import NotApplicable, StrategyFailure
-from femubench.core.harness.jobs import missing_capability, one_line
-from femubench.core.harness.task import Ending
-from femubench.core.model import Model
+from femubench.core.fem.model import Model
 from femubench.core.plugin.variants import Variant
-from femubench.core.strategy import Strategy, UpdateResult
+from femubench.core.run.jobs import missing_capability, one_line
+from femubench.core.run.workers import Ending
+from femubench.core.update.strategy import Strategy, UpdateResult
 
 Kind = Literal["result", "lacking", "not-applicable", "failed", "error", "stopped"]
 

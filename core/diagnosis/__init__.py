@@ -1,1 +1,1 @@
-"""What a model lacks: effects, evidence, verdict, gain."""
+"""Verdict, proof on unseen data, and words."""

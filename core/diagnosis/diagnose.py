@@ -8,18 +8,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from femubench.core.advise.advice import advise
 from femubench.core.case.case import Case
-from femubench.core.diagnosis.advice import advise
-from femubench.core.diagnosis.confirm import another_stands, extended_by, stands, unseen_of
-from femubench.core.diagnosis.exact import departure
-from femubench.core.diagnosis.examine import Examination, examine
-from femubench.core.diagnosis.explanation import Explanation, Posterior
-from femubench.core.diagnosis.gain import Unseen, gain_of, left_out
-from femubench.core.diagnosis.large import LargeProblem
-from femubench.core.diagnosis.localisation import locate
-from femubench.core.diagnosis.look import look
-from femubench.core.diagnosis.result import Advice, Cause, Diagnosis, Gain
-from femubench.core.diagnosis.sentences import sentence_of
+from femubench.core.diagnosis.proof import (
+    Unseen,
+    another_stands,
+    extended_by,
+    gain_of,
+    left_out,
+    stands,
+    unseen_of,
+)
+from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.tables import (
     causes_in,
     evidence_rows,
@@ -28,10 +28,18 @@ from femubench.core.diagnosis.tables import (
     smallest_visible,
 )
 from femubench.core.diagnosis.verdict import Decision, causes_of, decide
-from femubench.core.harness.scoring import score_model
-from femubench.core.model import Model
+from femubench.core.diagnosis.words import sentence_of
+from femubench.core.fem.model import Model
+from femubench.core.inference.examine import Examination, examine
+from femubench.core.inference.extended_model import departure
+from femubench.core.inference.posterior import Explanation, Posterior
+from femubench.core.inference.static_response import LargeProblem
+from femubench.core.look.localisation import locate
+from femubench.core.look.look import look
 from femubench.core.plugin.loader import registered_effects
 from femubench.core.plugin.roles import Effect
+from femubench.core.schema.diagnosis import Advice, Cause, Gain
+from femubench.core.score.scoring import score_model
 
 _SAME_MODEL = 0.3  # deviations by which the extended model may differ from the fit
 

@@ -12,9 +12,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 import femubench
 from femubench.core.case.case import Case
-from femubench.core.diagnosis.result import Diagnosis, Verdict
+from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.sketch import PlaceKind, Plane, sketch_of
 from femubench.core.errors import InputError
+from femubench.core.schema.diagnosis import Verdict
 
 
 def diagnosis_to_json(

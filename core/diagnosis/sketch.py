@@ -8,20 +8,13 @@ from typing import Literal
 
 from femubench.core.case.case import Case
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.diagnosis.places import (
-    ALL,
-    ends_of,
-    joints_of,
-    pair_of,
-    point_of,
-    split_direction,
-)
 from femubench.core.diagnosis.result import Diagnosis
+from femubench.core.effect.places import ALL, ends_of, joints_of, pair_of, point_of, split_direction
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame, Place
 from femubench.core.fem.mesh import place_xyz
-from femubench.core.measurement import Sensors
-from femubench.core.model import Geometry
+from femubench.core.fem.model import Geometry
+from femubench.core.fem.sensors import Sensors
 
 Point = tuple[float, float, float]
 PlaceKind = Literal["all", "joint", "member", "element", "end", "point", "pair", "elsewhere"]

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from femubench.core.diagnosis.effect import EffectParameter
-from femubench.core.diagnosis.examine import Examination
-from femubench.core.diagnosis.explanation import Explanation
-from femubench.core.diagnosis.fit import State
-from femubench.core.diagnosis.result import (
+from femubench.core.diagnosis.verdict import angle_between
+from femubench.core.effect.frame_effect import EffectParameter
+from femubench.core.inference.examine import Examination
+from femubench.core.inference.fit import State
+from femubench.core.inference.posterior import Explanation
+from femubench.core.inference.search import Found
+from femubench.core.schema.diagnosis import (
     Cause,
     CauseParameter,
     LocationRow,
@@ -18,8 +20,6 @@ from femubench.core.diagnosis.result import (
     Rival,
     SmallestVisible,
 )
-from femubench.core.diagnosis.search import Found
-from femubench.core.diagnosis.verdict import angle_between
 from femubench.core.typing import FloatArray
 
 TOO_SMALL = 12.0  # of chi-square: an effect below is too small to see

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.diagnosis.explanation import LIKELY_NOTHING, Explanation, Key, Posterior
-from femubench.core.diagnosis.result import Verdict
+from femubench.core.inference.posterior import LIKELY_NOTHING, Explanation, Key, Posterior
+from femubench.core.schema.diagnosis import Verdict
 
 # Rivals at least this probable, or nearly parallel and not yet excluded, stay in the group.
 _RIVAL, _PARALLEL_RIVAL = 0.05, 0.005

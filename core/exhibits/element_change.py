@@ -13,16 +13,16 @@ import numpy as np
 from femubench.core.errors import FemubenchError
 from femubench.core.exhibits.stage import node_labels
 from femubench.core.fem.beam import stiffness_matrices
+from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
-from femubench.core.model import Model
 from femubench.core.typing import FloatArray
 from femubench.core.update.element_families import (
     ElementFamily,
+    Symmetry,
     generic_family,
     nobari_family,
     physical_family,
 )
-from femubench.core.update.element_symmetry import Symmetry
 
 _PLAIN: tuple[Symmetry, ...] = ("half-turn", "full", "mirror", "none")
 _JOINT: tuple[Symmetry, ...] = ("none", "full")

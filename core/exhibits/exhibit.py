@@ -21,13 +21,13 @@ from femubench.core.exhibits.stage import (
     rounded,
     stage_of,
 )
-from femubench.core.measurement import Measurement, Sensors
+from femubench.core.fem.model import Model
+from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.correlation import mac, modal_scale_factor
-from femubench.core.modal.eigen import Modes
+from femubench.core.modal.eigen import Modes, modes_of
 from femubench.core.modal.frf import modal_sum, receptance
-from femubench.core.modal.kept import modes_of
+from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import pair_modes
-from femubench.core.model import Model
 from femubench.core.typing import FloatArray
 
 MOST_MODES = 12

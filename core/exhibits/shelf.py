@@ -14,9 +14,8 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from femubench.core.errors import InputError
-from femubench.core.harness.schema import parse_json
-from femubench.core.reading import read_text
-from femubench.core.writing import write_atomically
+from femubench.core.files import read_text, write_atomically
+from femubench.core.schema.records import parse_json
 
 FOLDER = "exhibits"
 MOST_BYTES = 4 * 2**20

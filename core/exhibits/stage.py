@@ -10,9 +10,10 @@ import numpy as np
 
 from femubench.core.case.case import Case
 from femubench.core.fem.mesh import place_xyz
+from femubench.core.fem.model import Model
+from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
-from femubench.core.measurement import Measurement, Sensors
-from femubench.core.model import Model
+from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray
 
 MOST_NODES = 3000  # more are no picture, and too much to keep for every job

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import ACTIVE, Brace, Frame, Oscillator
 from femubench.core.fem.kinematics import point_rows
-from femubench.core.measurement import DIRECTIONS
+from femubench.core.fem.meshed_frame import MeshedFrame
+from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.typing import FloatArray, IntArray, SparseArray
-
-if TYPE_CHECKING:
-    from femubench.core.fem.structure import Structure
 
 
 def check_attachments(frame: Frame) -> None:
@@ -53,7 +49,7 @@ def brace_lines(frame: Frame) -> tuple[FloatArray, FloatArray]:
     return along / length[:, None], length
 
 
-def brace_motion(structure: Structure) -> SparseArray:
+def brace_motion(structure: MeshedFrame) -> SparseArray:
     """Return the motion of the second end of every brace less the first, (3 n_braces, n)."""
     ends = brace_ends(structure.frame)
     first, second = ((6 * ends[:, [k]] + np.arange(3)).ravel() for k in (0, 1))
@@ -61,7 +57,7 @@ def brace_motion(structure: Structure) -> SparseArray:
     return transform[second] - transform[first]
 
 
-def brace_rows(structure: Structure) -> SparseArray:
+def brace_rows(structure: MeshedFrame) -> SparseArray:
     """Return the elongation of every brace from free dofs, (n_braces, n)."""
     unit, _ = brace_lines(structure.frame)
     count = len(unit)
@@ -69,7 +65,7 @@ def brace_rows(structure: Structure) -> SparseArray:
     return sp.csr_array((unit.ravel(), place), shape=(count, 3 * count)) @ brace_motion(structure)
 
 
-def brace_stiffness(structure: Structure) -> SparseArray:
+def brace_stiffness(structure: MeshedFrame) -> SparseArray:
     """Return the stiffness of the braces, (n, n)."""
     rows = brace_rows(structure)
     return rows.T @ sp.diags_array(_stiffness(structure.frame.braces)) @ rows
@@ -79,7 +75,7 @@ def _stiffness(braces: tuple[Brace, ...]) -> FloatArray:
     return np.array([brace.stiffness for brace in braces], dtype=float)
 
 
-def oscillator_matrices(structure: Structure) -> tuple[SparseArray, SparseArray]:
+def oscillator_matrices(structure: MeshedFrame) -> tuple[SparseArray, SparseArray]:
     """Return mass and stiffness of the oscillators, (n, n) each."""
     moving, stretch, masses, stiffness = [], [], [], []
     for node, item in zip(structure.mesh.oscillators, structure.frame.oscillators, strict=True):
@@ -94,7 +90,7 @@ def oscillator_matrices(structure: Structure) -> tuple[SparseArray, SparseArray]
 
 
 def _oscillator_rows(
-    structure: Structure, node: int, item: Oscillator
+    structure: MeshedFrame, node: int, item: Oscillator
 ) -> tuple[SparseArray, SparseArray]:
     """Return the translations of an oscillator's mass and the stretch of its spring."""
     transform = structure.kinematics.transform

@@ -12,7 +12,7 @@ from femubench.core.errors import ModelError
 from femubench.core.fem.beam import BeamProperties, shape_functions
 from femubench.core.fem.frame import ACTIVE, Frame, Place
 from femubench.core.fem.mesh import ON_MEMBER, SAME_STATION, Connection, Mesh, member_axes
-from femubench.core.measurement import DIRECTIONS
+from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 

@@ -1,26 +1,42 @@
-"""Element properties of a frame as it is described, before any parameter was changed."""
+"""A frame meshed as it is described: element properties before any parameter was changed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields
-from typing import TYPE_CHECKING, TypeVar
+from dataclasses import fields, replace
+from typing import TypeVar
 
 import numpy as np
 
 from femubench.core.errors import ModelError
+from femubench.core.fem.attachments import check_attachments
 from femubench.core.fem.beam import BeamProperties
+from femubench.core.fem.derivatives import apply_values
 from femubench.core.fem.frame import Coupling, Eccentricity, Factor, Frame, Member
-from femubench.core.fem.mesh import Mesh
-from femubench.core.fem.parameters import QUANTITIES, Parameter, apply_values
+from femubench.core.fem.kinematics import build_kinematics
+from femubench.core.fem.mesh import Mesh, build_mesh
+from femubench.core.fem.meshed_frame import MeshedFrame
+from femubench.core.fem.parameters import QUANTITIES, Parameter
 from femubench.core.typing import FloatArray
-
-if TYPE_CHECKING:
-    from femubench.core.fem.structure import Structure
 
 # Without shear or rotary inertia a beam is still one; without stiffness or mass it is none.
 MAY_VANISH = ("shear", "rotary")
 _Item = TypeVar("_Item", Coupling, Eccentricity)
+
+
+def meshed(frame: Frame) -> MeshedFrame:
+    """Return a frame with its mesh, dofs and element properties, factors included.
+
+    Raises:
+        ModelError: when the frame cannot be meshed.
+    """
+    check_attachments(frame)
+    mesh = build_mesh(frame)
+    springs = [k for c in mesh.connections for k in c.spring.stiffness.values()]
+    kinematics = build_kinematics(frame, mesh)
+    properties = nominal_properties(frame, mesh)
+    built = MeshedFrame(frame, mesh, kinematics, properties, np.array(springs, dtype=float))
+    return replace(built, properties=factored_properties(built)) if frame.factors else built
 
 
 def nominal_properties(frame: Frame, mesh: Mesh) -> BeamProperties:
@@ -77,7 +93,7 @@ def _of_members(
     return column
 
 
-def factored_properties(structure: Structure) -> BeamProperties:
+def factored_properties(structure: MeshedFrame) -> BeamProperties:
     """Return the properties of a frame with its factors; massless arms of joints have none.
 
     Raises:
@@ -89,7 +105,7 @@ def factored_properties(structure: Structure) -> BeamProperties:
     return apply_values(structure, parameters, [item.factor for item in factors])[0]
 
 
-def _parameter(structure: Structure, item: Factor) -> Parameter:
+def _parameter(structure: MeshedFrame, item: Factor) -> Parameter:
     name = f"factor on {item.quantity}"
     if item.quantity not in QUANTITIES or not QUANTITIES[item.quantity]:
         known = ", ".join(quantity for quantity, scaled in QUANTITIES.items() if scaled)

@@ -15,26 +15,214 @@ Source: strains and rotations of Simo & Vu-Quoc (1986).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.assembly import plan_assembly
-from femubench.core.fem.attachments import brace_lines, brace_motion
-from femubench.core.fem.beam import rigid_transform
-from femubench.core.fem.interpolation import GAUSS, cubic_rates, interpolation
-from femubench.core.fem.statics import StressState, statics_of
-from femubench.core.typing import FloatArray, SparseArray
+from femubench.core.fem.attachments import brace_lines, brace_motion, brace_rows
+from femubench.core.fem.beam import (
+    GAUSS,
+    cubic_rates,
+    interpolation,
+    rigid_transform,
+    stiffness_matrices,
+)
+from femubench.core.fem.elastic_stiffness import elastic_stiffness
+from femubench.core.fem.frame import ACTIVE, Frame, Support
+from femubench.core.fem.kinematics import build_kinematics, rigid_motions
+from femubench.core.fem.meshed_frame import MeshedFrame
+from femubench.core.fem.nominal import meshed
+from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
-if TYPE_CHECKING:
-    from femubench.core.fem.structure import Structure
+_IN_PLANE = ("x", "y", "rz")  # of a frame that moves out of plane
+_HELD = 1e-9
+# Without redundancy rounding leaves some 1e-13 of EA times the misfit strain.
+_NO_FORCE = 1e-10
+_DRAWS = 2
+
+
+@dataclass(frozen=True)
+class StressState:
+    """Internal forces on the face that looks to the second end, local axes.
+
+    Arguments:
+        force: normal and shear forces (N, Vy, Vz) of the elements in N, (n, 3).
+        moment: (T, My, Mz) at their second nodes in N m, (n, 3).
+        spring_force, spring_moment: on the member side of the joint springs, global, (c, 3).
+        brace_force: in the braces in N, tension positive, (b,).
+    """
+
+    force: FloatArray
+    moment: FloatArray
+    spring_force: FloatArray
+    spring_moment: FloatArray
+    brace_force: FloatArray
+
+    @property
+    def largest(self) -> float:
+        """Return the largest magnitude of a normal force in N."""
+        return float(np.abs(np.concatenate([self.force[:, 0], self.brace_force])).max())
+
+    def scaled(self, factor: float) -> StressState:
+        """Return a multiple of the state."""
+        return StressState(*(factor * values for values in vars(self).values()))
+
+
+@dataclass(frozen=True)
+class Statics:
+    """The frame in the plane in which it lies, factorised.
+
+    Arguments:
+        structure: the frame with the dofs of that plane.
+        stiffness: element matrices, (n_elements, 12, 12).
+        factor: of the stiffness on the dofs `free`.
+        free: the dofs but those that stop the rigid motions, where nothing reacts.
+    """
+
+    structure: MeshedFrame
+    stiffness: FloatArray
+    factor: Any
+    free: IntArray
+
+    def state(self, member: str) -> StressState:
+        """Return the state with 1 N as its largest normal force and tension in the member.
+
+        Raises:
+            ModelError: when the member is unknown or can be fitted without stress.
+        """
+        structure, mesh = self.structure, self.structure.mesh
+        if member not in structure.frame.member_index:
+            raise ModelError(f"there is no member {member!r}")
+        own = mesh.member == structure.frame.member_index[member]
+        own &= np.isnan(mesh.arm_factor)
+        misfit = self._misfit(own.astype(float))
+        motion = self._motion(misfit)
+        state = self._state(self._internal(motion, misfit), motion)
+        tension = float(state.force[own, 0].mean())
+        scale = float(np.abs(misfit).max())
+        if not np.isfinite(state.largest) or abs(tension) < _NO_FORCE * scale:
+            raise ModelError(
+                f"nothing resists a lack of fit of member {member!r}: the frame is not redundant"
+            )
+        return state.scaled(np.sign(tension) / state.largest)
+
+    def resisting(self) -> BoolArray:
+        """Tell which members cannot be fitted without stress, (n_members,).
+
+        A member that can feels no misfit of others either, so that misfits of all members at
+        once, taken at random, tell.
+        """
+        mesh, count = self.structure.mesh, len(self.structure.frame.members)
+        rng = np.random.default_rng(0)
+        found = np.zeros(count, dtype=bool)
+        for _ in range(_DRAWS):
+            misfit = self._misfit(rng.normal(size=count)[mesh.member])
+            tension = self._internal(self._motion(misfit), misfit)[:, 6]
+            scale = self._misfit(np.ones(len(tension)))[:, 6]
+            found[mesh.member[np.abs(tension) > _NO_FORCE * scale]] = True
+        return found
+
+    def _misfit(self, strain: FloatArray) -> FloatArray:
+        """Return the end forces that would stretch the elements so, (n_elements, 12)."""
+        p = self.structure.properties
+        pull = strain * p.EA * p.length / (p.length - p.rigid_1 - p.rigid_2)
+        misfit = np.zeros((len(pull), 12))
+        misfit[:, 0], misfit[:, 6] = -pull, pull
+        return misfit
+
+    def _motion(self, misfit: FloatArray) -> FloatArray:
+        """Return the displacements under a misfit, (n,)."""
+        load = self.structure.gather.T @ misfit.ravel()
+        motion = np.zeros(len(load))
+        motion[self.free] = self.factor.solve(load[self.free])
+        return motion
+
+    def _internal(self, motion: FloatArray, misfit: FloatArray) -> FloatArray:
+        """Return the end forces of the elements, (n_elements, 12)."""
+        local = (self.structure.gather @ motion).reshape(-1, 12, 1)
+        return np.asarray((self.stiffness @ local)[:, :, 0] - misfit)
+
+    def _state(self, ends: FloatArray, motion: FloatArray) -> StressState:
+        mesh, frame = self.structure.mesh, self.structure.frame
+        # A hanging node is the end of one element, so that its place among all ends is unique.
+        place = np.zeros(len(mesh.xyz), dtype=np.int64)
+        place[mesh.ends.ravel()] = np.arange(mesh.ends.size)
+        element, end = np.divmod(place[[c.node for c in mesh.connections]].astype(np.int64), 2)
+        local = ends.reshape(-1, 2, 2, 3)[element, end]
+        outer = -np.einsum("cij,cki->ckj", mesh.axes[element], local)
+        stiffness = np.array([brace.stiffness for brace in frame.braces])
+        stretch = brace_rows(self.structure) @ motion if frame.braces else np.zeros(0)
+        return StressState(ends[:, 6:9], ends[:, 9:], outer[:, 0], outer[:, 1], stiffness * stretch)
+
+
+def statics_of(structure: MeshedFrame) -> Statics:
+    """Return the statics of the frame as it is described, kept with the structure.
+
+    Raises:
+        ModelError: when the frame is a mechanism in its plane.
+    """
+    if "statics" not in structure.kept:
+        source = meshed(structure.frame) if structure.changes else structure
+        structure.kept["statics"] = _prepare(source)
+    statics: Statics = structure.kept["statics"]
+    return statics
+
+
+def _prepare(structure: MeshedFrame) -> Statics:
+    frame = replace(structure.frame, oscillators=())
+    directions = ACTIVE[frame.plane]
+    if frame.plane == "out-of-plane":
+        directions = _IN_PLANE
+        frame = replace(frame, supports=_clamps(frame))
+        flat = next((m.name for m in frame.members if m.section.Iz <= 0.0), None)
+        if flat is not None:
+            raise ModelError(f"member {flat!r}: the stress of a lack of fit needs Iz")
+    kinematics = build_kinematics(frame, structure.mesh, directions)
+    flat_structure = replace(structure, frame=frame, kinematics=kinematics)
+    free = _free(flat_structure)
+    matrix = sp.csc_array(elastic_stiffness(flat_structure))[free][:, free]
+    try:
+        factor = splu(sp.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0)
+    except RuntimeError:
+        raise ModelError("the frame is a mechanism in its plane") from None
+    stiffness = stiffness_matrices(flat_structure.properties)
+    return Statics(flat_structure, stiffness, factor, free)
+
+
+def _clamps(frame: Frame) -> tuple[Support, ...]:
+    """Return what supports out of plane hold in the plane: clamps everything, others nothing."""
+    whole = set(ACTIVE[frame.plane])
+    return tuple(Support(s.at, _IN_PLANE) for s in frame.supports if set(s.fixed) == whole)
+
+
+def _free(structure: MeshedFrame) -> IntArray:
+    """Return the dofs that are left when as few as possible stop the rigid motions."""
+    kinematics, xyz = structure.kinematics, structure.mesh.xyz
+    centre, size = xyz.mean(axis=0), max(float(np.ptp(xyz, axis=0).max()), 1e-12)
+
+    def motion(points: FloatArray, axes: FloatArray) -> FloatArray:
+        scale = np.repeat([1.0, size], 3)
+        return np.asarray(rigid_motions(points - centre, axes) / scale)
+
+    own = motion(xyz[kinematics.node], kinematics.axes)
+    moving = np.abs(own).max(axis=0, initial=0.0) > _HELD
+    _, singular, turn = la.svd(np.linalg.qr(structure.held(motion)[:, moving], mode="r"))
+    rank = int(np.sum(singular > _HELD))
+    loose = own[:, moving] @ turn[rank:].T
+    stopped = la.qr(loose.T, mode="r", pivoting=True)[1][: loose.shape[1]]
+    return np.setdiff1d(np.arange(len(own)), stopped)
+
 
 _AT_ONCE = 20000  # elements whose matrices are held, all states together
 
 
-def preload_stiffness(structure: Structure, member: str, force: float) -> SparseArray:
+def preload_stiffness(structure: MeshedFrame, member: str, force: float) -> SparseArray:
     """Return the geometric stiffness of one preload on the free dofs, sparse (n, n), N/m, N, N m.
 
     It is linear in the force. The state of stress is that of the frame as it is described:
@@ -52,7 +240,7 @@ def preload_stiffness(structure: Structure, member: str, force: float) -> Sparse
     return force * preload_stiffnesses(structure, [member])[0]
 
 
-def preload_stiffnesses(structure: Structure, members: Sequence[str]) -> tuple[SparseArray, ...]:
+def preload_stiffnesses(structure: MeshedFrame, members: Sequence[str]) -> tuple[SparseArray, ...]:
     """Return the geometric stiffness of a preload of 1 N in each of some members.
 
     Arguments:
@@ -82,7 +270,7 @@ def preload_stiffnesses(structure: Structure, members: Sequence[str]) -> tuple[S
     return tuple(found)
 
 
-def _geometric(structure: Structure, states: Sequence[StressState]) -> FloatArray:
+def _geometric(structure: MeshedFrame, states: Sequence[StressState]) -> FloatArray:
     """Return the geometric matrices of all elements in all states, (n_states, n, 12, 12)."""
     if not states:
         return np.zeros((0, len(structure.mesh.ends), 12, 12))
@@ -91,7 +279,7 @@ def _geometric(structure: Structure, states: Sequence[StressState]) -> FloatArra
     return geometric_matrices(structure, together).reshape(len(states), -1, 12, 12)
 
 
-def redundant_members(structure: Structure) -> tuple[str, ...]:
+def redundant_members(structure: MeshedFrame) -> tuple[str, ...]:
     """Return the members whose lack of fit the rest of the frame resists, in the frame's order."""
     try:
         resisting = statics_of(structure).resisting()
@@ -118,7 +306,7 @@ def _turned(force: FloatArray, line: FloatArray) -> FloatArray:
     return np.asarray(_symmetric(force[:, :, None] * line[:, None, :]) - work * np.eye(3))
 
 
-def geometric_matrices(structure: Structure, state: StressState) -> FloatArray:
+def geometric_matrices(structure: MeshedFrame, state: StressState) -> FloatArray:
     """Return the local geometric stiffness matrices of the elements, (s n, 12, 12).
 
     Arguments:
@@ -168,7 +356,7 @@ def _density(
     return _symmetric(mixed) + back @ turned @ rotation + wagner
 
 
-def _connections(structure: Structure, state: StressState) -> tuple[SparseArray, FloatArray]:
+def _connections(structure: MeshedFrame, state: StressState) -> tuple[SparseArray, FloatArray]:
     """Return motions of base and hanging node of the joint springs, and their forms.
 
     A spring behind a rigid arm is the same as a beam of one point: u' dx is the relative
@@ -186,7 +374,7 @@ def _connections(structure: Structure, state: StressState) -> tuple[SparseArray,
     return structure.kinematics.transform[rows], _symmetric(blocks)
 
 
-def _braces(structure: Structure, state: StressState) -> tuple[SparseArray, FloatArray]:
+def _braces(structure: MeshedFrame, state: StressState) -> tuple[SparseArray, FloatArray]:
     """Return relative motions of the ends of the braces, and their forms."""
     unit, length = brace_lines(structure.frame)
     across = np.eye(3) - unit[:, :, None] * unit[:, None, :]

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.fem.kinematics import point_rows
 from femubench.core.fem.mesh import SAME_STATION, locate
-from femubench.core.measurement import Sensors
+from femubench.core.fem.meshed_frame import MeshedFrame
+from femubench.core.fem.sensors import Sensors
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
-if TYPE_CHECKING:
-    from femubench.core.fem.structure import Structure
 
-
-def sensor_rows(structure: Structure, sensors: Sensors) -> SparseArray:
+def sensor_rows(structure: MeshedFrame, sensors: Sensors) -> SparseArray:
     """Return sensor readings from free dofs, sparse (n_sensors, n).
 
     Raises:
@@ -40,7 +36,7 @@ def sensor_rows(structure: Structure, sensors: Sensors) -> SparseArray:
     return rows @ transform
 
 
-def _nodes_at(structure: Structure, xyz: FloatArray) -> IntArray:
+def _nodes_at(structure: MeshedFrame, xyz: FloatArray) -> IntArray:
     """Return the nodes at points, -1 where there is none or it takes a closer look, (k,).
 
     At a flexible connection several nodes lie at one point, of which only the joint is sure.
@@ -53,7 +49,7 @@ def _nodes_at(structure: Structure, xyz: FloatArray) -> IntArray:
     return np.where(distance[np.arange(len(xyz)), nearest] <= SAME_STATION, nearest, -1)
 
 
-def _between_nodes(structure: Structure, sensors: Sensors, i: int) -> SparseArray:
+def _between_nodes(structure: MeshedFrame, sensors: Sensors, i: int) -> SparseArray:
     """Return the reading of a sensor from node displacements, sparse (1, 6 n_nodes)."""
     place = locate(structure.frame, sensors.xyz[i])
     point = point_rows(structure.frame, structure.mesh, structure.properties, place)

@@ -1,72 +1,29 @@
-"""A meshed frame: element properties, kinematics, matrices; rebuilt with other parameters."""
+"""A meshed frame with its matrices, rebuilt with other parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
-import numpy as np
-import scipy.sparse as sp
-
-from femubench.core.errors import ModelError
-from femubench.core.fem.assembly import AssemblyPlan, plan_assembly, prune
-from femubench.core.fem.attachments import brace_stiffness, check_attachments, oscillator_matrices
-from femubench.core.fem.beam import BeamProperties, mass_matrices, stiffness_matrices
-from femubench.core.fem.frame import Frame, GroundSpring, PointMass
-from femubench.core.fem.kinematics import (
-    Kinematics,
-    build_kinematics,
-    point_rows,
-    rigid_arm,
-    spring_rows,
-)
-from femubench.core.fem.mesh import Mesh, build_mesh
-from femubench.core.fem.nominal import factored_properties, nominal_properties
-from femubench.core.fem.parameters import Parameter, apply_values
+from femubench.core.fem.assembly import prune
+from femubench.core.fem.attachments import oscillator_matrices
+from femubench.core.fem.beam import mass_matrices
+from femubench.core.fem.derivatives import apply_values
+from femubench.core.fem.elastic_stiffness import elastic_stiffness
+from femubench.core.fem.frame import Frame
+from femubench.core.fem.meshed_frame import MeshedFrame
+from femubench.core.fem.nominal import meshed
+from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.preload import preload_stiffness
 from femubench.core.fem.sensing import sensor_rows
-from femubench.core.measurement import DIRECTIONS, Sensors
-from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
-
-
-def _positions(labels: Sequence[str]) -> dict[str, IntArray]:
-    found: dict[str, list[int]] = {}
-    for i, label in enumerate(labels):
-        found.setdefault(label, []).append(i)
-    return {label: np.array(where, dtype=np.int64) for label, where in found.items()}
+from femubench.core.fem.sensors import Sensors
+from femubench.core.typing import FloatArray, SparseArray
 
 
 @dataclass(frozen=True)
-class Structure:
-    """A frame with its mesh and the present values of everything that updating may change.
-
-    Arguments:
-        frame: the description.
-        mesh: nodes and elements.
-        kinematics: free dofs.
-        properties: present element properties.
-        springs: present joint spring stiffnesses, in the order of `spring_labels`.
-        changes: parameter values that were set since the frame was built.
-    """
-
-    frame: Frame
-    mesh: Mesh
-    kinematics: Kinematics
-    properties: BeamProperties
-    springs: FloatArray
-    changes: tuple[tuple[Parameter, float], ...] = ()
-
-    def __post_init__(self) -> None:
-        p = self.properties
-        for rigid in (p.rigid_1 + p.rigid_2, p.rigid_mass_1 + p.rigid_mass_2):
-            if np.any(rigid >= p.length):
-                raise ModelError("a rigid end is longer than its element")
-
-    def __getstate__(self) -> dict[str, Any]:
-        # Kept factorisations cannot be pickled; they are made again where they are wanted.
-        return {name: value for name, value in vars(self).items() if name != "kept"}
+class Structure(MeshedFrame):
+    """A meshed frame that gives its mass and stiffness, and reads sensors."""
 
     @classmethod
     def build(cls, frame: Frame) -> Structure:
@@ -75,13 +32,8 @@ class Structure:
         Raises:
             ModelError: when the frame cannot be meshed.
         """
-        check_attachments(frame)
-        mesh = build_mesh(frame)
-        springs = [k for c in mesh.connections for k in c.spring.stiffness.values()]
-        kinematics = build_kinematics(frame, mesh)
-        properties = nominal_properties(frame, mesh)
-        built = cls(frame, mesh, kinematics, properties, np.array(springs, dtype=float))
-        return replace(built, properties=factored_properties(built)) if frame.factors else built
+        found = meshed(frame)
+        return cls(found.frame, found.mesh, found.kinematics, found.properties, found.springs)
 
     def with_values(
         self, parameters: Sequence[Parameter], values: Sequence[float] | FloatArray
@@ -93,7 +45,7 @@ class Structure:
             self, properties=properties, springs=springs, changes=self.changes + changes
         )
         # All that is cached follows from frame, mesh and kinematics, which stay.
-        for name, member in vars(Structure).items():
+        for name, member in (*vars(MeshedFrame).items(), *vars(Structure).items()):
             if isinstance(member, cached_property):
                 changed.__dict__[name] = getattr(self, name)
         return changed
@@ -106,162 +58,10 @@ class Structure:
         return structure
 
     @cached_property
-    def gather(self) -> SparseArray:
-        """Return local element displacements from free dofs, sparse (12 n_elements, n)."""
-        count = len(self.mesh.ends)
-        nodes = (6 * self.mesh.ends[:, :, None] + np.arange(6)).reshape(count, 4, 3)
-        columns = np.broadcast_to(nodes[:, :, None, :], (count, 4, 3, 3))
-        axes = np.broadcast_to(self.mesh.axes[:, None], (count, 4, 3, 3))
-        rows = np.broadcast_to(np.arange(12 * count).reshape(count, 4, 3, 1), (count, 4, 3, 3))
-        turn = sp.csr_array(
-            (axes.ravel(), (rows.ravel(), columns.ravel())),
-            shape=(12 * count, 6 * len(self.mesh.xyz)),
-        )
-        gather = turn @ self.kinematics.transform
-        gather.eliminate_zeros()
-        return gather
-
-    @cached_property
-    def plan(self) -> AssemblyPlan:
-        """Return where the entries of the element matrices go."""
-        return plan_assembly(self.gather, 12)
-
-    @cached_property
-    def spring_rows(self) -> SparseArray:
-        """Return relative displacements of the joint springs, sparse (n_springs, n)."""
-        blocks = [spring_rows(self.mesh, connection) for connection in self.mesh.connections]
-        if not blocks:
-            return sp.csr_array((0, self.kinematics.transform.shape[1]))
-        return sp.csr_array(sp.vstack(blocks)) @ self.kinematics.transform
-
-    @cached_property
-    def labels(self) -> tuple[str, ...]:
-        """Return ``member/k`` of every element; empty for the massless arm of a joint."""
-        names = [member.name for member in self.frame.members]
-        arms = np.isfinite(self.mesh.arm_factor)
-        pairs = zip(self.mesh.member, self.mesh.number, arms, strict=True)
-        return tuple("" if arm else f"{names[m]}/{k}" for m, k, arm in pairs)
-
-    @cached_property
-    def spring_labels(self) -> tuple[str, ...]:
-        """Return ``member@joint:direction`` of every joint spring."""
-        return tuple(
-            f"{c.spring.member}@{c.spring.joint}:{direction}"
-            for c in self.mesh.connections
-            for direction in c.spring.stiffness
-        )
-
-    @cached_property
-    def label_index(self) -> dict[str, IntArray]:
-        """Return the elements of every ``member/k``; a split element has several."""
-        return _positions(self.labels)
-
-    @cached_property
-    def member_labels(self) -> dict[str, tuple[str, ...]]:
-        """Return the labels of the elements of every member."""
-        return {
-            member.name: tuple(f"{member.name}/{k + 1}" for k in range(member.elements))
-            for member in self.frame.members
-        }
-
-    @cached_property
-    def kept(self) -> dict[str, Any]:
-        """Return a store of what follows from the frame alone, whatever the parameters are."""
-        return {}
-
-    @cached_property
     def preload(self) -> SparseArray | None:
         """Return the geometric stiffness of all preloads on the free dofs, (n, n), or None."""
         parts = [preload_stiffness(self, p.member, p.force) for p in self.frame.preloads]
         return sum(parts[1:], start=parts[0]) if parts else None
-
-    @cached_property
-    def spring_index(self) -> dict[str, IntArray]:
-        """Return the position of every label of `spring_labels`."""
-        return _positions(self.spring_labels)
-
-    @cached_property
-    def element_ends(self) -> dict[str, tuple[int, int]]:
-        """Return from ``member@joint`` to (element, end) for every member end."""
-        ends: dict[str, tuple[int, int]] = {}
-        plain = np.flatnonzero(np.isnan(self.mesh.arm_factor))
-        member = self.mesh.member[plain]
-        first = np.unique(member, return_index=True)[1]
-        last = np.concatenate([first[1:], [len(plain)]]) - 1
-        for m, spec in enumerate(self.frame.members):
-            ends[f"{spec.name}@{spec.ends[0]}"] = (int(plain[first[m]]), 0)
-            ends[f"{spec.name}@{spec.ends[1]}"] = (int(plain[last[m]]), 1)
-        return ends
-
-    @cached_property
-    def joint_ends(self) -> dict[str, tuple[str, ...]]:
-        """Return from joint type to the ``member@joint`` ends that meet at joints of that type.
-
-        A joint without a type is a type of its own; a free end is no joint.
-        """
-        groups: dict[str, tuple[str, ...]] = {}
-        for joint in self.frame.joints:
-            members = self.frame.ends_at(joint.name)
-            if len(members) > 1:
-                key = joint.type or joint.name
-                ends = tuple(f"{member}@{joint.name}" for member in members)
-                groups[key] = groups.get(key, ()) + ends
-        return groups
-
-    def attached(
-        self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]
-    ) -> tuple[SparseArray, SparseArray]:
-        """Return the mass and stiffness that attachments add on the free dofs, (n, n) each."""
-        transform = self.kinematics.transform
-        n = transform.shape[1]
-        mass, stiffness = sp.csc_array((n, n)), sp.csc_array((n, n))
-        for item in masses:
-            point = point_rows(self.frame, self.mesh, self.properties, item.at)
-            # In a plane a mass acts in the directions of the plane, and in no other.
-            arm = rigid_arm(np.array(item.offset))[:3][self.active_local[:3]]
-            rows = sp.csr_array(arm) @ point @ transform
-            mass = mass + item.mass * (rows.T @ rows)
-        for spring in springs:
-            rows = self._ground_row(spring)
-            stiffness = stiffness + spring.stiffness * (rows.T @ rows)
-        return sp.csc_array(mass), sp.csc_array(stiffness)
-
-    def _ground_row(self, spring: GroundSpring) -> SparseArray:
-        """Return the elongation of a spring to ground from free dofs, sparse (1, n)."""
-        point = point_rows(self.frame, self.mesh, self.properties, spring.at)
-        row = DIRECTIONS.index(spring.direction.lstrip("+-"))
-        return point[row : row + 1] @ self.kinematics.transform
-
-    def held(self, motion: Callable[[FloatArray, FloatArray], FloatArray]) -> FloatArray:
-        """Return what supports and springs to ground see of motions of the whole, (m, r).
-
-        A motion is free where its column is zero. Exact on any mesh, unlike a strain energy
-        from the stiffness matrix, which loses a soft suspension in its rounding errors.
-
-        Arguments:
-            motion: displacements from positions (k, 3) and axes (k, 6), as columns (k, r).
-        """
-        transform, xyz = self.kinematics.transform, self.mesh.xyz
-        own = motion(xyz[self.kinematics.node], self.kinematics.axes)
-        free = np.tile(self.active_local[:6], (len(xyz), 1))
-        free[self.mesh.oscillators] = False  # they have dofs of their own and hold nothing
-        active = np.flatnonzero(free)
-        all_nodes = motion(xyz[active // 6], np.eye(6)[active % 6])
-        rows = [self._ground_row(spring) for spring in self.frame.springs if spring.stiffness]
-        pulled = [np.asarray(row @ own) for row in rows]
-        return np.vstack([transform[active] @ own - all_nodes, *pulled])
-
-    def elastic_stiffness(self) -> SparseArray:
-        """Return the stiffness without preloads and oscillators, (n, n)."""
-        stiffness = self.plan.assemble(stiffness_matrices(self.properties))
-        if len(self.springs):
-            rows = self.spring_rows
-            stiffness = stiffness + rows.T @ sp.diags_array(self.springs) @ rows
-        if self.frame.springs:
-            stiffness = stiffness + self.attached((), self.frame.springs)[1]
-        if self.frame.braces:
-            stiffness = stiffness + brace_stiffness(self)
-        return stiffness
 
     def matrices(self) -> tuple[SparseArray, SparseArray]:
         """Return mass and stiffness on the free dofs, sparse, (n, n) each.
@@ -272,7 +72,7 @@ class Structure:
         mass = self.plan.assemble(mass_matrices(self.properties))
         if self.frame.masses:
             mass = mass + self.attached(self.frame.masses, ())[0]
-        stiffness = self.elastic_stiffness()
+        stiffness = elastic_stiffness(self)
         if self.frame.oscillators:
             more_mass, more_stiffness = oscillator_matrices(self)
             mass, stiffness = mass + more_mass, stiffness + more_stiffness
@@ -287,8 +87,3 @@ class Structure:
             ModelError: when a sensor lies off the structure.
         """
         return sensor_rows(self, sensors)
-
-    @cached_property
-    def active_local(self) -> BoolArray:
-        """Tell which of the twelve local dofs the plane lets move, (12,)."""
-        return np.tile(self.kinematics.active, 2)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import weakref
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.linalg as la
 
 from femubench.core.errors import ModelError
+from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal.rigid import rigid_modes_of, rigid_share
 from femubench.core.modal.sparse_eigen import lowest_eigenpairs
-from femubench.core.model import LowRank, Model
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 DENSE_LIMIT = 500
@@ -241,3 +244,48 @@ def zero_tolerance(modes: Modes) -> float:
     """Return the eigenvalue below which a mode counts as one of zero frequency."""
     elastic = modes.eigenvalues[~modes.rigid & (modes.eigenvalues > 0.0)]
     return float(_ZERO * elastic[0]) if len(elastic) else 0.0
+
+
+_Kept = TypeVar("_Kept")
+# Models are compared by what they are, not by what they hold: equality of arrays is no key.
+_kept: dict[int, tuple[weakref.ref[Model], dict[Hashable, Any]]] = {}
+
+
+def once_for(model: Model, key: Hashable, make: Callable[[], _Kept]) -> _Kept:
+    """Return what was made before for this very model, or make it and keep it as long.
+
+    Arguments:
+        key: what it is, among all that is kept of a model.
+        make: called where it was not made before.
+    """
+    entry = _kept.get(id(model))
+    if entry is None or entry[0]() is not model:
+        number = id(model)
+        # Bound early: at the end of the interpreter the name may be gone before the model.
+        forget = partial(_forget, _kept, number)
+        entry = (weakref.ref(model, forget), {})
+        _kept[number] = entry
+    if key not in entry[1]:
+        entry[1][key] = make()
+    value: _Kept = entry[1][key]
+    return value
+
+
+def _forget(kept: dict[int, Any], number: int, _: object) -> None:
+    kept.pop(number, None)
+
+
+def modes_of(model: Model, count: int | None = None) -> Modes:
+    """Return the lowest modes of a model as `solve_modes` does, a small one solved only once.
+
+    Arguments:
+        model: any model.
+        count: number of modes wanted, rigid ones included; None as for `solve_modes`.
+
+    Raises:
+        ModelError: when the model has no modes.
+    """
+    if model.size > DENSE_LIMIT:
+        return solve_modes(model, count)
+    modes = once_for(model, "modes", lambda: solve_modes(model))
+    return modes if count is None else modes.take(np.arange(min(count, len(modes))))

@@ -6,8 +6,8 @@ import numpy as np
 import scipy.linalg as la
 
 from femubench.core.errors import NotApplicable
+from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import dense_matrices
-from femubench.core.model import Model
 from femubench.core.typing import BoolArray, FloatArray, SparseArray
 
 

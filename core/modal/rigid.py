@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.measurement import DIRECTIONS
-from femubench.core.model import Dofs, Model
+from femubench.core.fem.model import Dofs, Model
+from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.typing import BoolArray, FloatArray
 
 _ZERO_ENERGY = 1e-12

@@ -9,9 +9,10 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.parameters import Derivatives, Parameter, derivatives
+from femubench.core.fem.derivatives import Derivatives, derivatives
+from femubench.core.fem.model import Model
+from femubench.core.fem.parameters import Parameter
 from femubench.core.modal.eigen import Modes
-from femubench.core.model import Model
 from femubench.core.typing import FloatArray, IntArray
 
 _REPEATED = 1e-8

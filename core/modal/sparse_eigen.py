@@ -11,8 +11,8 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
 from femubench.core.errors import ModelError
+from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal.rigid import rigid_modes_of
-from femubench.core.model import LowRank, Model
 from femubench.core.typing import FloatArray
 
 _RIGID_RESIDUAL = 1e-12

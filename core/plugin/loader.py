@@ -7,20 +7,23 @@ own: what is wrong with one is recorded in `Plugins.broken` and touches no other
 from __future__ import annotations
 
 import inspect
+import tomllib
 import traceback
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import Any
 
 import pluggy
 
+import femubench
 from femubench.core.errors import PluginError
 from femubench.core.plugin import hookspecs
 from femubench.core.plugin.markers import PROJECT
 from femubench.core.plugin.roles import Effect, Reader, Reporter, Scenario
 from femubench.core.plugin.validation import CHECKS, did_you_mean
-from femubench.core.strategy import Strategy
+from femubench.core.update.strategy import Strategy
 
 PREFIX = f"{PROJECT}_"
 HOOKS = tuple(PREFIX + kind for kind in CHECKS)
@@ -93,10 +96,14 @@ def load_plugins(
     """Return what all plugins offer.
 
     Arguments:
-        points: the entry points; by default all of the group ``femubench`` that are installed.
+        points: the entry points; by default all of the group ``femubench`` that are installed,
+            and those of the clone that femubench is imported from where it is not installed.
         extra: further plugins by name, already imported.
     """
-    sources = list(_installed(entry_points(group=PROJECT) if points is None else points))
+    installed = tuple(entry_points(group=PROJECT) if points is None else points)
+    sources = list(_installed(installed))
+    if points is None and not any(_package(point) == PROJECT for point in installed):
+        sources = [*_of_clone(), *sources]
     sources += [
         _Source(name, "given by hand", given=plugin) for name, plugin in (extra or {}).items()
     ]
@@ -139,13 +146,27 @@ def _installed(points: Iterable[EntryPoint]) -> Iterator[_Source]:
     """Return the entry points, the built-ins first so that no one can take their names."""
 
     def order(point: EntryPoint) -> tuple[bool, str, str]:
-        name = "" if point.dist is None else point.dist.name
+        name = _package(point)
         return name != PROJECT, name, point.name
 
     for point in sorted(points, key=order):
         dist = point.dist
         distribution = "no distribution" if dist is None else f"{dist.name} {dist.version}"
         yield _Source(point.name, distribution, point)
+
+
+def _package(point: EntryPoint) -> str:
+    return "" if point.dist is None else point.dist.name
+
+
+def _of_clone() -> Iterator[_Source]:
+    """Return the built-ins as the clone's pyproject.toml lists them."""
+    file = Path(femubench.__file__).parents[1] / "pyproject.toml"
+    if file.is_file():
+        listed = tomllib.loads(file.read_text(encoding="utf-8"))["project"]["entry-points"][PROJECT]
+        for name, module in sorted(listed.items()):
+            point = EntryPoint(name, module, PROJECT)
+            yield _Source(name, f"{PROJECT} {femubench.__version__}, not installed", point)
 
 
 def _register(source: _Source) -> pluggy.PluginManager:

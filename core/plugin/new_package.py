@@ -37,7 +37,10 @@ _COMMON = {
     ".github/workflows/ci.yml": "ci.yml",
 }
 _FURTHER = {
-    "strategy": {"tests/structure.py": "strategy_structure.py"},
+    "strategy": {
+        "tests/structure.py": "strategy_structure.py",
+        "tests/test_speed.py": "strategy_speed.py",
+    },
     "reader": {
         "tests/case/case.toml": "reader_case.toml",
         "tests/case/modes.json": "reader_modes.json",

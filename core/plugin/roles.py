@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 if TYPE_CHECKING:
-    from femubench.core.diagnosis.effect import EffectParameter
-    from femubench.core.harness.results import Run
-    from femubench.core.measurement import Measurement
-    from femubench.core.model import Model
+    from femubench.core.effect.frame_effect import EffectParameter
+    from femubench.core.fem.model import Model
+    from femubench.core.modal.measurement import Measurement
+    from femubench.core.schema.results import Run
     from femubench.core.typing import SparseArray
 
 

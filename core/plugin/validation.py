@@ -11,7 +11,7 @@ from typing import Any
 
 from femubench.core.errors import PluginError
 from femubench.core.plugin.roles import Effect, Reader, Reporter, Scenario
-from femubench.core.strategy import CAPABILITIES, Strategy
+from femubench.core.update.strategy import CAPABILITIES, Strategy
 
 # Names become words on the command line and parts of file names.
 _WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")

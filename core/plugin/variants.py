@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 from femubench.core.errors import InputError
 from femubench.core.plugin.validation import did_you_mean
-from femubench.core.strategy import Strategy, UpdateResult
+from femubench.core.update.strategy import Strategy, UpdateResult
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from femubench.core.measurement import Measurement
-    from femubench.core.model import Model
+    from femubench.core.fem.model import Model
+    from femubench.core.modal.measurement import Measurement
 
 _SIMPLE = (bool, int, float, str, type(None))
 _UNKNOWN = object()

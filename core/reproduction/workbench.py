@@ -9,7 +9,7 @@ import numpy as np
 
 from femubench.core.case.case import Case
 from femubench.core.plugin.variants import strategy_of
-from femubench.core.strategy import Strategy, UpdateResult
+from femubench.core.update.strategy import Strategy, UpdateResult
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from femubench.core.errors import NotApplicable
-from femubench.core.measurement import Measurement
+from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import DENSE_LIMIT
 from femubench.core.modal.expansion import expand_by_dynamics
+from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.sparse_eigen import ShiftedModel
-from femubench.core.model import Model
 from femubench.core.typing import FloatArray, SparseArray
 from femubench.core.update.promise import force_scale
 

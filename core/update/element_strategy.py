@@ -9,13 +9,13 @@ from typing import ClassVar, get_args
 import numpy as np
 
 from femubench.core.errors import InputError
+from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
-from femubench.core.measurement import Measurement
-from femubench.core.model import Model
-from femubench.core.strategy import Strategy, UpdateResult
+from femubench.core.modal.measurement import Measurement
 from femubench.core.update.element_families import ElementFamily
 from femubench.core.update.equation_error import update_by_equation_error
-from femubench.core.update.wanted import Expansion, Frequencies
+from femubench.core.update.quasi import Expansion, Frequencies
+from femubench.core.update.strategy import Strategy, UpdateResult
 
 
 @dataclass(frozen=True)

@@ -6,19 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+from scipy.sparse.linalg import SuperLU, splu
 
 from femubench.core.errors import NotApplicable, SelfCheckFailed, StrategyFailure
-from femubench.core.measurement import Measurement
-from femubench.core.model import Model
-from femubench.core.strategy import UpdateResult
-from femubench.core.typing import FloatArray
-from femubench.core.update.least_change import (
-    Equations,
-    null_space,
-    smallest_change,
-    smallest_change_sparse,
-)
-from femubench.core.update.pattern import EntryPattern
+from femubench.core.fem.model import Model
+from femubench.core.modal.measurement import Measurement
+from femubench.core.typing import FloatArray, IntArray, SparseArray
 from femubench.core.update.promise import (
     ALLOWED,
     Residuals,
@@ -27,6 +22,190 @@ from femubench.core.update.promise import (
     measure_residuals,
 )
 from femubench.core.update.quasi import ITERATIONS, QuasiModes, quasi_measured_modes
+from femubench.core.update.strategy import UpdateResult
+
+
+@dataclass(frozen=True)
+class EntryPattern:
+    """The non-zero entries of the upper triangle of a symmetric matrix.
+
+    Arguments:
+        row, column: where they stand, row <= column, (n_entries,).
+        values: their nominal values, (n_entries,).
+        size: number of dofs n.
+    """
+
+    row: IntArray
+    column: IntArray
+    values: FloatArray
+    size: int
+
+    @classmethod
+    def of(cls, model: Model) -> EntryPattern:
+        """Return the pattern of a model's stiffness matrix.
+
+        Raises:
+            NotApplicable: when the stiffness has a low-rank term, which has no zeros to keep.
+        """
+        if model.stiffness_change is not None:
+            raise NotApplicable("a stiffness with a low-rank term has no pattern of zeros")
+        upper = sp.triu(model.stiffness, format="coo")
+        upper.sum_duplicates()
+        kept = upper.data != 0.0
+        row, column = upper.row[kept].astype(np.int64), upper.col[kept].astype(np.int64)
+        return cls(row, column, upper.data[kept], model.size)
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    def matrix(self, changes: FloatArray) -> SparseArray:
+        """Return the full matrix after relative changes of the entries, sparse (n, n).
+
+        Arguments:
+            changes: of every entry, relative to its nominal size, (n_entries,).
+        """
+        values = self.values + np.abs(self.values) * changes
+        off = self.row != self.column
+        entries = np.concatenate([values, values[off]])
+        rows = np.concatenate([self.row, self.column[off]])
+        columns = np.concatenate([self.column, self.row[off]])
+        return sp.csc_array((entries, (rows, columns)), shape=(self.size, self.size))
+
+    def products(self, vectors: FloatArray, scale: FloatArray) -> SparseArray:
+        """Return how scale * (K @ vectors) depends on the relative changes.
+
+        Arguments:
+            vectors: (n, m).
+            scale: factor of every row of the product, (n,).
+
+        Returns:
+            Sparse (n m, n_entries); row i m + j belongs to dof i of vector j.
+        """
+        m, off = vectors.shape[1], self.row != self.column
+        entry = np.arange(len(self))
+        target = np.concatenate([self.row, self.column[off]])
+        source = np.concatenate([self.column, self.row[off]])
+        which = np.concatenate([entry, entry[off]])
+        factor = scale[target] * np.abs(self.values[which])
+        data = factor[:, None] * vectors[source]
+        rows = target[:, None] * m + np.arange(m)
+        columns = np.broadcast_to(which[:, None], data.shape)
+        triplet = (data.ravel(), (rows.ravel(), columns.ravel()))
+        return sp.csr_array(triplet, shape=(self.size * m, len(self)))
+
+    def energies(self, vectors: FloatArray) -> FloatArray:
+        """Return how triu(vectors' K vectors) depends on the relative changes.
+
+        Returns:
+            (m (m + 1) / 2, n_entries), rows in the order of ``numpy.triu_indices(m)``.
+        """
+        i, j = np.triu_indices(vectors.shape[1])
+        straight = vectors[self.row][:, i] * vectors[self.column][:, j]
+        mirrored = vectors[self.column][:, i] * vectors[self.row][:, j]
+        both = straight + np.where((self.row != self.column)[:, None], mirrored, 0.0)
+        return np.asarray((np.abs(self.values)[:, None] * both).T)
+
+
+_RANK = 1e-10
+_REFINEMENTS = 60
+_MET = 1e-13
+_WEAK = 1e-6
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Linear equations in unknowns x, in the order in which they are to be met.
+
+    Arguments:
+        exact: rows with exact @ x = exact_right, (k, n_unknowns), k small.
+        exact_right: (k,).
+        fitted: rows to be met in the least-squares sense, sparse (n_fitted, n_unknowns).
+        fitted_right: (n_fitted,).
+        cutoff: singular values of ``fitted`` below it count as zero.
+    """
+
+    exact: FloatArray
+    exact_right: FloatArray
+    fitted: SparseArray
+    fitted_right: FloatArray
+    cutoff: float
+
+
+def null_space(rows: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of what the rows leave free, (n_unknowns, n_free)."""
+    if rows.shape[0] == 0:
+        return np.eye(rows.shape[1])
+    q, r, _ = la.qr(rows.T, pivoting=True)
+    diagonal = np.abs(np.diagonal(r))
+    return np.asarray(q[:, int(np.sum(diagonal > _RANK * diagonal[0])) :])
+
+
+def smallest_change(equations: Equations, free: FloatArray) -> tuple[FloatArray, int]:
+    """Return the shortest x and the rank of the equations, by singular values.
+
+    Arguments:
+        equations: with at most some thousand unknowns.
+        free: orthonormal basis of the space in which x must lie, (n_unknowns, n_free).
+    """
+    left, singular, right = la.svd(equations.exact @ free)
+    rank = int(np.sum(singular > _RANK * singular[0]))
+    solved = (left[:, :rank].T @ equations.exact_right) / singular[:rank]
+    change = free @ (right[:rank].T @ solved)
+    rest = free @ right[rank:].T
+    left, singular, right = la.svd(equations.fitted @ rest, full_matrices=False)
+    found = int(np.sum(singular > equations.cutoff))
+    target = left[:, :found].T @ (equations.fitted_right - equations.fitted @ change)
+    return change + rest @ (right[:found].T @ (target / singular[:found])), rank + found
+
+
+def smallest_change_sparse(equations: Equations) -> FloatArray:
+    """Return x of many unknowns by one sparse factorisation.
+
+    Where singular values are cut off in the dense case, they are damped here:
+    |fitted x - right|^2 + cutoff^2 |x|^2 is least subject to the exact rows, which the method of
+    multipliers meets to rounding.
+
+    Raises:
+        StrategyFailure: when the exact rows cannot be met.
+
+    Source: Tikhonov (1963); Rockafellar (1976), proximal method of multipliers.
+    """
+    exact, weak = sp.csr_array(equations.exact), _WEAK * equations.cutoff**2
+    factor = _factorised(equations, exact, weak)
+    count, rows = exact.shape[1], equations.fitted.shape[0]
+    head = np.concatenate([np.zeros(count), equations.fitted_right])
+    force, previous = np.zeros(exact.shape[0]), np.inf
+    for _ in range(_REFINEMENTS):
+        solution = factor.solve(np.concatenate([head, equations.exact_right - weak * force]))
+        change, force = solution[:count], solution[count + rows :]
+        missing = float(np.abs(exact @ change - equations.exact_right).max())
+        if missing <= _MET or missing > 0.5 * previous:
+            break
+        previous = missing
+    # The iteration of the caller removes what is left; this only guards against nonsense.
+    if not missing <= 1e-3 * max(1.0, float(np.abs(equations.exact_right).max())):
+        raise StrategyFailure(f"the orthogonality equations are met to {missing:.2g} only")
+    return np.asarray(change)
+
+
+def _factorised(equations: Equations, exact: SparseArray, weak: float) -> SuperLU:
+    """Factorise the equations of the damped problem, exact rows given way by ``weak``."""
+    fitted = equations.fitted
+    system = sp.block_array(
+        [
+            [equations.cutoff**2 * sp.eye_array(fitted.shape[1]), fitted.T, exact.T],
+            [fitted, -sp.eye_array(fitted.shape[0]), None],
+            [exact, None, -weak * sp.eye_array(exact.shape[0])],
+        ]
+    )
+    # Quasidefinite: it has an LDL' factorisation in every symmetric order (Vanderbei 1995).
+    return splu(
+        sp.csc_matrix(system),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
+
 
 # A direction in which entries change by 100 % and forces by less than 3 % of the inertia forces
 # is taken for one that the modes do not show.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femubench.core.errors import SelfCheckFailed
-from femubench.core.model import Model
+from femubench.core.fem.model import Model
 from femubench.core.typing import FloatArray
 
 ALLOWED = 1e-8

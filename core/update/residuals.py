@@ -10,14 +10,15 @@ from typing import Literal
 import numpy as np
 
 from femubench.core.errors import NotApplicable
-from femubench.core.fem.parameters import Derivatives, Parameter, derivatives
+from femubench.core.fem.derivatives import Derivatives, derivatives
+from femubench.core.fem.model import Model
+from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.structure import Structure
-from femubench.core.measurement import Measurement
 from femubench.core.modal.correlation import modal_scale_factor
 from femubench.core.modal.eigen import Modes, enough_modes, solve_modes
+from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import pair_modes
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities, shape_sensitivities
-from femubench.core.model import Model
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 Residual = Literal["eigenvalue", "relative-eigenvalue", "frequency"]

@@ -9,10 +9,10 @@ import numpy as np
 
 from femubench.core.errors import Diverged, ModelError, NotApplicable, StrategyFailure
 from femubench.core.fem.structure import Structure
-from femubench.core.measurement import Measurement
-from femubench.core.strategy import ParameterEstimate, UpdateResult
+from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import BoolArray, FloatArray
 from femubench.core.update.residuals import Data, Prediction, common_rows, predict
+from femubench.core.update.strategy import ParameterEstimate, UpdateResult
 from femubench.core.update.unknowns import Scaling, Unknown, UpdateOptions
 
 _SMALLEST_STEP = 1e-9

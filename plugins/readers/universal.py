@@ -79,7 +79,7 @@ def _datasets(path: Path) -> tuple[list[Dataset], set[int]]:
     wanted: list[Dataset] = []
     other: set[int] = set()
     try:
-        file = pyuff.UFF(str(path))
+        file: Any = pyuff.UFF(str(path))
         types = [int(number) for number in file.get_set_types()]
     except Exception as error:  # pyuff raises nothing more special
         raise InputError(f"cannot be read: {error}", file=path) from None
@@ -111,7 +111,7 @@ def _length_factor(path: Path, datasets: Sequence[Dataset]) -> float:
 
 def _global_systems(datasets: Sequence[Dataset]) -> dict[int, bool]:
     """Return from the number of a coordinate system to whether it is the global one."""
-    systems = dict.fromkeys(_GLOBAL, True)
+    systems: dict[int, bool] = dict.fromkeys(_GLOBAL, True)
     for dataset in _of(datasets, 2420):
         triples = zip(
             dataset["CS_sys_labels"], dataset["CS_types"], dataset["CS_matrices"], strict=True

@@ -84,12 +84,14 @@ class Baruch(Strategy):
             NotApplicable: when there are fewer complete sensors than modes.
         """
         current, history = model, []
-        for _ in range(ITERATIONS):
+        while True:
             quasi = quasi_measured_modes(current, measurement)
             step = stiffness_change(current, quasi)
             change = total_change([current.stiffness_change, step])
             current = replace(current, stiffness_change=change)
             history.append({"largest_eigenvalue_change": float(np.abs(np.diag(step.core)).max())})
+            if len(history) == ITERATIONS:
+                break
         found = check_used_modes(current, quasi.shapes, quasi.eigenvalues)
         rank = 0 if change is None else len(change.core)
         return UpdateResult(

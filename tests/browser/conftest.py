@@ -15,7 +15,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 from femubench import Run
 from femubench.core.cli.main import bench
-from femubench.core.harness.serial import read_run
+from femubench.core.schema.records import read_run
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 STRATEGIES = ("unchanged", "baruch", "generic-ls", "local", "nobari", "kabe")

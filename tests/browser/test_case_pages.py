@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Page
 
 from femubench import Run
-from femubench.core.harness.store import Store
+from femubench.core.run.store import Store
 from femubench.reports.htmls import HtmlReporter
 
 VIEW, TOLD = ".case-structure canvas.case-view", ".case-structure .case-told"

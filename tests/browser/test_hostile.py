@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from femubench import Run, run_to_json
-from femubench.core.harness.serial import finite
+from femubench.core.schema.records import finite
 from femubench.reports.csvs import CsvReporter
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.markdown import MarkdownReporter

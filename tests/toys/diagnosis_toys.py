@@ -8,11 +8,11 @@ from typing import Any
 
 import harness_toys
 
-from femubench.core.diagnosis.result import (
+from femubench.core.diagnosis.result import Diagnosis
+from femubench.core.schema.diagnosis import (
     Advice,
     Cause,
     CauseParameter,
-    Diagnosis,
     Gain,
     LocationRow,
     LookWarning,

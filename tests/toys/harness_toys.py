@@ -22,12 +22,13 @@ import scipy.sparse as sp
 from femubench.core.case.case import Case, Modification
 from femubench.core.errors import Diverged, NotApplicable, SelfCheckFailed
 from femubench.core.fem.frame import Frame, GroundSpring, Joint, Material, Member, Place, PointMass
+from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.sections import Section
-from femubench.core.measurement import Measurement, Sensors
+from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.model import LowRank, Model
-from femubench.core.strategy import ParameterEstimate, Strategy, UpdateResult
+from femubench.core.modal.measurement import Measurement
+from femubench.core.update.strategy import ParameterEstimate, Strategy, UpdateResult
 
 SECRET = re.compile("zq[0-9]{12}")
 SECRET_BYTES = re.compile(b"zq[0-9]{12}")

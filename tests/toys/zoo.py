@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from femubench.core.measurement import Measurement
-from femubench.core.model import Model
-from femubench.core.strategy import Strategy, UpdateResult
+from femubench.core.fem.model import Model
+from femubench.core.modal.measurement import Measurement
+from femubench.core.update.strategy import Strategy, UpdateResult
 
 MARK = "femubench-zoo-animal"
 _SLEEPER = [sys.executable, "-c", f"import time; time.sleep(900)  # {MARK}"]

@@ -1,0 +1,323 @@
+"""What to measure next, so that explanations that the data cannot tell apart come apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from femubench.core.advise.point_attachments import (
+    antiresonances,
+    loaded_frequencies,
+    nearest,
+    points_of,
+)
+from femubench.core.advise.prediction import Outlook, Points, Predicted, distance, outlook_of
+from femubench.core.effect.attachments import total_mass
+from femubench.core.fem.model import Model
+from femubench.core.inference.fit import Fit, Problem
+from femubench.core.inference.residuals import Data
+from femubench.core.schema.diagnosis import Advice
+from femubench.core.typing import FloatArray
+
+# Relative standard deviations that a careful test reaches.
+_SCALES, _ANTIRESONANCE, _SHAPE, _DIAL = 0.002, 0.005, 0.015, 0.01
+_THERMOMETER = 1.0  # K
+_KNOWN_MASS = 0.02  # of the structure
+_MORE_MODES = 2
+_BAND = 0.25  # of the lowest used frequency: antiresonances may lie below the first resonance
+_ALIKE = (0.8, 1.25)  # two explanations mean the same antiresonance
+_LEVEL = "measure at twice the excitation level: a stiffness that falls with the amplitude"
+_SOFTENS = ("youngs-modulus", "member-stiffness", "joint-rotation")
+
+
+@dataclass(frozen=True)
+class Option:
+    """A measurement that one could make.
+
+    Arguments:
+        kind: options of one kind are alike.
+        text: an imperative clause.
+        distances: of the first explanation from each of the others.
+    """
+
+    kind: str
+    text: str
+    distances: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Group:
+    """The explanations of a group, the points where one can measure, and how well.
+
+    Arguments:
+        views: the most probable first.
+        points: where masses, hammers and sensors may go.
+        weight: mass of the nominal model in kg.
+        hertz: relative standard deviation of a frequency, element scatter included.
+        tolerance: standard deviation of the relative scatter of every element.
+        elements: number of elements that scatter.
+    """
+
+    views: tuple[Outlook, ...]
+    points: Points
+    weight: float
+    hertz: float
+    tolerance: float
+    elements: int
+
+    @property
+    def data(self) -> Data:
+        """Return the data that the explanations share."""
+        return self.views[0].state.problem.data
+
+    def option(
+        self,
+        kind: str,
+        text: str,
+        predicted: Sequence[Predicted | None],
+        std: FloatArray | float,
+    ) -> Option:
+        """Return an option from the predictions of all explanations."""
+        first = predicted[0]
+        assert first is not None
+        deviation = np.broadcast_to(np.asarray(std, dtype=float), first.values.shape)
+        distances = (
+            0.0 if other is None else distance(first, other, deviation) for other in predicted[1:]
+        )
+        return Option(kind, text, tuple(distances))
+
+
+def _weighing(group: Group) -> Iterator[Option]:
+    if group.data.mass is None and group.views[0].state.mass > 0.0:
+        predicted = [view.mass() for view in group.views]
+        relative = np.hypot(_SCALES, group.tolerance / np.sqrt(group.elements))
+        yield group.option("mass", "weigh the structure", predicted, relative * predicted[0].values)
+
+
+def _more_modes(group: Group) -> Iterator[Option]:
+    first = group.views[0]
+    modes = first.further(_MORE_MODES)
+    if len(modes):
+        wanted = first.frequencies(modes)
+        others = [_matched(wanted.values, view) for view in group.views[1:]]
+        near = " and ".join(_hertz(f) for f in wanted.values)
+        text = f"measure {len(modes)} more mode{'s'[: len(modes) - 1]}, near {near} Hz"
+        yield group.option("modes", text, [wanted, *others], group.hertz * wanted.values)
+
+
+def _matched(wanted: FloatArray, view: Outlook) -> Predicted | None:
+    """Return the modes nearest to some frequencies, of those that were not measured."""
+    frequencies, zero = view.state.frequencies, view.zero
+    free = np.setdiff1d(np.flatnonzero(frequencies > zero), view.state.partner)
+    if len(free) < len(wanted):
+        return None
+    cost = np.square(frequencies[free] / wanted[:, None] - 1.0)
+    return view.frequencies(free[linear_sum_assignment(cost)[1]])
+
+
+def _masses(group: Group) -> Iterator[Option]:
+    if not group.points.labels or group.weight <= 0.0:
+        return
+    size = float(f"{_KNOWN_MASS * group.weight:.1e}")
+    tables = [loaded_frequencies(view, group.points, size) for view in group.views]
+    for label, *predicted in zip(group.points.labels, *tables, strict=True):
+        text = f"attach {_kilograms(size)} kg at {label} and measure again"
+        yield group.option("load", text, predicted, group.hertz * predicted[0].values)
+
+
+def _antiresonances(group: Group) -> Iterator[Option]:
+    """Yield the best of the lowest two antiresonances of every point and direction."""
+    if not group.points.labels:
+        return
+    used = group.data.measurement.frequencies
+    tables = [antiresonances(view) for view in group.views]
+    relative = np.hypot(_ANTIRESONANCE, group.hertz)
+    for sensor, first, *others in zip(group.points.sensors, *tables, strict=True):
+        band = (first.values >= _BAND * used.min()) & (first.values <= used.max())
+        found = []
+        for i in np.flatnonzero(band)[:2]:
+            own = first.take([int(i)])
+            rivals = [nearest(float(own.values[0]), other, _ALIKE) for other in others]
+            where = f"near {_hertz(own.values[0])} Hz of the point receptance"
+            text = f"measure the antiresonance {where} at {sensor}"
+            found.append(group.option("zero", text, [own, *rivals], relative * own.values))
+        if found:
+            yield max(found, key=lambda option: min(option.distances))
+
+
+def _shapes(group: Group) -> Iterator[Option]:
+    if len(group.data.shape_rows[0]) or not group.points.labels:
+        return
+    pairs = [view.shapes() for view in group.views]
+    shapes = pairs[0][0]
+    if len(shapes) < 2:
+        return
+    std = np.hypot(_SHAPE, group.tolerance) * np.abs(shapes).max(axis=0)
+    own, *others = [aligned(shapes, *pair) for pair in pairs]
+    yield group.option(
+        "shapes",
+        "measure the shapes of the used modes at joints and in the middle of members",
+        [own, *others],
+        np.broadcast_to(std, shapes.shape).ravel(),
+    )
+
+
+def aligned(reference: FloatArray, shapes: FloatArray, spread: FloatArray) -> Predicted:
+    """Return shapes at their best scale to others, all that goes along with these left out.
+
+    Arguments:
+        reference, shapes: (s, m).
+        spread: of the shapes, (s, m, p).
+    """
+    size = np.square(shapes).sum(axis=0)
+    factor = (reference * shapes).sum(axis=0) / np.where(size > 0.0, size, 1.0)
+    unit = reference / np.maximum(np.linalg.norm(reference, axis=0), 1e-300)
+    values, spread = factor * shapes, factor[:, None] * spread
+    values = values - unit * (unit * values).sum(axis=0)
+    spread = spread - unit[..., None] * np.einsum("sm,smp->mp", unit, spread)
+    return Predicted(values.ravel(), spread.reshape(values.size, spread.shape[2]))
+
+
+def _thermometer(group: Group) -> Iterator[Option]:
+    found = [view.parameter("K") for view in group.views]
+    if any(found):
+        nothing = [Predicted(np.zeros(1), np.zeros((1, len(view.state.x)))) for view in group.views]
+        predicted = [own or none for own, none in zip(found, nothing, strict=True)]
+        yield group.option("temperature", "read the temperature", predicted, _THERMOMETER)
+
+
+def _deflection(group: Group) -> Iterator[Option]:
+    """Yield the deflection of the softest point of a structure that is held."""
+    points = group.points
+    if not points.labels or any(view.state.eigenvalues[0] <= 0.0 for view in group.views):
+        return
+    if group.views[0].state.problem.space.rigid:
+        return
+    predicted = [view.flexibility() for view in group.views]
+    best = int(predicted[0].values.argmax())
+    text = f"measure the static deflection under a known load at {points.sensors[best]}"
+    softest = [p.take([best]) for p in predicted]
+    yield group.option("deflection", text, softest, _DIAL * softest[0].values)
+
+
+def second_level(group: Group) -> Option | None:
+    """Return what twice the level of excitation would show, were a softer part one that softens.
+
+    The loss of stiffness is taken to grow in proportion to the level: what a cause did to the
+    frequencies at the present level it would do to them once more.
+    """
+    std = np.sqrt(2.0) * group.hertz
+    found = []
+    for view in group.views:
+        now = np.sort(view.state.frequencies[view.state.partner])
+        spread = view.frequencies(np.sort(view.state.partner)).spread / now[:, None]
+        for hypothesis, columns in view.causes:
+            if hypothesis.name not in _SOFTENS:
+                continue
+            stiff = view.without(columns)
+            fall = 1.0 - np.sort(stiff.frequencies[stiff.partner]) / now
+            if fall.sum() >= 0.0:
+                continue
+            none = Predicted(np.zeros_like(now), np.zeros((len(now), 0)))
+            size = distance(Predicted(fall, spread), none, np.full(len(now), std))
+            text = f"{_LEVEL} looks like {hypothesis.name}"
+            found.append(Option("level", text, (size,)))
+    return max(found, key=lambda option: option.distances[0], default=None)
+
+
+def _hertz(frequency: float) -> str:
+    return f"{frequency:.0f}" if frequency >= 99.5 else f"{frequency:.3g}"
+
+
+def _kilograms(mass: float) -> str:
+    return f"{mass:.{max(0, 1 - int(np.floor(np.log10(mass))))}f}"
+
+
+_KINDS: tuple[Callable[[Group], Iterator[Option]], ...] = (
+    _weighing, _more_modes, _masses, _antiresonances, _shapes, _thermometer, _deflection,
+)  # fmt: skip
+
+
+def options_for(group: Group) -> list[Option]:
+    """Return every measurement that one could make next."""
+    return [option for kind in _KINDS for option in kind(group)]
+
+
+_WORTH, _CLEAR = 1.0, 9.0
+_MOST, _OF_A_KIND = 8, 3
+
+
+def advise(
+    model: Model, problems: Sequence[Problem], fits: Sequence[Fit], *, tolerance: float
+) -> tuple[Advice, ...]:
+    """Return the measurements that tell the first explanation best from all others.
+
+    A separation is the squared distance of the two predictions in standard deviations, of the
+    first explanation from the one that the measurement tells least from it. Where it tells the
+    first from some only, the text says from which, and it comes after all that tell the first
+    from every other by three standard deviations. A second level of excitation comes last: it
+    tells a softer structure from one that softens, which is no matter between the explanations.
+
+    Arguments:
+        model: the nominal model.
+        problems: of each fit; the model may have textbook effects in it.
+        fits: explanations that the data cannot tell apart, the most probable first.
+        tolerance: standard deviation of the relative scatter of every element.
+
+    Returns:
+        up to eight, best first; at least one where anything can be measured.
+
+    Source: Box & Hill (1967), Technometrics 9, 57-71.
+    """
+    if len(fits) < 2:
+        return ()
+    points = points_of(model)
+    pairs = zip(problems, fits, strict=True)
+    views = tuple(outlook_of(problem, found, points) for problem, found in pairs)
+    m = problems[0].data.measurement
+    scatter = np.linalg.norm(problems[0].noise.factor[: len(m)], axis=1)
+    hertz = float(np.median(scatter * m.frequency_std / m.frequencies))
+    structure = model.structure
+    elements = len(structure.properties) if structure is not None else model.size
+    group = Group(views, points, total_mass(model), hertz, tolerance, elements)
+    return _ranked(options_for(group), [_label(view) for view in views], second_level(group))
+
+
+def _ranked(
+    options: Sequence[Option], labels: Sequence[str], level: Option | None
+) -> tuple[Advice, ...]:
+    """Return the best options; those that clearly tell the first explanation from all lead."""
+    rows = [(option, *_told(option, labels)) for option in options]
+    # Clearly all comes before very clearly some.
+    rows.sort(key=lambda row: (min(row[0].distances) < _CLEAR, -row[2]))
+    seen: dict[str, int] = {}
+    chosen: list[Advice] = []
+    for option, text, size in rows:
+        seen[option.kind] = seen.get(option.kind, 0) + 1
+        if (size >= _WORTH and seen[option.kind] <= _OF_A_KIND) or not chosen:
+            chosen.append(Advice(text, size))
+    last: list[Advice] = []
+    if level is not None and min(level.distances) >= _WORTH:
+        last.append(Advice(level.text, min(level.distances)))
+    return (*chosen[: _MOST - len(last)], *last)
+
+
+def _told(option: Option, labels: Sequence[str]) -> tuple[str, float]:
+    """Return the text of an option and its separation from those that it tells from the first."""
+    pairs = list(zip(labels[1:], option.distances, strict=True))
+    told = [(label, d) for label, d in pairs if d >= _WORTH]
+    if not told or len(told) == len(pairs):
+        return option.text, min(option.distances)
+    # Explanations that differ in textbook effects alone have one name.
+    names = " and ".join(dict.fromkeys(label for label, _ in told if label != labels[0]))
+    if not names:
+        return option.text, min(d for _, d in told)
+    return f"{option.text} (tells {labels[0]} from {names} only)", min(d for _, d in told)
+
+
+def _label(view: Outlook) -> str:
+    names = [f"{h.name} at {h.place}" if h.place != "all" else h.name for h, _ in view.causes]
+    return " + ".join(names) or "nothing more"

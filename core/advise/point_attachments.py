@@ -1,0 +1,130 @@
+"""A structure with a mass at one of many points, or held there: natural frequencies of all at once.
+
+A change at a point moves the modes within the lowest ones and the static response of the higher
+ones to a force there, so that every point costs an eigensolution of a few dozen unknowns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from femubench.core.advise.prediction import Outlook, Points, Predicted
+from femubench.core.effect.attachments import free_translations, point_in
+from femubench.core.effect.places import point_places
+from femubench.core.fem.model import Model
+from femubench.core.inference.fit import signed_hz
+from femubench.core.typing import FloatArray
+
+_MOST = 48
+_SPARE = 8
+# A resonance closer than this hides an antiresonance.
+_HIDDEN = 0.01
+
+
+def points_of(model: Model) -> Points:
+    """Return joints and the middles of members, at most 48 spread over the model."""
+    chosen = _chosen(model)
+    chosen = chosen[:: -(-len(chosen) // _MOST)] if chosen else chosen
+    pairs = [(label, free_translations(model, point_in(model, label))) for label in chosen]
+    moving = [(label, free) for label, free in pairs if free]
+    return Points(tuple(label for label, _ in moving), tuple(free for _, free in moving))
+
+
+def _chosen(model: Model) -> list[str]:
+    """Return joints, and of every member the point nearest to its middle."""
+    places = point_places(model)
+    if model.structure is None:
+        return list(places)
+    joints = model.structure.frame.joint_index
+    middle: dict[str, tuple[float, str]] = {}
+    for place in places:
+        if place not in joints:
+            member, _, station = place.rpartition("@")
+            middle[member] = min((abs(float(station) - 0.5), place), middle.get(member, (1.0, "")))
+    return [*(p for p in places if p in joints), *(place for _, place in middle.values())]
+
+
+def _ritz(values: FloatArray, rows: FloatArray, low: int) -> FloatArray:
+    """Return orthonormal vectors that carry the change at every point, (n_points, N, r).
+
+    Arguments:
+        values: all eigenvalues, (N,).
+        rows: displacements of the points from modes, (n_points, p, N).
+        low: number of lowest modes to keep.
+    """
+    count, _, size = rows.shape
+    more = min(rows.shape[1], size - low)
+    basis = np.zeros((count, size, low + more))
+    basis[:, range(low), range(low)] = 1.0
+    if more:
+        response = np.swapaxes(rows[:, :, low:] / values[low:], 1, 2)
+        basis[:, low:, low:] = np.linalg.qr(response)[0]
+    return basis
+
+
+def _low(outlook: Outlook) -> int:
+    state = outlook.state
+    return min(len(state.eigenvalues), int(state.partner.max()) + 1 + _SPARE)
+
+
+def loaded_frequencies(outlook: Outlook, points: Points, mass: float) -> list[Predicted]:
+    """Return the frequencies of the measured modes with a mass at each of the points, in Hz.
+
+    Arguments:
+        mass: in kg; it acts in all directions of the plane.
+    """
+    values, tracked = outlook.state.eigenvalues, np.sort(outlook.state.partner)
+    counts = points.counts
+    seen = np.zeros((len(counts), max(counts), len(values)))
+    seen[np.arange(max(counts)) < np.array(counts)[:, None]] = outlook.seen
+    basis = _ritz(values, seen, _low(outlook))
+    across = np.swapaxes(basis, 1, 2)
+    inner = across @ (values[:, None] * basis)
+    near = seen @ basis
+    heavy = np.eye(basis.shape[2]) + mass * (np.swapaxes(near, 1, 2) @ near)
+    back = np.swapaxes(np.linalg.inv(np.linalg.cholesky(heavy)), 1, 2)
+    eigenvalues, vectors = np.linalg.eigh(np.swapaxes(back, 1, 2) @ inner @ back)
+    vectors = basis @ (back @ vectors[:, :, tracked])
+    frequencies, spread = outlook.hertz(eigenvalues[:, tracked], vectors)
+    return [Predicted(f, s) for f, s in zip(frequencies, spread, strict=True)]
+
+
+def antiresonances(outlook: Outlook) -> list[Predicted]:
+    """Return the antiresonances of the point receptance at every point and direction, in Hz.
+
+    They are the natural frequencies of the structure held there (Wahl, Schmidt & Forrai 1999);
+    those that a resonance hides are left out. In the order of `Points.sensors`.
+    """
+    values = outlook.state.eigenvalues
+    seen, low = outlook.seen[:, None, :], _low(outlook)
+    basis = _ritz(values, seen, low)
+    row = (seen @ basis)[:, 0]
+    # Householder: all but the first column of the mirror are orthogonal to the row.
+    mirror = row / np.linalg.norm(row, axis=1, keepdims=True)
+    mirror[:, 0] += np.where(mirror[:, 0] < 0.0, -1.0, 1.0)
+    share = 2.0 * mirror / np.square(mirror).sum(axis=1, keepdims=True)
+    still = np.eye(basis.shape[2])[:, 1:] - share[:, :, None] * mirror[:, None, 1:]
+    basis = basis @ still
+    inner = np.swapaxes(basis, 1, 2) @ (values[:, None] * basis)
+    eigenvalues, vectors = np.linalg.eigh(inner)
+    kept = min(low - 1, eigenvalues.shape[1])
+    frequencies, spread = outlook.hertz(eigenvalues[:, :kept], basis @ vectors[:, :, :kept])
+    poles, zero = signed_hz(values), outlook.zero
+    gap = np.abs(frequencies[..., None] - poles).min(axis=-1)
+    shown = (frequencies > zero) & (gap > _HIDDEN * frequencies)
+    return [Predicted(f[i], s[i]) for f, s, i in zip(frequencies, spread, shown, strict=True)]
+
+
+def nearest(first: float, second: Predicted, within: Sequence[float]) -> Predicted | None:
+    """Return the value of `second` nearest to that of `first`, None where none is in reach.
+
+    Arguments:
+        within: lowest and highest ratio of the two.
+    """
+    if not len(second.values):
+        return None
+    i = int(np.abs(second.values - first).argmin())
+    low, high = within
+    return second.take([i]) if low * first <= second.values[i] <= high * first else None

@@ -1,0 +1,232 @@
+"""What a fitted explanation predicts for data that were not taken yet, and how surely."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from femubench.core.effect.attachments import point_in, translation_rows
+from femubench.core.fem.model import Model
+from femubench.core.inference.fit import Fit, Problem, State, signed_hz, state_at
+from femubench.core.inference.hypothesis import Hypothesis
+from femubench.core.inference.modal_basis import nominal_space
+from femubench.core.inference.static_response import LargeProblem
+from femubench.core.modal.eigen import solve_modes
+from femubench.core.typing import FloatArray, IntArray, SparseArray
+
+_CLOSE = 1e-3  # of an eigenvalue: closer modes turn into each other at the least change
+_STEP = 1e-4
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """Values that an explanation predicts.
+
+    Arguments:
+        values: (k,).
+        spread: their change with each independent standard deviation of the fit, (k, p).
+    """
+
+    values: FloatArray
+    spread: FloatArray
+
+    def take(self, index: IntArray | list[int]) -> Predicted:
+        """Return some of the values."""
+        return Predicted(self.values[index], self.spread[index])
+
+
+def distance(first: Predicted, second: Predicted, std: FloatArray) -> float:
+    """Return the squared distance of two predictions in standard deviations of what is measured.
+
+    Arguments:
+        first, second: of k values.
+        std: standard deviations of the measurement, (k,).
+
+    Source: Box & Hill (1967), Technometrics 9, 57-71: the term of the two means.
+    """
+    gap = first.values - second.values
+    spread = np.hstack([first.spread, second.spread])
+    covariance = np.diag(np.square(std)) + spread @ spread.T
+    return float(gap @ la.solve(covariance, gap, assume_a="pos"))
+
+
+@dataclass(frozen=True)
+class Points:
+    """Points of a structure and the directions in which they can move.
+
+    Arguments:
+        labels: words of `point_places`.
+        directions: of each.
+    """
+
+    labels: tuple[str, ...]
+    directions: tuple[tuple[str, ...], ...]
+
+    @property
+    def sensors(self) -> list[str]:
+        """Return the words for every point and direction."""
+        pairs = zip(self.labels, self.directions, strict=True)
+        return [f"{label}, {name}" for label, names in pairs for name in names]
+
+    @property
+    def counts(self) -> list[int]:
+        """Return the number of directions of every point."""
+        return [len(names) for names in self.directions]
+
+    def rows(self, model: Model) -> SparseArray:
+        """Return the translations from the dofs of a model, sparse (n_sensors, n)."""
+        pairs = zip(self.labels, self.directions, strict=True)
+        rows = [translation_rows(model, point_in(model, label), d) for label, d in pairs]
+        return sp.csr_array(sp.vstack(rows)) if rows else sp.csr_array((0, model.size))
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """One explanation at its best fit.
+
+    Arguments:
+        state: in modal coordinates of the model that it extends.
+        root: lower Cholesky factor of the covariance of its coordinates, (p, p).
+        readings: translations of points from the modal coordinates, (s, N).
+    """
+
+    state: State
+    root: FloatArray
+    readings: FloatArray
+
+    @property
+    def causes(self) -> tuple[tuple[Hypothesis, slice], ...]:
+        """Return the causes with their places among the coordinates."""
+        result, start = [], 0
+        for part in self.state.parts:
+            count = len(part.hypothesis.parameters)
+            result.append((part.hypothesis, slice(start, start + count)))
+            start += count
+        return tuple(result)
+
+    @property
+    def zero(self) -> float:
+        """Return the frequency in Hz up to which a mode counts as one of zero frequency."""
+        return self.state.problem.space.zero
+
+    @cached_property
+    def seen(self) -> FloatArray:
+        """Return the translations of the points from the modes, (s, N)."""
+        return np.asarray(self.readings @ self.state.vectors[: self.readings.shape[1]])
+
+    @cached_property
+    def _slopes(self) -> list[tuple[FloatArray, FloatArray, float]]:
+        return self.state.problem.space.slopes(self.state.parts, self.state.x)
+
+    @cached_property
+    def stiffness_spread(self) -> FloatArray:
+        """Return the change of stiffness with each deviation between all modes, (p, N, N)."""
+        return self._turned([stiffness for stiffness, *_ in self._slopes])
+
+    @cached_property
+    def mass_spread(self) -> FloatArray:
+        """Return the change of mass with each deviation between all modes, (p, N, N)."""
+        return self._turned([mass for _, mass, _ in self._slopes])
+
+    def _turned(self, matrices: Sequence[FloatArray]) -> FloatArray:
+        vectors = self.state.vectors
+        if not matrices:
+            return np.zeros((0, *vectors.shape))
+        modal = vectors.T @ np.array(matrices) @ vectors
+        return np.asarray(np.tensordot(self.root.T, modal, axes=1))
+
+    def hertz(self, values: FloatArray, vectors: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return frequencies in Hz and their spread.
+
+        Arguments:
+            values: eigenvalues of the structure or of one derived from it, (..., q).
+            vectors: in its modes, of unit modal mass there, (..., N, q).
+
+        Returns:
+            frequencies (..., q) and spread (..., q, p).
+        """
+        spread = np.zeros((*values.shape, len(self.stiffness_spread)))
+        for i, (stiff, heavy) in enumerate(
+            zip(self.stiffness_spread, self.mass_spread, strict=True)
+        ):
+            force = stiff @ vectors - (heavy @ vectors) * values[..., None, :]
+            spread[..., i] = (vectors * force).sum(axis=-2)
+        frequencies = signed_hz(values)
+        scale = 8.0 * np.pi**2 * np.maximum(np.abs(frequencies), 1e-9)
+        return frequencies, spread / scale[..., None]
+
+    def mass(self) -> Predicted:
+        """Return the mass of the structure in kg."""
+        slope = np.array([[weight for *_, weight in self._slopes]])
+        return Predicted(np.array([self.state.mass]), slope @ self.root)
+
+    def frequencies(self, modes: IntArray) -> Predicted:
+        """Return natural frequencies in Hz."""
+        vectors = np.eye(len(self.state.eigenvalues))[:, modes]
+        return Predicted(*self.hertz(self.state.eigenvalues[modes], vectors))
+
+    def further(self, count: int) -> IntArray:
+        """Return the elastic modes next above those that were measured, (count,) or fewer."""
+        start = int(self.state.partner.max()) + 1
+        return np.arange(start, min(start + count, len(self.state.eigenvalues)))
+
+    def shapes(self) -> tuple[FloatArray, FloatArray]:
+        """Return the measured modes at the points and their spread, (s, m) and (s, m, p)."""
+        values, partner = self.state.eigenvalues, self.state.partner
+        gap = values[partner] - values[:, None]
+        least = _CLOSE * np.abs(values[partner])
+        gap = np.where(np.abs(gap) < least, np.copysign(least, gap), gap)
+        gap[partner, np.arange(len(partner))] = np.inf
+        force = self.stiffness_spread[:, :, partner]
+        force = force - self.mass_spread[:, :, partner] * values[partner]
+        return self.seen[:, partner], np.moveaxis(self.seen @ (force / gap), 0, 2)
+
+    def flexibility(self) -> Predicted:
+        """Return the deflections at the points under unit loads there, in m/N, (s,)."""
+        bent = self.seen / self.state.eigenvalues
+        softer = -np.einsum("sn,pnm,sm->sp", bent, self.stiffness_spread, bent)
+        return Predicted((bent * self.seen).sum(axis=1), softer)
+
+    def parameter(self, unit: str) -> Predicted | None:
+        """Return the sum of all parameters in a unit, None where there is none."""
+        value, slope, found = 0.0, np.zeros(len(self.state.x)), False
+        for hypothesis, columns in self.causes:
+            for i, parameter in enumerate(hypothesis.parameters, start=columns.start):
+                if parameter.unit == unit:
+                    ends = self.state.x[i] + _STEP * np.array([-1.0, 1.0])
+                    low, high = parameter.value(ends)
+                    value, found = value + float(parameter.value(self.state.x[i])), True
+                    slope[i] = (high - low) / (2.0 * _STEP)
+        return Predicted(np.array([value]), slope[None] @ self.root) if found else None
+
+    def without(self, columns: slice) -> State:
+        """Return the explanation with some coordinates of the causes at zero."""
+        x = self.state.x.copy()
+        x[columns] = 0.0
+        return state_at(self.state.problem, self.state.parts, x)
+
+
+def outlook_of(problem: Problem, found: Fit, points: Points) -> Outlook:
+    """Return the outlook of a fit.
+
+    Arguments:
+        problem: the model that the fit extends, and the data.
+        found: an explanation.
+        points: of this or any like model.
+    """
+    # In coordinates of our own: those of the problem are not kept as motions of the dofs.
+    hypotheses = [part.hypothesis for part in found.parts]
+    if isinstance(problem, LargeProblem):
+        space, shapes = problem.common.enriched(problem.space, found.parts)
+    else:
+        modes = solve_modes(problem.model)
+        shapes = modes.shapes[:, np.argsort(~modes.rigid, kind="stable")]
+        space = nominal_space(problem.model, modes, problem.data.measurement.sensors, hypotheses)
+    state = state_at(replace(problem, space=space), space.projections, found.state.x)
+    root = la.cholesky(found.covariance, lower=True) if hypotheses else np.zeros((0, 0))
+    return Outlook(state, np.asarray(root), points.rows(problem.model) @ shapes)

@@ -1,0 +1,426 @@
+"""Say in keys of `case.toml` what a frame is: the way back from `frames`."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import MISSING, dataclass, field, fields, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from femubench.core.case.faults import Fault
+from femubench.core.case.files import read_text
+from femubench.core.case.frames import section_of
+from femubench.core.case.schema import FrameSpec, MaterialSpec, MemberSpec, SectionSpec, parse_spec
+from femubench.core.errors import InputError
+from femubench.core.fem.frame import Factor, Frame, Member, Place, Plane, RigidEnd
+from femubench.core.fem.nominal import MAY_VANISH
+from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.sections import (
+    SHAPES,
+    Section,
+    ShearCoefficients,
+    constant_kappa,
+    rectangular_tube,
+    round_tube,
+)
+from femubench.core.fem.structure import Structure
+
+Keys: TypeAlias = dict[str, Any]
+_LONGEST = 80
+
+
+@dataclass(frozen=True)
+class Known:
+    """What the file of a case says beyond its frame: names, sizes of shapes, the share of noise."""
+
+    sections: Mapping[str, SectionSpec] = field(default_factory=dict)
+    materials: Mapping[str, MaterialSpec] = field(default_factory=dict)
+    members: Mapping[str, MemberSpec] = field(default_factory=dict)
+    shape_std: float | None = None
+
+    def name_of(self, kind: str, member: str) -> str | None:
+        """Return the name of a member's ``section`` or ``material``."""
+        spec = self.members.get(member)
+        return None if spec is None else str(getattr(spec, kind))
+
+
+def known_from(file: Path) -> Known:
+    """Return what a `case.toml` says; nothing where it is not there or not a case."""
+    try:
+        spec = parse_spec(tomllib.loads(read_text(file)))
+    except (InputError, ValueError, RecursionError):  # not TOML, or not the keys of a case
+        return Known()
+    share = spec.measurement.shape_std
+    if not isinstance(spec.model, FrameSpec):
+        return Known(shape_std=share)
+    members = {member.name: member for member in spec.model.members}
+    return Known(spec.model.sections, spec.model.materials, members, share)
+
+
+def named_tables(
+    contents: Sequence[tuple[str, Keys]],
+    own: Mapping[str, str],
+    tables: Mapping[str, Keys],
+    plain: str,
+) -> tuple[list[str], dict[str, Keys]]:
+    """Return the name that every member uses, and the tables of these names.
+
+    A content keeps the name it had. A new one takes the name of what it replaces, unless others
+    still bear it: then the member's name follows, as in ``aluminium-front-left``.
+
+    Arguments:
+        contents: the member's name and the content of its table, for every member.
+        own: the name that a member used before.
+        tables: what the names meant before.
+        plain: a name for what never had one.
+    """
+    found = [_known_name(content, own.get(member), tables) for member, content in contents]
+    bases = [own.get(member, plain) for member, _ in contents]
+    pairs = {(base, _frozen(c)) for base, (_, c) in zip(bases, contents, strict=True)}
+    taken = {name for name in found if name is not None}
+    new: dict[tuple[object, ...], str] = {}
+    names, result = [], {}
+    for name, base, (member, content) in zip(found, bases, contents, strict=True):
+        key = _frozen(content)
+        chosen = name or new.get(key)
+        if chosen is None:
+            alone = sum(base == other for other, _ in pairs) == 1
+            chosen = new[key] = _free_name(base if alone else f"{base}-{member}", taken)
+        names.append(chosen)
+        result[chosen] = content
+        taken.add(chosen)
+    return names, result
+
+
+def _known_name(content: Keys, own: str | None, tables: Mapping[str, Keys]) -> str | None:
+    if own is not None and tables.get(own) == content:
+        return own
+    return next((name for name, table in tables.items() if table == content), None)
+
+
+def _frozen(content: Keys) -> tuple[object, ...]:
+    return tuple(content.items())
+
+
+def _free_name(name: str, taken: set[str]) -> str:
+    chosen, count = name[:_LONGEST].rstrip(), 1
+    while chosen in taken:
+        count += 1
+        chosen = f"{name[: _LONGEST - 8].rstrip()}-{count}"
+    return chosen
+
+
+_Factors = dict[tuple[str, str], float]
+
+
+def described_frame(structure: Structure) -> Frame:
+    """Return the frame with all parameter changes turned into factors, joint springs, rigid ends.
+
+    Raises:
+        Fault: for a value that no key of a frame can have.
+    """
+    frame = structure.frame
+    factors: _Factors = {}
+    for parameter, value in structure.changes:
+        if not np.isfinite(value):
+            raise _refused(parameter, value)
+        if parameter.quantity == "spring":
+            frame = _with_springs(frame, parameter, value)
+        elif parameter.quantity == "rigid":
+            frame = _with_rigid_ends(frame, parameter, value)
+        else:
+            possible = value > 0.0 or (value == 0.0 and parameter.quantity in MAY_VANISH)
+            if not possible or "" in parameter.places:
+                raise _refused(parameter, value)
+            for place in dict.fromkeys(parameter.places):
+                key = parameter.quantity, place
+                factors[key] = factors.get(key, 1.0) * value
+    return replace(frame, factors=(*frame.factors, *_written(structure, factors)))
+
+
+def _refused(parameter: Parameter, value: float) -> Fault:
+    what = f"{parameter.name} = {value:g} cannot be written as a key of a frame"
+    expected = "values > 0 of factors, >= 0 of springs, on members of the frame"
+    return Fault(("model",), what, expected)
+
+
+def _with_springs(frame: Frame, parameter: Parameter, value: float) -> Frame:
+    if value < 0.0:
+        raise _refused(parameter, value)
+    springs = list(frame.joint_springs)
+    for place in parameter.places:
+        end, _, direction = place.rpartition(":")
+        for i, spring in enumerate(springs):
+            if f"{spring.member}@{spring.joint}" == end:
+                stiffness = {**spring.stiffness, direction: value}
+                springs[i] = replace(spring, stiffness=stiffness)
+    return replace(frame, joint_springs=tuple(springs))
+
+
+def _with_rigid_ends(frame: Frame, parameter: Parameter, value: float) -> Frame:
+    ends = {f"{end.member}@{end.joint}": end for end in frame.rigid_ends}
+    for place in parameter.places:
+        member, _, joint = place.rpartition("@")
+        old = ends.get(place, RigidEnd(joint, member, 0.0))
+        ends[place] = replace(old, stiffness_length=value)
+    return replace(frame, rigid_ends=tuple(ends.values()))
+
+
+def _written(structure: Structure, factors: _Factors) -> tuple[Factor, ...]:
+    groups: dict[tuple[str, float], list[str]] = {}
+    for (quantity, place), factor in factors.items():
+        if factor != 1.0:
+            groups.setdefault((quantity, factor), []).append(place)
+    return tuple(
+        Factor(quantity, _shortened(structure, places), factor)
+        for (quantity, factor), places in groups.items()
+    )
+
+
+def _shortened(structure: Structure, places: Sequence[str]) -> tuple[str, ...]:
+    """Return ``all`` for every element of the frame, a member's name for all elements of it."""
+    rest = dict.fromkeys(places)
+    short: list[str] = []
+    for member, labels in structure.member_labels.items():
+        if all(label in rest for label in labels):
+            short.append(member)
+        else:
+            short += [label for label in labels if label in rest]
+    return ("all",) if short == list(structure.member_labels) else tuple(short)
+
+
+_CONSTANTS = ("A", "Iy", "Iz", "J", "Jp")
+_SIZES = ("width", "height", "diameter", "wall")
+_SAME_KAPPA = 1e-13
+_ANY_NU = 0.3  # a section of case.toml has the kappa of its shape or one number for every nu
+
+
+def frame_keys(frame: Frame, known: Known) -> Keys:
+    """Return the table `[model]` of a frame as plain data, every key that is not its default.
+
+    Arguments:
+        frame: any frame; its fields bear the names of the keys.
+        known: names and sizes from the file of the case that it comes from.
+
+    Raises:
+        Fault: when a section cannot be said in keys, with a path from the top of the file.
+    """
+    # A beam without length is no arm, and the reader takes none.
+    springs = (replace(s, arm_factor=s.arm_factor if s.arm else None) for s in frame.joint_springs)
+    plain = keys_of(replace(frame, joint_springs=tuple(springs)), without=("members",))
+    sections, section_tables = _sections(frame, known)
+    materials, material_tables = _materials(frame, known)
+    members = [
+        {
+            **keys_of(member, without=("section", "material")),
+            "elements": int(member.elements),
+            "section": section,
+            "material": material,
+        }
+        for member, section, material in zip(frame.members, sections, materials, strict=True)
+    ]
+    head = {key: value for key, value in plain.items() if not isinstance(value, list)}
+    lists = {key: value for key, value in plain.items() if isinstance(value, list)}
+    tables = {"materials": material_tables, "sections": section_tables}
+    whole = {"joints": lists.pop("joints"), "members": members, **lists}
+    return {"kind": "frame", **head, **tables, **whole}
+
+
+def keys_of(item: Any, without: Collection[str] = ()) -> Keys:  # noqa: ANN401 - see below
+    """Return the fields that differ from their defaults, as what TOML can hold.
+
+    Arguments:
+        item: any of the dataclasses of `fem.frame`.
+        without: fields to leave out.
+    """
+    keys = {}
+    for f in fields(item):
+        if f.name not in without:
+            value = _plain(getattr(item, f.name))
+            if f.default is MISSING or value != _plain(f.default):
+                keys[f.name] = value
+    return keys
+
+
+def _plain(value: object) -> Any:  # noqa: ANN401 - what TOML can hold
+    if value is None or isinstance(value, str):
+        return value
+    if isinstance(value, Place):
+        return (
+            value.joint
+            if value.joint is not None
+            else {"member": value.member, "s": _plain(value.s)}
+        )
+    if isinstance(value, Mapping):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, (tuple, list, np.ndarray)):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    return float(value) if isinstance(value, (int, float, np.number)) else keys_of(value)
+
+
+def _materials(frame: Frame, known: Known) -> tuple[list[str], dict[str, Keys]]:
+    contents = [(member.name, keys_of(member.material)) for member in frame.members]
+    contents = [(name, {k: float(v) for k, v in keys.items()}) for name, keys in contents]
+    tables = {name: {k: float(v) for k, v in spec} for name, spec in known.materials.items()}
+    return named_tables(contents, _own(frame, known, "material"), tables, "material")
+
+
+def _sections(frame: Frame, known: Known) -> tuple[list[str], dict[str, Keys]]:
+    own = _own(frame, known, "section")
+    contents, seen = [], dict[tuple[int, float, str], Keys]()
+    for member in frame.members:
+        name = own.get(member.name, "")
+        key = id(member.section), member.material.nu, name
+        if key not in seen:
+            seen[key] = _section_keys(member, frame.plane, known.sections.get(name))
+        contents.append((member.name, seen[key]))
+    tables = {}
+    for name, spec in known.sections.items():
+        try:
+            section = section_of(spec, frame.plane, "euler-bernoulli")
+        except Fault:
+            continue
+        tables[name] = section_keys(section, _ANY_NU, frame.plane, spec)
+    return named_tables(contents, own, tables, "section")
+
+
+def _own(frame: Frame, known: Known, kind: str) -> dict[str, str]:
+    """Return the name that every member's section or material had."""
+    names = ((member.name, known.name_of(kind, member.name)) for member in frame.members)
+    return {member: name for member, name in names if name is not None}
+
+
+def _section_keys(member: Member, plane: Plane, hint: SectionSpec | None) -> Keys:
+    try:
+        return section_keys(member.section, member.material.nu, plane, hint)
+    except Fault as fault:
+        what = f"member {member.name!r}: {fault.what}"
+        raise Fault(("model", "sections"), what, fault.expected) from None
+
+
+def section_keys(section: Section, nu: float, plane: Plane, hint: SectionSpec | None) -> Keys:
+    """Return the table of a section: its shape with what differs from it, or numbers.
+
+    Arguments:
+        section: any section.
+        nu: Poisson's ratio of the material, for a shear coefficient that no key can say.
+        plane: of the frame.
+        hint: a table with the shape and the sizes that the section may have had.
+
+    Raises:
+        Fault: when the shear coefficients of a frame in 3d differ in a way that no shape has.
+    """
+    best, least = None, np.inf
+    for shape, sizes in (*_hinted(hint), *_recovered(section)):
+        made = SHAPES[shape][0](**sizes)
+        if (made.shape, made.width, made.height) != (section.shape, section.width, section.height):
+            continue
+        differ = {key: _number(section, key) for key in _CONSTANTS}
+        differ = {key: value for key, value in differ.items() if value != _number(made, key)}
+        gap = _kappa_gap(made.kappa, section.kappa)
+        if section.kappa is not None and gap > _SAME_KAPPA:
+            differ["kappa"] = _kappa(section.kappa, nu, plane)
+        # What is the same but for rounding is as good as anything but the very same.
+        score = len(differ) + (0.5 if 0.0 < gap <= _SAME_KAPPA else 0.0)
+        if score < least:
+            best, least = {"shape": shape, **sizes, **differ}, score
+        if score == 0.0:
+            break
+    if best is not None:
+        return best
+    numbers: Keys = {key: _number(section, key) for key in _CONSTANTS}
+    if section.kappa is not None:
+        numbers["kappa"] = _kappa(section.kappa, nu, plane)
+    return {key: value for key, value in numbers.items() if value != 0.0}
+
+
+def _number(section: Section, key: str) -> float:
+    return float(getattr(section, key))
+
+
+def _hinted(hint: SectionSpec | None) -> Iterator[tuple[str, dict[str, float]]]:
+    shape = None if hint is None else hint.shape
+    if shape is not None and shape in SHAPES:
+        sizes = {key: getattr(hint, key) for key in SHAPES[shape][1]}
+        if None not in sizes.values():
+            yield shape, sizes
+
+
+def _recovered(section: Section) -> Iterator[tuple[str, dict[str, float]]]:
+    """Yield shapes with sizes that the section may come from, short numbers first."""
+    width, height = section.width, section.height
+    if width is None or height is None:
+        return
+    square = width == height
+    if section.shape == "solid-rectangle":
+        sizes = {"width": width} if square else {"width": width, "height": height}
+        yield "solid-square" if square else "solid-rectangle", sizes
+    elif section.shape == "round-tube":
+        yield "solid-circle", {"diameter": width}
+        for wall in _walls(section, width, height):
+            yield "round-tube", {"diameter": width, "wall": wall}
+    elif section.shape == "rectangular-tube":
+        for wall in _walls(section, width, height):
+            if square:
+                yield "square-tube", {"width": width, "wall": wall}
+            else:
+                yield "rectangular-tube", {"width": width, "height": height, "wall": wall}
+
+
+def _walls(section: Section, width: float, height: float) -> Iterator[float]:
+    """Yield wall thicknesses that the shear coefficient or the area of a tube tells of."""
+    for wall in (*_walls_of_kappa(section, width, height), _wall_of_area(section, width, height)):
+        for digits in range(3, 18):
+            rounded = float(f"{wall:.{digits}g}")
+            if 0.0 < rounded < min(width, height) / 2:  # nan compares false
+                yield rounded
+
+
+def _walls_of_kappa(section: Section, width: float, height: float) -> Iterator[float]:
+    kappa, wall = section.kappa, min(width, height) / 4
+    box, ring = rectangular_tube(width, height, wall).kappa, round_tube(width, wall).kappa
+    if not isinstance(kappa, partial):
+        return
+    if isinstance(box, partial) and kappa.func is box.func:
+        # It knows the centre-line sizes; the wall is what both of them round from.
+        pairs = [(width, kappa.args[0]), (height, kappa.args[1])]
+        low = max(outer - line - np.spacing(line) / 2 for outer, line in pairs)
+        high = min(outer - line + np.spacing(line) / 2 for outer, line in pairs)
+        yield from (float((low + high) / 2), float(low), float(high))
+    elif isinstance(ring, partial) and kappa.func is ring.func:
+        yield float((1.0 - kappa.args[0]) * width / 2)  # inner over outer radius
+
+
+def _wall_of_area(section: Section, width: float, height: float) -> float:
+    with np.errstate(invalid="ignore"):
+        if section.shape == "round-tube":
+            return float(width / 2 - np.sqrt(width**2 / 4 - section.A / np.pi))
+        return float((width + height - np.sqrt((width + height) ** 2 - 4 * section.A)) / 4)
+
+
+def _kappa_gap(one: ShearCoefficients | None, other: ShearCoefficients | None) -> float:
+    """Return how far two shear coefficients are apart: `partial` objects are never equal."""
+    if one is other:
+        return 0.0
+    if not (isinstance(one, partial) and isinstance(other, partial) and one.func is other.func):
+        return float("inf")
+    apart = np.array(one.args) - np.array(other.args)
+    return float(np.abs(apart).max(initial=0.0) / max(np.abs(one.args).max(initial=0.0), 1e-300))
+
+
+def _kappa(kappa: ShearCoefficients, nu: float, plane: Plane) -> float:
+    """Return the shear coefficient as the one number that a table can hold."""
+    constant = constant_kappa(1.0)
+    if isinstance(kappa, partial) and isinstance(constant, partial) and kappa.func is constant.func:
+        return float(kappa.args[0])
+    along_y, along_z = kappa(nu)
+    if plane == "3d" and along_y != along_z:
+        what = f"shear coefficients {along_y:g} along y and {along_z:g} along z cannot be written"
+        raise Fault((), what, "those of a shape, or one number")
+    return float(along_z)

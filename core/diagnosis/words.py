@@ -1,0 +1,82 @@
+"""Verdicts as sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from femubench.core.diagnosis.verdict import Decision
+from femubench.core.schema.diagnosis import Cause, Gain
+
+
+def percent(probability: float) -> str:
+    """Return a probability as a percentage that never claims certainty."""
+    if probability > 0.999:
+        return "> 99.9 %"
+    if probability < 0.001:
+        return "< 0.1 %"
+    return f"{100.0 * probability:.3g} %"
+
+
+def named(cause: Cause) -> str:
+    """Return a cause with its place."""
+    return f"{cause.effect} at {cause.place}" if cause.place != "all" else cause.effect
+
+
+def listed(names: Iterable[str], last: str = "and") -> str:
+    """Return names as in a sentence."""
+    unique = tuple(dict.fromkeys(names))
+    if len(unique) < 2:
+        return "".join(unique)
+    return f"{', '.join(unique[:-1])} {last} {unique[-1]}"
+
+
+def sentence_of(
+    decision: Decision,
+    causes: Sequence[Cause],
+    options: Sequence[Sequence[Cause]],
+    probability: float,
+    gain: Gain,
+) -> str:
+    """Return the verdict in one sentence.
+
+    Arguments:
+        decision: what was decided.
+        causes: named, or best guess.
+        options: the causes of every explanation that stands.
+        probability: of the first name.
+        gain: before and after.
+    """
+    names = listed(named(cause) for cause in causes)
+    if decision.verdict == "none":
+        sure = percent(decision.nothing)
+        return f"The data show nothing that the model lacks (probability {sure})."
+    if decision.verdict == "named":
+        return f"The model lacks {names} (probability {percent(probability)}){_gain(gain)}."
+    if decision.verdict == "ambiguous":
+        return _either(options)
+    guess = f"; the nearest is {names}" if causes else ""
+    if decision.verdict == "unknown":
+        return f"No known effect explains what the model gets wrong{guess}."
+    return f"What fits the used data best does not hold on data that it has not seen{guess}."
+
+
+def _either(options: Sequence[Sequence[Cause]]) -> str:
+    """Return what all options share, and what they leave open."""
+    sets = [dict.fromkeys(named(cause) for cause in option) for option in options]
+    common = [name for name in sets[0] if all(name in other for other in sets)]
+    rest = [" with ".join(n for n in names if n not in common) for names in sets]
+    open_ = listed((words or "nothing more" for words in rest), "or")
+    if common:
+        return f"The model lacks {listed(common)}, and these data cannot tell what else: {open_}."
+    return f"The model lacks something, and these data cannot tell which: {open_}."
+
+
+def _gain(gain: Gain) -> str:
+    for label, pair in (
+        ("held-out modes", gain.held_out_percent),
+        ("modified structure", gain.modified_percent),
+        ("modes left out in turn", gain.cross_validated_percent),
+    ):
+        if pair is not None:
+            return f"; the error on {label} falls from {pair[0]:.3g} to {pair[1]:.3g} %"
+    return ""

@@ -1,0 +1,283 @@
+"""Elements with springs at their ends, the rotations of the springs condensed.
+
+An element of stiffness k hangs on its node by a rigid massless arm (u = A q) and a rotational
+spring kappa, whose own rotation d follows the node statically: with B the rotations of its end,
+(B'kB + kappa) d = -B'kA q. In the eigenvectors of B'kB = V diag(r) V' the condensed stiffness is
+
+    A'kA - sum_i tau_i / r_i (A'kB v_i)(A'kB v_i)' ,   tau_i = r_i / (r_i + kappa)
+
+exactly. The mass goes through the same motion (Guyan 1965): by Schwarz' inequality a mode gains at
+most (omega / omega_e)^2 of its eigenvalue, with omega_e the lowest frequency of an element that
+turns at one end while its nodes are held; inertia that couples motions of different rates is left
+out (it is there with eccentric mass centres or coupled sections alone).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from femubench.core.effect.attachments import once_for
+from femubench.core.effect.change import (
+    Change,
+    ElementOperator,
+    RowOperator,
+    Term,
+    barycentric,
+    chebyshev_nodes,
+)
+from femubench.core.fem.beam import mass_matrices, stiffness_matrices
+from femubench.core.fem.joints import available_length, half_depth
+from femubench.core.fem.kinematics import rigid_arm
+from femubench.core.fem.model import Model
+from femubench.core.fem.sensors import DIRECTIONS
+from femubench.core.fem.structure import Structure
+from femubench.core.typing import FloatArray, IntArray
+
+_MOST = 24
+_NODES = 20
+_SAME_RATE = 1e-10
+
+
+def rate_nodes(rates: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the rates that stand for all, and how much every one takes of each.
+
+    Arguments:
+        rates: positive, (k,).
+
+    Returns:
+        nodes (q,) and weights (k, q): f(rates) = weights @ f(nodes), exactly for up to 24
+        different rates, else to about 1e-6 of the largest share over a range of 1:1000.
+    """
+    if not len(rates):
+        return np.zeros(0), np.zeros((0, 0))
+    order = np.argsort(rates)
+    ordered = rates[order]
+    fresh = np.concatenate([[True], np.diff(ordered) > _SAME_RATE * ordered[1:]])
+    nodes = ordered[fresh]
+    if len(nodes) <= _MOST:
+        weights = np.zeros((len(rates), len(nodes)))
+        weights[order, np.cumsum(fresh) - 1] = 1.0
+        return nodes, weights
+    points = chebyshev_nodes(float(np.log(nodes[0])), float(np.log(nodes[-1])), _NODES)
+    return np.exp(points), barycentric(points, np.log(rates))
+
+
+_Key = tuple[int, float, float]
+_Parts = tuple[FloatArray, FloatArray, FloatArray]
+_EMPTY = 1e-12
+_ALIKE = 1e-9
+
+
+@dataclass(frozen=True)
+class _Item:
+    """What one rate of one element gives: blocks that come with tau, tau and tau^2."""
+
+    row: int
+    rate: float
+    blocks: tuple[FloatArray, FloatArray, FloatArray]
+
+
+def end_arm(structure: Structure, end: str) -> float:
+    """Return the length in m of the rigid arm before a new spring at a ``member@joint`` end.
+
+    Half the depth of the crossing member, as far as the end element has room for it; 0 behind a
+    spring that is there already.
+    """
+    frame = structure.frame
+    member, _, joint = end.rpartition("@")
+    if any((s.member, s.joint) == (member, joint) for s in frame.joint_springs):
+        return 0.0
+    element, side = structure.element_ends[end]
+    p = structure.properties
+    rigid = (p.rigid_1, p.rigid_2)[side][element], (p.rigid_mass_1, p.rigid_mass_2)[side][element]
+    room = available_length(structure, end) - max(0.0, *map(float, rigid))
+    return max(0.0, min(half_depth(frame, end), room))
+
+
+def flexible_ends_change(
+    model: Model, ends: Sequence[str], parts: Sequence[tuple[str, ...]]
+) -> Change:
+    """Return what rotational springs at member ends do, in series with those that are there.
+
+    Arguments:
+        model: a frame as it is.
+        ends: ``member@joint``.
+        parts: for every value of the change, the local directions of its springs. The values are
+            stiffnesses in N m/rad, infinite for rigid connections, of which the arms remain.
+    """
+    structure = model.frame_structure
+    rows = np.array(sorted({structure.element_ends[end][0] for end in ends}), dtype=np.int64)
+    arms = np.zeros((len(rows), 2))
+    for end in ends:
+        element, side = structure.element_ends[end]
+        length = once_for(model, ("arm", end), partial(end_arm, structure, end))
+        arms[np.searchsorted(rows, element), side] = length
+    elements = _Elements.of(model, rows, arms)
+    terms, rates, powers, where = elements.arm_terms(model), [], [], []
+    fixed = len(terms)
+    for column, directions in enumerate(parts):
+        items = elements.items(_slots(structure, ends, directions))
+        nodes, weights = rate_nodes(np.array([item.rate for item in items]))
+        for node, weight in zip(nodes, weights.T, strict=True):
+            for term, power in _node_terms(structure, items, weight):
+                terms.append(term)
+                rates.append(float(node))
+                powers.append(power)
+                where.append(column)
+    series = [
+        (*found, column)
+        for column, directions in enumerate(parts)
+        for found in _series_terms(structure, ends, directions)
+    ]
+    rate, power_of, taken = np.array(rates), np.array(powers), np.array(where, dtype=np.int64)
+    present = np.array([stiffness for _, stiffness, _ in series])
+    beside = np.array([column for _, _, column in series], dtype=np.int64)
+
+    def coefficients(values: FloatArray) -> FloatArray:
+        arm = np.ones((len(values), fixed))
+        share = (rate / (rate + values[:, taken])) ** power_of
+        softer = -(present**2) / (present + values[:, beside])
+        return np.hstack([arm, share, softer])
+
+    return Change((*terms, *(term for term, _, _ in series)), coefficients)
+
+
+def _slots(
+    structure: Structure, ends: Sequence[str], directions: Sequence[str]
+) -> dict[int, list[int]]:
+    """Return from elements to their local dofs that become free, sprung ones left out."""
+    slots: dict[int, list[int]] = {}
+    for end in ends:
+        element, side = structure.element_ends[end]
+        fresh = [d for d in directions if f"{end}:{d}" not in structure.spring_index]
+        own = [6 * side + DIRECTIONS.index(d) for d in fresh]
+        slots.setdefault(element, []).extend(own)
+    return slots
+
+
+@dataclass(frozen=True)
+class _Elements:
+    """Elements behind their arms.
+
+    Arguments:
+        rows: in the mesh, (k,).
+        arms: lengths at both ends in m, (k, 2).
+        stiffness, mass: of what lies between the arms, (k, 12, 12).
+        motion: A, its ends from the nodes, (k, 12, 12).
+    """
+
+    rows: IntArray
+    arms: FloatArray
+    stiffness: FloatArray
+    mass: FloatArray
+    motion: FloatArray
+
+    @classmethod
+    def of(cls, model: Model, rows: IntArray, arms: FloatArray) -> _Elements:
+        """Return elements of a model, each with given arms made once for all who ask."""
+        keys = [(int(row), float(a), float(b)) for row, (a, b) in zip(rows, arms, strict=True)]
+        known: dict[_Key, _Parts] = once_for(model, "elements behind arms", dict)
+        fresh = [i for i, key in enumerate(keys) if key not in known]
+        if fresh:
+            made = _behind_arms(model.frame_structure, rows[fresh], arms[fresh])
+            known.update((keys[i], parts) for i, parts in zip(fresh, made, strict=True))
+        return cls(rows, arms, *map(np.array, zip(*(known[key] for key in keys), strict=True)))
+
+    def arm_terms(self, model: Model) -> list[Term]:
+        """Return the terms of the arms alone, whatever the springs are."""
+        if not self.arms.any():
+            return []
+        structure, turned = model.frame_structure, np.swapaxes(self.motion, 1, 2)
+        p = structure.properties
+        plain_k = once_for(model, "element stiffness", lambda: stiffness_matrices(p))
+        plain_m = once_for(model, "element mass", lambda: mass_matrices(p))
+        stiffness = turned @ self.stiffness @ self.motion - plain_k[self.rows]
+        mass = turned @ self.mass @ self.motion - plain_m[self.rows]
+        return [
+            Term("stiffness", ElementOperator(structure, self.rows, stiffness)),
+            Term("mass", ElementOperator(structure, self.rows, mass)),
+        ]
+
+    def items(self, slots: Mapping[int, Sequence[int]]) -> list[_Item]:
+        """Return what springs at some local dofs of elements do, by rate."""
+        items: list[_Item] = []
+        for i, row in enumerate(self.rows):
+            own = slots.get(int(row))
+            if own:
+                matrices = self.stiffness[i], self.mass[i], self.motion[i]
+                items += _element_items(int(row), *matrices, own)
+        return items
+
+
+def _behind_arms(structure: Structure, rows: IntArray, arms: FloatArray) -> list[_Parts]:
+    """Return stiffness, mass and motion of every element behind its arms."""
+    p = structure.properties.take(rows)
+    p = replace(p, length=p.length - arms.sum(axis=1))
+    motion = np.tile(np.eye(12), (len(rows), 1, 1))
+    for side, sign in ((0, 1.0), (1, -1.0)):
+        own = slice(6 * side, 6 * side + 6)
+        motion[:, own, own] = [rigid_arm(np.array([sign * a, 0.0, 0.0])) for a in arms[:, side]]
+    return list(zip(stiffness_matrices(p), mass_matrices(p), motion, strict=True))
+
+
+def _element_items(
+    row: int, k: FloatArray, m: FloatArray, motion: FloatArray, slots: Sequence[int]
+) -> list[_Item]:
+    inner = k[np.ix_(slots, slots)]
+    rate, v = np.linalg.eigh(inner)
+    kept = rate > _EMPTY * np.abs(k).max(initial=0.0)
+    rate, v = rate[kept], v[:, kept]
+    force = motion.T @ k[:, slots] @ v / rate
+    momentum = motion.T @ m[:, slots] @ v
+    inertia = v.T @ m[np.ix_(slots, slots)] @ v
+    items = []
+    for i, own in enumerate(rate):
+        alike = np.flatnonzero(np.abs(rate - own) < _ALIKE * own)
+        cross = np.outer(force[:, alike] @ inertia[alike, i], force[:, i])
+        mixed = np.outer(momentum[:, i], force[:, i])
+        blocks = (
+            -own * np.outer(force[:, i], force[:, i]),
+            -(mixed + mixed.T),
+            0.5 * (cross + cross.T),
+        )
+        items.append(_Item(row, float(own), blocks))
+    return items
+
+
+def _node_terms(
+    structure: Structure, items: Sequence[_Item], weight: FloatArray
+) -> list[tuple[Term, int]]:
+    """Return the terms of one rate with the power of tau that they come with."""
+    used = [int(i) for i in np.flatnonzero(weight)]
+    elements = np.array([items[i].row for i in used], dtype=np.int64)
+    stiffness, linear, square = (
+        np.array([weight[i] * items[i].blocks[kind] for i in used]) for kind in range(3)
+    )
+    return [
+        (Term("stiffness", ElementOperator(structure, elements, stiffness)), 1),
+        (Term("mass", ElementOperator(structure, elements, linear)), 1),
+        (Term("mass", ElementOperator(structure, elements, square)), 2),
+    ]
+
+
+def _series_terms(
+    structure: Structure, ends: Sequence[str], directions: Sequence[str]
+) -> list[tuple[Term, float]]:
+    """Return a term for the springs of each stiffness that are there already."""
+    groups: dict[float, list[int]] = {}
+    for end in ends:
+        for direction in directions:
+            for index in structure.spring_index.get(f"{end}:{direction}", ()):
+                groups.setdefault(float(structure.springs[index]), []).append(int(index))
+    return [
+        (
+            Term("stiffness", RowOperator(structure.spring_rows[index], np.eye(len(index)))),
+            stiffness,
+        )
+        for stiffness, index in groups.items()
+        if stiffness > 0.0
+    ]

@@ -1,0 +1,112 @@
+"""The role of an effect: its parameters with their prior, and effects on frames."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from femubench.core.errors import NotApplicable
+from femubench.core.fem.frame import Frame
+from femubench.core.fem.model import Model
+from femubench.core.plugin.roles import Effect
+
+Scaling = Literal["linear", "exponential", "compliance"]
+
+
+@dataclass(frozen=True)
+class EffectParameter:
+    """One number of an effect, and what is known of it before any measurement.
+
+    The diagnosis works in a coordinate x that is standard normal a priori (half normal where
+    `one_sided`), x = 0 for a model without the effect:
+
+    - ``linear``: value = neutral + scale x
+    - ``exponential``: value = neutral + scale (exp |x| - 1) sign x, for sizes over decades
+    - ``compliance``: value = scale / (exp x - 1), for springs that are rigid at x = 0
+
+    Arguments:
+        name: for tables.
+        unit: of the value; empty for a ratio.
+        scale: of the value at x = 1.
+        neutral: the value that leaves the model as it is; infinite for ``compliance``.
+        lower, upper: bounds of the value.
+        scaling: how x becomes a value.
+        one_sided: whether x >= 0.
+        textbook: a value that physics gives without any fit, e.g. 1 for shear deformation.
+    """
+
+    name: str
+    unit: str
+    scale: float
+    neutral: float = 0.0
+    lower: float = -np.inf
+    upper: float = np.inf
+    scaling: Scaling = "linear"
+    one_sided: bool = False
+    textbook: float | None = None
+
+    def value(self, x: Any) -> Any:  # noqa: ANN401 - numbers, arrays and complex steps alike
+        """Return the value at a coordinate, bounds not applied; any shape."""
+        if self.scaling == "linear":
+            return self.neutral + self.scale * x
+        if self.scaling == "compliance":
+            return self.scale / np.expm1(np.maximum(x, 1e-9))
+        return self.neutral + self.scale * np.expm1(np.abs(x)) * np.sign(x)
+
+    def coordinate(self, value: float) -> float:
+        """Return x of a value."""
+        if self.scaling == "compliance":
+            return float(np.log1p(self.scale / value)) if np.isfinite(value) else 0.0
+        share = (value - self.neutral) / self.scale
+        if self.scaling == "linear":
+            return float(share)
+        return float(np.sign(share) * np.log1p(abs(share)))
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Return the smallest and the largest x that the bounds allow, within 6 deviations."""
+        if self.scaling == "compliance":
+            low, high = self.coordinate(self.upper), self.coordinate(max(self.lower, 1e-300))
+        else:
+            low, high = self.coordinate(self.lower), self.coordinate(self.upper)
+        low = 0.0 if self.one_sided else low
+        return max(low, -6.0), min(high, 6.0)
+
+
+class FrameEffect(Effect):
+    """Base class of effects on frames: override `places`, `parameters` and `frame`.
+
+    Attributes:
+        name: a slug such as ``"joint-rotation"``.
+        summary: what the model lacks, as a clause: ``"the joints rotate"``.
+    """
+
+    name: ClassVar[str]
+    summary: ClassVar[str] = ""
+
+    @abstractmethod
+    def places(self, model: Model) -> Sequence[str]:
+        """Return where the effect may sit in this model; nothing where it does not apply."""
+
+    @abstractmethod
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+        """Return its parameters there."""
+
+    @abstractmethod
+    def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
+        """Return the frame with the effect in it, written as ordinary keys of a case."""
+
+    def extend(self, model: Model, place: str, values: Sequence[float]) -> Model:
+        """Return the model with the effect in it.
+
+        Raises:
+            NotApplicable: when the model came as matrices.
+        """
+        if model.structure is None:
+            raise NotApplicable(f"{self.name} needs a frame, not a pair of matrices")
+        structure = model.structure
+        return Model.of(structure.rebuilt(self.frame(structure.frame, place, values)))

@@ -1,0 +1,247 @@
+"""Words for the places of a frame at which an effect may sit, and what they stand for.
+
+``all``; a joint type (``type:L`` where it equals a joint's name); a joint; a member; ``member/k``,
+element k from 1; ``member@joint``, an end; ``member@0.25``, a point; ``A-E``, a pair of joints; a
+suffix ``:z`` names a direction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.errors import ModelError
+from femubench.core.fem.frame import Frame, Place
+from femubench.core.fem.joints import joint_groups
+from femubench.core.fem.model import Model
+from femubench.core.fem.sensors import DIRECTIONS
+from femubench.core.fem.structure import Structure
+from femubench.core.typing import IntArray
+
+ALL = "all"
+_TYPE, _BRANCH = "type:", ":branch"
+# Stations are written with six digits, mesh nodes have more.
+_SAME = 1e-5
+_FEW = 4
+
+
+def elements_of(structure: Structure, place: str, *, arms: bool = False) -> IntArray:
+    """Return the rows of the mesh at ``all``, a member or ``member/k``, pieces of split ones too.
+
+    Arguments:
+        structure: a meshed frame.
+        place: where.
+        arms: whether the massless arms of joint springs count with their member.
+
+    Raises:
+        ModelError: when there is no such place.
+    """
+    mesh, frame = structure.mesh, structure.frame
+    plain = np.isnan(mesh.arm_factor)
+    if place in frame.member_index:
+        chosen = mesh.member == frame.member_index[place]
+    elif place == ALL:
+        chosen = np.ones(len(plain), dtype=bool)
+    else:
+        member, _, number = place.rpartition("/")
+        if member not in frame.member_index or not number.isdecimal():
+            raise ModelError(f"there is no place {place!r}")
+        chosen = (mesh.member == frame.member_index[member]) & (mesh.number == int(number))
+        arms = False
+    rows = np.flatnonzero(chosen if arms else chosen & plain)
+    if not len(rows):
+        raise ModelError(f"there is no place {place!r}")
+    return rows
+
+
+def member_labels(frame: Frame) -> tuple[str, ...]:
+    """Return the names of the members."""
+    return tuple(member.name for member in frame.members)
+
+
+def element_labels(frame: Frame) -> tuple[str, ...]:
+    """Return ``member/k`` of every element."""
+    return tuple(f"{m.name}/{k}" for m in frame.members for k in range(1, m.elements + 1))
+
+
+def member_length(frame: Frame, member: str) -> float:
+    """Return the distance of a member's two joints in m."""
+    first, last = frame.corners[frame.member_ends[frame.member_index[member]]]
+    return float(np.linalg.norm(last - first))
+
+
+def joints_with_members(frame: Frame) -> tuple[str, ...]:
+    """Return the joints at which two members meet at least; a free end is none."""
+    return tuple(joint.name for joint in frame.joints if len(frame.ends_at(joint.name)) > 1)
+
+
+def joint_types(frame: Frame) -> Mapping[str, tuple[str, ...]]:
+    """Return from every joint type to its joints, free ends and joints without type left out."""
+    types: dict[str, tuple[str, ...]] = {}
+    for name in joints_with_members(frame):
+        kind = frame.joint(name).type
+        if kind:
+            types[kind] = (*types.get(kind, ()), name)
+    return types
+
+
+def type_place(frame: Frame, type: str) -> str:
+    """Return the place of a joint type: ``type:L`` where a joint has that name, else ``L``."""
+    return f"{_TYPE}{type}" if type in frame.joint_index else type
+
+
+def type_places(frame: Frame) -> tuple[str, ...]:
+    """Return the places of the joint types with two joints at least; else the joint says it."""
+    return tuple(type_place(frame, kind) for kind, names in joint_types(frame).items() if names[1:])
+
+
+def joints_of(frame: Frame, place: str) -> tuple[str, ...]:
+    """Return the joints of a joint or a joint type; nothing where the place is neither."""
+    if place in frame.joint_index:
+        return (place,)
+    return joint_types(frame).get(place.removeprefix(_TYPE), ())
+
+
+def end_places(frame: Frame) -> tuple[str, ...]:
+    """Return the ``member@joint`` ends at joints of three members or more.
+
+    At a joint of two, a flexible end and a flexible joint are the same.
+    """
+    return tuple(
+        f"{member}@{joint}"
+        for joint in joints_with_members(frame)
+        for member in frame.ends_at(joint)
+        if len(frame.ends_at(joint)) > 2
+    )
+
+
+def branch_places(frame: Frame) -> tuple[str, ...]:
+    """Return ``T:branch`` for every joint type where members branch off ones that pass through.
+
+    A member that passes is continuous; what turns is the end that is welded to its face. Types
+    with one such end are left out: the end says it.
+    """
+    return tuple(
+        type_place(frame, group.type) + _BRANCH
+        for group in joint_groups(frame)
+        if group.role == "branch" and len(group.ends) > 1 and joint_types(frame).get(group.type)
+    )
+
+
+def ends_of(frame: Frame, place: str) -> tuple[str, ...]:
+    """Return the ``member@joint`` ends at a type, a type's branches, a joint, or the end itself.
+
+    Raises:
+        ModelError: when there is no such place.
+    """
+    if place.endswith(_BRANCH):
+        kind = place.removesuffix(_BRANCH).removeprefix(_TYPE)
+        for group in joint_groups(frame):
+            if (group.type, group.role) == (kind, "branch"):
+                return group.ends
+    joints = joints_of(frame, place)
+    ends = tuple(f"{member}@{joint}" for joint in joints for member in frame.ends_at(joint))
+    if ends:
+        return ends
+    member, _, joint = place.rpartition("@")
+    if member in frame.ends_at(joint):
+        return (place,)
+    raise ModelError(f"no member ends at {place!r}")
+
+
+def split_direction(place: str) -> tuple[str, str | None]:
+    """Return a place without its suffix ``:z``, and the direction; None where it has none."""
+    head, _, tail = place.rpartition(":")
+    # "type:x" is the joint type x.
+    if head and head != _TYPE[:-1] and tail.lstrip("+-") in DIRECTIONS:
+        return head, tail
+    return place, None
+
+
+def point_of(frame: Frame, place: str) -> Place:
+    """Return the point of a joint or of ``member@0.25``; a direction is left out.
+
+    Raises:
+        ModelError: when there is no such point.
+    """
+    place, _ = split_direction(place)
+    if place in frame.joint_index:
+        return Place(joint=place)
+    member, _, station = place.rpartition("@")
+    if member in frame.ends_at(station):
+        return Place(joint=station)
+    try:
+        spec, s = frame.members[frame.member_index[member]], float(station)
+    except (KeyError, ValueError):
+        raise ModelError(f"there is no point {place!r}") from None
+    if not 0.0 <= s <= 1.0:
+        raise ModelError(f"station {s:g} of member {member!r} is not within 0..1")
+    nearest = round(s * spec.elements) / spec.elements
+    s = nearest if abs(nearest - s) < _SAME else s
+    return Place(joint=spec.ends[int(s)]) if s in (0.0, 1.0) else Place(member=member, s=s)
+
+
+def point_places(model: Model) -> tuple[str, ...]:
+    """Return where something may be attached: every joint, free ends too, and along the members.
+
+    A member of up to four elements offers its mesh nodes, a longer one those nearest to its
+    quarter points; a model that came as matrices offers its nodes.
+    """
+    if model.structure is None:
+        return model.geometry.names if isinstance(model.geometry, MatrixGeometry) else ()
+    frame = model.structure.frame
+    points = [joint.name for joint in frame.joints]
+    for member in frame.members:
+        count = member.elements
+        nodes = range(1, count) if count <= _FEW else [round(q * count / 4) for q in (1, 2, 3)]
+        points += [f"{member.name}@{k / count:g}" for k in nodes]
+    return tuple(points)
+
+
+def pair_of(frame: Frame, place: str) -> tuple[str, str]:
+    """Return the two joints of ``A-E``; names with a dash of their own are understood.
+
+    Raises:
+        ModelError: when there is no such pair.
+    """
+    words = place.split("-")
+    for cut in range(1, len(words)):
+        pair = "-".join(words[:cut]), "-".join(words[cut:])
+        if pair[0] in frame.joint_index and pair[1] in frame.joint_index:
+            return pair
+    raise ModelError(f"there is no pair of joints {place!r}")
+
+
+def _canonical(frame: Frame, place: str) -> tuple[str, ...]:
+    """Return one form for all words that stand for the same place."""
+    place, direction = split_direction(place)
+    suffix = () if direction is None else (direction.lstrip("+-"),)
+    joints = joints_of(frame, place)
+    if joints:
+        word = joints[0] if len(joints) == 1 else _TYPE + place.removeprefix(_TYPE)
+        return (word, *suffix)
+    if place == ALL or (len(frame.members) == 1 and place in frame.member_index):
+        return (ALL, *suffix)
+    if place in frame.member_index:
+        return (place, *suffix)
+    member, _, end = place.rpartition("@")
+    if member in frame.ends_at(end):
+        return (end if len(frame.ends_at(end)) <= 2 else place, *suffix)
+    for read in (lambda: (str(point_of(frame, place)),), lambda: sorted(pair_of(frame, place))):
+        try:
+            return (*read(), *suffix)
+        except ModelError:
+            continue
+    return (place, *suffix)
+
+
+def match(frame: Frame, place_a: str, place_b: str) -> bool:
+    """Tell whether two words stand for the same place.
+
+    At a joint of two members an end is the joint; a type with one joint is that joint; the member
+    of a frame with one member is ``all``; the ends of a member are joints; pairs have no order,
+    directions no sign.
+    """
+    return _canonical(frame, place_a) == _canonical(frame, place_b)

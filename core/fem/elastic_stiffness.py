@@ -1,0 +1,23 @@
+"""Stiffness of a meshed frame: elements, joint springs, springs to ground and braces."""
+
+from __future__ import annotations
+
+import scipy.sparse as sp
+
+from femubench.core.fem.attachments import brace_stiffness
+from femubench.core.fem.beam import stiffness_matrices
+from femubench.core.fem.meshed_frame import MeshedFrame
+from femubench.core.typing import SparseArray
+
+
+def elastic_stiffness(structure: MeshedFrame) -> SparseArray:
+    """Return the stiffness without preloads and oscillators, (n, n)."""
+    stiffness = structure.plan.assemble(stiffness_matrices(structure.properties))
+    if len(structure.springs):
+        rows = structure.spring_rows
+        stiffness = stiffness + rows.T @ sp.diags_array(structure.springs) @ rows
+    if structure.frame.springs:
+        stiffness = stiffness + structure.attached((), structure.frame.springs)[1]
+    if structure.frame.braces:
+        stiffness = stiffness + brace_stiffness(structure)
+    return stiffness

@@ -1,0 +1,202 @@
+"""The role of a model: sparse mass and stiffness, labelled dofs, and what else a case can offer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench.core.errors import ModelError, NotApplicable
+from femubench.core.fem.frame import Frame, GroundSpring, PointMass
+from femubench.core.fem.sensors import Sensors
+from femubench.core.fem.structure import Structure
+from femubench.core.typing import FloatArray, IntArray, SparseArray
+
+
+@dataclass(frozen=True)
+class Dofs:
+    """Labels of the degrees of freedom.
+
+    Arguments:
+        node: node of every dof, (n,).
+        direction: one of x y z rx ry rz, (n,).
+        xyz: position of every dof's node in m, (n, 3).
+        axes: unit motion of every dof in (x, y, z, rx, ry, rz), (n, 6); None where it is the
+            direction itself. Flexible connections of skew members have dofs along the member.
+    """
+
+    node: IntArray
+    direction: tuple[str, ...]
+    xyz: FloatArray
+    axes: FloatArray | None = None
+
+    def __len__(self) -> int:
+        return len(self.direction)
+
+
+@dataclass(frozen=True)
+class LowRank:
+    """A symmetric change ``basis @ core @ basis.T`` that is never multiplied out.
+
+    Arguments:
+        basis: (n, p).
+        core: symmetric, (p, p).
+    """
+
+    basis: FloatArray
+    core: FloatArray
+
+    def __matmul__(self, vectors: FloatArray) -> FloatArray:
+        product: FloatArray = self.basis @ (self.core @ (self.basis.T @ vectors))
+        return product
+
+    def toarray(self) -> FloatArray:
+        """Return the dense matrix, for small models."""
+        dense: FloatArray = self.basis @ self.core @ self.basis.T
+        return dense
+
+
+class Geometry(Protocol):
+    """What a model needs to know of its structure besides the matrices."""
+
+    def observe(self, sensors: Sensors) -> SparseArray:
+        """Return sensor readings from dofs, sparse (n_sensors, n)."""
+        ...
+
+    def attached(
+        self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]
+    ) -> tuple[SparseArray, SparseArray]:
+        """Return the mass and stiffness that attachments add, sparse (n, n) each."""
+        ...
+
+
+@dataclass(frozen=True)
+class Model:
+    """A structural model; strategies return another one made by `dataclasses.replace`.
+
+    Arguments:
+        mass: sparse symmetric, (n, n), in kg, kg m, kg m2.
+        stiffness: sparse symmetric, (n, n), in N/m, N, N m.
+        dofs: what the rows are.
+        geometry: where sensors and attachments act.
+        structure: the meshed frame that gave the matrices; None for matrices from files.
+        mass_change, stiffness_change: low-rank terms on top of the sparse matrices.
+        groups: named parts of the stiffness of a model from files, sparse (n, n) each.
+    """
+
+    mass: SparseArray
+    stiffness: SparseArray
+    dofs: Dofs
+    geometry: Geometry
+    structure: Structure | None = None
+    mass_change: LowRank | None = None
+    stiffness_change: LowRank | None = None
+    groups: Mapping[str, SparseArray] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, source: Frame | Structure) -> Model:
+        """Return the model of a frame or of a meshed frame.
+
+        Raises:
+            ModelError: when the frame cannot be meshed.
+        """
+        structure = Structure.build(source) if isinstance(source, Frame) else source
+        mass, stiffness = structure.matrices()
+        kinematics = structure.kinematics
+        xyz = structure.mesh.xyz[kinematics.node]
+        dofs = Dofs(kinematics.node, kinematics.direction, xyz, kinematics.axes)
+        return cls(mass, stiffness, dofs, structure, structure)
+
+    @property
+    def size(self) -> int:
+        """Return the number of degrees of freedom n."""
+        return len(self.dofs)
+
+    @property
+    def frame_structure(self) -> Structure:
+        """Return the meshed frame.
+
+        Raises:
+            NotApplicable: when the model came as matrices.
+        """
+        if self.structure is None:
+            raise NotApplicable("the model is a pair of matrices without elements")
+        return self.structure
+
+    def observe(self, sensors: Sensors) -> SparseArray:
+        """Return sensor readings from dofs, sparse (n_sensors, n).
+
+        Raises:
+            ModelError: when a sensor lies off the structure.
+        """
+        return self.geometry.observe(sensors)
+
+    def stiffness_times(self, vectors: FloatArray) -> FloatArray:
+        """Return K @ vectors with the low-rank change, (n, m)."""
+        product: FloatArray = self.stiffness @ vectors
+        change = self.stiffness_change
+        return product if change is None else product + change @ vectors
+
+    def mass_times(self, vectors: FloatArray) -> FloatArray:
+        """Return M @ vectors with the low-rank change, (n, m)."""
+        product: FloatArray = self.mass @ vectors
+        change = self.mass_change
+        return product if change is None else product + change @ vectors
+
+    def attach(self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]) -> Model:
+        """Return the model with further masses and springs to ground.
+
+        A frame is meshed anew, so that an attachment between nodes splits its element; what an
+        update changed in the matrices is carried over to the dofs that were there before.
+
+        Raises:
+            ModelError: when an attachment lies off the structure.
+        """
+        if self.structure is None:
+            mass, stiffness = self.geometry.attached(masses, springs)
+            return replace(self, mass=self.mass + mass, stiffness=self.stiffness + stiffness)
+        frame = self.structure.frame.with_attachments(tuple(masses), tuple(springs))
+        new = Model.of(self.structure.rebuilt(frame))
+        old_mass, old_stiffness = self.structure.matrices()
+        keep = common_dofs(self.structure, new.frame_structure)
+        return replace(
+            new,
+            mass=new.mass + _spread(self.mass - old_mass, keep, new.size),
+            stiffness=new.stiffness + _spread(self.stiffness - old_stiffness, keep, new.size),
+            mass_change=_spread_low_rank(self.mass_change, keep, new.size),
+            stiffness_change=_spread_low_rank(self.stiffness_change, keep, new.size),
+        )
+
+
+def _keys(structure: Structure) -> list[tuple[object, ...]]:
+    """Return a name of every dof that stays the same when other elements are split."""
+    nodes = structure.mesh.node_keys(len(structure.frame.joints))
+    kinematics = structure.kinematics
+    pairs = zip(kinematics.node, kinematics.direction, strict=True)
+    return [(*nodes[node], direction) for node, direction in pairs]
+
+
+def common_dofs(old: Structure, new: Structure) -> IntArray:
+    """Return the position of every old dof among the new ones, (n_old,)."""
+    index = {key: i for i, key in enumerate(_keys(new))}
+    try:
+        return np.array([index[key] for key in _keys(old)], dtype=np.int64)
+    except KeyError as error:
+        raise ModelError("two attachments lie too close to each other on a member") from error
+
+
+def _spread(change: SparseArray, keep: IntArray, size: int) -> SparseArray:
+    entries = sp.coo_array(change)
+    triplet = (entries.data, (keep[entries.row], keep[entries.col]))
+    return sp.csc_array(triplet, shape=(size, size))
+
+
+def _spread_low_rank(change: LowRank | None, keep: IntArray, size: int) -> LowRank | None:
+    if change is None:
+        return None
+    basis = np.zeros((size, change.basis.shape[1]))
+    basis[keep] = change.basis
+    return LowRank(basis, change.core)

@@ -1,0 +1,124 @@
+"""Read files of strangers with limits, and write files in one step."""
+
+from __future__ import annotations
+
+import os
+import stat
+import tempfile
+from pathlib import Path
+from typing import BinaryIO
+
+from femubench.core.errors import InputError
+
+MIB = 2**20
+
+
+def check_regular(path: Path, largest: int) -> None:
+    """Check that a path is a file with bytes in it, and not too many, before it is opened.
+
+    A pipe would be waited for and a device may act on being opened.
+
+    Arguments:
+        path: may be a link.
+        largest: the size in bytes up to which it is read.
+
+    Raises:
+        InputError: for anything else.
+    """
+    try:
+        found = path.stat()
+    except (OSError, ValueError) as error:
+        raise unreadable(path, error) from None
+    _check(found, path, largest)
+
+
+def open_regular(path: Path, largest: int) -> BinaryIO:
+    """Return a stream on a regular file, without ever waiting for it to open.
+
+    Raises:
+        InputError: when it is no regular file, is too large or cannot be opened.
+    """
+    check_regular(path, largest)
+    try:
+        # Should a pipe have taken its place meanwhile, this does not wait for a writer.
+        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+    except OSError as error:
+        raise unreadable(path, error) from None
+    try:
+        _check(os.fstat(descriptor), path, largest)
+        return os.fdopen(descriptor, "rb")
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
+def read_bytes(path: Path, largest: int) -> bytes:
+    """Return the content of a regular file.
+
+    Raises:
+        InputError: when it is no regular file, is too large or cannot be read.
+    """
+    with open_regular(path, largest) as stream:
+        try:
+            content = stream.read(largest + 1)
+        except OSError as error:
+            raise unreadable(path, error) from None
+    if len(content) > largest:
+        raise _too_large(path, largest)
+    return content
+
+
+def read_text(path: Path, largest: int) -> str:
+    """Return the text of a file, without a byte order mark, with any kind of line ends.
+
+    Raises:
+        InputError: when it cannot be read, is too large, or is not UTF-8.
+    """
+    try:
+        text = read_bytes(path, largest).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = error.object[: error.start].count(b"\n") + 1
+        raise InputError("not a text", file=path, line=line, expected="UTF-8") from None
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def unreadable(path: Path, error: OSError | ValueError) -> InputError:
+    """Return the error of a file that the system does not hand out."""
+    why = error.strerror if isinstance(error, OSError) else str(error)
+    return InputError(f"cannot be read: {why}", file=path, expected="a file that can be read")
+
+
+def _check(found: os.stat_result, path: Path, largest: int) -> None:
+    if not stat.S_ISREG(found.st_mode):
+        what = "is a folder" if stat.S_ISDIR(found.st_mode) else "is a pipe or a device"
+        raise InputError(what, file=path, expected="a regular file")
+    if found.st_size > largest:
+        raise _too_large(path, largest)
+
+
+def _too_large(path: Path, largest: int) -> InputError:
+    limit = f"{largest // MIB} MiB" if largest >= MIB else f"{largest} bytes"
+    return InputError("file is too large", file=path, expected=f"at most {limit}")
+
+
+def write_atomically(path: Path, content: str | bytes) -> None:
+    """Write bytes, or a text with a final newline; a reader sees the old file or the new."""
+    if isinstance(content, str):
+        content = (content.rstrip("\n") + "\n").encode()
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    part = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+        # mkstemp gives 0600; a report is as public as any file that the user makes.
+        part.chmod(0o666 & ~_umask())
+        part.replace(path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,1 +1,0 @@
-"""The harness: jobs, isolation, store, scoring, statistics."""

@@ -1,0 +1,1 @@
+"""Data, noise, prior, fit, evidence and search of explanations."""

@@ -1,0 +1,86 @@
+"""Explanations as models of their own: extended one effect after the other, and solved anew."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from femubench.core.errors import FemubenchError
+from femubench.core.fem.model import Model
+from femubench.core.inference.fit import Fit, Problem, fit, signed_hz
+from femubench.core.inference.projection import Projection
+from femubench.core.modal.eigen import enough_modes, solve_modes
+from femubench.core.typing import FloatArray
+from femubench.core.update.residuals import total_mass
+
+_ROUNDS = 3
+_AGREES = 0.3  # deviations in all, below which a fit and its model are the same to the data
+
+
+def extended(model: Model, parts: Sequence[Projection], x: FloatArray) -> Model:
+    """Return the model with effects in it, at their coordinates."""
+    start = 0
+    for part in parts:
+        h = part.hypothesis
+        values = h.values(x[None, start : start + len(h.parameters)])[0]
+        start += len(h.parameters)
+        model = h.effect.extend(model, h.place, [float(v) for v in values])
+    return model
+
+
+def raw_residual(problem: Problem, model: Model) -> FloatArray:
+    """Return the residuals of a model in standard deviations of the measurement, (n_data,).
+
+    Raises:
+        ModelError: when the model has no modes.
+    """
+    data = problem.data
+    modes = solve_modes(model, enough_modes(model, 2 * len(data.measurement)))
+    order = np.argsort(modes.eigenvalues)
+    hertz = signed_hz(modes.eigenvalues[order])[None]
+    hertz = data.corrected(hertz, problem.space.zero)
+    seen = np.asarray(model.observe(data.measurement.sensors) @ modes.shapes[:, order])[None]
+    partner = data.pair(hertz, seen)[0]
+    mass = total_mass(model.structure) if model.structure is not None else 0.0
+    residual = data.residual(hertz[:, partner], seen[:, :, partner], np.array([mass]))
+    return np.asarray(residual[0])
+
+
+def agreed(found: Fit) -> Fit:
+    """Return a fit of several causes that its own model bears out.
+
+    In modal coordinates the changes of several causes add up; in a model the second one changes
+    what the first one left. The difference at the best fit is taken as constant nearby and the
+    fit repeated (deferred correction; Stetter 1978).
+    """
+    problem, best = found.state.problem, found
+    for _ in range(_ROUNDS):
+        state = best.state
+        try:
+            exact = raw_residual(problem, extended(problem.model, best.parts, state.x))
+        except FemubenchError:
+            return found
+        offset = exact - (state.raw - state.problem.offset)
+        if not np.isfinite(offset).all():
+            return found
+        gap = np.linalg.norm(state.problem.noise.whiten(offset - state.problem.offset))
+        if gap < _AGREES:
+            break
+        again = fit(replace(problem, offset=offset), best.parts, state.x)
+        if again is None:
+            break
+        best = again
+    return best
+
+
+def departure(found: Fit) -> float:
+    """Return how far a fit is from what its own model gives, in deviations of the data in all.
+
+    Raises:
+        FemubenchError: when that model cannot be built or solved.
+    """
+    state = found.state
+    exact = raw_residual(state.problem, extended(state.problem.model, state.parts, state.x))
+    return float(np.linalg.norm(state.problem.noise.whiten(exact - state.raw)))

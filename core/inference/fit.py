@@ -1,0 +1,293 @@
+"""Fit hypotheses to the data: exact modes in modal coordinates, damped Gauss-Newton, evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg as la
+from scipy.special import log_ndtr
+
+from femubench.core.errors import ModelError
+from femubench.core.fem.model import Model
+from femubench.core.inference.modal_basis import Space, solve_pencil
+from femubench.core.inference.noise import Noise
+from femubench.core.inference.projection import Projection
+from femubench.core.inference.residuals import Data
+from femubench.core.typing import FloatArray, IntArray
+
+_STEPS = 12
+_SETTLED = 2e-2  # of chi-square plus prior: a hundredth of a nat
+_LONGEST = 1.5  # prior deviations a step
+# Two modes closer than this share of an eigenvalue turn into each other at the least change; a
+# linear rule has no more to say there.
+_CLOSE = 1e-3
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What a fit needs besides the hypotheses.
+
+    Arguments:
+        model: that the hypotheses extend.
+        space: its modal coordinates with the hypotheses.
+        data: the used modes.
+        noise: their covariance.
+        offset: added to every residual, in standard deviations of the measurement, (n_data,);
+            what the modal coordinates are known to get wrong near the point of interest.
+    """
+
+    model: Model
+    space: Space
+    data: Data
+    noise: Noise
+    offset: FloatArray | float = 0.0
+
+
+@dataclass(frozen=True)
+class State:
+    """Hypotheses at definite coordinates, and what they predict.
+
+    Arguments:
+        problem: data and modal coordinates.
+        parts: the hypotheses; none for the model as it is.
+        x: coordinates, (k,).
+        eigenvalues, vectors: all modes in the coordinates of the space.
+        partner: of every measured mode, (m,).
+        mass: total mass in kg.
+        raw: residuals in standard deviations of the measurement, (n_data,).
+    """
+
+    problem: Problem
+    parts: tuple[Projection, ...]
+    x: FloatArray
+    eigenvalues: FloatArray
+    vectors: FloatArray
+    partner: IntArray
+    mass: float
+    raw: FloatArray
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """Return the residuals in units of the noise, (n_data,)."""
+        return self.problem.noise.whiten(self.raw)
+
+    @property
+    def chi2(self) -> float:
+        """Return chi-square."""
+        return float(self.residual @ self.residual)
+
+    @property
+    def cost(self) -> float:
+        """Return chi-square plus the share of the prior."""
+        return self.chi2 + float(self.x @ self.x)
+
+    @property
+    def frequencies(self) -> FloatArray:
+        """Return all predicted frequencies in Hz, without the correction for the mesh."""
+        return signed_hz(self.eigenvalues)
+
+    @cached_property
+    def readings(self) -> FloatArray:
+        """Return the readings of the partners at the sensors, (n_sensors, m)."""
+        seen = self.problem.space.padded_readings(len(self.vectors))
+        return np.asarray(seen @ self.vectors[:, self.partner])
+
+    @cached_property
+    def jacobian(self) -> FloatArray:
+        """Return d prediction / d x in units of the noise, (n_data, k)."""
+        if not self.parts:
+            return np.zeros((len(self.raw), 0))
+        near, values = self.vectors[:, self.partner], self.eigenvalues[self.partner]
+        forces, masses = self.problem.space.forces(self.parts, self.x, near, values)
+        return self.problem.noise.whiten(self.rows(forces, masses).T).T
+
+    def rows(self, forces: FloatArray, masses: FloatArray) -> FloatArray:
+        """Return d prediction / d x in standard deviations from modal forces, (n_data, p).
+
+        Arguments:
+            forces: (dK - lambda_j dM) phi_j in the coordinates of the space, (N, m, p).
+            masses: d mass / d x in kg, (p,).
+        """
+        share = np.tensordot(self.vectors, forces, axes=(0, 0))
+        values = self.eigenvalues[self.partner]
+        gap = values - self.eigenvalues[:, None]
+        least = _CLOSE * np.abs(values)
+        gap = np.where(np.abs(gap) < least, np.copysign(least, gap), gap)
+        gap[self.partner, np.arange(len(values))] = np.inf
+        still = self.problem.space.still(self.eigenvalues)
+        gap[np.logical_and.outer(still, still[self.partner])] = np.inf
+        slope = share[self.partner, np.arange(len(values))]
+        turn = share / gap[:, :, None]
+        seen = self.problem.space.padded_readings(len(self.vectors)) @ self.vectors
+        change = np.tensordot(seen, turn, axes=1)
+        moving = np.where(still[self.partner], np.inf, np.abs(signed_hz(values)))
+        hertz = slope / (8.0 * np.pi**2 * moving)[:, None]
+        return self.problem.data.slope(hertz, self.readings, change, masses)
+
+
+def signed_hz(eigenvalues: FloatArray) -> FloatArray:
+    """Return frequencies in Hz, negative for imaginary ones."""
+    return np.asarray(np.copysign(np.sqrt(np.abs(eigenvalues)), eigenvalues) / (2.0 * np.pi))
+
+
+def state_at(problem: Problem, parts: Sequence[Projection], x: FloatArray) -> State:
+    """Return the prediction of some hypotheses at given coordinates.
+
+    Raises:
+        ModelError: when they make the mass indefinite.
+    """
+    stiffness, mass, weight = problem.space.assembled(parts, x)
+    values, vectors = solve_pencil(stiffness, mass)
+    data = problem.data
+    count = min(len(values), problem.space.rigid + 2 * len(data.measurement) + 8)
+    hertz = data.corrected(signed_hz(values[None, :count]), problem.space.zero)
+    seen = problem.space.padded_readings(len(vectors)) @ vectors[:, :count]
+    partner = data.pair(hertz, seen[None])[0]
+    raw = data.residual(hertz[:, partner], seen[None][:, :, partner], np.array([weight]))[0]
+    raw = raw + problem.offset
+    return State(problem, tuple(parts), x, values, vectors, partner, weight, raw)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The best fit of some hypotheses.
+
+    Arguments:
+        state: at the optimum.
+        log_evidence: ln of the probability of the data, up to a constant of the data; without
+            the prior of the hypotheses themselves.
+    """
+
+    state: State
+    log_evidence: float
+
+    @property
+    def parts(self) -> tuple[Projection, ...]:
+        """Return the hypotheses."""
+        return self.state.parts
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Return the covariance of the coordinates, (k, k)."""
+        jacobian = self.state.jacobian
+        precision = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
+        return np.asarray(la.inv(precision)) if len(precision) else precision
+
+
+def bounds_of(parts: Sequence[Projection]) -> tuple[FloatArray, FloatArray]:
+    """Return the lowest and the highest coordinates of all parameters, (k,) each."""
+    pairs = [part.hypothesis.bounds for part in parts]
+    if not pairs:
+        return np.zeros(0), np.zeros(0)
+    return np.concatenate([low for low, _ in pairs]), np.concatenate([high for _, high in pairs])
+
+
+def fit(
+    problem: Problem,
+    parts: Sequence[Projection],
+    start: FloatArray,
+    *,
+    give_up: float = np.inf,
+    steps: int = _STEPS,
+) -> Fit | None:
+    """Return the most probable coordinates of some hypotheses by damped Gauss-Newton steps.
+
+    Arguments:
+        problem: data and modal coordinates.
+        parts: the hypotheses.
+        start: where to start, (k,).
+        give_up: stop when the next step cannot bring the cost below this.
+        steps: how many steps at most.
+    """
+    low, high = bounds_of(parts)
+    try:
+        point = state_at(problem, parts, np.clip(start, low, high))
+    except ModelError:
+        return None
+    damping = 0.0
+    for _ in range(steps if len(start) else 0):
+        step = _step(point, low, high, damping)
+        promised = _promise(point, step)
+        if promised < _SETTLED or point.cost - 3.0 * promised > give_up:
+            break
+        trial = _tried(problem, parts, point, step, low, high)
+        if trial is not None and trial.cost < point.cost:
+            gained, point = point.cost - trial.cost, trial
+            damping = damping / 10.0 if damping > 1e-3 else 0.0
+            if gained < _SETTLED:
+                break
+        else:
+            damping = max(10.0 * damping, 1.0)
+            if damping > 1e6:
+                break
+    return Fit(point, log_evidence(point))
+
+
+def _tried(
+    problem: Problem,
+    parts: Sequence[Projection],
+    point: State,
+    step: FloatArray,
+    low: FloatArray,
+    high: FloatArray,
+) -> State | None:
+    try:
+        return state_at(problem, parts, np.clip(point.x + step, low, high))
+    except ModelError:
+        return None
+
+
+def _step(point: State, low: FloatArray, high: FloatArray, damping: float) -> FloatArray:
+    """Return (J'J + I + damping diag)^-1 (J'r - x) with bounds respected one by one."""
+    jacobian = point.jacobian
+    normal = jacobian.T @ jacobian + np.eye(len(point.x))
+    normal += damping * np.diag(normal.diagonal())
+    right = jacobian.T @ point.residual - point.x
+    step = np.zeros(len(point.x))
+    free = np.ones(len(point.x), dtype=bool)
+    while free.any():
+        step[:] = 0.0
+        step[free] = la.solve(normal[np.ix_(free, free)], right[free], assume_a="pos")
+        stuck = free & (point.x <= low) & (step < 0.0)
+        stuck |= free & (point.x >= high) & (step > 0.0)
+        if not stuck.any():
+            break
+        free &= ~stuck
+    longest = float(np.abs(step).max(initial=0.0))
+    step = step * min(1.0, _LONGEST / longest) if longest > 0.0 else step
+    return np.asarray(np.clip(point.x + step, low, high) - point.x)
+
+
+def _promise(point: State, step: FloatArray) -> float:
+    after = point.residual - point.jacobian @ step
+    rest = point.x + step
+    return point.cost - float(after @ after + rest @ rest)
+
+
+def log_evidence(point: State) -> float:
+    """Return ln of the integral of likelihood times prior by Laplace's method.
+
+    A coordinate that cannot be negative has a half-normal prior, and the integral over it ends at
+    zero: with slope g and curvature h of the cost's half there, the Gaussian integral over the
+    line is replaced by that over x >= 0 (Kass & Raftery 1995, section 4.1, with the boundary).
+    """
+    jacobian, x = point.jacobian, point.x
+    curvature = jacobian.T @ jacobian + np.eye(len(x))
+    gradient = x - jacobian.T @ point.residual
+    result = -0.5 * point.cost
+    if len(x) == 0:
+        return result
+    result -= float(np.log(la.cholesky(curvature).diagonal()).sum())
+    one_sided = np.concatenate([part.hypothesis.one_sided for part in point.parts])
+    spread = np.sqrt(la.inv(curvature).diagonal())
+    for i in np.flatnonzero(one_sided):
+        centre = x[i]
+        if x[i] <= 0.0 and gradient[i] > 0.0:
+            slip = gradient[i] * spread[i]
+            result += float(0.5 * slip**2)
+            centre = -gradient[i] * spread[i] ** 2
+        result += float(np.log(2.0) + log_ndtr(centre / spread[i]))
+    return result

@@ -1,0 +1,349 @@
+"""Every hypothesis at a few magnitudes at once: where to start, and what is hopeless.
+
+Each hypothesis acts in a small basis: the lowest modes and the first-order response of the higher
+ones to it (Fox & Kapoor 1968), so that thousands of candidates cost one batched eigensolution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import log_ndtr
+
+from femubench.core.inference.fit import Problem, State, signed_hz
+from femubench.core.inference.modal_basis import Space
+from femubench.core.inference.noise import marginal
+from femubench.core.inference.projection import Projection
+from femubench.core.typing import FloatArray
+
+
+@dataclass(frozen=True)
+class Screened:
+    """A hypothesis on the atlas.
+
+    Arguments:
+        projection: the hypothesis.
+        grid: coordinates that were tried, (g, k).
+        residuals: in units of the noise there, (g, n_data).
+        x: the most probable coordinates by interpolation, (k,).
+        cost: chi-square plus prior there.
+        log_evidence: about, as for `Fit`.
+    """
+
+    projection: Projection
+    grid: FloatArray
+    residuals: FloatArray
+    x: FloatArray
+    cost: float
+    log_evidence: float
+
+
+def interpolated(
+    projections: Sequence[Projection], residuals: FloatArray, still: FloatArray
+) -> list[Screened]:
+    """Return the best point of every hypothesis.
+
+    Arguments:
+        projections: the hypotheses.
+        residuals: on their grids one after the other, (sum of g, n_data).
+        still: residuals of the base model, (n_data,).
+    """
+    last = np.cumsum([len(p.hypothesis.grid) for p in projections])
+    own = [
+        residuals[stop - len(p.hypothesis.grid) : stop]
+        for p, stop in zip(projections, last, strict=True)
+    ]
+    found: dict[int, Screened] = {}
+    alike: dict[tuple[int, bool], list[int]] = {}
+    for i, p in enumerate(projections):
+        h = p.hypothesis
+        if len(h.parameters) == 1:
+            alike.setdefault((len(h.grid), h.still), []).append(i)
+        else:
+            found[i] = _best_of_grid(p, own[i])
+    for (_, begins), members in alike.items():
+        rows = np.array([own[i] for i in members])
+        x = np.array([projections[i].hypothesis.grid[:, 0] for i in members])
+        if begins:
+            x = np.hstack([x, np.zeros((len(x), 1))])
+            rows = np.concatenate([rows, np.broadcast_to(still, (len(x), 1, len(still)))], axis=1)
+            order = np.argsort(x, axis=1)
+            x = np.take_along_axis(x, order, axis=1)
+            rows = np.take_along_axis(rows, order[:, :, None], axis=1)
+        sided = np.array([projections[i].hypothesis.one_sided[0] for i in members], dtype=bool)
+        for i, place, cost, evidence in zip(members, *_on_chords(x, rows, sided), strict=True):
+            p = projections[i]
+            best = np.array([place])
+            found[i] = Screened(p, p.hypothesis.grid, own[i], best, float(cost), float(evidence))
+    return [found[i] for i in range(len(projections))]
+
+
+def _best_of_grid(projection: Projection, residuals: FloatArray) -> Screened:
+    grid = projection.hypothesis.grid
+    point, least = _in_cells(grid, residuals)
+    evidence = -0.5 * least - 0.5 * _spread(residuals, grid)
+    return Screened(projection, grid, residuals, point, least, float(evidence))
+
+
+def _in_cells(grid: FloatArray, residuals: FloatArray) -> tuple[FloatArray, float]:
+    """Return the best point of a grid in two coordinates, residuals linear within its cells."""
+    cost = np.square(residuals).sum(axis=1) + np.square(grid).sum(axis=1)
+    best = int(cost.argmin())
+    axes = [np.unique(column) for column in grid.T]
+    rows = residuals.reshape(*map(len, axes), -1)
+    corner = np.stack(np.meshgrid(*(axis[:-1] for axis in axes), indexing="ij"), axis=2)
+    size = np.stack(np.meshgrid(*map(np.diff, axes), indexing="ij"), axis=2)
+    here = rows[:-1, :-1]
+    sides = np.stack([rows[1:, :-1] - here, rows[:-1, 1:] - here], axis=3)
+    turned = np.swapaxes(sides, 2, 3)
+    normal = turned @ sides + np.square(size)[..., None] * np.eye(2)
+    right = (turned @ here[..., None])[..., 0] + size * corner
+    share = np.clip(-np.linalg.solve(normal, right[..., None])[..., 0], 0.0, 1.0)
+    x = corner + share * size
+    left = here + (sides @ share[..., None])[..., 0]
+    value = np.square(left).sum(axis=2) + np.square(x).sum(axis=2)
+    if value.size == 0 or value.min() >= cost[best]:
+        return grid[best], float(cost[best])
+    cell = np.unravel_index(value.argmin(), value.shape)
+    return x[cell], float(value[cell])
+
+
+def _on_chords(
+    x: FloatArray, rows: FloatArray, sided: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the best points on the chords between neighbours, their costs and evidences.
+
+    Arguments:
+        x: ascending, (h, g).
+        rows: residuals there, (h, g, n_data).
+        sided: whether x cannot be negative, (h,).
+    """
+    if x.shape[1] == 1:
+        cost = np.square(rows[:, 0]).sum(axis=1) + np.square(x[:, 0])
+        return x[:, 0], cost, -0.5 * cost
+    chord, width = np.diff(rows, axis=1), np.diff(x, axis=1)
+    a = np.square(chord).sum(axis=2) + np.square(width)
+    b = np.einsum("hgi,hgi->hg", chord, rows[:, :-1]) + width * x[:, :-1]
+    t = np.clip(-b / a, 0.0, 1.0)
+    cost = np.square(rows[:, :-1]).sum(axis=2) + np.square(x[:, :-1]) + 2 * b * t + a * t**2
+    best = np.arange(len(x)), cost.argmin(axis=1)
+    place = x[best] + t[best] * width[best]
+    curvature = a[best] / np.square(width[best])
+    evidence = -0.5 * cost[best] - 0.5 * np.log(curvature)
+    half = np.log(2.0) + log_ndtr(place * np.sqrt(curvature))
+    return place, cost[best], evidence + np.where(sided, half, 0.0)
+
+
+def _spread(residuals: FloatArray, grid: FloatArray) -> float:
+    """Return about ln det of the curvature from the widest differences on a grid."""
+    span = np.ptp(grid, axis=0)
+    steep = np.linalg.norm(residuals - residuals.mean(axis=0), axis=1).max()
+    return float(np.log(1.0 + np.square(steep / np.maximum(span, 1e-9))).sum())
+
+
+_RESPONSES, _FEW = 6, 3
+_MINOR = 1e-4  # of the largest squared response: what is left out moves the modes by its square
+_KEPT, _TRACKED = 5, 3  # modes beyond the last partner: in the basis, and with their response
+_LIKELY = 40  # that are looked at beside causes
+_FAR = 1e18
+
+
+def screen(
+    problem: Problem,
+    base: State,
+    projections: Sequence[Projection],
+    yielding: FloatArray | None = None,
+) -> list[Screened]:
+    """Return every hypothesis with its best magnitude by interpolation on the atlas.
+
+    Arguments:
+        problem: data and modal coordinates of the base model.
+        base: the base model itself, no hypothesis in it.
+        projections: the hypotheses.
+        yielding: sensitivities of causes that the base model holds, and that may still move to
+            make room, in units of the noise, (n_data, k).
+    """
+    if not projections:
+        return []
+    # Modes beyond the last partner matter as neighbours that may come down among them.
+    top = max(problem.space.rigid + len(base.partner), int(base.partner.max(initial=-1)) + 1)
+    residuals, still = _residuals(problem, projections, top), base.residual
+    if yielding is not None:
+        residuals, still = marginal(residuals, yielding), marginal(still, yielding)
+    return interpolated(projections, residuals, still)
+
+
+def likely(
+    screened: Sequence[Screened], still: FloatArray, state: State, least: float
+) -> list[Projection]:
+    """Return the hypotheses that promise most beside causes, were what they do to add up.
+
+    It does not, but nearly enough to tell what is not worth an eigensolution.
+
+    Arguments:
+        screened: hypotheses on the model without these causes.
+        still: residuals of that model, (n_data,).
+        state: the model with the causes in it.
+        least: what chi-square must promise to fall by.
+    """
+    projections = [item.projection for item in screened]
+    if not projections:
+        return []
+    both = np.concatenate([item.residuals for item in screened]) + (state.residual - still)
+    seen = marginal(both, state.jacobian), marginal(state.residual, state.jacobian)
+    rows = interpolated(projections, *seen)
+    promising = [row for row in rows if state.chi2 - row.cost > least]
+    promising.sort(key=lambda row: row.cost)
+    return [row.projection for row in promising[:_LIKELY]]
+
+
+def _residuals(problem: Problem, projections: Sequence[Projection], top: int) -> FloatArray:
+    """Return the residuals of all candidates in units of the noise, (sum of g, n_data).
+
+    Arguments:
+        problem: data and modal coordinates.
+        projections: the hypotheses.
+        top: number of modes up to the last one that has a measured partner.
+    """
+    space, data = problem.space, problem.data
+    low, tracked = min(len(space), top + _KEPT), min(len(space), top + _TRACKED)
+    counts = [len(p.hypothesis.grid) for p in projections]
+    first = np.concatenate([[0], np.cumsum(counts)])
+    hertz = np.zeros((first[-1], low))
+    seen = np.zeros((first[-1], len(space.readings), low))
+    responses, few = _responses(space, projections, low, tracked)
+    kinds: dict[tuple[int, bool, bool], list[int]] = {}
+    for i, p in enumerate(projections):
+        kinds.setdefault((p.extra, bool(p.is_mass.any()), bool(few[i])), []).append(i)
+    for (_, _, small), members in kinds.items():
+        kept = min(_FEW if small else _RESPONSES, responses.shape[2])
+        chosen = responses[members][:, :, responses.shape[2] - kept :]
+        rows = np.concatenate([np.arange(first[i], first[i + 1]) for i in members])
+        own = [projections[i] for i in members]
+        hertz[rows], seen[rows] = _modes(space, own, chosen, low)
+    hertz = data.corrected(hertz, space.zero)
+    partner = data.pair(hertz, seen)
+    mass = [space.mass + p.hypothesis.grid_factors @ p.weights for p in projections]
+    each = np.arange(len(partner))[:, None]
+    paired = np.moveaxis(np.moveaxis(seen, 2, 1)[each, partner], 1, 2)
+    raw = data.residual(hertz[each, partner], paired, np.concatenate(mass))
+    return problem.noise.whiten(raw + problem.offset)
+
+
+def _responses(
+    space: Space, projections: Sequence[Projection], low: int, tracked: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return the main responses of the higher modes, orthonormal, the largest last.
+
+    Returns:
+        responses (h, N - low, kept), zero where there is none, and whether few will do, (h,).
+    """
+    n = len(space)
+    values = space.eigenvalues
+    response = np.empty((len(projections), n - low, tracked))
+    for i, projection in enumerate(projections):
+        response[i] = _forces(projection, low, n, tracked, values)
+    response /= values[:tracked] - values[low:, None]
+    kept = min(_RESPONSES, n - low, tracked)
+    gram = np.swapaxes(response, 1, 2) @ response
+    size, turn = np.linalg.eigh(gram)
+    few = np.ones(len(projections), dtype=bool)
+    if kept > _FEW:
+        few = size[:, -_FEW - 1] <= _MINOR * size[:, -1]
+    size, turn = size[:, tracked - kept :], turn[:, :, tracked - kept :]
+    visible = size > 1e-10 * np.maximum(size[:, -1:], 1e-30)
+    scale = np.where(visible, 1.0 / np.sqrt(np.where(visible, size, 1.0)), 0.0)
+    return response @ (turn * scale[:, None, :]), few
+
+
+def _forces(
+    projection: Projection, low: int, n: int, tracked: int, values: FloatArray
+) -> FloatArray:
+    """Return what a typical magnitude exerts on the high modes, (n - low, tracked)."""
+    factors, near = projection.hypothesis.typical_factors, projection.rows[:, :tracked]
+    force = np.zeros(near.shape)
+    stiff, heavy = (projection.core(factors, mass=mass) for mass in (False, True))
+    if stiff is not None:
+        force = stiff @ near
+    if heavy is not None:
+        force = force - heavy @ near * values[:tracked]
+    return np.asarray(projection.rows[:, low:n].T @ force)
+
+
+def _modes(
+    space: Space, members: Sequence[Projection], responses: FloatArray, low: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return Hz and readings of the lowest modes of all candidates, (g, low), (g, n_sensors, low).
+
+    Arguments:
+        space: modal coordinates.
+        members: hypotheses with the same added coordinates, all with or all without mass.
+        responses: of the higher modes, (h, N - low, kept).
+        low: number of modes that are kept as they are.
+    """
+    n, extra, kept = len(space), members[0].extra, responses.shape[2]
+    size, heavy = low + extra + kept, bool(members[0].is_mass.any())
+    counts = [len(p.hypothesis.grid) for p in members]
+    last = np.cumsum(counts)
+    stiffness = np.empty((last[-1], size, size))
+    mass = np.empty(stiffness.shape if heavy else (0, size, size))
+    plain = _unloaded(space, responses, low, extra)
+    unit = np.diag(np.repeat([1.0, 0.0, 1.0], [low, extra, kept]))
+    for projection, response, base, stop in zip(members, responses, plain, last, strict=True):
+        own = slice(stop - len(projection.hypothesis.grid), stop)
+        known = projection.rows
+        rows = np.hstack([known[:, :low], known[:, n:], known[:, low:n] @ response])
+        factors = projection.hypothesis.grid_factors
+        for target, start, kind in ((stiffness, base, False), (mass, unit, True)):
+            core = projection.core(factors, mass=kind)
+            if kind and not heavy:
+                continue
+            target[own] = start if core is None else start + rows.T @ (core @ rows)
+    values, vectors = _solve(stiffness, mass if heavy else None, low)
+    readings = np.zeros((len(members), len(space.readings), size))
+    readings[:, :, :low] = space.readings[:, :low]
+    readings[:, :, low + extra :] = space.readings[:, low:n] @ responses
+    return signed_hz(values), np.repeat(readings, counts, axis=0) @ vectors
+
+
+def _unloaded(space: Space, responses: FloatArray, low: int, extra: int) -> FloatArray:
+    """Return the stiffness without a hypothesis in the small bases, (h, size, size)."""
+    kept = responses.shape[2]
+    start, size = low + extra, low + extra + kept
+    plain = np.zeros((len(responses), size, size))
+    plain[:, range(low), range(low)] = space.eigenvalues[:low]
+    high = np.swapaxes(responses, 1, 2) @ (space.eigenvalues[low:, None] * responses)
+    plain[:, start:, start:] = high
+    own = plain[:, range(start, size), range(start, size)]
+    idle = ~responses.any(axis=1)
+    plain[:, range(start, size), range(start, size)] = np.where(idle, _FAR, own)
+    return plain
+
+
+def _solve(
+    stiffness: FloatArray, mass: FloatArray | None, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return the lowest eigenvalues and mass-normalised vectors of a batch.
+
+    Those with an indefinite mass are hopeless, and go far away.
+    """
+    if mass is None:
+        values, vectors = np.linalg.eigh(stiffness)
+        return values[:, :count], vectors[:, :, :count]
+    try:
+        lower = np.linalg.cholesky(mass)
+    except np.linalg.LinAlgError:
+        bad = np.linalg.eigvalsh(mass)[:, 0] <= 0.0
+        mass, stiffness = mass.copy(), stiffness.copy()
+        mass[bad], stiffness[bad] = np.eye(mass.shape[1]), _FAR * np.eye(mass.shape[1])
+        lower = np.linalg.cholesky(mass)
+    # One inverse costs less than three solutions with as many right-hand sides.
+    inverse = np.linalg.inv(lower)
+    turned = np.swapaxes(inverse, 1, 2)
+    values, vectors = np.linalg.eigh(inverse @ stiffness @ turned)
+    return values[:, :count], turned @ vectors[:, :, :count]
+
+
+__all__ = ["Screened", "likely", "screen"]

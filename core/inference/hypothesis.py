@@ -1,0 +1,140 @@
+"""A hypothesis: one effect at one place, ready to be tried on modal data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from femubench.core.effect.change import Change
+from femubench.core.effect.frame_effect import EffectParameter
+from femubench.core.effect.tabulated_change import tabulated_change
+from femubench.core.fem.model import Model
+from femubench.core.plugin.roles import Effect
+from femubench.core.typing import FloatArray
+
+_SLOPE_STEP = 1e-5
+_SINGLE = (0.12, 0.5, 1.3, 2.6)
+_DOUBLE = (0.03, 0.2, 0.7, 1.8)
+_OSCILLATOR = (0.4, 1.2, 2.2)
+_STIFF = 0.01
+_TYPICAL = 0.6
+_NOTHING = 1e-12
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """An effect at a place.
+
+    Arguments:
+        effect: the effect itself.
+        place: where it sits.
+        parameters: what it takes there.
+        change: what it does to the matrices.
+        places: number of places that the effect could sit at.
+    """
+
+    effect: Effect
+    place: str
+    parameters: tuple[EffectParameter, ...]
+    change: Change
+    places: int
+
+    @property
+    def name(self) -> str:
+        """Return the slug of the effect."""
+        return self.effect.name
+
+    @property
+    def textbook(self) -> FloatArray | None:
+        """Return the coordinates of the textbook values, None where one has none."""
+        values = [p.textbook for p in self.parameters]
+        if any(value is None for value in values):
+            return None
+        pairs = zip(self.parameters, values, strict=True)
+        return np.array([p.coordinate(v) for p, v in pairs if v is not None])
+
+    @cached_property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Return the lowest and the highest coordinates, (k,) each."""
+        low, high = np.array([p.range for p in self.parameters]).T
+        return low, high
+
+    @cached_property
+    def one_sided(self) -> FloatArray:
+        """Tell which coordinates cannot be negative, as 0 or 1, (k,)."""
+        return np.array([p.one_sided for p in self.parameters], dtype=float)
+
+    @cached_property
+    def still(self) -> bool:
+        """Tell whether the model is as it is at x = 0; rigid joints still have their arms."""
+        return bool(np.all(np.abs(self.factors(np.zeros((1, len(self.parameters))))) < _NOTHING))
+
+    @cached_property
+    def grid(self) -> FloatArray:
+        """Return the coordinates at which it is tried first, (g, k)."""
+        parameters = self.parameters
+        if self.change.extra and len(parameters) == 2:
+            first = [v for v in _OSCILLATOR if v <= parameters[0].range[1]]
+            second = np.linspace(*parameters[1].range, 14)[1:]
+            return np.array(list(product(first, second)))
+        sizes = _SINGLE if len(parameters) == 1 else _DOUBLE
+        return np.array(list(product(*(_points(parameter, sizes) for parameter in parameters))))
+
+    @cached_property
+    def grid_factors(self) -> FloatArray:
+        """Return the factors of the terms on the grid, (g, n_terms)."""
+        return self.factors(self.grid)
+
+    @cached_property
+    def typical_factors(self) -> FloatArray:
+        """Return the factors of the terms at a typical magnitude, (n_terms,)."""
+        low, high = self.bounds
+        return np.asarray(self.factors(np.clip(np.full(len(low), _TYPICAL), low, high)[None])[0])
+
+    def values(self, x: FloatArray) -> FloatArray:
+        """Return parameter values of coordinates, (g, k) both."""
+        columns = [p.value(x[:, i]) for i, p in enumerate(self.parameters)]
+        return np.column_stack(columns)
+
+    def factors(self, x: FloatArray) -> FloatArray:
+        """Return the factors of the terms, (g, n_terms), of coordinates, (g, k)."""
+        return np.asarray(self.change.coefficients(self.values(x)))
+
+    def slopes(self, x: FloatArray) -> FloatArray:
+        """Return d factors / d x at one point, (k, n_terms); one-sided where a bound is near."""
+        low, high = self.bounds
+        step = _SLOPE_STEP * np.eye(len(x))
+        up, down = np.minimum(x + step, high), np.maximum(x - step, low)
+        width = (up - down).diagonal()
+        return np.asarray((self.factors(up) - self.factors(down)) / width[:, None])
+
+
+def _points(parameter: EffectParameter, sizes: Sequence[float]) -> list[float]:
+    low, high = parameter.range
+    if parameter.scaling == "compliance":
+        # Its arm stays rigid however stiff the spring: x = 0 is no model without the effect.
+        sizes = (_STIFF, *sizes)
+    wanted = list(sizes) if parameter.one_sided else [-s for s in reversed(sizes)] + list(sizes)
+    inside = [x for x in wanted if low <= x <= high]
+    return inside or [0.5 * (low + high)]
+
+
+def hypotheses_of(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ...]:
+    """Return every effect at every place where it may sit in a model."""
+    found = []
+    for effect in effects:
+        places = tuple(dict.fromkeys(effect.places(model)))
+        for place in places:
+            parameters: Sequence[EffectParameter] = tuple(effect.parameters(model, place))
+            change = getattr(effect, "change", None)
+            made = (
+                change(model, place)
+                if callable(change)
+                else tabulated_change(effect, model, place, parameters)
+            )
+            found.append(Hypothesis(effect, place, tuple(parameters), made, len(places)))
+    return tuple(found)

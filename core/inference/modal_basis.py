@@ -1,0 +1,212 @@
+"""A modal basis of the nominal model, and what every hypothesis does in it.
+
+In the basis of its own modes the nominal stiffness is diag(lambda) and the mass the identity; a
+hypothesis adds the projections of its fixed matrices. Where all modes are at hand (small models)
+this is exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg as la
+
+from femubench.core.errors import ModelError
+from femubench.core.fem.beam import mass_matrices, stiffness_matrices
+from femubench.core.fem.model import Model
+from femubench.core.fem.sensors import Sensors
+from femubench.core.fem.structure import Structure
+from femubench.core.inference.hypothesis import Hypothesis
+from femubench.core.inference.projection import Projection, Projector
+from femubench.core.modal.eigen import Modes
+from femubench.core.typing import BoolArray, FloatArray, IntArray
+from femubench.core.update.residuals import total_mass
+
+
+@dataclass(frozen=True)
+class Space:
+    """Modal coordinates with the hypotheses in them.
+
+    Arguments:
+        eigenvalues: of the coordinates, ascending, (N,).
+        readings: of the coordinates at the sensors, (n_sensors, N).
+        projections: the hypotheses.
+        mass: of the structure in kg.
+        rigid: number of coordinates that are rigid-body motions.
+    """
+
+    eigenvalues: FloatArray
+    readings: FloatArray
+    projections: tuple[Projection, ...]
+    mass: float
+    rigid: int
+
+    def __len__(self) -> int:
+        return len(self.eigenvalues)
+
+    @property
+    def zero(self) -> float:
+        """Return the frequency in Hz up to which a mode counts as one of zero frequency."""
+        first = self.eigenvalues[self.rigid :][:1].sum()
+        return float(1e-3 * np.sqrt(max(first, 0.0)) / (2.0 * np.pi))
+
+    def still(self, eigenvalues: FloatArray) -> BoolArray:
+        """Tell which eigenvalues count as zero."""
+        return np.asarray(np.abs(eigenvalues) <= np.square(2.0 * np.pi * self.zero))
+
+    def assembled(
+        self, parts: Sequence[Projection], x: FloatArray
+    ) -> tuple[FloatArray, FloatArray, float]:
+        """Return stiffness, mass and total mass with some hypotheses at their coordinates.
+
+        Arguments:
+            parts: what takes part; their added coordinates follow those of the space in order.
+            x: coordinates of all of their parameters, (k,).
+        """
+        size = len(self) + sum(part.extra for part in parts)
+        stiffness, mass = np.zeros((size, size)), np.zeros((size, size))
+        own = np.arange(len(self))
+        stiffness[own, own], mass[own, own] = self.eigenvalues, 1.0
+        weight = self.mass
+        for part, index, columns in _placed(len(self), parts):
+            factors = part.hypothesis.factors(x[None, columns])[0]
+            weight += float(factors @ part.weights)
+            for matrix, kind in ((stiffness, False), (mass, True)):
+                change = part.matrix(factors, mass=kind)
+                if change is not None:
+                    matrix[np.ix_(index, index)] += change
+        return stiffness, mass, weight
+
+    def slopes(
+        self, parts: Sequence[Projection], x: FloatArray
+    ) -> list[tuple[FloatArray, FloatArray, float]]:
+        """Return the derivatives of `assembled` with respect to every coordinate."""
+        size = len(self) + sum(part.extra for part in parts)
+        result = []
+        for part, index, columns in _placed(len(self), parts):
+            for slope in part.hypothesis.slopes(x[columns]):
+                pair = np.zeros((2, size, size))
+                for matrix, kind in zip(pair, (False, True), strict=True):
+                    change = part.matrix(slope, mass=kind)
+                    if change is not None:
+                        matrix[np.ix_(index, index)] = change
+                result.append((pair[0], pair[1], float(slope @ part.weights)))
+        return result
+
+    def forces(
+        self, parts: Sequence[Projection], x: FloatArray, near: FloatArray, values: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return (dK - lambda_j dM) v_j and the derivative of the mass by every coordinate.
+
+        Arguments:
+            parts, x: as in `assembled`.
+            near: vectors, (N + extra, m).
+            values: an eigenvalue for each of them, (m,).
+
+        Returns:
+            forces (N + extra, m, p) and masses in kg (p,).
+        """
+        forces, masses = np.zeros((len(x), *near.shape)), np.zeros(len(x))
+        for part, index, columns in _placed(len(self), parts):
+            slopes = part.hypothesis.slopes(x[columns])
+            masses[columns] = slopes @ part.weights
+            seen = part.rows @ near[index]
+            for kind, scale in ((False, np.ones(len(values))), (True, -values)):
+                core = part.core(slopes, mass=kind)
+                if core is not None:
+                    forces[columns, index] += part.rows.T @ (core @ (seen * scale))
+        return np.moveaxis(forces, 0, 2), masses
+
+    def padded_readings(self, size: int) -> FloatArray:
+        """Return the readings with zeros for added coordinates, (n_sensors, size)."""
+        more = size - self.readings.shape[1]
+        return np.pad(self.readings, ((0, 0), (0, more))) if more else self.readings
+
+    def rebased(self, parts: Sequence[Projection], x: FloatArray) -> Space:
+        """Return the modal coordinates of the model with some hypotheses in it."""
+        stiffness, mass, weight = self.assembled(parts, x)
+        values, turn = solve_pencil(stiffness, mass)
+        readings = self.padded_readings(len(stiffness)) @ turn
+        # All rows at once: one product of large matrices is faster than hundreds of small ones.
+        known = [part.rows for part in self.projections]
+        n = len(self)
+        together = np.concatenate([rows[:, :n] for rows in known] or [np.zeros((0, n))]) @ turn[:n]
+        projections, last = [], 0
+        for part in self.projections:
+            first, last = last, last + len(part.rows)
+            rows = together[first:last]
+            rows = np.hstack([rows, part.rows[:, n:]]) if part.extra else rows
+            projections.append(replace(part, rows=rows))
+        small = float(np.abs(values[self.rigid : self.rigid + 1]).sum()) * 1e-8
+        rigid = int((np.abs(values[: self.rigid]) <= small).sum())
+        return Space(values, readings, tuple(projections), weight, rigid)
+
+
+def _placed(size: int, parts: Sequence[Projection]) -> list[tuple[Projection, IntArray, slice]]:
+    """Return every part with its rows in the joint matrices and its columns of x."""
+    result, row, column = [], size, 0
+    for part in parts:
+        index = np.concatenate([np.arange(size), row + np.arange(part.extra)])
+        count = len(part.hypothesis.parameters)
+        result.append((part, index, slice(column, column + count)))
+        row, column = row + part.extra, column + count
+    return result
+
+
+def solve_pencil(stiffness: FloatArray, mass: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return eigenvalues, ascending, and mass-normalised vectors of a small dense pencil.
+
+    Raises:
+        ModelError: when the mass is not positive definite.
+    """
+    try:
+        if np.array_equal(mass, np.eye(len(mass))):  # half the work, and most causes add no mass
+            values, vectors = la.eigh(stiffness, driver="evd", check_finite=False)
+        else:
+            values, vectors = la.eigh(stiffness, mass, driver="gvd", check_finite=False)
+    except la.LinAlgError as error:
+        raise ModelError("a hypothesis makes the mass indefinite") from error
+    return values, vectors
+
+
+def nominal_space(
+    model: Model, modes: Modes, sensors: Sensors, hypotheses: Sequence[Hypothesis]
+) -> Space:
+    """Return the modal coordinates of a model with all of its hypotheses.
+
+    Arguments:
+        model: the nominal model.
+        modes: all of its modes.
+        sensors: where shapes are read.
+        hypotheses: what may be missing.
+    """
+    order = np.argsort(~modes.rigid, kind="stable")
+    modes = modes.take(order)
+    project = Projector(model, modes.shapes)
+    readings = np.asarray(model.observe(sensors) @ modes.shapes)
+    mass = total_mass(model.structure) if model.structure is not None else 0.0
+    eigenvalues = np.where(modes.rigid, 0.0, modes.eigenvalues)
+    projections = tuple(project(hypothesis) for hypothesis in hypotheses)
+    return Space(eigenvalues, readings, projections, mass, int(modes.rigid.sum()))
+
+
+def scatter_terms(structure: Structure, vectors: FloatArray, eigenvalues: FloatArray) -> FloatArray:
+    """Return the modal forces of a relative change of every element's stiffness, then its mass.
+
+    Arguments:
+        structure: the nominal frame.
+        vectors: its modes, (n, N).
+        eigenvalues: of the modes of interest, which come first among the columns, (q,).
+
+    Returns:
+        phi_k' (dK - lambda_j dM) phi_j by element and kind, mode j, coordinate k,
+        (2 n_elements, q, N).
+    """
+    q = len(eigenvalues)
+    local = (structure.gather @ vectors).reshape(-1, 12, vectors.shape[1])
+    near = local[:, :, :q]
+    stiff = np.swapaxes(stiffness_matrices(structure.properties) @ near, 1, 2) @ local
+    heavy = np.swapaxes(mass_matrices(structure.properties) @ near, 1, 2) @ local
+    return np.concatenate([stiff, -eigenvalues[:, None] * heavy])

@@ -1,0 +1,57 @@
+"""The noise of the data: measurement and ordinary scatter of the elements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg as la
+
+from femubench.core.typing import FloatArray
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The covariance of the residuals: measurement and ordinary scatter of the elements.
+
+    Arguments:
+        factor: lower Cholesky factor of I + S S' tolerance^2, (n_data, n_data).
+    """
+
+    factor: FloatArray
+
+    @classmethod
+    def of(cls, slopes: FloatArray, tolerance: float) -> Noise:
+        """Return the noise of data with sensitivities to independent scatters.
+
+        Arguments:
+            slopes: d prediction / d relative change of one element, (n_data, n_scatter).
+            tolerance: standard deviation of a relative change.
+        """
+        covariance = np.eye(len(slopes)) + tolerance**2 * (slopes @ slopes.T)
+        return cls(np.asarray(la.cholesky(covariance, lower=True)))
+
+    @cached_property
+    def _inverse(self) -> FloatArray:
+        identity = np.eye(len(self.factor))
+        return np.asarray(la.solve_triangular(self.factor, identity, lower=True))
+
+    def whiten(self, rows: FloatArray) -> FloatArray:
+        """Return vectors along the last axis in units of the noise, same shape."""
+        return np.asarray(rows @ self._inverse.T)
+
+
+def marginal(rows: FloatArray, slopes: FloatArray) -> FloatArray:
+    """Return vectors in units of noise and linear causes together: (I + J J')^(-1/2) times each.
+
+    The squares of marginal residuals are what is left after the best move of the causes within
+    their standard normal prior.
+
+    Arguments:
+        rows: residuals or slopes in units of the noise along the last axis, (..., n_data).
+        slopes: J, the derivatives of the data by the causes, (n_data, k).
+    """
+    along, size, _ = np.linalg.svd(slopes, full_matrices=False)
+    taken = 1.0 - 1.0 / np.sqrt(1.0 + np.square(size))
+    return np.asarray(rows - (rows @ along * taken) @ along.T)

@@ -1,0 +1,148 @@
+"""Explanations, and their probabilities by prior and evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from math import log
+
+import numpy as np
+from scipy.special import logsumexp
+
+from femubench.core.inference.fit import Fit
+from femubench.core.inference.prior import PRIOR_BEYOND_TEXTBOOK, PRIOR_OF_COUNT, Base, log_prior
+from femubench.core.inference.projection import Projection
+
+# From this probability on the verdict is that nothing is missing.
+LIKELY_NOTHING = 0.5
+# A textbook effect is part of a name only where it is likely, and the data made it so.
+_EARNED, _FACTOR = 0.6, 20.0
+Key = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A base with causes on top.
+
+    Arguments:
+        base: textbook effects.
+        fit: of the causes; its parts are the causes, none for a model that lacks nothing more.
+        names: number of effects that were candidates.
+    """
+
+    base: Base
+    fit: Fit
+    names: int
+
+    @property
+    def parts(self) -> tuple[Projection, ...]:
+        """Return the causes."""
+        return self.fit.parts
+
+    @property
+    def chi2(self) -> float:
+        """Return chi-square at the best fit."""
+        return self.fit.state.chi2
+
+    @cached_property
+    def log_weight(self) -> float:
+        """Return ln of prior times evidence."""
+        counts = PRIOR_BEYOND_TEXTBOOK if self.base.parts else PRIOR_OF_COUNT
+        prior = log_prior(self.parts, self.names, counts)
+        return self.base.log_prior + prior + self.fit.log_evidence
+
+    @property
+    def searched(self) -> Key:
+        """Return the slugs of the causes, sorted."""
+        return tuple(sorted(part.hypothesis.name for part in self.parts))
+
+    @property
+    def effects(self) -> frozenset[str]:
+        """Return the slugs of all that is in the model, textbook or fitted."""
+        return frozenset({*self.base.names, *self.searched})
+
+    @property
+    def place(self) -> str:
+        """Return the places of the causes in the order of `searched`."""
+        pairs = sorted((part.hypothesis.name, part.hypothesis.place) for part in self.parts)
+        return " + ".join(place for _, place in pairs)
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """All explanations with their probabilities.
+
+    Arguments:
+        explanations: most probable first.
+        probabilities: of each, (k,).
+    """
+
+    explanations: tuple[Explanation, ...]
+    probabilities: tuple[float, ...]
+
+    @classmethod
+    def of(cls, explanations: Iterable[Explanation]) -> Posterior:
+        """Weigh explanations against each other by prior and evidence."""
+        ranked = sorted(explanations, key=lambda e: -e.log_weight)
+        weights = np.array([e.log_weight for e in ranked])
+        shares = np.exp(weights - logsumexp(weights))
+        return cls(tuple(ranked), tuple(float(p) for p in shares))
+
+    @cached_property
+    def earned(self) -> frozenset[str]:
+        """Return the textbook effects that the data made part of the name.
+
+        Each by itself; and where none of several can be missed by itself, all that cannot be
+        missed together.
+        """
+        likely = {name for e in self.explanations for name in e.base.names if self._likely(name)}
+        alone = frozenset(name for name in likely if self._missed(frozenset({name})))
+        rest = frozenset(likely - alone)
+        return alone | rest if len(rest) > 1 and self._missed(rest) else alone
+
+    def _likely(self, name: str) -> bool:
+        pairs = zip(self.explanations, self.probabilities, strict=True)
+        return sum(p for e, p in pairs if name in e.effects) >= _EARNED
+
+    def _missed(self, names: frozenset[str]) -> bool:
+        """Tell whether the best explanation with textbook effects is much better than without.
+
+        Textbook physics is weighed against the model without it, not against another effect that
+        is fitted to stand for it.
+        """
+        best = next((e for e in self.explanations if names <= set(e.base.names)), None)
+        if best is None:
+            return False
+        rest, fitted = best.effects - names, tuple(n for n in best.searched if n not in names)
+        for other in self.explanations:
+            if other.effects == rest and other.searched == fitted:
+                return best.fit.log_evidence - other.fit.log_evidence > log(_FACTOR)
+        return True
+
+    def key(self, explanation: Explanation) -> Key:
+        """Return the name of an explanation: its causes and the textbook effects that count."""
+        physics = [name for name in explanation.base.names if name in self.earned]
+        return tuple(sorted({*explanation.searched, *physics}))
+
+    @cached_property
+    def names(self) -> dict[Key, float]:
+        """Return the probability of every name, most probable first."""
+        totals: dict[Key, float] = {}
+        for e, p in zip(self.explanations, self.probabilities, strict=True):
+            key = self.key(e)
+            totals[key] = totals.get(key, 0.0) + p
+        return dict(sorted(totals.items(), key=lambda item: -item[1]))
+
+    def inclusion(self, name: str) -> float:
+        """Return the probability that an effect is part of the name."""
+        return sum(p for key, p in self.names.items() if name in key)
+
+    def best(self, key: Key) -> Explanation:
+        """Return the most probable explanation of that name."""
+        return next(e for e in self.explanations if self.key(e) == key)
+
+    def members(self, key: Key) -> list[tuple[Explanation, float]]:
+        """Return the explanations of that name with their probabilities."""
+        pairs = zip(self.explanations, self.probabilities, strict=True)
+        return [(e, p) for e, p in pairs if self.key(e) == key]

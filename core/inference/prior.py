@@ -1,0 +1,79 @@
+"""What is believed before any datum is seen: how many causes, where, which textbook physics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import factorial, log
+
+import numpy as np
+
+from femubench.core.inference.projection import Projection
+
+# How many causes a model lacks besides textbook physics, before any datum is seen.
+PRIOR_OF_COUNT = (0.5, 0.4, 0.08, 0.015, 0.005)
+# The same where the textbook already mends something.
+PRIOR_BEYOND_TEXTBOOK = (0.6, 0.3, 0.08, 0.015, 0.005)
+# Physics that every beam has need not earn its place: a model that lacks it most likely lacks all
+# of it. Some textbook effects without the others share the rest.
+_AS_DRAWN, _ALL_TEXTBOOK = 0.1, 0.8
+
+
+@dataclass(frozen=True)
+class Base:
+    """Effects of the textbook that are in the model before causes are sought.
+
+    Arguments:
+        parts: at their textbook coordinates.
+        log_prior: ln of the probability of this set.
+    """
+
+    parts: tuple[Projection, ...]
+    log_prior: float
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the slugs."""
+        return tuple(part.hypothesis.name for part in self.parts)
+
+    @property
+    def x(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        """Return the textbook coordinates, (k,)."""
+        found = [part.hypothesis.textbook for part in self.parts]
+        return np.concatenate([x for x in found if x is not None] or [np.zeros(0)])
+
+
+def textbook_bases(projections: Iterable[Projection]) -> list[Base]:
+    """Return every set of textbook effects that the model lacks, the empty one first."""
+    known = [p for p in projections if p.hypothesis.textbook is not None]
+    if not known:
+        return [Base((), 0.0)]
+    some = max(2 ** len(known) - 2, 1)
+    shares = {0: _AS_DRAWN, len(known): _ALL_TEXTBOOK}
+    rest = (1.0 - _AS_DRAWN - _ALL_TEXTBOOK) / some
+    return [
+        Base(parts, log(shares.get(count, rest)))
+        for count in range(len(known) + 1)
+        for parts in combinations(known, count)
+    ]
+
+
+def log_prior(parts: Sequence[Projection], names: int, counts: Sequence[float]) -> float:
+    """Return ln of the prior probability of causes at places.
+
+    Arguments:
+        parts: the causes.
+        names: number of effects that were candidates.
+        counts: prior probability of so many causes.
+    """
+    count = len(parts)
+    result = log(counts[min(count, len(counts) - 1)]) + log(factorial(count))
+    for part in parts:
+        result -= log(names) + log(part.hypothesis.places)
+    return result
+
+
+def selection_cost(names: int, places: float) -> float:
+    """Return by how much chi-square must fall for one more cause to be worth its prior."""
+    return 2.0 * (log(names) + log(max(places, 1.0)) + log(PRIOR_OF_COUNT[1] / PRIOR_OF_COUNT[2]))

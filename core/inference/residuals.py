@@ -1,0 +1,162 @@
+"""The data of a diagnosis as one vector of residuals, for many candidate models at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from femubench.core.errors import NotApplicable
+from femubench.core.modal.measurement import Measurement
+from femubench.core.typing import FloatArray, IntArray
+
+# Far from the truth a frequency is no sharper a label of a mode than this.
+_LABEL = 0.03
+
+
+@dataclass(frozen=True)
+class Data:
+    """Used modes as residuals in standard deviations: frequencies, shapes, mass.
+
+    Arguments:
+        measurement: the used modes.
+        bias: relative corrections of predicted frequencies by elastic mode, for the mesh, (k,).
+    """
+
+    measurement: Measurement
+    bias: FloatArray
+
+    def __post_init__(self) -> None:
+        std = self.measurement.frequency_std
+        if not (np.isfinite(std) & (std > 0.0)).all():
+            raise NotApplicable("a used frequency has no standard deviation")
+
+    def __len__(self) -> int:
+        return len(self.measurement) + len(self.shape_rows[0]) + (self.mass is not None)
+
+    @property
+    def mass(self) -> tuple[float, float] | None:
+        """Return the weighed mass and its standard deviation in kg."""
+        return self.measurement.total_mass
+
+    @cached_property
+    def weight(self) -> FloatArray:
+        """Return 1/sigma of every shape component, 0 where there is none, (n_sensors, m)."""
+        shapes, std = self.measurement.shapes, self.measurement.shape_std
+        known = np.isfinite(shapes) & np.isfinite(std) & (std > 0.0)
+        known &= known.sum(axis=0) > 1
+        return np.where(known, 1.0 / np.where(known, std, 1.0), 0.0)
+
+    @cached_property
+    def shapes(self) -> FloatArray:
+        """Return the measured shapes with 0 where there is none, (n_sensors, m)."""
+        return np.where(self.weight > 0.0, self.measurement.shapes, 0.0)
+
+    @cached_property
+    def shape_rows(self) -> tuple[IntArray, IntArray]:
+        """Return (mode, sensor) of every shape datum."""
+        mode, sensor = np.nonzero(self.weight.T > 0.0)
+        return mode, sensor
+
+    @property
+    def scale_count(self) -> int:
+        """Return the number of shape scales that the data themselves must fix."""
+        return int((self.weight > 0.0).any(axis=0).sum())
+
+    def pair(self, frequencies: FloatArray, readings: FloatArray) -> IntArray:
+        """Return the predicted partner of every measured mode for every candidate, (g, m).
+
+        The assignment with the least chi-square; frequencies count with a deviation of at least
+        3 %, since a candidate may be far from its best fit.
+
+        Arguments:
+            frequencies: predicted, Hz, (g, q).
+            readings: predicted shapes at the sensors, (g, n_sensors, q).
+        """
+        measured = self.measurement.frequencies
+        label = np.hypot(self.measurement.frequency_std / measured, _LABEL)
+        gap = frequencies[:, None, :] / measured[:, None] - 1.0
+        cost = np.square(gap / label[:, None])
+        square = np.square(self.weight)
+        seen = np.einsum("sm,gsq->gmq", square * self.shapes, readings)
+        norm = np.einsum("sm,gsq->gmq", square, np.square(readings))
+        total = np.einsum("sm,sm->m", square, np.square(self.shapes))
+        floor = 1e-12 * norm.max(axis=2, keepdims=True, initial=0.0) + 1e-300
+        cost += total[:, None] - np.square(seen) / np.maximum(norm, floor)
+        best = cost.argmin(axis=2)
+        ordered = np.sort(best, axis=1)
+        for g in np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1)):
+            best[g] = linear_sum_assignment(cost[g])[1]
+        return np.asarray(best)
+
+    def scaled(self, readings: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return paired shapes times their modal scale factor, and the factors.
+
+        Arguments:
+            readings: of the partners, (g, n_sensors, m).
+        """
+        square = np.square(self.weight)
+        seen = np.einsum("sm,gsm->gm", square * self.shapes, readings)
+        norm = np.einsum("sm,gsm->gm", square, np.square(readings))
+        factor = seen / np.where(norm > 0.0, norm, 1.0)
+        return readings * factor[:, None, :], factor
+
+    def residual(
+        self, frequencies: FloatArray, readings: FloatArray, mass: FloatArray
+    ) -> FloatArray:
+        """Return measured minus predicted in standard deviations, (g, n_data).
+
+        Arguments:
+            frequencies: of the partners in Hz, (g, m).
+            readings: of the partners, (g, n_sensors, m).
+            mass: of the structure in kg, (g,).
+        """
+        m = self.measurement
+        mode, sensor = self.shape_rows
+        scaled, _ = self.scaled(readings)
+        misfit = self.weight * (self.shapes - scaled)
+        parts = [(m.frequencies - frequencies) / m.frequency_std, misfit[:, sensor, mode]]
+        if self.mass is not None:
+            parts.append((self.mass[0] - mass[:, None]) / self.mass[1])
+        return np.concatenate(parts, axis=1)
+
+    def slope(
+        self, frequency: FloatArray, readings: FloatArray, turn: FloatArray, mass: FloatArray
+    ) -> FloatArray:
+        """Return the derivative of the prediction in standard deviations, (n_data, p).
+
+        Arguments:
+            frequency: d f / d x of the partners in Hz, (m, p).
+            readings: of the partners, (n_sensors, m).
+            turn: d readings / d x, (n_sensors, m, p).
+            mass: d mass / d x in kg, (p,).
+        """
+        square = np.square(self.weight)
+        mode, sensor = self.shape_rows
+        scaled, factor = self.scaled(readings[None])
+        norm = np.einsum("sm,sm->m", square, np.square(readings))
+        rest = self.shapes - 2.0 * scaled[0]
+        slip = np.einsum("sm,smp->mp", square * rest, turn)
+        slip = slip / np.where(norm > 0.0, norm, 1.0)[:, None]
+        change = factor[0][None, :, None] * turn + readings[:, :, None] * slip[None]
+        change = self.weight[:, :, None] * change
+        parts = [frequency / self.measurement.frequency_std[:, None], change[sensor, mode]]
+        if self.mass is not None:
+            parts.append(mass[None, :] / self.mass[1])
+        return np.vstack(parts)
+
+    def corrected(self, frequencies: FloatArray, rigid: float) -> FloatArray:
+        """Return frequencies with the correction for the mesh, counted from the first elastic one.
+
+        Arguments:
+            frequencies: predicted, ascending, (g, q).
+            rigid: what counts as zero in Hz.
+        """
+        order = np.cumsum(frequencies > rigid, axis=1) - 1
+        known = (order >= 0) & (order < len(self.bias))
+        if len(self.bias) == 0:
+            return frequencies
+        factor = self.bias[np.clip(order, 0, len(self.bias) - 1)]
+        return np.asarray(frequencies * (1.0 + np.where(known, factor, 0.0)))

@@ -1,0 +1,282 @@
+"""Search the explanations: nothing, one cause, two, and more, on top of textbook physics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2 as chi_square
+
+from femubench.core.inference.extended_model import agreed, extended
+from femubench.core.inference.fit import Fit, Problem, State, fit, state_at
+from femubench.core.inference.grid_search import Screened, likely, screen
+from femubench.core.inference.hypothesis import hypotheses_of
+from femubench.core.inference.posterior import Explanation, Posterior
+from femubench.core.inference.prior import Base, selection_cost, textbook_bases
+from femubench.core.inference.projection import Projection
+from femubench.core.inference.screening import beside, screened, with_shortlist
+from femubench.core.inference.static_response import Basis, LargeProblem, enriched, placed
+from femubench.core.plugin.roles import Effect
+from femubench.core.typing import FloatArray
+
+
+def adequacy(state: State, unknowns: int) -> float:
+    """Return the probability of residuals as large as these, were they noise.
+
+    The smallest of the probabilities of all data, of the frequencies, of the shape of any one
+    mode and of any one sensor, times the number of these looks (Bonferroni): a sensor that reads
+    wrong is hidden in the sum over many good ones.
+
+    Arguments:
+        state: after the fit.
+        unknowns: number of values that were fitted.
+    """
+    data = state.problem.data
+    count, modes = len(data.measurement), len(state.partner)
+    residual = state.residual
+    mode, sensor = data.shape_rows
+    total = _tail(residual, unknowns + data.scale_count)
+    looks = [total, _tail(residual[:count], 0)]
+    shape = residual[count : count + len(mode)]
+    by_mode = [_tail(shape[mode == j], 1) for j in range(modes) if (mode == j).sum() > 2]
+    by_sensor = [_tail(shape[sensor == s], 0) for s in np.unique(sensor)]
+    parts = [min(ps) * len(ps) for ps in (by_mode, by_sensor) if ps]
+    return float(min(1.0, total, len(looks + parts) * min(looks + parts)))
+
+
+def _tail(residual: FloatArray, unknowns: int) -> float:
+    dof = max(len(residual) - unknowns, 1)
+    return float(chi_square.sf(residual @ residual, dof)) if len(residual) else 1.0
+
+
+_REFINED = 40  # hypotheses that are fitted exactly at most
+_NEAR = 16.0  # of the cost, below which the interpolation may have ranked wrongly
+_CURVED = 0.05  # share of the explained chi-square that the interpolation may miss
+_LOST = 20.0  # behind the best by so much, a fit is not brought to its end
+_SINGLES_FOR_PAIRS, _PARTNERS = 6, 8
+_PROMISE = 0.3  # of the chi-square that a partner must explain, were effects to add up
+_MOST_CAUSES = 4
+_ADEQUATE = 0.05
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found on one base.
+
+    Arguments:
+        base: textbook effects.
+        problem: with the base in the modal coordinates.
+        explanations: every one that was tried.
+        screened: the atlas.
+    """
+
+    base: Base
+    problem: Problem
+    explanations: tuple[Explanation, ...]
+    screened: tuple[Screened, ...]
+
+    @property
+    def best(self) -> Explanation:
+        """Return the most probable explanation."""
+        return max(self.explanations, key=lambda e: e.log_weight)
+
+
+class Search:
+    """State of one search.
+
+    Arguments:
+        problem: data and modal coordinates of the nominal model.
+        effects: what may be missing.
+        pairs: whether more than one cause is sought.
+    """
+
+    def __init__(self, problem: Problem, effects: Sequence[Effect], *, pairs: bool = True) -> None:
+        self.problem, self.effects, self.pairs = problem, effects, pairs
+        places = {p.hypothesis.name: p.hypothesis.places for p in problem.space.projections}
+        self.names = len(places)
+        self.places = sum(places.values()) / max(self.names, 1)
+
+    def run(self) -> tuple[Posterior, list[Found]]:
+        """Return all explanations and the atlas of every base that was searched."""
+        bases = textbook_bases(self.problem.space.projections)
+        found = [self.on(bases[0])]
+        bare = [self.bare(base) for base in bases[1:]]
+        found += [self.on(base) for base in self.promising(bare, found[0])]
+        explanations = [e for item in found for e in item.explanations]
+        searched = {item.base.names for item in found}
+        explanations += [e for e in bare if e.base.names not in searched]
+        if self.pairs and self.names:
+            explanations += self.combined(found)
+        if isinstance(self.problem, LargeProblem):
+            explanations = self.borne_out(explanations)
+        return Posterior.of(explanations), found
+
+    def bare(self, base: Base) -> Explanation:
+        """Return a textbook set with nothing on top, in the coordinates of the model as drawn."""
+        state = state_at(*enriched(self.problem, base.parts), base.x)
+        alone = replace(state, parts=(), x=np.zeros(0))
+        return Explanation(base, Fit(alone, -0.5 * state.chi2), self.names)
+
+    def borne_out(self, explanations: list[Explanation]) -> list[Explanation]:
+        """Return explanations, the best cause fitted until its own model agrees with it."""
+        best = max(explanations, key=lambda e: e.log_weight)
+        if not best.parts:
+            return explanations
+        others = [e for e in explanations if e is not best]
+        return [*others, replace(best, fit=agreed(best.fit))]
+
+    def promising(self, bare: Sequence[Explanation], plain: Found) -> list[Base]:
+        """Return the textbook sets that come nearer to the data than the model as drawn."""
+        nothing = plain.explanations[0].chi2
+        ranked = sorted(bare, key=lambda e: e.chi2 - 2.0 * e.base.log_prior)
+        better = [e.base for e in ranked if e.chi2 < nothing - 6.0]
+        return better[: 1 if self.adequate(plain.best) else 2]
+
+    def adequate(self, explanation: Explanation) -> bool:
+        """Tell whether an explanation leaves no more than noise."""
+        state = explanation.fit.state
+        return adequacy(state, len(state.x)) > _ADEQUATE
+
+    def on(self, base: Base) -> Found:
+        """Return nothing and every single cause on top of a textbook set."""
+        problem = self.grounded(base) if base.parts else self.problem
+        start = fit(problem, (), np.zeros(0))
+        assert start is not None
+        atlas = screened(problem, start.state, problem.space.projections)
+        fits = self.refined(problem, start, atlas)
+        explanations = [Explanation(base, item, self.names) for item in (start, *fits)]
+        return Found(base, problem, tuple(explanations), tuple(atlas))
+
+    def grounded(self, base: Base) -> Problem:
+        """Return the data in the modal coordinates of the model with textbook effects in it.
+
+        All effects are sought there anew: what they do depends on what is there, and a textbook
+        value may be off.
+        """
+        model = extended(self.problem.model, base.parts, base.x)
+        known = hypotheses_of(model, self.effects)
+        basis = Basis.of(model, self.problem.data.measurement)
+        return with_shortlist(placed(basis, self.problem.data, self.problem.noise, known))
+
+    def refined(self, problem: Problem, start: Fit, screened: Sequence[Screened]) -> list[Fit]:
+        """Return exact fits of the hypotheses that the atlas does not rule out."""
+        if not screened:
+            return []
+        lowest = min(s.cost for s in screened)
+        explained = start.state.chi2 - lowest
+        limit = lowest + _NEAR + _CURVED * max(explained, 0.0)
+        near = [s for s in screened if s.cost <= limit]
+        near.sort(key=lambda s: np.log(s.projection.hypothesis.places) - s.log_evidence)
+        fits: list[Fit] = []
+        best = start.state.cost
+        for item in near[:_REFINED]:
+            own, parts = enriched(problem, (item.projection,))
+            result = fit(own, parts, item.x, give_up=best + _LOST)
+            if result is not None:
+                fits.append(result)
+                best = min(best, result.state.cost)
+        return fits
+
+    def combined(self, found: Sequence[Found]) -> list[Explanation]:
+        """Return explanations with two causes, then greedily more while that is worth it."""
+        by_base = {item.base.names: item for item in found}
+        singles = [e for item in found for e in item.explanations if e.parts]
+        singles.sort(key=lambda e: -e.log_weight)
+        seeds = singles[: _SINGLES_FOR_PAIRS if not self.enough(found) else 1]
+        result: list[Explanation] = []
+        tried: set[tuple[object, ...]] = set()
+        for seed in seeds:
+            result += self.grown(by_base[seed.base.names], seed, tried)
+        if not result:
+            return result
+        best = max(result, key=lambda e: e.log_weight)
+        result += self.swapped(by_base[best.base.names], best, tried)
+        while True:
+            best = max(result, key=lambda e: e.log_weight)
+            if len(best.parts) >= _MOST_CAUSES or self.adequate(best):
+                return result
+            more = self.grown(by_base[best.base.names], best, tried)
+            result += more
+            if not more or max(e.log_weight for e in more) <= best.log_weight:
+                return result
+
+    def enough(self, found: Sequence[Found]) -> bool:
+        """Tell whether nothing or one cause leaves no more than noise."""
+        return any(self.adequate(e) for item in found for e in item.explanations)
+
+    def grown(
+        self, found: Found, seed: Explanation, tried: set[tuple[object, ...]]
+    ) -> list[Explanation]:
+        """Return an explanation with one cause more, for every partner that is worth it."""
+        problem, state = found.problem, seed.fit.state
+        floor = 0.5 * selection_cost(self.names, self.places)
+        above = beside(worthwhile(found, seed, _PROMISE * floor), seed.fit)
+        start = fit(above, (), np.zeros(0))
+        assert start is not None
+        originals = {id(p.hypothesis): p for p in problem.space.projections}
+        taken = {id(part.hypothesis) for part in seed.parts}
+        free = [p for p in above.space.projections if id(p.hypothesis) not in taken]
+        ranked = sorted(screen(above, start.state, free, state.jacobian), key=lambda s: s.cost)
+        result = []
+        for item in ranked[:_PARTNERS]:
+            if start.state.chi2 - item.cost < floor:
+                break
+            partner = originals.get(id(item.projection.hypothesis), item.projection)
+            joint = self.joint(problem, (*seed.parts, partner), state.x, item.x, tried)
+            if joint is not None:
+                result.append(Explanation(found.base, joint, self.names))
+        return result
+
+    def joint(
+        self,
+        problem: Problem,
+        parts: tuple[Projection, ...],
+        first: FloatArray,
+        last: FloatArray,
+        tried: set[tuple[object, ...]],
+    ) -> Fit | None:
+        """Return the joint fit of several causes, None where it was tried before or fails."""
+        order = np.argsort([id(part.hypothesis) for part in parts])
+        key = (id(problem), *(id(parts[i].hypothesis) for i in order))
+        if key in tried:
+            return None
+        tried.add(key)
+        own, parts = enriched(problem, parts)
+        found = fit(own, parts, np.concatenate([first, last]))
+        # A large model is solved anew for the best explanation alone.
+        return found if found is None or isinstance(own, LargeProblem) else agreed(found)
+
+    def swapped(
+        self, found: Found, pair: Explanation, tried: set[tuple[object, ...]]
+    ) -> list[Explanation]:
+        """Return pairs in which either cause of the best pair has another partner."""
+        result = []
+        for i, part in enumerate(pair.parts):
+            counts = [len(p.hypothesis.parameters) for p in pair.parts]
+            first = sum(counts[:i])
+            x = pair.fit.state.x[first : first + counts[i]]
+            own, parts = enriched(found.problem, (part,))
+            alone = fit(own, parts, x, steps=0)
+            if alone is not None:
+                seed = Explanation(found.base, alone, self.names)
+                result += self.grown(found, seed, tried)
+        return result
+
+
+def worthwhile(found: Found, seed: Explanation, least: float) -> Problem:
+    """Return the data with those hypotheses alone that may be worth something beside a seed.
+
+    Arguments:
+        found: the atlas without the seed.
+        seed: causes.
+        least: what chi-square must promise to fall by.
+    """
+    problem = found.problem
+    if isinstance(problem, LargeProblem):
+        return problem
+    taken = {id(part.hypothesis) for part in seed.parts}
+    others = [item for item in found.screened if id(item.projection.hypothesis) not in taken]
+    still = found.explanations[0].fit.state.residual
+    chosen = likely(others, still, seed.fit.state, least)
+    return replace(problem, space=replace(problem.space, projections=tuple(chosen)))

@@ -1,0 +1,290 @@
+"""Large models: some of their modes, and their response to what each hypothesis exerts on these.
+
+A few modes say what a change of the structure does to first order; how it bends where it is changed
+is in all the others. Their response to a force is static but for (omega / omega_rest)^2, so that
+one factorisation of K - s M gives a basis in which a hypothesis acts as in the whole model: the
+modes, (K - s M)^-1 (dK - lambda_j dM) phi_j, and the same for forces at the sensors, with which the
+readings of a small change are right whatever it is.
+
+Source: MacNeal (1971), residual flexibility; Fox & Kapoor (1968) for the forces of a change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+import scipy.linalg as la
+
+from femubench.core.effect.change import RowOperator, Term
+from femubench.core.fem.model import Model
+from femubench.core.inference.fit import Problem
+from femubench.core.inference.hypothesis import Hypothesis
+from femubench.core.inference.modal_basis import Space, nominal_space
+from femubench.core.inference.noise import Noise
+from femubench.core.inference.projection import Projection, Projector
+from femubench.core.inference.residuals import Data
+from femubench.core.modal.eigen import DENSE_LIMIT, Modes, modes_of
+from femubench.core.modal.measurement import Measurement
+from femubench.core.modal.sparse_eigen import ShiftedModel
+from femubench.core.typing import FloatArray, SparseArray
+
+_A_MODE, _SPARE = 4, 20  # modes that are solved for every measured one, and besides
+_RIGID, _MISSED = 6, 6
+_SHIFT = 0.5  # of the first elastic eigenvalue, below zero
+_FROM_SENSORS, _FROM_HYPOTHESIS = 40, 64  # vectors at most
+_APART = 1e-10  # squared sine below which a vector lies in the span of the others
+_FELT = 1e-7  # of the largest force
+_FEW_TERMS = 6
+_SIZES, _FREQUENCIES = (0.3, 1.5), 15
+
+
+@dataclass(frozen=True, eq=False)
+class Basis:
+    """All modes of a small model; of a large one some, and its response to forces at the sensors.
+
+    Arguments:
+        modes: rigid-body modes first, then ascending; behind the exact ones the Ritz vectors of
+            the response, orthogonal to them.
+        exact: number of modes that are exact.
+        tracked: number of modes whose change by a hypothesis matters.
+        solver: K - s M, s below the first elastic eigenvalue.
+        rows: sensor readings from dofs, sparse (n_sensors, n).
+    """
+
+    modes: Modes
+    exact: int
+    tracked: int
+    solver: ShiftedModel
+    rows: SparseArray
+
+    @classmethod
+    def of(cls, model: Model, measurement: Measurement) -> Basis:
+        """Solve a model for the modes that the diagnosis of a measurement needs.
+
+        Raises:
+            ModelError: when the model has no modes.
+        """
+        count = _RIGID + _A_MODE * len(measurement) + _SPARE
+        modes = modes_of(model, count if model.size > DENSE_LIMIT else None)
+        modes = modes.take(np.argsort(~modes.rigid, kind="stable"))
+        first = float(np.abs(modes.eigenvalues[~modes.rigid]).min(initial=np.inf))
+        shift = min(-_SHIFT * first, 2.0 * float(modes.eigenvalues.min()))
+        tracked = min(int(modes.rigid.sum()) + len(measurement) + _MISSED, len(modes))
+        rows = model.observe(measurement.sensors)
+        bare = cls(modes, len(modes), tracked, ShiftedModel(model, shift), rows)
+        if bare.complete:
+            return bare
+        added = bare.response(np.asarray(rows.T.toarray()), _FROM_SENSORS)
+        values, turn = la.eigh(added.T @ model.stiffness_times(added))
+        full = Modes(
+            np.concatenate([modes.eigenvalues, values]),
+            np.hstack([modes.shapes, added @ turn]),
+            np.append(modes.rigid, np.zeros(len(values), dtype=bool)),
+        )
+        return replace(bare, modes=full)
+
+    @property
+    def model(self) -> Model:
+        """Return the model."""
+        return self.solver.model
+
+    @property
+    def complete(self) -> bool:
+        """Tell whether the modes are all that the model has."""
+        return self.model.size <= DENSE_LIMIT
+
+    @cached_property
+    def momentum(self) -> FloatArray:
+        """Return the mass times all vectors, (n, N)."""
+        return self.model.mass_times(self.modes.shapes)
+
+    def response(
+        self, forces: FloatArray, most: int, known: FloatArray | None = None
+    ) -> FloatArray:
+        """Return what the basis lacks of the response to some forces, M-orthonormal, (n, r).
+
+        Arguments:
+            forces: on the dofs, (n, c).
+            most: number of vectors that are kept.
+            known: further vectors, orthonormal to the basis, that it has, (n, k).
+        """
+        if forces.shape[1] == 0:
+            return forces
+        shapes, momentum = self.modes.shapes[:, : self.exact], self.momentum[:, : self.exact]
+        moved = self.solver.solve(forces - momentum @ (shapes.T @ forces))
+        vectors, heavy = self.modes.shapes, self.momentum
+        if known is not None and known.shape[1]:
+            vectors = np.hstack([vectors, known])
+            heavy = np.hstack([heavy, self.model.mass_times(known)])
+        whole = np.sqrt(np.einsum("ij,ij->j", moved, self.model.mass_times(moved)))
+        for _ in range(2):  # the second time what rounding left of the basis
+            moved = moved - vectors @ (heavy.T @ moved)
+            moved = moved / np.where(whole > 0.0, whole, 1.0)
+            values, turn = la.eigh(moved.T @ self.model.mass_times(moved))
+            kept = np.flatnonzero(values > _APART)[-most:]
+            moved = moved @ (turn[:, kept] / np.sqrt(values[kept]))
+            whole = np.ones(moved.shape[1])
+        return np.asarray(moved)
+
+    def enriched(
+        self, space: Space, parts: Sequence[Projection], rounds: int = 2
+    ) -> tuple[Space, FloatArray]:
+        """Return coordinates of their own for some hypotheses, and their motions, (n, N + r).
+
+        Arguments:
+            space: the coordinates of the basis.
+            parts: the hypotheses, in any coordinates of the model.
+            rounds: 1 for the response to what they exert on the modes, 2 for that to what they
+                exert on this response besides, and to its inertia.
+        """
+        if not parts:
+            return replace(space, projections=()), self.modes.shapes
+        near = self.modes.take(np.arange(self.tracked))
+        forces = [exerted(part.hypothesis, near) for part in parts]
+        added = self.response(np.hstack(forces), _FROM_HYPOTHESIS * len(parts))
+        if rounds > 1 and added.shape[1]:
+            there = Modes(np.full(added.shape[1], near.eigenvalues[-1]), added, near.rigid[:0])
+            forces = [exerted(part.hypothesis, there) for part in parts]
+            forces.append(self.model.mass_times(added))
+            more = self.response(np.hstack(forces), _FROM_HYPOTHESIS * len(parts), added)
+            added = np.hstack([added, more])
+        old = np.arange(self.exact, len(self.modes))
+        tail = np.hstack([self.modes.shapes[:, old], added])
+        inner = np.diag(np.append(self.modes.eigenvalues[old], np.zeros(added.shape[1])))
+        cross = tail.T @ self.model.stiffness_times(added)
+        inner[:, len(old) :], inner[len(old) :, : len(old)] = cross, cross[: len(old)].T
+        values, turn = la.eigh(inner)
+        vectors = np.hstack([self.modes.shapes[:, : self.exact], tail @ turn])
+        values = np.concatenate([space.eigenvalues[: self.exact], values])
+        project = Projector(self.model, vectors)
+        own = tuple(project(part.hypothesis) for part in parts)
+        readings = np.asarray(self.rows @ vectors)
+        return replace(space, eigenvalues=values, readings=readings, projections=own), vectors
+
+
+def exerted(hypothesis: Hypothesis, near: Modes) -> FloatArray:
+    """Return forces that span what a hypothesis exerts on some modes at any magnitude, (n, r)."""
+    terms = hypothesis.change.terms
+    blocks = [_range(term, near.shapes, hypothesis.change.extra) for term in terms]
+    if len(terms) > _FEW_TERMS:
+        blocks = _at_sizes(hypothesis, near)
+    sizes = [float(np.linalg.norm(block)) for block in blocks]
+    scaled = [block / size for block, size in zip(blocks, sizes, strict=True) if size > 0.0]
+    forces = np.zeros((len(near.shapes), 0))
+    return _principal(np.hstack(scaled)) if scaled else forces
+
+
+def _at_sizes(hypothesis: Hypothesis, near: Modes) -> list[FloatArray]:
+    """Return the forces at a few magnitudes, where single terms are too many, (n, m) each."""
+    terms = hypothesis.change.terms
+    sign = [1.0 if term.matrix == "stiffness" else -near.eigenvalues for term in terms]
+    pulls = [
+        _applied(term, near.shapes, hypothesis.change.extra) * s
+        for term, s in zip(terms, sign, strict=True)
+    ]
+    together, factors = np.array(pulls), hypothesis.factors(magnitudes(hypothesis))
+    return [np.tensordot(row, together, axes=1) for row in factors]
+
+
+def magnitudes(hypothesis: Hypothesis, sizes: Sequence[float] = _SIZES) -> FloatArray:
+    """Return coordinates at which a hypothesis is tried, (g, k).
+
+    Arguments:
+        hypothesis: with one parameter or more.
+        sizes: positive; the second parameter of what adds dofs is its frequency, which runs over
+            its range.
+    """
+    chosen = []
+    for i, parameter in enumerate(hypothesis.parameters):
+        low, high = parameter.range
+        if hypothesis.change.extra and i:
+            chosen.append(np.linspace(low, high, _FREQUENCIES))
+        else:
+            below = [] if parameter.one_sided else [-size for size in sizes]
+            chosen.append(np.unique(np.clip([*below, *sizes], low, high)))
+    return np.array(list(product(*chosen)))
+
+
+def _principal(forces: FloatArray) -> FloatArray:
+    """Return orthonormal forces that span the largest of some, zero where these are, (n, r)."""
+    rows = np.flatnonzero(forces.any(axis=1))
+    local = forces[rows]
+    if local.shape[0] < local.shape[1]:
+        left, size, _ = la.svd(local, full_matrices=False)
+    else:
+        square, turn = la.eigh(local.T @ local)
+        size = np.sqrt(np.maximum(square[::-1], 0.0))
+        left = local @ (turn[:, ::-1] / np.where(size > 0.0, size, 1.0))
+    kept = np.flatnonzero(size > _FELT * size[0])[:_FROM_HYPOTHESIS]
+    result = np.zeros((len(forces), len(kept)))
+    result[rows] = left[:, kept]
+    return result
+
+
+def _range(term: Term, shapes: FloatArray, extra: int) -> FloatArray:
+    """Return forces that span those of one term: where few rows move it, all it can exert."""
+    operator = term.operator
+    if isinstance(operator, RowOperator) and operator.rows.shape[0] <= shapes.shape[1]:
+        return np.asarray(operator.rows[:, : len(shapes)].T.toarray())
+    return _applied(term, shapes, extra)
+
+
+def _applied(term: Term, shapes: FloatArray, extra: int) -> FloatArray:
+    """Return the forces of one term on the dofs of the model, (n, m)."""
+    grown = np.vstack([shapes, np.zeros((extra, shapes.shape[1]))]) if extra else shapes
+    return term.operator.apply(grown)[: len(shapes)]
+
+
+@dataclass(frozen=True)
+class LargeProblem(Problem):
+    """A problem on a large model, in the coordinates of its basis or in those of some hypotheses.
+
+    The coordinates hold a short list of the hypotheses; `hypotheses` are all of them.
+    """
+
+    basis: Basis | None = None
+    hypotheses: tuple[Hypothesis, ...] = ()
+
+    @property
+    def common(self) -> Basis:
+        """Return the basis."""
+        assert self.basis is not None
+        return self.basis
+
+
+def enriched(
+    problem: Problem, parts: Sequence[Projection], rounds: int = 2
+) -> tuple[Problem, tuple[Projection, ...]]:
+    """Return the data in coordinates that hold the response to some hypotheses, and these there.
+
+    The problem itself where its coordinates are complete.
+
+    Arguments:
+        problem: of the model.
+        parts: the hypotheses, in any coordinates of the model.
+        rounds: as in `Basis.enriched`.
+    """
+    if not isinstance(problem, LargeProblem) or not parts:
+        return problem, tuple(parts)
+    space, _ = problem.common.enriched(problem.space, parts, rounds)
+    return replace(problem, space=space), space.projections
+
+
+def placed(basis: Basis, data: Data, noise: Noise, hypotheses: Sequence[Hypothesis]) -> Problem:
+    """Return data in modal coordinates; none of the hypotheses is in them yet if some lack.
+
+    Arguments:
+        basis: of the model.
+        data, noise: the used modes.
+        hypotheses: what may be missing.
+    """
+    known, sensors = tuple(hypotheses), data.measurement.sensors
+    if basis.complete:
+        space = nominal_space(basis.model, basis.modes, sensors, known)
+        return Problem(basis.model, space, data, noise)
+    space = nominal_space(basis.model, basis.modes, sensors, ())
+    return LargeProblem(basis.model, space, data, noise, basis=basis, hypotheses=known)

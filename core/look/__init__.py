@@ -1,0 +1,1 @@
+"""What is odd about a model and its measurement before any fit."""

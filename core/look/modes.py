@@ -1,0 +1,111 @@
+"""What a plain look compares: the modes of the model and their measured partners."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg as la
+
+from femubench.core.errors import ModelError
+from femubench.core.fem.frame import Frame
+from femubench.core.fem.model import Model
+from femubench.core.modal.eigen import Modes
+from femubench.core.modal.frequency_changes import (
+    SOLVED_LIMIT,
+    elastic_modes,
+    frequency_changes,
+    matched,
+)
+from femubench.core.modal.measurement import Measurement
+from femubench.core.modal.pairing import Pairing, pair_modes
+from femubench.core.typing import FloatArray
+
+_MOST_MODES = 40
+_MARGIN = 4  # modes beyond those wanted, so that a pair may cross the end of the list
+_RIGID = 6
+Changes = tuple[tuple[int, float], ...]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A model beside its measurement.
+
+    Arguments:
+        model: any model.
+        measurement: some measured modes.
+    """
+
+    model: Model
+    measurement: Measurement
+
+    @cached_property
+    def modes(self) -> Modes:
+        """Return the elastic modes, those of zero frequency left out, a margin included."""
+        wanted = min(2 * len(self.measurement) + 8, _MOST_MODES)
+        return elastic_modes(self.model, wanted + _MARGIN)
+
+    @cached_property
+    def readings(self) -> FloatArray:
+        """Return the modes at the sensors, (n_sensors, p)."""
+        return np.asarray(self.model.observe(self.measurement.sensors) @ self.modes.shapes)
+
+    @cached_property
+    def pairing(self) -> Pairing:
+        """Return the partners of the measured modes."""
+        m = self.measurement
+        return pair_modes(m.frequencies, m.shapes, self.modes.natural_frequencies, self.readings)
+
+    @cached_property
+    def count(self) -> int:
+        """Return how many elastic modes lie in the range of the measured ones."""
+        highest = int(self.pairing.index.max(initial=-1)) + 1
+        wanted = highest if highest > 0 else len(self.measurement)
+        return min(wanted, len(self.modes))
+
+    @cached_property
+    def deviations(self) -> FloatArray:
+        """Return the relative deviation of the measured partner, infinite without one, (p,)."""
+        result = np.full(len(self.modes), np.inf)
+        std = self.measurement.frequency_std / self.measurement.frequencies
+        known = (self.pairing.index >= 0) & np.isfinite(std) & (std > 0.0)
+        result[self.pairing.index[known]] = std[known]
+        return result
+
+    def changes(self, frame: Frame) -> FloatArray | None:
+        """Return the relative changes of the first `count` frequencies in another frame, (count,).
+
+        None where the frame cannot be built or solved, or has other dofs. Models beyond 5000
+        dofs are not solved anew: the other matrices are reduced to the modes at hand.
+        """
+        structure = self.model.frame_structure
+        try:
+            other = Model.of(structure.rebuilt(frame))
+            if other.size != self.model.size:
+                return None
+            if other.size > SOLVED_LIMIT:
+                return self._ritz(other)
+            return frequency_changes(self.model, self.modes, other, self.count)
+        except ModelError:
+            return None
+
+    def _ritz(self, other: Model) -> FloatArray:
+        """Return the changes by Rayleigh and Ritz in the space of the modes at hand."""
+        shapes = self.modes.shapes
+        stiffness = shapes.T @ other.stiffness_times(shapes)
+        mass = shapes.T @ other.mass_times(shapes)
+        values, turn = la.eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
+        partner = matched(np.square(turn))[: self.count]
+        ratio = values[partner] / self.modes.eigenvalues[: self.count]
+        return np.asarray(np.sqrt(np.maximum(ratio, 0.0)) - 1.0)
+
+    def exceeds(self, changes: FloatArray, least: float, deviations: float) -> bool:
+        """Tell whether any mode changes by more than a share, or than so many deviations."""
+        limit = np.minimum(least, deviations * self.deviations[: len(changes)])
+        return bool((np.abs(changes) > limit).any())
+
+
+def percent(changes: FloatArray) -> Changes:
+    """Return relative changes as (elastic mode number from 1, percent)."""
+    return tuple((k + 1, 100.0 * float(change)) for k, change in enumerate(changes))

@@ -1,0 +1,185 @@
+"""Measured modes at all dofs of a model, with the displacement gap that tells where it is wrong."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from femubench.core.errors import ModelError
+from femubench.core.fem.model import Model
+from femubench.core.inference.mesh_error import mesh_bias
+from femubench.core.modal.eigen import Modes
+from femubench.core.modal.frequency_changes import elastic_modes
+from femubench.core.modal.measurement import Measurement
+from femubench.core.modal.pairing import LEAST_SENSORS, Pairing, pair_modes
+from femubench.core.modal.sparse_eigen import ShiftedModel
+from femubench.core.typing import FloatArray
+
+_DEFAULT_STD = 0.02  # of the largest component, where a shape has no deviation
+_NEAR = 1e-7  # relative distance to an eigenvalue below which K - lambda M is as good as singular
+_WEIGHTS = (1e-6, 1e18)  # of the readings against the model, times the largest sensitivity
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Measured modes beside the modes of a model.
+
+    Arguments:
+        model: any model.
+        measurement: measured modes.
+        modes: elastic modes of the model.
+        readings: the same at the sensors, (n_sensors, p).
+        pairing: partners of the measured modes.
+        bias: relative correction of the model's frequencies for its mesh, (p,).
+    """
+
+    model: Model
+    measurement: Measurement
+    modes: Modes
+    readings: FloatArray
+    pairing: Pairing
+    bias: FloatArray
+
+    @classmethod
+    def of(cls, model: Model, measurement: Measurement) -> Comparison:
+        """Solve a model and pair its modes with the measured ones.
+
+        Raises:
+            ModelError: when the model has no modes.
+        """
+        modes = elastic_modes(model, 2 * len(measurement) + 8)
+        readings = np.asarray(model.observe(measurement.sensors) @ modes.shapes)
+        pairing = pair_modes(
+            measurement.frequencies, measurement.shapes, modes.natural_frequencies, readings
+        )
+        bias = np.zeros(len(modes))
+        found = mesh_bias(model, int(pairing.index.max(initial=-1)) + 1, modes)
+        if found is not None:
+            bias[: len(found)] = found
+        return cls(model, measurement, modes, readings, pairing, bias)
+
+    @property
+    def shifts(self) -> FloatArray:
+        """Return f_measured / f_model - 1 of every pair, nan without a partner, (m,)."""
+        index = self.pairing.index
+        frequency = self.modes.natural_frequencies * (1.0 + self.bias)
+        ratio = self.measurement.frequencies / frequency[index] - 1.0
+        return np.where(index >= 0, ratio, np.nan)
+
+    @property
+    def eigenvalues(self) -> FloatArray:
+        """Return measured eigenvalues as this mesh would show them in rad^2/s^2, (m,)."""
+        index = self.pairing.index
+        bias = np.where(index >= 0, self.bias[index], 0.0)
+        return np.asarray(self.measurement.eigenvalues / np.square(1.0 + bias))
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """Measured modes at all dofs.
+
+    Arguments:
+        shapes: u with u' M u = 1, (n, m).
+        gaps: u - v, where v is the static response of the model to the inertia of u, (n, m).
+        eigenvalues: measured, in rad^2/s^2, (m,).
+    """
+
+    shapes: FloatArray
+    gaps: FloatArray
+    eigenvalues: FloatArray
+
+
+def expand(comparison: Comparison) -> Expansion:
+    """Return the measured modes that have a shape, expanded by the error in constitutive relation.
+
+    Of all shapes u that meet the readings within their noise, the one whose error has the least
+    strain energy, |u - v|^2 in the metric of K with K v = lambda M u. With A = K - lambda M and
+    readings y = S u the gap is u - v = A^-1 S' c, u = A^-1 K (u - v); the forces c are fitted
+    with the weight at which the misfit is that of noise (Morozov's discrepancy principle).
+
+    Source: Ladeveze & Chouaki (1999), Application of a posteriori error estimation for structural
+    model updating, Inverse Problems 15; the solution by readings is the dual of theirs by dofs.
+    """
+    m = comparison.measurement
+    rows = comparison.model.observe(m.sensors)
+    columns = []
+    for j, eigenvalue in enumerate(comparison.eigenvalues):
+        known = np.isfinite(m.shapes[:, j])
+        if known.sum() < LEAST_SENSORS:
+            continue
+        reading = m.shapes[known, j]
+        size = float(np.abs(reading).max())
+        std = m.shape_std[known, j]
+        std = np.where(np.isfinite(std) & (std > 0.0), std, _DEFAULT_STD * size)
+        sensors = np.asarray(rows[np.flatnonzero(known)].toarray()) / std[:, None]
+        if size > 0.0:
+            columns.append(_expanded(comparison, sensors, reading / std, float(eigenvalue)))
+    if not columns:
+        none = np.zeros((comparison.model.size, 0))
+        return Expansion(none, none, np.zeros(0))
+    shapes, gaps, values = zip(*columns, strict=True)
+    return Expansion(np.column_stack(shapes), np.column_stack(gaps), np.array(values))
+
+
+def _expanded(
+    comparison: Comparison, sensors: FloatArray, reading: FloatArray, eigenvalue: float
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return shape and gap of one mode, and the eigenvalue.
+
+    Arguments:
+        comparison: model and modes.
+        sensors: readings from dofs in standard deviations, (n_sensors, n).
+        reading: in standard deviations, (n_sensors,).
+        eigenvalue: measured, in rad^2/s^2.
+    """
+    model = comparison.model
+    solve = _Solver(model, _off_resonance(comparison.modes, eigenvalue))
+    patterns = solve(sensors.T)
+    energy = patterns.T @ model.stiffness_times(patterns)
+    values, turn = la.eigh(0.5 * (energy + energy.T))
+    values, parts = np.maximum(values, 0.0), turn.T @ reading
+    weight = _discrepancy(values, parts)
+    gap = patterns @ (turn @ (weight * parts / (1.0 + weight * values)))
+    shape = solve(model.stiffness_times(gap[:, None]))[:, 0]
+    scale = 1.0 / np.sqrt(float(shape @ model.mass_times(shape[:, None])[:, 0]))
+    return scale * shape, scale * gap, eigenvalue
+
+
+def _off_resonance(modes: Modes, eigenvalue: float) -> float:
+    """Return the eigenvalue, moved off one of the model that it hits."""
+    near = np.abs(modes.eigenvalues / eigenvalue - 1.0).min(initial=1.0)
+    return eigenvalue * (1.0 + _NEAR) if near < 0.5 * _NEAR else eigenvalue
+
+
+class _Solver:
+    """Solve (K - lambda M) x = b, refined once, since the factors are not pivoted."""
+
+    def __init__(self, model: Model, eigenvalue: float) -> None:
+        self.model, self.eigenvalue = model, eigenvalue
+        self.shifted = ShiftedModel(model, eigenvalue)
+
+    def __call__(self, right: FloatArray) -> FloatArray:
+        answer = self.shifted.solve(right)
+        left = self.model.stiffness_times(answer) - self.eigenvalue * self.model.mass_times(answer)
+        return np.asarray(answer + self.shifted.solve(right - left))
+
+
+def _discrepancy(values: FloatArray, parts: FloatArray) -> float:
+    """Return the weight of the readings at which the misfit is that of noise.
+
+    Arguments:
+        values: eigenvalues of the sensitivity of the readings to the forces, (n_sensors,).
+        parts: readings along its eigenvectors in standard deviations, (n_sensors,).
+    """
+    largest = float(values.max(initial=0.0))
+    if largest == 0.0:
+        raise ModelError("no sensor sees any motion that the model can make")
+    low, high = (np.log(w / largest) for w in _WEIGHTS)
+    expected = max(len(parts) - 1.0, 1.0)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        misfit = np.square(parts / (1.0 + np.exp(middle) * values)).sum()
+        low, high = (middle, high) if misfit > expected else (low, middle)
+    return float(np.exp(high))

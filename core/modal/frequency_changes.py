@@ -1,0 +1,52 @@
+"""Changes of frequencies between two models that are much alike, paired by shape."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from femubench.core.fem.model import Model
+from femubench.core.modal.eigen import Modes, modes_of, zero_tolerance
+from femubench.core.typing import FloatArray, IntArray
+
+_MARGIN = 4  # modes beyond those wanted, so that a pair may cross the end of the list
+_RIGID = 6
+SOLVED_LIMIT = 5000  # dofs up to which another model is solved anew
+
+
+def elastic_modes(model: Model, count: int) -> Modes:
+    """Return at least `count` elastic modes with a frequency above zero, if there are so many."""
+    modes = modes_of(model, min(count + _RIGID, model.size - 1))
+    alive = ~modes.rigid & (modes.eigenvalues > zero_tolerance(modes))
+    return modes.take(alive)
+
+
+def matched(likeness: FloatArray) -> IntArray:
+    """Return the column that belongs to every row, all likenesses together as large as can be."""
+    return np.asarray(linear_sum_assignment(likeness, maximize=True)[1])
+
+
+def frequency_changes(
+    model: Model,
+    modes: Modes,
+    other: Model,
+    count: int,
+    restrict: Callable[[FloatArray], FloatArray] = np.asarray,
+) -> FloatArray:
+    """Return f_other / f - 1 of the first modes, paired by shape in the metric of the mass.
+
+    Arguments:
+        model: whose modes they are.
+        modes: its elastic modes, mass-normalised.
+        other: a model that is much like it.
+        count: number of modes wanted.
+        restrict: from shapes of the other model to the dofs of the first.
+    """
+    further = elastic_modes(other, min(count, len(modes)) + _MARGIN)
+    count = min(count, len(modes), len(further))
+    likeness = np.square(model.mass_times(modes.shapes[:, :count]).T @ restrict(further.shapes))
+    partner = matched(likeness)
+    ratio = further.eigenvalues[partner] / modes.eigenvalues[:count]
+    return np.asarray(np.sqrt(ratio) - 1.0)

@@ -1,0 +1,76 @@
+"""What a vibration test gives: frequencies and mode shapes with their standard deviations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from femubench.core.fem.sensors import Sensors
+from femubench.core.typing import FloatArray
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """Measured modes of one structure.
+
+    Arguments:
+        sensors: where the shapes were measured.
+        numbers: the label of every mode, (m,); says nothing about a model's order.
+        frequencies: natural frequencies in Hz, (m,).
+        frequency_std: their standard deviations in Hz, (m,).
+        damping: damping ratios, (m,); nan where none was measured.
+        shapes: real mode shapes, (n_sensors, m), every one with its own scale; nan where missing.
+        shape_std: standard deviations in the unit of each shape, (n_sensors, m).
+        total_mass: mass of the whole structure and its standard deviation in kg, if weighed.
+    """
+
+    sensors: Sensors
+    numbers: tuple[int, ...]
+    frequencies: FloatArray
+    frequency_std: FloatArray
+    damping: FloatArray
+    shapes: FloatArray
+    shape_std: FloatArray
+    total_mass: tuple[float, float] | None = None
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    @property
+    def eigenvalues(self) -> FloatArray:
+        """Return (2 pi f)^2 in rad^2/s^2, (m,)."""
+        return np.square(2.0 * np.pi * self.frequencies)
+
+    @property
+    def has_shapes(self) -> bool:
+        """Tell whether every mode has a shape at one sensor at least."""
+        return len(self.sensors) > 0 and bool(np.isfinite(self.shapes).any(axis=0).all())
+
+    def select(self, numbers: Iterable[int]) -> Measurement:
+        """Return the modes of the given labels, in the given order.
+
+        Raises:
+            KeyError: when a label is not among the modes.
+        """
+        wanted = tuple(numbers)
+        missing = [number for number in wanted if number not in self.numbers]
+        if missing:
+            raise KeyError(f"no measured mode {missing[0]}; there are {list(self.numbers)}")
+        columns = [self.numbers.index(number) for number in wanted]
+        return replace(
+            self,
+            numbers=wanted,
+            frequencies=self.frequencies[columns],
+            frequency_std=self.frequency_std[columns],
+            damping=self.damping[columns],
+            shapes=self.shapes[:, columns],
+            shape_std=self.shape_std[:, columns],
+        )
+
+    def with_noise(self, rng: np.random.Generator) -> Measurement:
+        """Return the same modes with one draw of Gaussian noise at their standard deviations."""
+        frequencies = self.frequencies + self.frequency_std * rng.standard_normal(len(self))
+        shapes = self.shapes + self.shape_std * rng.standard_normal(self.shapes.shape)
+        return replace(self, frequencies=np.abs(frequencies), shapes=shapes)

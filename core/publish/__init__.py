@@ -1,0 +1,1 @@
+"""A public leaderboard from result files."""

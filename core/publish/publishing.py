@@ -1,0 +1,176 @@
+"""Keep a static site of published runs: read all, build it beside the old one, swap."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from femubench.core.errors import InputError
+from femubench.core.files import MIB, read_text
+from femubench.core.publish.board import index_of
+from femubench.core.publish.submissions import SCHEMA, Submission, read_submission
+from femubench.core.schema.records import parse_json
+
+MARKER = "femubench-site.json"
+KIND = "femubench leaderboard"
+DATA = "data"
+MOST_RUNS, MOST_RESULTS = 1_000, 200_000
+# What publish makes; everything else in the folder, such as .git or CNAME, is somebody's and stays.
+OWN = (MARKER, DATA, "index.html", "index.json", "strategies", "cases")
+# A folder with nothing but these counts as empty.
+_SPARE = frozenset({".git", ".nojekyll", "CNAME", ".gitignore", ".gitattributes"})
+Render = Callable[[Mapping[str, Any]], Mapping[str, str]]
+
+
+@dataclass(frozen=True)
+class Published:
+    """What a call of `publish` did.
+
+    Arguments:
+        added: names of the data files that are new.
+        index: what ``index.json`` holds.
+    """
+
+    added: tuple[str, ...]
+    index: Mapping[str, Any]
+
+
+def publish(folder: Path, files: Sequence[Path], render: Render) -> Published:
+    """Merge result files into the site in a folder, all of them or none.
+
+    Arguments:
+        folder: made by this function, empty, or not there yet.
+        files: what ``bench run --json`` wrote.
+        render: from the content of ``index.json`` to the pages by relative name.
+
+    Raises:
+        InputError: for a file that is not sound, or a folder with something else in it.
+    """
+    folder = folder.resolve()
+    old = _published(folder)
+    merged = _merged([*old, *(read_submission(file) for file in files)])
+    index = index_of(merged)
+    pages = {
+        **render(index),
+        **{f"{DATA}/{item.name}": item.text for item in merged},
+        "index.json": json.dumps(index, indent=1, sort_keys=True, allow_nan=False) + "\n",
+        MARKER: json.dumps({"kind": KIND, "schema": SCHEMA}) + "\n",
+    }
+    _replace(folder, pages)
+    known = {item.name for item in old}
+    return Published(tuple(item.name for item in merged if item.name not in known), index)
+
+
+def check_site(folder: Path) -> None:
+    """Check that a folder may become a site or is one.
+
+    Raises:
+        InputError: when it is a file or holds what publish has not made.
+    """
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise InputError("is a file", file=folder, expected="a folder")
+    inside = {path.name for path in folder.iterdir()}
+    if MARKER not in inside:
+        if inside <= _SPARE:
+            return
+        raise InputError(
+            f"not made by bench publish: there is {sorted(inside - _SPARE)[0]!r}",
+            file=folder,
+            expected="a new or empty folder, or one that bench publish made",
+        )
+    file = folder / MARKER
+    expected = "what bench publish writes"
+    data = parse_json(read_text(file, MIB), file=file, expected=expected)
+    if not isinstance(data, dict) or data.get("kind") != KIND:
+        raise InputError("no site", file=file, key="kind", expected=repr(KIND))
+    if data.get("schema") != SCHEMA:
+        what = f"schema {data.get('schema')!r}"
+        raise InputError(what, file=file, key="schema", expected=str(SCHEMA))
+
+
+def _published(folder: Path) -> list[Submission]:
+    """Return what a site holds; its files are read as carefully as those of strangers."""
+    check_site(folder)
+    data = folder / DATA
+    names = sorted(path for path in data.glob("*.json")) if data.is_dir() else []
+    return [read_submission(path) for path in names]
+
+
+def _merged(submissions: Iterable[Submission]) -> list[Submission]:
+    """Return every run once, whatever order they came in.
+
+    A run that another file of the same run holds whole, as one made before it was resumed, is
+    left out.
+    """
+    unique = {item.name: item for item in submissions}
+    listed = sorted(unique.values(), key=lambda item: item.order)
+    parts = {item.name: _results(item) for item in listed}
+    kept = [
+        item
+        for item in listed
+        if not any(
+            item.run.meta["run"] == other.run.meta["run"] and parts[item.name] < parts[other.name]
+            for other in listed
+        )
+    ]
+    results = sum(len(item.run.results) for item in kept)
+    if len(kept) > MOST_RUNS or results > MOST_RESULTS:
+        what = f"{len(kept)} runs with {results} results"
+        raise InputError(what, expected=f"at most {MOST_RUNS} runs and {MOST_RESULTS} results")
+    return kept
+
+
+def _results(item: Submission) -> frozenset[str]:
+    """Return the results of a run, each as a text."""
+    return frozenset(json.dumps(one, sort_keys=True) for one in json.loads(item.text)["results"])
+
+
+def _replace(folder: Path, pages: Mapping[str, str]) -> None:
+    """Write a folder beside the old one and let them change places.
+
+    Whatever happens on the way, the old site is there whole, or the new one is.
+    """
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    room = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
+    try:
+        new, old = room / "new", room / "old"
+        new.mkdir()
+        for name, text in pages.items():
+            path = new / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(text.encode("utf-8"))
+        if folder.exists():
+            new.chmod(folder.stat().st_mode & 0o7777)
+            folder.rename(old)
+            try:
+                new.rename(folder)
+            except OSError:
+                old.rename(folder)
+                raise
+            _move_rest(old, folder)
+        else:
+            new.rename(folder)
+    finally:
+        _remove(room)
+
+
+def _move_rest(old: Path, folder: Path) -> None:
+    """Move what somebody else put there into the new folder."""
+    for path in sorted(old.iterdir()):
+        if path.name not in OWN:
+            os.rename(path, folder / path.name)
+
+
+def _remove(room: Path) -> None:
+    """Remove the temporary folder, but never what somebody else's files are still in."""
+    old = room / "old"
+    if not old.exists() or all(path.name in OWN for path in old.iterdir()):
+        shutil.rmtree(room, ignore_errors=True)

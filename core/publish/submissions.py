@@ -1,0 +1,206 @@
+"""Result files of strangers for a public leaderboard: checked, normalised, named by content."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from femubench.core.errors import InputError
+from femubench.core.files import read_text
+from femubench.core.schema.records import (
+    LARGEST_RUN,
+    Name,
+    parse_json,
+    result_to_json,
+    run_from_json,
+)
+from femubench.core.schema.results import Block, JobResult, Run
+from femubench.core.score.ranking import rank_results
+from femubench.core.score.scoring import frequency_error
+
+SCHEMA = 1
+_MOMENT = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{1,9})?(\+00:00|Z)$"
+_LONGEST = 1e9  # s
+_ROUNDING = 1e-6  # relative, of an rms that is computed again from its modes
+_Word = Annotated[str, Field(max_length=200)]
+_Moment = Annotated[str, Field(pattern=_MOMENT)]
+_Digest = Annotated[str, Field(min_length=1, max_length=200)]
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+
+
+class _Machine(_Record):
+    platform: _Word | None = None
+    cpu: _Word | None = None
+    cpu_count: Annotated[int, Field(ge=0, lt=2**31)] | None = None
+    blas: _Word | None = None
+
+
+class _Case(_Record):
+    title: Annotated[str, Field(max_length=1_000)] | None = None
+    digest: _Digest
+
+
+class _Meta(_Record):
+    """The meta data that are published; nothing else of them is."""
+
+    run: Annotated[str, Field(min_length=1, max_length=200)]
+    started: _Moment
+    finished: _Moment | None = None
+    seeds: list[int] = []
+    seed: int = 0
+    strategies: list[Name] = []
+    cases: dict[Name, _Case]
+    citations: dict[Name, Annotated[str, Field(max_length=5_000)]] = {}
+    reference: dict[Name, dict[Literal["used", "higher", "modified"], float]]
+    versions: Annotated[dict[_Word, _Word], Field(max_length=50)] = {}
+    machine: _Machine = _Machine()
+    git_commit: _Word | None = None
+
+
+@dataclass(frozen=True)
+class Submission:
+    """A run as it is published.
+
+    Arguments:
+        run: with scores and ranks computed anew.
+        text: the normalised file.
+        name: of that file, from the run's id and a hash of the text.
+    """
+
+    run: Run
+    text: str
+    name: str
+
+    @property
+    def started(self) -> str:
+        """Return the moment at which the run began, in a form that sorts by time."""
+        return str(self.run.meta["started"]).replace("Z", "+00:00")
+
+    @property
+    def order(self) -> tuple[str, str]:
+        """Return what submissions are sorted by: time, then name, whatever order they came in."""
+        return self.started, self.name
+
+
+def read_submission(file: Path) -> Submission:
+    """Return the run of a file, normalised.
+
+    Raises:
+        InputError: naming file and key of the first thing that is wrong.
+    """
+    expected = "what 'bench run --json' writes"
+    data = parse_json(read_text(file, LARGEST_RUN), file=file, expected=expected)
+    if isinstance(data, dict) and data.get("schema", SCHEMA) != SCHEMA:
+        what = f"schema {data['schema']!r}"
+        raise InputError(what, file=file, key="schema", expected=str(SCHEMA))
+    run = run_from_json(data, file=file)
+    meta = _meta(run, file)
+    results = _deduplicated(run, meta, file)
+    order = sorted(results.values(), key=lambda r: (r.case, r.strategy, r.seed, r.key))
+    return _submission(meta, order, file)
+
+
+def slug(text: str, longest: int = 40) -> str:
+    """Return a file name for any text: letters, digits, and a hash that keeps it apart."""
+    word = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")[:longest].strip("-")
+    digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+    return f"{word}-{digest}" if word else digest
+
+
+def _submission(meta: Mapping[str, Any], results: Iterable[JobResult], file: Path) -> Submission:
+    """Return a run as its file says it, so that it is the same when that is read again."""
+    dropped = {"score": None, "rank": None, "traceback": ""}
+    records = [{**result_to_json(item), **dropped} for item in results]
+    data = {"schema": SCHEMA, "meta": meta, "results": records}
+    text = json.dumps(data, sort_keys=True, allow_nan=False, separators=(",", ":")) + "\n"
+    digest = hashlib.sha256(text.encode()).hexdigest()[:12]
+    run = run_from_json(json.loads(text), file=file)
+    ranked = replace(run, results=rank_results(run.results, meta["reference"]))
+    return Submission(ranked, text, f"{slug(str(meta['run']))}-{digest}.json")
+
+
+def _meta(run: Run, file: Path) -> dict[str, Any]:
+    try:
+        record = _Meta.model_validate(_encodable(run.meta))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = ".".join(["meta", *map(str, first["loc"])])
+        raise InputError(first["msg"], file=file, key=key) from error
+    data: dict[str, Any] = record.model_dump()
+    for name, blocks in data["reference"].items():
+        for block, value in blocks.items():
+            if not 0.0 <= value <= 1e150:
+                key = f"meta.reference.{name}.{block}"
+                raise InputError(f"{value}", file=file, key=key, expected="an error >= 0 in %")
+    return data
+
+
+def _encodable(data: Mapping[str, Any]) -> Any:  # noqa: ANN401 - JSON data of any form
+    """Return the meta data without halves of characters, which no file could hold."""
+    return json.loads(json.dumps(data, ensure_ascii=False).encode("utf-8", "replace"))
+
+
+def _deduplicated(run: Run, meta: Mapping[str, Any], file: Path) -> dict[str, JobResult]:
+    """Return the results by key; the last of a key counts, as in the store."""
+    if not run.results:
+        raise InputError("no results", file=file, key="results", expected="at least one")
+    found: dict[str, JobResult] = {}
+    for number, result in enumerate(run.results):
+        _check(result, meta, file, f"results[{number}]")
+        found[result.key] = result
+    return found
+
+
+def _check(result: JobResult, meta: Mapping[str, Any], file: Path, key: str) -> None:
+    """Check what a ranking among strangers rests on.
+
+    Raises:
+        InputError: for a job without key or digest, or an error that its modes do not give.
+    """
+    if not re.fullmatch(r"[0-9a-f]{8,128}", result.key):
+        what = f"{result.key!r} is no key" if result.key else "no key"
+        raise InputError(what, file=file, key=f"{key}.key", expected="a hash of the job")
+    if result.seconds > _LONGEST:
+        what, where = f"{result.seconds:g} s", f"{key}.seconds"
+        raise InputError(what, file=file, key=where, expected=f"at most {_LONGEST:g}")
+    for name in ("case", "strategy", "femubench"):
+        text = result.provenance.get(name)
+        if not isinstance(text, str) or not 0 < len(text) <= 200:
+            where = f"{key}.provenance.{name}"
+            expected = "a digest" if name == "case" else "a version"
+            raise InputError("missing or not a text", file=file, key=where, expected=expected)
+    case = meta["cases"].get(result.case)
+    if case is None or case["digest"] != result.provenance["case"]:
+        where = f"{key}.provenance.case"
+        expected = "the digest that meta.cases has"
+        raise InputError("another case", file=file, key=where, expected=expected)
+    reference = meta["reference"].get(result.case)
+    if not reference:
+        where = f"meta.reference.{result.case}"
+        raise InputError(
+            "missing", file=file, key=where, expected="the errors of the nominal model"
+        )
+    for name, block in result.blocks.items():
+        _check_block(block, reference, file, f"{key}.{name}")
+
+
+def _check_block(block: Block, reference: Mapping[str, float], file: Path, key: str) -> None:
+    name = key.rpartition(".")[2]
+    if name not in reference or not block.modes:
+        what = "no modes" if name in reference else "a block that the nominal model has not"
+        raise InputError(what, file=file, key=key, expected="one of meta.reference, with modes")
+    errors = [frequency_error(mode) for mode in block.modes]
+    rms = 100.0 * (sum(error * error for error in errors) / len(errors)) ** 0.5
+    if abs(rms - block.rms_percent) > _ROUNDING * (1.0 + rms):
+        what = f"{block.rms_percent:g} %, its modes give {rms:g} %"
+        raise InputError(what, file=file, key=f"{key}.rms_percent", expected="the rms of its modes")

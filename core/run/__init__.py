@@ -1,0 +1,1 @@
+"""Jobs, their isolation and limits, the judge and the store."""

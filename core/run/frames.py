@@ -1,0 +1,90 @@
+"""Results as data frames, and as the JSON of ``bench run --json``."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from femubench.core.schema.records import run_from_json, run_to_json
+from femubench.core.schema.results import BLOCKS, Run
+from femubench.core.score.scoring import frequency_error
+
+__all__ = ["modes_frame", "results_frame", "run_from_json", "run_to_json"]
+
+
+def results_frame(run: Run) -> pd.DataFrame:
+    """Return one row a job: status, errors by block, counts, score and rank.
+
+    Columns: case strategy seed status reason seconds; ``used_percent``, ``used_mac`` and the same
+    for ``higher`` and ``modified`` (nan where the case has no such block); rigid_body_modes
+    rigid_body_modes_expected negative_eigenvalues unphysical parameter_count evaluations score
+    rank.
+    """
+    rows = []
+    for result in run.results:
+        row: dict[str, object] = {
+            name: getattr(result, name)
+            for name in ("case", "strategy", "seed", "status", "reason", "seconds")
+        }
+        for name in BLOCKS:
+            block = result.blocks.get(name)
+            row[f"{name}_percent"] = None if block is None else block.rms_percent
+            row[f"{name}_mac"] = None if block is None else block.mean_mac
+        for name in _COUNTS:
+            row[name] = getattr(result, name)
+        rows.append(row)
+    frame = pd.DataFrame(rows, columns=list(_RESULT_COLUMNS))
+    whole = {name: "Int64" for name in _COUNTS if name not in ("unphysical", "score")}
+    return frame.astype({**whole, **dict.fromkeys(_FLOATS, "float64")})
+
+
+def modes_frame(run: Run) -> pd.DataFrame:
+    """Return one row a measured mode of every job that is ok.
+
+    Columns: case strategy seed block modification mode measured_hz predicted_hz error_percent
+    mac. The error is signed, (f_p / f_m - 1), and nan for a mode without partner or with an
+    imaginary one; `counted_percent` is what the score takes, 100 for such a mode.
+    """
+    rows = [
+        {
+            "case": result.case,
+            "strategy": result.strategy,
+            "seed": result.seed,
+            "block": name,
+            "modification": mode.modification,
+            "mode": mode.number,
+            "measured_hz": mode.measured_hz,
+            "predicted_hz": mode.predicted_hz,
+            "error_percent": _signed(mode.measured_hz, mode.predicted_hz),
+            "counted_percent": 100.0 * frequency_error(mode),
+            "mac": mode.mac,
+        }
+        for result in run.results
+        for name, block in result.blocks.items()
+        for mode in block.modes
+    ]
+    floats = ("measured_hz", "predicted_hz", "error_percent", "counted_percent", "mac")
+    frame = pd.DataFrame(rows, columns=list(_MODE_COLUMNS))
+    return frame.astype(dict.fromkeys(floats, "float64"))
+
+
+def _signed(measured: float, predicted: float | None) -> float | None:
+    if predicted is None or predicted <= 0.0:
+        return None
+    return 100.0 * (predicted / measured - 1.0)
+
+
+_COUNTS = (
+    *("rigid_body_modes", "rigid_body_modes_expected", "negative_eigenvalues", "unphysical"),
+    *("parameter_count", "evaluations", "score", "rank"),
+)
+_ERRORS = tuple(f"{name}_{what}" for name in BLOCKS for what in ("percent", "mac"))
+_FLOATS = ("seconds", *_ERRORS, "score")
+_RESULT_COLUMNS = (
+    *("case", "strategy", "seed", "status", "reason", "seconds"),
+    *_ERRORS,
+    *_COUNTS,
+)
+_MODE_COLUMNS = (
+    *("case", "strategy", "seed", "block", "modification", "mode", "measured_hz"),
+    *("predicted_hz", "error_percent", "counted_percent", "mac"),
+)

@@ -1,0 +1,181 @@
+"""One job: a strategy on a model and its used modes, and what became of it."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+import time
+import traceback
+import warnings
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from femubench.core.errors import Diverged, NotApplicable, StrategyFailure
+from femubench.core.fem.model import Model
+from femubench.core.modal.eigen import counted_evaluations
+from femubench.core.modal.measurement import Measurement
+from femubench.core.schema.results import Status
+from femubench.core.update.strategy import CAPABILITIES, Strategy, UpdateResult
+
+
+@dataclass(frozen=True)
+class Job:
+    """All that a worker process is given; neither the case nor its name is among it.
+
+    Arguments:
+        strategy, model, measurement: pickled, so that the bytes of a large model exist once for
+            all strategies and whatever goes wrong with them goes wrong inside `execute`.
+        words: seed of the random generator.
+    """
+
+    strategy: bytes
+    model: bytes
+    measurement: bytes
+    words: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class JobOutcome:
+    """What a strategy left behind, before anybody has judged it.
+
+    Arguments:
+        status, reason, traceback: how it ended.
+        seconds: wall time of the strategy alone.
+        evaluations: eigenvalue solutions it made.
+        model: the updated model; None unless the status is ``ok``.
+        parameter_count, parameters, history, diagnostics: its own report in plain data.
+    """
+
+    status: Status
+    reason: str = ""
+    traceback: str = ""
+    seconds: float = 0.0
+    evaluations: int | None = None
+    model: Model | None = None
+    parameter_count: int | None = None
+    parameters: tuple[Mapping[str, Any], ...] = ()
+    history: tuple[Mapping[str, float], ...] = ()
+    diagnostics: Mapping[str, float] = field(default_factory=dict)
+
+
+def seed_words(case: str, strategy: str, seed: int) -> tuple[int, ...]:
+    """Return the seed of a job's random generator: the same on every machine and in any order.
+
+    The names go in as a hash, since a generator shows its seed to whoever holds it.
+    """
+    digest = hashlib.sha256("\0".join((str(seed), case, strategy)).encode()).digest()
+    return tuple(int(word) for word in np.frombuffer(digest, dtype="<u4"))
+
+
+def missing_capability(needs: frozenset[str], model: Model, measurement: Measurement) -> str | None:
+    """Return why a strategy with these needs cannot run, None where it can.
+
+    Raises:
+        ValueError: for a need that is not one of `CAPABILITIES`.
+    """
+    unknown = sorted(needs - set(CAPABILITIES))
+    if unknown:
+        raise ValueError(f"unknown need {unknown[0]!r}, expected one of {', '.join(CAPABILITIES)}")
+    if "shapes" in needs and not measurement.has_shapes:
+        return "needs measured mode shapes, and a used mode has none"
+    if model.structure is None:
+        lacking = [need for need in ("elements", "geometry", "joints") if need in needs]
+        return f"needs {lacking[0]}, and the model is a pair of matrices" if lacking else None
+    frame = model.structure.frame
+    if "joints" in needs and all(len(frame.ends_at(joint.name)) < 2 for joint in frame.joints):
+        return "needs joints, and no two members of the frame meet"
+    return None
+
+
+def execute(job: Job) -> JobOutcome:
+    """Run one job in this process and tell how it ended; no exception of a strategy gets out."""
+    try:
+        strategy, model, measurement = (
+            pickle.loads(part) for part in (job.strategy, job.model, job.measurement)
+        )
+        reason = missing_capability(strategy.needs, model, measurement)
+    except Exception as error:
+        return JobOutcome("failed", one_line(error), traceback.format_exc())
+    if reason is not None:
+        return JobOutcome("not-applicable", reason)
+    rng = np.random.default_rng(np.random.SeedSequence(job.words))
+    start = time.perf_counter()
+    with warnings.catch_warnings(), counted_evaluations() as counter:
+        # A result is judged by its figures; what numerical libraries mutter on the way is not.
+        warnings.simplefilter("ignore")
+        outcome = _attempt(strategy, model, measurement, rng)
+    if outcome.status == "ok" and _changed(model, pickle.loads(job.model)):
+        outcome = JobOutcome("failed", "the nominal model was changed in place, expected a new one")
+    return replace(outcome, seconds=time.perf_counter() - start, evaluations=counter.count)
+
+
+def _changed(model: Model, nominal: Model) -> bool:
+    """Tell whether a strategy wrote into the matrices that it was given."""
+    pairs = ((model.mass, nominal.mass), (model.stiffness, nominal.stiffness))
+    return any((now != before).nnz > 0 for now, before in pairs)
+
+
+def one_line(error: BaseException) -> str:
+    """Return ``ExceptionType: message`` in one line, whatever the exception's own text does."""
+    try:
+        text = " ".join(str(error).split())
+    except Exception:
+        text = ""
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def _attempt(
+    strategy: Strategy, model: Model, measurement: Measurement, rng: np.random.Generator
+) -> JobOutcome:
+    try:
+        return _plain(strategy.update(model, measurement, rng))
+    except NotApplicable as error:
+        return JobOutcome("not-applicable", _text(error), traceback.format_exc())
+    except Diverged as error:
+        return JobOutcome("diverged", _text(error), traceback.format_exc())
+    except StrategyFailure as error:
+        return JobOutcome("failed", _text(error), traceback.format_exc())
+    except MemoryError as error:
+        return JobOutcome("failed", f"out of memory: {one_line(error)}", traceback.format_exc())
+    except BaseException as error:  # Ctrl-C does not reach a worker: this is the strategy's own
+        return JobOutcome("failed", one_line(error), traceback.format_exc())
+
+
+def _text(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _plain(result: UpdateResult) -> JobOutcome:
+    """Return a result as an outcome; figures that are none raise TypeError or ValueError."""
+    if not isinstance(result, UpdateResult):
+        raise TypeError(f"update returned {type(result).__name__}, expected UpdateResult")
+    if not isinstance(result.model, Model):
+        raise TypeError(f"the updated model is {type(result.model).__name__}, expected Model")
+    count = int(result.parameter_count)
+    if not 0 <= count < 2**63:
+        raise ValueError(f"parameter_count is {str(count)[:20]}, expected the number of unknowns")
+    return JobOutcome(
+        status="ok",
+        model=result.model,
+        parameter_count=count,
+        parameters=tuple(_parameter(asdict(item)) for item in result.parameters),
+        history=tuple(_figures(item) for item in result.history),
+        diagnostics=_figures(result.diagnostics),
+    )
+
+
+def _parameter(item: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "name": str(item["name"]),
+        "before": float(item["before"]),
+        "after": float(item["after"]),
+        "unit": str(item["unit"]),
+        "std": None if item["std"] is None else float(item["std"]),
+    }
+
+
+def _figures(item: Mapping[str, float]) -> dict[str, float]:
+    return {str(name): float(value) for name, value in item.items()}

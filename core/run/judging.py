@@ -1,0 +1,113 @@
+"""Judging what a strategy handed back, in a process that holds the data it was not shown."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import traceback
+import warnings
+from dataclasses import dataclass, replace
+from typing import Any
+
+from femubench.core.case.case import Case
+from femubench.core.errors import FemubenchError
+from femubench.core.run.answers import AnswerError, packed, unpacked
+from femubench.core.run.jobs import Job, JobOutcome, execute, one_line
+from femubench.core.run.model_checks import check_model
+from femubench.core.schema.records import result_to_json
+from femubench.core.schema.results import JobResult
+from femubench.core.score.scoring import Reference, judge, score_of
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What it takes to judge an answer.
+
+    Arguments:
+        case: the case and its `Reference`, pickled by this program.
+        answer: of the strategy's worker, from `packed`; nobody has looked into it yet.
+        strategy, seed: of the job.
+        exhibited: whether its exhibit is wanted too.
+    """
+
+    case: bytes
+    answer: bytes
+    strategy: str
+    seed: int
+    exhibited: bool = False
+
+
+def run_strategy(job: Job) -> bytes:
+    """Return the packed outcome of a job; runs in a worker."""
+    return packed(execute(job))
+
+
+def run_judge(verdict: Verdict) -> bytes:
+    """Return the result of a job and its exhibit as JSON; runs in a worker."""
+    case, reference = pickle.loads(verdict.case)
+    try:
+        outcome = unpacked(verdict.answer)
+    except AnswerError as error:
+        outcome = JobOutcome("failed", str(error), traceback.format_exc())
+    result = judged(case, reference, verdict.strategy, verdict.seed, outcome)
+    exhibit = _exhibit(case, outcome, result) if verdict.exhibited else None
+    return json.dumps({"result": result_to_json(result), "exhibit": exhibit}).encode()
+
+
+def _exhibit(case: Case, outcome: JobOutcome, result: JobResult) -> dict[str, Any] | None:
+    """Return the pictures of a result; what goes wrong with them is no fault of the result."""
+    if outcome.model is None or result.status != "ok":
+        return None
+    from femubench.core.exhibits.exhibit import exhibit_of
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = exhibit_of(case, outcome.model, outcome.parameters)
+        json.dumps(found, allow_nan=False)
+    except Exception:
+        return None
+    return found
+
+
+def judged(
+    case: Case, reference: Reference, strategy: str, seed: int, outcome: JobOutcome
+) -> JobResult:
+    """Return the result of a job: its model checked and scored; a model that fails has failed."""
+    result = JobResult(
+        case=case.name,
+        strategy=strategy,
+        seed=seed,
+        status=outcome.status,
+        reason=outcome.reason,
+        seconds=outcome.seconds,
+        rigid_body_modes_expected=reference.rigid.shape[1],
+        parameter_count=outcome.parameter_count,
+        evaluations=outcome.evaluations,
+        parameters=outcome.parameters,
+        history=outcome.history,
+        diagnostics=outcome.diagnostics,
+        traceback=outcome.traceback,
+    )
+    if outcome.model is not None:
+        result = _scored(result, case, outcome, reference)
+    return replace(result, score=score_of(result, reference.rms_percent))
+
+
+def _scored(result: JobResult, case: Case, outcome: JobOutcome, reference: Reference) -> JobResult:
+    assert outcome.model is not None
+    try:
+        with warnings.catch_warnings():
+            # An ill-conditioned model shows in its figures.
+            warnings.simplefilter("ignore")
+            check_model(outcome.model, case.model)
+            judgement = judge(case, outcome.model, reference)
+    except Exception as error:
+        reason = str(error) if isinstance(error, FemubenchError) else one_line(error)
+        return replace(result, status="failed", reason=reason, traceback=traceback.format_exc())
+    return replace(
+        result,
+        blocks=judgement.blocks,
+        rigid_body_modes=judgement.rigid_body_modes,
+        negative_eigenvalues=judgement.negative_eigenvalues,
+    )

@@ -1,0 +1,95 @@
+"""Checks of a model that came back from a strategy, before anything is computed with it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench.core.errors import StrategyFailure
+from femubench.core.fem.model import LowRank, Model
+
+_SYMMETRY = 1e-8  # of the largest entry
+
+
+def check_model(model: Model, nominal: Model) -> None:
+    """Check that an updated model has finite symmetric matrices of the right size.
+
+    The size is that of the nominal model; a strategy that returns a frame meshed anew (with
+    joints that it made flexible, say) answers for that frame's own dofs.
+
+    Raises:
+        StrategyFailure: with what was seen and what was expected.
+    """
+    size = len(model.dofs)
+    own = model.structure is not None and model.structure.kinematics.transform.shape[1] == size
+    if size != nominal.size and not own:
+        raise StrategyFailure(
+            f"the updated model has {size} degrees of freedom, expected {nominal.size}"
+        )
+    for name in ("mass", "stiffness"):
+        _check_sparse(name, getattr(model, name), size)
+        change = getattr(model, f"{name}_change")
+        if change is not None:
+            _check_low_rank(f"{name}_change", change, size)
+
+
+def _check_sparse(name: str, matrix: Any, size: int) -> None:  # noqa: ANN401 - whatever came back
+    if not sp.issparse(matrix):
+        raise StrategyFailure(f"{name} is {type(matrix).__name__}, expected a sparse array")
+    _check_shape(name, matrix.shape, (size, size))
+    _check_indices(name, matrix)
+    entries = sp.coo_array(matrix)
+    _check_numbers(name, entries.data)
+    transposed = sp.csr_array(entries).T
+    _check_symmetry(name, sp.csr_array(entries) - transposed, entries.data)
+
+
+def _check_indices(name: str, matrix: Any) -> None:  # noqa: ANN401
+    """Make sure that no index points outside: compiled code would follow it."""
+    try:
+        if matrix.format in ("csr", "csc", "bsr"):
+            matrix.check_format(full_check=True)
+        elif matrix.format == "coo":
+            matrix._check()
+        elif matrix.format != "dia":
+            raise ValueError(f"format {matrix.format}, expected csc, csr, coo, bsr or dia")
+    except (ValueError, TypeError, AttributeError, IndexError) as error:
+        raise StrategyFailure(f"{name} is not a valid sparse array: {error}") from error
+
+
+def _check_low_rank(name: str, change: Any, size: int) -> None:  # noqa: ANN401
+    if not isinstance(change, LowRank):
+        raise StrategyFailure(f"{name} is {type(change).__name__}, expected LowRank")
+    basis, core = np.asarray(change.basis), np.asarray(change.core)
+    if basis.ndim != 2:
+        raise StrategyFailure(f"{name}: basis has {basis.ndim} dimensions, expected 2")
+    _check_shape(f"{name}: basis", basis.shape, (size, basis.shape[1]))
+    _check_shape(f"{name}: core", core.shape, (basis.shape[1], basis.shape[1]))
+    _check_numbers(f"{name}: basis", basis)
+    _check_numbers(f"{name}: core", core)
+    _check_symmetry(f"{name}: core", core - core.T, core)
+
+
+def _check_shape(name: str, shape: tuple[int, ...], expected: tuple[int, ...]) -> None:
+    if tuple(shape) != expected:
+        raise StrategyFailure(f"{name} has shape {tuple(shape)}, expected {expected}")
+
+
+def _check_numbers(name: str, data: Any) -> None:  # noqa: ANN401
+    if not np.issubdtype(data.dtype, np.floating) and not np.issubdtype(data.dtype, np.integer):
+        raise StrategyFailure(f"{name} has entries of type {data.dtype}, expected real numbers")
+    bad = int(np.count_nonzero(~np.isfinite(data)))
+    if bad:
+        raise StrategyFailure(f"{name} has {bad} entries that are not finite, expected none")
+
+
+def _check_symmetry(name: str, difference: Any, data: Any) -> None:  # noqa: ANN401
+    largest = float(np.abs(data).max(initial=0.0))
+    gap = float(abs(difference).max()) if 0 not in difference.shape else 0.0
+    if gap > _SYMMETRY * largest:
+        raise StrategyFailure(
+            f"{name} is not symmetric: relative difference {gap / largest:.3g}, "
+            f"allowed {_SYMMETRY:.0e}"
+        )

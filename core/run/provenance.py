@@ -1,0 +1,219 @@
+"""What makes two jobs the same, where a result comes from, where a run was made."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import secrets
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from datetime import UTC, datetime
+from functools import cache, lru_cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import femubench
+from femubench.core.case.case import Case
+from femubench.core.plugin.variants import Variant
+from femubench.core.score.scoring import Reference
+from femubench.core.update.strategy import Strategy
+
+Stamp = tuple[Path, int, int]  # a file, when it was changed, its size
+
+
+def job_key(case: Case, strategy: str, code: bytes, version: str, seed: int) -> str:
+    """Return the key of a job: equal keys have equal results, whoever computes them.
+
+    Arguments:
+        case: its name and the digest of its files go in.
+        strategy: name, with options.
+        code: the pickled strategy: its class and its parameters.
+        version: from `strategy_version`.
+        seed: of the noise.
+    """
+    parts = (
+        *(femubench.__version__, case.name, case.digest, strategy),
+        *(hashlib.sha256(code).hexdigest(), version, str(seed)),
+    )
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
+
+
+def plan_digest(keys: Iterable[str]) -> str:
+    """Return one digest for the keys of all jobs of a run, in any order."""
+    return hashlib.sha256("\0".join(sorted(keys)).encode()).hexdigest()[:32]
+
+
+def strategy_version(strategy: Strategy) -> str:
+    """Return the version of the package that a strategy comes from, and a digest of its source.
+
+    The digest is there because a package in the making changes and keeps its number.
+    """
+    inner = strategy.base if isinstance(strategy, Variant) else strategy
+    top = type(inner).__module__.partition(".")[0]
+    return f"{_number(top)}+{_digest(tuple(_stamps(top, type(inner).__module__)))}"
+
+
+@cache
+def _number(top: str) -> str:
+    return str(getattr(sys.modules.get(top), "__version__", "") or _installed(top))
+
+
+def _installed(top: str) -> str:
+    from importlib import metadata
+
+    try:
+        return metadata.version(top)
+    except metadata.PackageNotFoundError:
+        return "0"
+
+
+def _stamps(top: str, module: str) -> Iterator[Stamp]:
+    """Yield the Python files of a package, or the file of a lone module, with time and size."""
+    package = sys.modules.get(top)
+    folders = [Path(folder) for folder in getattr(package, "__path__", ())]
+    files = sorted({file for folder in folders for file in _python_files(folder)})
+    own = getattr(sys.modules.get(module), "__file__", None)
+    if not files and own:
+        files = [Path(own)]
+    for file in files:
+        try:
+            found = file.stat()
+        except OSError:  # a link that leads nowhere is no source
+            yield file, 0, 0
+        else:
+            yield file, found.st_mtime_ns, found.st_size
+
+
+@lru_cache(maxsize=64)
+def _digest(stamps: tuple[Stamp, ...]) -> str:
+    """Return a digest of files; they are read once as long as they stay as they are."""
+    found = hashlib.sha256()
+    for file, _, _ in stamps:
+        found.update(file.name.encode() + b"\0")
+        with suppress(OSError):
+            found.update(file.read_bytes())
+    return found.hexdigest()[:12]
+
+
+def _python_files(folder: Path) -> Iterable[Path]:
+    for where, below, names in os.walk(folder, followlinks=True):
+        below[:] = [name for name in below if name != "__pycache__"]
+        yield from (Path(where) / name for name in names if name.endswith(".py"))
+
+
+def provenance(meta: Mapping[str, Any], case: Case, version: str, seed: int) -> dict[str, Any]:
+    """Return where a result comes from, in plain data.
+
+    Arguments:
+        meta: of the run.
+        case, version, seed: of the job.
+    """
+    machine = meta["machine"]
+    return {
+        **meta["versions"],
+        "blas": machine["blas"],
+        "cpu": machine["cpu"],
+        "git": meta["git_commit"],
+        "case": case.digest,
+        "strategy": version,
+        "seed": seed,
+    }
+
+
+@cache
+def cpu_name() -> str:
+    """Return what the machine calls its processor."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return " ".join(line.partition(":")[2].split())
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+def blas_name() -> str:
+    """Return the linear algebra libraries that are loaded, with version and kernel."""
+    from threadpoolctl import threadpool_info
+
+    found = {
+        " ".join(
+            str(item[key]) for key in ("internal_api", "version", "architecture") if item.get(key)
+        )
+        for item in threadpool_info()
+        if item.get("user_api") == "blas"
+    }
+    return ", ".join(sorted(found)) or "unknown"
+
+
+_PACKAGES = ("femubench", "numpy", "scipy")
+
+
+def new_run_id(now: datetime | None = None) -> str:
+    """Return a run id that sorts by time: UTC time stamp and six random hexadecimal digits."""
+    moment = datetime.now(UTC) if now is None else now
+    return f"{moment:%Y%m%dT%H%M%SZ}-{secrets.token_hex(3)}"
+
+
+def run_meta(
+    cases: Sequence[Case],
+    strategies: Sequence[Strategy],
+    references: Mapping[str, Reference],
+    seeds: Sequence[int],
+    settings: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Return the meta data of a run: id, seeds, versions, machine, commit, cases, references.
+
+    Arguments:
+        settings: ``seed`` of the run's statistics, ``jobs``, ``timeout`` in s, ``memory`` in bytes,
+            ``plan`` (digest of the keys of all jobs), ``request`` (what was asked for, so that the
+            run can be continued and repeated).
+    """
+    return {
+        "run": new_run_id(),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+        "seeds": list(seeds),
+        **settings,
+        "versions": versions(),
+        "machine": {
+            "platform": platform.platform(),
+            "cpu": cpu_name(),
+            "cpu_count": os.cpu_count(),
+            "blas": blas_name(),
+        },
+        "git_commit": git_commit(),
+        "cases": {case.name: {"title": case.title, "digest": case.digest} for case in cases},
+        "strategies": [strategy.name for strategy in strategies],
+        "citations": {strategy.name: strategy.citation for strategy in strategies},
+        "reference": {name: item.rms_percent for name, item in references.items()},
+    }
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that results depend on."""
+    found = {"python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            found[package] = "not installed"
+    return found
+
+
+def git_commit() -> str | None:
+    """Return the commit of the repository around the working directory, None without one."""
+    try:
+        answer = subprocess.run(
+            ["git", "rev-parse", "HEAD"],
+            capture_output=True,
+            text=True,
+            timeout=5.0,
+            check=True,
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return answer.stdout.strip() or None

@@ -1,0 +1,95 @@
+"""Runs every (case, strategy, seed) in a process of its own and judges what comes back."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from femubench.core.case.case import Case
+from femubench.core.errors import InputError
+from femubench.core.run.limits import Limits, memory_share
+from femubench.core.run.provenance import plan_digest, run_meta
+from femubench.core.run.recording import Overwrite, Progress, Results, ended, recorded
+from femubench.core.run.schedule import computed, slots_of
+from femubench.core.run.store import Store
+from femubench.core.schema.results import Run
+from femubench.core.score.scoring import rank_results, reference_of
+from femubench.core.update.strategy import Strategy
+
+
+def run_jobs(
+    cases: Sequence[Case],
+    strategies: Sequence[Strategy],
+    *,
+    seeds: Sequence[int] = (0,),
+    jobs: int | None = None,
+    timeout: float | None = 600.0,
+    timeouts: Mapping[str, float] | None = None,
+    memory: int | None = None,
+    store: Store | None = None,
+    overwrite: Overwrite | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+    run_seed: int = 0,
+    request: Mapping[str, Any] | None = None,
+) -> Run:
+    """Run every strategy on every case with every seed, each job in a process of its own.
+
+    What a strategy returns is judged in another process. A script needs the usual
+    ``if __name__ == "__main__":`` around its call. On Ctrl-C what is done stays in the store.
+
+    Arguments:
+        seeds: 0 is the data as recorded, every other one a draw of measurement noise.
+        jobs: number of workers; None for the number of processors.
+        timeout: seconds that one job may take; None for no limit.
+        timeouts: the same for single strategies, by name.
+        memory: bytes that one job may take; None for an even share of the machine's.
+        store: where each result goes as soon as it is there.
+        overwrite: which stored results of the same jobs are computed anew: ``always`` all,
+            ``missing`` none, ``failed`` the failures. Default: all, of a resumed run the failures.
+        resume: go on with the latest stored run of these jobs.
+        progress: called with (result, jobs done, jobs in all).
+        run_seed, request: seed of the run's own statistics, and what was asked for in plain data.
+
+    Raises:
+        InputError: for two of one name, no worker, or a run that another process works on.
+        ModelError: when the nominal model of a case cannot be solved.
+    """
+    workers = _worker_count(jobs)
+    _check_names("case", [case.name for case in cases])
+    _check_names("strategy", [strategy.name for strategy in strategies])
+    share = memory_share(workers) if memory is None else memory
+    limits = {s.name: Limits((timeouts or {}).get(s.name, timeout), share) for s in strategies}
+    settings: dict[str, Any] = {"seed": run_seed, "jobs": workers, "timeout": timeout}
+    settings |= {"memory": share, "request": dict(request or {})}
+    with threadpool_limits(1), ExitStack() as stack:
+        references = {case.name: reference_of(case) for case in cases}
+        slots = list(slots_of(cases, strategies, seeds))
+        settings["plan"] = plan_digest(slot.key for slot in slots)
+        meta = run_meta(cases, strategies, references, seeds, settings)
+        slots = [slot.made_by(meta) for slot in slots]
+        meta, known = recorded(stack, store, meta, overwrite, resume)
+        ending = stack.enter_context(ended(store, meta["run"]))
+        results = Results(slots, store, meta["run"], progress)
+        wanted = results.keep(known)
+        for index, result in computed(slots, wanted, references, limits, workers, results.shelf):
+            results.add(index, result)
+    return Run({**meta, **ending}, rank_results(results.in_order(), meta["reference"]))
+
+
+def _worker_count(jobs: int | None) -> int:
+    if jobs is None:
+        return len(os.sched_getaffinity(0))
+    if jobs < 1:
+        raise InputError(f"{jobs} worker processes", key="jobs", expected="1 or more")
+    return jobs
+
+
+def _check_names(kind: str, names: Sequence[str]) -> None:
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(f"{kind} {twice[0]!r} occurs twice", expected="every name once")

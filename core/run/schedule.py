@@ -1,0 +1,246 @@
+"""Jobs through the workers: run in one process, judged in another."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import traceback
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+from femubench.core.case.case import Case
+from femubench.core.errors import InputError
+from femubench.core.run.answers import AnswerError, head_of
+from femubench.core.run.jobs import Job, JobOutcome, one_line, seed_words
+from femubench.core.run.judging import Verdict, judged, run_judge, run_strategy
+from femubench.core.run.limits import Limits
+from femubench.core.run.provenance import job_key, provenance, strategy_version
+from femubench.core.run.workers import Ending, How, Workers
+from femubench.core.schema.records import result_from_json
+from femubench.core.schema.results import JobResult, Status
+from femubench.core.score.scoring import Reference
+from femubench.core.update.strategy import Strategy
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One job of the run: who and what, and the job or why there is none.
+
+    Arguments:
+        case, strategy, seed: the job.
+        key: of everything that decides on its result.
+        provenance: of its result, in plain data.
+        job: what a worker is given; None where it could not be made.
+        fault: why.
+        version: returns that of the strategy as its source is now.
+    """
+
+    case: Case
+    strategy: str
+    seed: int
+    key: str
+    provenance: Mapping[str, Any]
+    job: Job | None
+    fault: JobOutcome | None = None
+    version: Callable[[], str] | None = None
+
+    @property
+    def stale(self) -> bool:
+        """Tell whether the source of the strategy has changed since the key was made."""
+        return self.version is not None and self.version() != self.provenance["strategy"]
+
+    def made_by(self, meta: Mapping[str, Any]) -> Slot:
+        """Return the job with the whole provenance of a run's results."""
+        version = str(self.provenance["strategy"])
+        return replace(self, provenance=provenance(meta, self.case, version, self.seed))
+
+
+def slots_of(
+    cases: Sequence[Case], strategies: Sequence[Strategy], seeds: Sequence[int]
+) -> Iterator[Slot]:
+    """Yield the jobs of a run, case by case and seed by seed."""
+    pickled: list[bytes | JobOutcome] = [_pickled(strategy) for strategy in strategies]
+    versions = [strategy_version(strategy) for strategy in strategies]
+    for case in cases:
+        model = _pickled(case.model)
+        for seed in seeds:
+            measurement = _pickled(case.used_measurement(seed))
+            for strategy, code, version in zip(strategies, pickled, versions, strict=True):
+                parts = (code, model, measurement)
+                fault = next((part for part in parts if isinstance(part, JobOutcome)), None)
+                words = seed_words(case.name, strategy.name, seed)
+                job = None if fault else Job(*parts, words)  # type: ignore[arg-type]
+                known = code if isinstance(code, bytes) else repr(type(strategy)).encode()
+                key = job_key(case, strategy.name, known, version, seed)
+                plain, now = {"strategy": version}, partial(strategy_version, strategy)
+                yield Slot(case, strategy.name, seed, key, plain, job, fault, now)
+
+
+def _pickled(thing: object) -> bytes | JobOutcome:
+    try:
+        return pickle.dumps(thing, protocol=pickle.HIGHEST_PROTOCOL)
+    except Exception as error:
+        reason = f"{type(thing).__name__} cannot be sent to a worker process: {one_line(error)}"
+        return JobOutcome("failed", reason, traceback.format_exc())
+
+
+_STATUS: Mapping[How, Status] = {
+    "timeout": "timeout",
+    "memory": "crashed",
+    "output": "crashed",
+    "answer-size": "crashed",
+    "died": "crashed",
+    "no-start": "crashed",
+    "orphaned": "crashed",
+}
+Show = Callable[[Slot, Mapping[str, Any]], None]
+_LEAST_JUDGING = 300.0  # s
+_ATTEMPTS = 3  # to start a process
+
+
+def computed(
+    slots: Sequence[Slot],
+    wanted: Sequence[int],
+    references: Mapping[str, Reference],
+    limits: Mapping[str, Limits],
+    count: int,
+    show: Show | None = None,
+) -> Iterator[tuple[int, JobResult]]:
+    """Yield the result of every wanted slot as it comes.
+
+    Arguments:
+        show: takes the exhibit of a job of the first seed, before its result comes.
+    """
+
+    def result_of(index: int, outcome: JobOutcome) -> tuple[int, JobResult]:
+        slot = slots[index]
+        reference = references[slot.case.name]
+        return index, judged(slot.case, reference, slot.strategy, slot.seed, outcome)
+
+    for index in wanted:
+        fault = slots[index].fault
+        if fault is not None:
+            yield result_of(index, fault)
+    waiting = deque(index for index in wanted if slots[index].job is not None)
+    if not waiting:
+        return
+    bench = _Bench(slots, references, limits, show)
+    with Workers[tuple[int, bytes]](count).open() as workers:
+        while waiting or bench.answers or bench.lonely or workers.busy:
+            while workers.free and bench.has_work(workers, waiting):
+                lost = bench.start(workers, waiting)
+                if lost is not None:
+                    yield result_of(*lost)
+            for (index, answer), ending in workers.wait():
+                found = bench.taken(index, answer, ending, waiting)
+                if isinstance(found, JobResult):
+                    yield index, found
+                elif found is not None:
+                    yield result_of(index, found)
+
+
+class _Bench:
+    """What happens to a job: run in one process, judged in another."""
+
+    def __init__(
+        self,
+        slots: Sequence[Slot],
+        references: Mapping[str, Reference],
+        limits: Mapping[str, Limits],
+        show: Show | None,
+    ) -> None:
+        self._slots, self._references, self._limits = slots, references, limits
+        self._show, self._shown = show, min(slot.seed for slot in slots)
+        self._cases: dict[str, bytes] = {}
+        self._attempts: dict[int, int] = {}
+        self._alone: set[int] = set()
+        self.answers: deque[tuple[int, bytes]] = deque()
+        # Ended by another job, or they ended others: they run last, one at a time.
+        self.lonely: deque[tuple[int, bytes]] = deque()
+
+    def has_work(self, workers: Workers[tuple[int, bytes]], waiting: deque[int]) -> bool:
+        """Tell whether there is something to start now."""
+        return bool(waiting or self.answers or (self.lonely and not workers.busy))
+
+    def start(
+        self, workers: Workers[tuple[int, bytes]], waiting: deque[int]
+    ) -> tuple[int, JobOutcome] | None:
+        """Start judging an answer or running a job; return a job that cannot be started."""
+        if self.answers or not waiting:
+            index, answer = (self.answers or self.lonely).popleft()
+        else:
+            index, answer = waiting.popleft(), b""
+        slot = self._slots[index]
+        if answer:
+            shown = self._show is not None and slot.seed == self._shown
+            verdict = Verdict(self._case(slot.case), answer, slot.strategy, slot.seed, shown)
+            ending = workers.start(
+                (index, answer), run_judge, verdict, self._judging(slot.strategy)
+            )
+        else:
+            ending = workers.start(
+                (index, b""), run_strategy, slot.job, self._limits[slot.strategy]
+            )
+        if ending is None or self._again(index, answer, waiting):
+            return None
+        return index, JobOutcome("crashed", ending.reason)
+
+    def _again(self, index: int, answer: bytes, waiting: deque[int]) -> bool:
+        """Try a task once more for which there was no process; tell whether it may be tried."""
+        self._attempts[index] = self._attempts.get(index, 0) + 1
+        if self._attempts[index] >= _ATTEMPTS:
+            return False
+        if answer:
+            self.answers.append((index, answer))
+        else:
+            waiting.append(index)
+        return True
+
+    def taken(
+        self, index: int, answer: bytes, ending: Ending, waiting: deque[int]
+    ) -> JobResult | JobOutcome | None:
+        """Return the result of a task that has ended, or its outcome; None while it goes on."""
+        if ending.how == "orphaned" and index not in self._alone:
+            self._alone.add(index)
+            self.lonely.append((index, answer))
+            return None
+        if ending.how == "no-start" and self._again(index, answer, waiting):
+            return None
+        if answer:
+            return self._judgement(self._slots[index], ending)
+        if ending.how == "answer":
+            try:
+                outcome = head_of(ending.answer)
+            except AnswerError as error:
+                return JobOutcome("failed", str(error), seconds=ending.seconds)
+            if outcome.status != "ok":
+                return outcome
+            self.answers.append((index, ending.answer))
+            return None
+        return JobOutcome(_STATUS[ending.how], ending.reason, seconds=ending.seconds)
+
+    def _judgement(self, slot: Slot, ending: Ending) -> JobResult | JobOutcome:
+        if ending.how != "answer":
+            return JobOutcome("failed", f"its model could not be judged: {ending.reason}")
+        data = json.loads(ending.answer)
+        try:
+            result = result_from_json(data["result"])
+        except InputError as error:
+            return JobOutcome("failed", f"its result is out of bounds: {error}")
+        if self._show is not None and data["exhibit"] is not None:
+            self._show(slot, data["exhibit"])
+        return result
+
+    def _case(self, case: Case) -> bytes:
+        if case.name not in self._cases:
+            pair = (case, self._references[case.name])
+            self._cases[case.name] = pickle.dumps(pair, protocol=pickle.HIGHEST_PROTOCOL)
+        return self._cases[case.name]
+
+    def _judging(self, strategy: str) -> Limits:
+        limits = self._limits[strategy]
+        seconds = None if limits.seconds is None else max(_LEAST_JUDGING, limits.seconds)
+        return replace(limits, seconds=seconds)

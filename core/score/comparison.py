@@ -1,0 +1,324 @@
+"""What a comparison of two runs says, in plain data."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from femubench.core.errors import InputError
+from femubench.core.schema.results import BLOCKS, DONE, JobResult, Run
+from femubench.core.score.ranking import OFFSET_PERCENT, geometric_mean, score_of
+from femubench.core.score.repeatability import environment_differences
+from femubench.core.score.statistics import Evidence, evidence_of
+
+Metric = Literal["skill", "used", "higher", "modified", "seconds", "failures"]
+METRICS: tuple[Metric, ...] = ("skill", "used", "higher", "modified", "seconds", "failures")
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """The largest value of a metric that is still accepted.
+
+    Arguments:
+        metric: a ratio B / A, or ``failures``, the number of results that B lost.
+        most: exceeded means worse.
+    """
+
+    metric: Metric
+    most: float
+
+
+DEFAULT_THRESHOLDS = (Threshold("skill", 1.01), Threshold("failures", 0.0))
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job by its names."""
+
+    strategy: str
+    case: str
+    seed: int
+
+
+@dataclass(frozen=True)
+class Change:
+    """A job that ended otherwise in B.
+
+    Arguments:
+        kind: ``lost`` (a sound result before, none now), ``gained`` or ``other``.
+        before, after: status; ``unphysical`` for a model that lost rigid-body modes or has
+            negative eigenvalues.
+        reason: of the one that is no sound result.
+    """
+
+    strategy: str
+    case: str
+    seed: int
+    kind: Literal["lost", "gained", "other"]
+    before: str
+    after: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Row:
+    """Ratios B / A of one strategy in one scenario; less than 1 is better in B.
+
+    Arguments:
+        scenario: None for all of them together.
+        jobs: that both runs have.
+        values: by metric; None where nothing can be said.
+    """
+
+    strategy: str
+    scenario: str | None
+    jobs: int
+    values: Mapping[str, float | None]
+
+
+@dataclass(frozen=True)
+class Excess:
+    """A value beyond its threshold."""
+
+    strategy: str
+    scenario: str | None
+    metric: Metric
+    value: float
+    most: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Run B against run A.
+
+    Arguments:
+        before, after: names of the runs.
+        jobs: number that both have.
+        changes: what ended otherwise, lost results first.
+        rows: by strategy, all scenarios first.
+        evidence: of every strategy.
+        only_before, only_after: jobs of one run alone.
+        other_cases: jobs of one name on case files that are not the same; not compared.
+        environment: what differs between the machines, a line each.
+        thresholds, excesses: what was asked for, and what lies beyond it.
+        untested: metrics with a threshold for which no job has a value.
+    """
+
+    before: str
+    after: str
+    jobs: int
+    changes: tuple[Change, ...]
+    rows: tuple[Row, ...]
+    evidence: tuple[Evidence, ...]
+    only_before: tuple[Job, ...]
+    only_after: tuple[Job, ...]
+    other_cases: tuple[Job, ...]
+    environment: tuple[str, ...]
+    thresholds: tuple[Threshold, ...]
+    excesses: tuple[Excess, ...]
+    untested: tuple[str, ...]
+
+    @property
+    def worse(self) -> bool:
+        """Tell whether something got worse beyond its threshold."""
+        return bool(self.excesses)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the comparison as plain data with its schema."""
+        return {"schema": SCHEMA, "worse": self.worse, **asdict(self)}
+
+
+_ROUNDING = 1e-9  # relative; two machines may differ by it
+_Job = tuple[str, str, int]  # strategy, case, seed
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """One job in both runs; the errors of the nominal model stand for both."""
+
+    before: JobResult
+    after: JobResult
+    reference: Mapping[str, float]
+
+    @property
+    def blocks(self) -> dict[str, float]:
+        """Return the ratio of the errors of every block that both have."""
+        first, second = self.before.blocks, self.after.blocks
+        return {
+            name: (second[name].rms_percent + OFFSET_PERCENT)
+            / (first[name].rms_percent + OFFSET_PERCENT)
+            for name in BLOCKS
+            if name in first and name in second
+        }
+
+    @property
+    def skill(self) -> float | None:
+        """Return the ratio of the scores; None where a failure has nothing to be set against."""
+        reference = self.reference
+        if not reference and self.before.status == self.after.status == "ok":
+            return geometric_mean(self.blocks.values()) if self.blocks else None
+        if reference:
+            return score_of(self.after, reference) / score_of(self.before, reference)
+        scores = self.before.score, self.after.score
+        return None if scores[0] is None or scores[1] is None else scores[1] / scores[0]
+
+    @property
+    def weight(self) -> int:
+        """Return the number of blocks, by which a score counts."""
+        return max(len(self.reference), len(self.before.blocks), len(self.after.blocks), 1)
+
+
+def compare_runs(
+    before: Run,
+    after: Run,
+    *,
+    thresholds: Sequence[Threshold] = DEFAULT_THRESHOLDS,
+    strategies: Iterable[str] = (),
+) -> Comparison:
+    """Return what run `after` (B) does otherwise than run `before` (A).
+
+    Arguments:
+        thresholds: what counts as worse.
+        strategies: those to compare; all where there are none.
+
+    Raises:
+        InputError: when the runs have no job in common.
+    """
+    chosen = frozenset(strategies)
+    old, new = (_by_job(run, chosen) for run in (before, after))
+    shared = [job for job in old if job in new]
+    other = [job for job in shared if _moved(before, old[job], after, new[job])]
+    shared = [job for job in shared if job not in set(other)]
+    if not shared:
+        raise InputError(
+            "the two runs have no job in common",
+            expected="one (case, strategy, seed) with the same case files",
+        )
+    references = {**(after.meta.get("reference") or {}), **(before.meta.get("reference") or {})}
+    pairs = [_Pair(old[job], new[job], references.get(job[1]) or {}) for job in shared]
+    rows = tuple(_rows(pairs))
+    return Comparison(
+        before=str(before.meta.get("run") or "A"),
+        after=str(after.meta.get("run") or "B"),
+        jobs=len(pairs),
+        changes=_changes(pairs),
+        rows=rows,
+        evidence=evidence_of(_ratios(pairs)),
+        only_before=tuple(Job(*job) for job in old if job not in new),
+        only_after=tuple(Job(*job) for job in new if job not in old),
+        other_cases=tuple(Job(*job) for job in other),
+        environment=tuple(environment_differences(_safe(before.meta), _safe(after.meta))),
+        thresholds=tuple(thresholds),
+        excesses=tuple(_excesses(rows, thresholds)),
+        untested=tuple(
+            item.metric
+            for item in thresholds
+            if all(row.values[item.metric] is None for row in rows)
+        ),
+    )
+
+
+def _by_job(run: Run, chosen: frozenset[str]) -> dict[_Job, JobResult]:
+    return {
+        (item.strategy, item.case, item.seed): item
+        for item in run.results
+        if not chosen or item.strategy in chosen
+    }
+
+
+def _digest(run: Run, result: JobResult) -> str:
+    """Return the digest of the case files of a result, nothing where it is not known."""
+    listed = (run.meta.get("cases") or {}).get(result.case) or {}
+    return str(result.provenance.get("case") or listed.get("digest") or "")
+
+
+def _moved(before: Run, old: JobResult, after: Run, new: JobResult) -> bool:
+    """Tell whether one name stands for two different cases."""
+    first, second = _digest(before, old), _digest(after, new)
+    return bool(first and second and first != second)
+
+
+def _safe(meta: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the meta data with nothing in place of what a stranger wrote for a table."""
+    return {
+        name: value
+        for name, value in meta.items()
+        if name not in ("versions", "machine", "cases") or isinstance(value, dict)
+    }
+
+
+def _state(result: JobResult) -> str:
+    return "unphysical" if result.unphysical else result.status
+
+
+def _changes(pairs: Iterable[_Pair]) -> tuple[Change, ...]:
+    found = []
+    for pair in pairs:
+        states = _state(pair.before), _state(pair.after)
+        if states[0] == states[1]:
+            continue
+        sound = [state in DONE for state in states]
+        kind: Literal["lost", "gained", "other"] = "other"
+        if sound[0] != sound[1]:
+            kind = "lost" if sound[0] else "gained"
+        result = pair.before if kind == "gained" else pair.after
+        reason = result.reason or ("" if not result.unphysical else _damage(result))
+        job = result.strategy, result.case, result.seed
+        found.append(Change(*job, kind, *states, reason))
+    places = {"lost": 0, "gained": 1, "other": 2}
+    return tuple(sorted(found, key=lambda change: places[change.kind]))
+
+
+def _damage(result: JobResult) -> str:
+    lost = (result.rigid_body_modes_expected or 0) - (result.rigid_body_modes or 0)
+    return (
+        f"{max(lost, 0)} rigid-body modes lost, {result.negative_eigenvalues or 0} eigenvalues < 0"
+    )
+
+
+def _ratios(pairs: Iterable[_Pair]) -> dict[str, list[float]]:
+    """Return the ratios of all (case, block, seed) by strategy."""
+    found: dict[str, list[float]] = {}
+    for pair in pairs:
+        found.setdefault(pair.before.strategy, []).extend(pair.blocks.values())
+    return found
+
+
+def _rows(pairs: Iterable[_Pair]) -> Iterable[Row]:
+    groups: dict[str, dict[str | None, list[_Pair]]] = {}
+    for pair in pairs:
+        group = groups.setdefault(pair.before.strategy, {None: []})
+        group[None].append(pair)
+        group.setdefault(pair.before.case.partition("/")[0], []).append(pair)
+    for strategy, scenarios in groups.items():
+        for scenario, listed in scenarios.items():
+            yield Row(strategy, scenario, len(listed), _values(listed))
+
+
+def _values(pairs: Sequence[_Pair]) -> dict[str, float | None]:
+    skills = [(pair.skill, pair.weight) for pair in pairs]
+    known = [(skill, weight) for skill, weight in skills if skill is not None]
+    values: dict[str, float | None] = {"skill": None}
+    if known:
+        values["skill"] = geometric_mean((s for s, _ in known), (w for _, w in known))
+    for block in BLOCKS:
+        ratios = [pair.blocks[block] for pair in pairs if block in pair.blocks]
+        values[block] = geometric_mean(ratios) if ratios else None
+    timed = [pair for pair in pairs if pair.before.status == pair.after.status == "ok"]
+    total = sum(pair.before.seconds for pair in timed)
+    ratio = sum(pair.after.seconds for pair in timed) / total if total > 0.0 else math.inf
+    values["seconds"] = ratio if math.isfinite(ratio) else None
+    values["failures"] = float(sum(change.kind == "lost" for change in _changes(pairs)))
+    return values
+
+
+def _excesses(rows: Iterable[Row], thresholds: Iterable[Threshold]) -> Iterable[Excess]:
+    listed = list(rows)
+    for item in thresholds:
+        for row in listed:
+            value = row.values[item.metric]
+            if value is not None and value > item.most + _ROUNDING * abs(item.most):
+                yield Excess(row.strategy, row.scenario, item.metric, value, item.most)

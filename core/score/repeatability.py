@@ -1,0 +1,99 @@
+"""What differs between a run and its repetition."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from femubench.core.schema.records import result_to_json
+from femubench.core.schema.results import JobResult, Run
+
+# What belongs to a run, or to the past, rather than to a result.
+_VOLATILE = frozenset({"seconds", "rank", "score", "key", "provenance", "traceback", "unphysical"})
+# Figures of a result that depend on nothing but its provenance.
+_COUNTS = (
+    *("rigid_body_modes", "rigid_body_modes_expected", "negative_eigenvalues"),
+    *("parameter_count", "evaluations"),
+)
+
+
+def environment_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+    """Return what is not the same in the meta data of two runs, a line each.
+
+    Arguments:
+        old, new: `Run.meta`.
+    """
+    return [
+        f"{name}: {before} then, {after} now"
+        for name, before, after in _pairs(_environment(old), _environment(new))
+    ]
+
+
+def result_differences(old: Run, new: Run) -> list[str]:
+    """Return which results are not the same to the last bit, a line each.
+
+    Times and ranks are left out: they do not belong to a result.
+    """
+    before, after = _by_job(old), _by_job(new)
+    lines = []
+    for job in sorted(before.keys() | after.keys(), key=str):
+        name = f"{job[0]}, {job[1]}, seed {job[2]}"
+        if job not in after:
+            lines.append(f"{name}: not run now")
+        elif job not in before:
+            lines.append(f"{name}: not run then")
+        else:
+            lines += [f"{name}: {what}" for what in _differences(before[job], after[job])]
+    return lines
+
+
+def _by_job(run: Run) -> dict[tuple[str, str, int], JobResult]:
+    return {(item.case, item.strategy, item.seed): item for item in run.results}
+
+
+def _environment(meta: Mapping[str, Any]) -> dict[str, Any]:
+    machine, cases = meta.get("machine") or {}, meta.get("cases") or {}
+    return {
+        **(meta.get("versions") or {}),
+        "platform": machine.get("platform"),
+        "cpu": machine.get("cpu"),
+        "blas": machine.get("blas"),
+        "git commit": meta.get("git_commit"),
+        **{f"case {name}": str(item.get("digest"))[:12] for name, item in cases.items()},
+    }
+
+
+def _pairs(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[tuple[str, object, object]]:
+    for name in dict.fromkeys((*old, *new)):
+        if old.get(name) != new.get(name):
+            yield name, old.get(name, "nothing"), new.get(name, "nothing")
+
+
+def _differences(old: JobResult, new: JobResult) -> Iterator[str]:
+    if old.provenance.get("strategy") != new.provenance.get("strategy"):
+        versions = (item.provenance.get("strategy") for item in (old, new))
+        yield "version of the strategy: {} then, {} now".format(*versions)
+    if old.status != new.status:
+        yield f"{old.status} then, {new.status} now"
+        return
+    told = set()
+    for block in dict.fromkeys((*old.blocks, *new.blocks)):
+        first, second = (
+            item.blocks[block].rms_percent if block in item.blocks else None for item in (old, new)
+        )
+        if first != second:
+            told.add(block)
+            yield f"{block} rms {first} % then, {second} % now"
+    for name in _COUNTS:
+        if getattr(old, name) != getattr(new, name):
+            told.add(name)
+            yield f"{name} {getattr(old, name)} then, {getattr(new, name)} now"
+    before, after = _stable(old), _stable(new)
+    parts = [name for name in before if before[name] != after.get(name) and name not in told]
+    if parts:
+        yield f"differs in {', '.join(parts)}"
+
+
+def _stable(result: JobResult) -> dict[str, Any]:
+    """Return all of a result that should be the same again, in plain data."""
+    return {name: value for name, value in result_to_json(result).items() if name not in _VOLATILE}

@@ -1,0 +1,252 @@
+"""What a model predicts of the measured modes: blocks of errors, rigid-body modes, signs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+import scipy.linalg as la
+
+from femubench.core.case.case import Case, Modification
+from femubench.core.fem.model import Model
+from femubench.core.modal.close_modes import align_close_modes
+from femubench.core.modal.eigen import (
+    DENSE_LIMIT,
+    Modes,
+    enough_modes,
+    modes_of,
+    once_for,
+    solve_modes,
+    zero_tolerance,
+)
+from femubench.core.modal.measurement import Measurement
+from femubench.core.modal.pairing import LEAST_SENSORS, WINDOW, pair_modes
+from femubench.core.modal.rigid import rigid_modes_of
+from femubench.core.schema.results import Block, PairedMode
+from femubench.core.score.leaderboard import leaderboard
+from femubench.core.score.ranking import rank_results, score_of
+from femubench.core.typing import FloatArray
+
+__all__ = [
+    "Judgement",
+    "Reference",
+    "frequency_error",
+    "judge",
+    "leaderboard",
+    "predict_block",
+    "rank_results",
+    "reference_of",
+    "score_model",
+    "score_of",
+]
+
+_UNSEEN = 1e-9  # of the largest reading of any mode: the sensors do not see this one
+_SAME_MOTION = 0.9  # squared cosine between a zero mode and the nominal rigid-body motions
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What the nominal model of a case gives, so that no score depends on who else runs.
+
+    Arguments:
+        blocks: the errors of the nominal model by block name.
+        zero: eigenvalue up to which a mode counts as one of zero frequency, rad^2/s^2.
+        rigid: the rigid-body motions that the nominal model leaves free, (n, r).
+    """
+
+    blocks: Mapping[str, Block]
+    zero: float
+    rigid: FloatArray
+
+    @property
+    def rms_percent(self) -> dict[str, float]:
+        """Return the rms error by block name, the denominators of every score."""
+        return {name: block.rms_percent for name, block in self.blocks.items()}
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """A model judged against a case.
+
+    Arguments:
+        blocks: errors by block name.
+        rigid_body_modes: zero-frequency modes that are rigid-body motions of the nominal model.
+        negative_eigenvalues: of the model as tested, without modifications.
+    """
+
+    blocks: dict[str, Block]
+    rigid_body_modes: int
+    negative_eigenvalues: int
+
+
+def frequency_error(mode: PairedMode) -> float:
+    """Return |f_p / f_m - 1|; 1 for a mode without partner or with an imaginary one."""
+    if mode.predicted_hz is None or mode.predicted_hz <= 0.0:
+        return 1.0
+    return abs(mode.predicted_hz / mode.measured_hz - 1.0)
+
+
+def predict_block(
+    model: Model, measurement: Measurement, modification: str | None
+) -> tuple[PairedMode, ...]:
+    """Return what a model predicts of every measured mode, paired by shape and frequency.
+
+    Arguments:
+        model: with its modification already attached.
+        measurement: the modes to pair, in one assignment.
+        modification: name of the design change; None for the structure as tested.
+
+    Raises:
+        ModelError: when the model has no modes or a sensor lies off the structure.
+    """
+    return _predict(model, _modes_for(model, (measurement,)), measurement, modification)
+
+
+def modified_modes(model: Model, change: Modification) -> tuple[PairedMode, ...]:
+    """Return what a model predicts of a modified structure, computed once for this very model.
+
+    Raises:
+        ModelError: when the modified model has no modes or a sensor lies off the structure.
+    """
+
+    def make() -> tuple[Modification, tuple[PairedMode, ...]]:
+        changed = model.attach(change.masses, change.springs)
+        # With the change, so that nothing else gets its number as long as this is kept.
+        return change, predict_block(changed, change.measurement, change.name)
+
+    return once_for(model, ("modified", id(change)), make)[1]
+
+
+def score_model(case: Case, model: Model) -> dict[str, Block]:
+    """Return the errors of a model by block: used, higher, modified, where the case has data.
+
+    Used and higher modes are paired in one assignment, so that none is predicted twice.
+
+    Raises:
+        ModelError: when the model has no modes.
+    """
+    return _blocks(case, model, _modes_for(model, (case.measurement,)))
+
+
+def reference_of(case: Case) -> Reference:
+    """Return what the nominal model gives, with which every other model is compared.
+
+    Raises:
+        ModelError: when the nominal model has no modes.
+    """
+    modes = _modes_for(case.model, (case.measurement,))
+    blocks = _blocks(case, case.model, modes)
+    return Reference(blocks, zero_tolerance(modes), rigid_modes_of(case.model))
+
+
+def judge(case: Case, model: Model, reference: Reference) -> Judgement:
+    """Return errors, rigid-body modes kept and negative eigenvalues of a model.
+
+    A rigid-body mode is kept where |lambda| <= 1e-6 times the first elastic eigenvalue of the
+    nominal model, an eigenvalue is negative below minus that.
+
+    Raises:
+        ModelError: when the model has no modes.
+    """
+    modes = _modes_for(model, (case.measurement,))
+    negative = int(np.count_nonzero(modes.eigenvalues < -reference.zero))
+    return Judgement(
+        _blocks(case, model, modes), _kept_rigid_modes(case, model, modes, reference), negative
+    )
+
+
+def _modes_for(model: Model, measurements: Sequence[Measurement]) -> Modes:
+    """Return all modes of a small model, of a large one those that could find a partner."""
+    if model.size <= DENSE_LIMIT:
+        return modes_of(model)
+    measured = np.concatenate([item.frequencies for item in measurements])
+    top = WINDOW * float(measured.max(initial=0.0))
+    count, limit = enough_modes(model, len(measured)) or model.size, model.size // 2
+    modes = solve_modes(model, min(count, limit))
+    while modes.natural_frequencies[-1] < top and count < limit:
+        count = min(2 * count, limit)
+        modes = solve_modes(model, count)
+    return modes
+
+
+def _predict(
+    model: Model, modes: Modes, measurement: Measurement, modification: str | None
+) -> tuple[PairedMode, ...]:
+    elastic = modes.elastic
+    readings = np.asarray(model.observe(measurement.sensors) @ elastic.shapes)
+    # Mass-normalised shapes have a common scale: what is left of an unseen one is roundoff, of
+    # which a MAC would make a shape like any other.
+    largest = np.abs(readings).max(axis=0, initial=0.0)
+    readings = np.where(largest > _UNSEEN * largest.max(initial=0.0), readings, 0.0)
+    frequencies = elastic.natural_frequencies
+    # Modes within two standard deviations of each other are one to the test.
+    closeness = 2.0 * float(np.median(measurement.frequency_std / measurement.frequencies))
+    readings = align_close_modes(frequencies, readings, measurement.shapes, closeness)
+    pairing = pair_modes(measurement.frequencies, measurement.shapes, frequencies, readings)
+    return tuple(
+        PairedMode(
+            number=number,
+            measured_hz=float(measured),
+            predicted_hz=float(frequencies[partner]) if partner >= 0 else None,
+            mac=None if np.isnan(likeness) else float(likeness),
+            modification=modification,
+        )
+        for number, measured, partner, likeness in zip(
+            measurement.numbers, measurement.frequencies, pairing.index, pairing.mac, strict=True
+        )
+    )
+
+
+def _blocks(case: Case, model: Model, modes: Modes) -> dict[str, Block]:
+    tested = case.measurement.select(chain(case.used, case.held_out))
+    pairs = _predict(model, modes, tested, None)
+    shaped = _with_shape(tested)
+    first = len(case.used)
+    parts = {
+        "used": (pairs[:first], shaped[:first]),
+        "higher": (pairs[first:], shaped[first:]),
+        "modified": _modified(case, model),
+    }
+    return {name: _block(*part) for name, part in parts.items() if part[0]}
+
+
+def _modified(case: Case, model: Model) -> tuple[tuple[PairedMode, ...], list[bool]]:
+    """Return the modes of all modifications in one list: every mode counts alike."""
+    pairs: list[PairedMode] = []
+    shaped: list[bool] = []
+    for change in case.modifications:
+        pairs += modified_modes(model, change)
+        shaped += _with_shape(change.measurement)
+    return tuple(pairs), shaped
+
+
+def _with_shape(measurement: Measurement) -> list[bool]:
+    present = np.isfinite(measurement.shapes).sum(axis=0) >= LEAST_SENSORS
+    return [bool(flag) for flag in present]
+
+
+def _block(pairs: tuple[PairedMode, ...], shaped: Sequence[bool]) -> Block:
+    errors = np.array([frequency_error(pair) for pair in pairs])
+    likeness = [pair.mac or 0.0 for pair, has in zip(pairs, shaped, strict=True) if has]
+    mean_mac = float(np.mean(likeness)) if likeness else None
+    return Block(100.0 * float(np.sqrt(np.mean(np.square(errors)))), mean_mac, pairs)
+
+
+def _kept_rigid_modes(case: Case, model: Model, modes: Modes, reference: Reference) -> int:
+    """Count the directions that zero modes and nominal rigid-body motions have in common.
+
+    Spaces are compared, not modes: among several zero modes the eigenvectors are arbitrary.
+    """
+    still = modes.shapes[:, np.abs(modes.eigenvalues) <= reference.zero]
+    same = model.size == case.model.size
+    rigid = reference.rigid if same else rigid_modes_of(model)
+    mass = case.model.mass if same else model.mass
+    if still.shape[1] == 0 or rigid.shape[1] == 0:
+        return 0
+    values, turn = la.eigh(still.T @ (mass @ still))
+    keep = values > 1e-12 * values[-1]
+    basis = still @ (turn[:, keep] / np.sqrt(values[keep]))
+    cosines = la.svdvals(rigid.T @ (mass @ basis))
+    return int(np.count_nonzero(np.square(cosines) > _SAME_MOTION))
