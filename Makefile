@@ -56,7 +56,7 @@ $(BIN)/python:
 
 # Installed by link: a change of a source file needs no other install, one of the dependencies does.
 $(VENV)/.installed: pyproject.toml | $(BIN)/python
-	$(PIP) install --quiet -e .
+	$(PIP) install --quiet -e '.[plot]'
 	touch $@
 
 $(VENV)/.installed-test: pyproject.toml | $(BIN)/python

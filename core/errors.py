@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 
 _LONGEST = 600  # characters of one part of a message, which may quote what a stranger wrote
@@ -65,8 +66,31 @@ def _input_error(
     return InputError(what, file=file, line=line, key=key, expected=expected)
 
 
+def require(package: str, extra: str, what: str) -> None:
+    """Make sure that a package of an extra is there.
+
+    Arguments:
+        package: that is imported next.
+        extra: of femubench, which brings it.
+        what: needs it, e.g. ``"format parquet"``.
+
+    Raises:
+        InputError: naming the extra to install.
+    """
+    if find_spec(package) is None:
+        raise InputError(f"{what} needs {package}", expected=f"pip install 'femubench[{extra}]'")
+
+
 class ModelError(FemubenchError):
-    """A model that cannot be built or solved, e.g. a degree of freedom without any stiffness."""
+    """A model that cannot be built or solved, e.g. a degree of freedom without any stiffness.
+
+    Arguments:
+        item: the part of the frame that is at fault, e.g. a member; None where it is no single one.
+    """
+
+    def __init__(self, what: str, item: object = None) -> None:
+        super().__init__(what)
+        self.item = item
 
 
 class PluginError(FemubenchError):
@@ -85,14 +109,14 @@ class SelfCheckFailed(StrategyFailure):
     """A strategy's own promise is not met by its result.
 
     Arguments:
-        promise: what was promised, e.g. ``"used modes reproduced"``.
-        measured: the residual that was found.
-        allowed: the largest residual that would have been accepted.
+        promise: what was promised, in words, e.g. ``"sum of the masses kept"``.
+        measured: the relative error that was found.
+        allowed: the largest one that would have been accepted.
     """
 
     def __init__(self, promise: str, measured: float, allowed: float) -> None:
         self.promise, self.measured, self.allowed = promise, measured, allowed
-        super().__init__(f"{promise}: measured {measured:.3g}, allowed {allowed:.3g}")
+        super().__init__(f"{promise}: off by {measured:.3g}, the method promises {allowed:.3g}")
 
     def __reduce__(self) -> tuple[object, ...]:
         return SelfCheckFailed, (self.promise, self.measured, self.allowed)

@@ -25,6 +25,8 @@ _NAMES = {
     "diagnosis.diagnose": "diagnose extended_by",
     "diagnosis.result": "Diagnosis",
     "diagnosis.tables": "causes_in",
+    "drawing.element_change": "element_norms stiffness_difference",
+    "drawing.wireframe": "Wireframe wireframe_of",
     "effect.attachments": (
         "directed_places directed_point elastic_band elongation_row "
         "free_translations mass_term once_for point_in "
@@ -43,11 +45,12 @@ _NAMES = {
         "member_labels member_length pair_of point_of "
         "point_places split_direction type_place type_places"
     ),
+    "effect.sizes": "Site Size",
+    "effect.words": "Reading",
     "errors": (
         "Diverged FemubenchError InputError ModelError "
         "NotApplicable PluginError SelfCheckFailed StrategyFailure"
     ),
-    "exhibits.element_change": "element_norms stiffness_difference",
     "fem.beam": (
         "BeamProperties coupling_matrices eccentric_mass_parts mass_matrices stiffness_matrices"
     ),
@@ -66,12 +69,12 @@ _NAMES = {
     "fem.model": "LowRank Model",
     "fem.parameters": "Parameter",
     "fem.preload": "preload_stiffness preload_stiffnesses redundant_members",
-    "fem.sections": "Section constant_kappa rectangular_tube round_tube solid_rectangle",
+    "fem.sections": "Section bredt constant_kappa rectangular_tube round_tube solid_rectangle",
     "fem.sensors": "Sensors",
     "fem.structure": "Structure",
-    "figure": "Bars Curve Curves Figure MatrixImage StructureMap",
     "inference.examine": "Examination examine",
     "inference.posterior": "Explanation",
+    "look.modes": "Seen",
     "modal.complex_modes": "real_modes",
     "modal.correlation": "auto_mac mac modal_scale_factor",
     "modal.eigen": "Modes solve_modes",
@@ -81,6 +84,7 @@ _NAMES = {
     "modal.pairing": "Pairing pair_modes",
     "modal.rigid": "rigid_body_vectors rigid_modes_of",
     "modal.sensitivity": "eigenvalue_sensitivities frequency_sensitivities shape_sensitivities",
+    "plot.figure": "Bars Curve Curves Figure MatrixImage StructureMap",
     "plugin.loader": "registered_effects",
     "plugin.markers": "hookimpl",
     "plugin.roles": "Effect Reader Reporter Scenario",
@@ -90,10 +94,12 @@ _NAMES = {
     "run.frames": "modes_frame results_frame run_from_json run_to_json",
     "run.runner": "run_jobs",
     "run.store": "Store",
+    "schema.diagnosis": "LookWarning",
     "schema.results": "Block JobResult PairedMode Run",
     "score.leaderboard": "leaderboard",
-    "score.ranking": "OFFSET_PERCENT SCORE_OF_FAILURE rank_results",
+    "score.ranking": "OFFSET_PERCENT SCORE_OF_FAILURE TIE rank_results ranked",
     "score.scoring": "frequency_error predict_block score_model",
+    "score.statistics": "METHOD tell_apart",
     "typing": "FloatArray IntArray SparseArray",
     "update.dynamic": "expand_measured_shapes",
     "update.element_families": (
@@ -122,6 +128,14 @@ if TYPE_CHECKING:
     )
     from femubench.core.diagnosis.result import Diagnosis as Diagnosis
     from femubench.core.diagnosis.tables import causes_in as causes_in
+    from femubench.core.drawing.element_change import (
+        element_norms as element_norms,
+        stiffness_difference as stiffness_difference,
+    )
+    from femubench.core.drawing.wireframe import (
+        Wireframe as Wireframe,
+        wireframe_of as wireframe_of,
+    )
     from femubench.core.effect.attachments import (
         directed_places as directed_places,
         directed_point as directed_point,
@@ -175,6 +189,8 @@ if TYPE_CHECKING:
         type_place as type_place,
         type_places as type_places,
     )
+    from femubench.core.effect.sizes import Site as Site, Size as Size
+    from femubench.core.effect.words import Reading as Reading
     from femubench.core.errors import (
         Diverged as Diverged,
         FemubenchError as FemubenchError,
@@ -184,10 +200,6 @@ if TYPE_CHECKING:
         PluginError as PluginError,
         SelfCheckFailed as SelfCheckFailed,
         StrategyFailure as StrategyFailure,
-    )
-    from femubench.core.exhibits.element_change import (
-        element_norms as element_norms,
-        stiffness_difference as stiffness_difference,
     )
     from femubench.core.fem.beam import (
         BeamProperties as BeamProperties,
@@ -236,6 +248,7 @@ if TYPE_CHECKING:
     )
     from femubench.core.fem.sections import (
         Section as Section,
+        bredt as bredt,
         constant_kappa as constant_kappa,
         rectangular_tube as rectangular_tube,
         round_tube as round_tube,
@@ -243,16 +256,9 @@ if TYPE_CHECKING:
     )
     from femubench.core.fem.sensors import Sensors as Sensors
     from femubench.core.fem.structure import Structure as Structure
-    from femubench.core.figure import (
-        Bars as Bars,
-        Curve as Curve,
-        Curves as Curves,
-        Figure as Figure,
-        MatrixImage as MatrixImage,
-        StructureMap as StructureMap,
-    )
     from femubench.core.inference.examine import Examination as Examination, examine as examine
     from femubench.core.inference.posterior import Explanation as Explanation
+    from femubench.core.look.modes import Seen as Seen
     from femubench.core.modal.complex_modes import real_modes as real_modes
     from femubench.core.modal.correlation import (
         auto_mac as auto_mac,
@@ -277,6 +283,14 @@ if TYPE_CHECKING:
         frequency_sensitivities as frequency_sensitivities,
         shape_sensitivities as shape_sensitivities,
     )
+    from femubench.core.plot.figure import (
+        Bars as Bars,
+        Curve as Curve,
+        Curves as Curves,
+        Figure as Figure,
+        MatrixImage as MatrixImage,
+        StructureMap as StructureMap,
+    )
     from femubench.core.plugin.loader import registered_effects as registered_effects
     from femubench.core.plugin.markers import hookimpl as hookimpl
     from femubench.core.plugin.roles import (
@@ -300,6 +314,7 @@ if TYPE_CHECKING:
     )
     from femubench.core.run.runner import run_jobs as run_jobs
     from femubench.core.run.store import Store as Store
+    from femubench.core.schema.diagnosis import LookWarning as LookWarning
     from femubench.core.schema.results import (
         Block as Block,
         JobResult as JobResult,
@@ -310,13 +325,16 @@ if TYPE_CHECKING:
     from femubench.core.score.ranking import (
         OFFSET_PERCENT as OFFSET_PERCENT,
         SCORE_OF_FAILURE as SCORE_OF_FAILURE,
+        TIE as TIE,
         rank_results as rank_results,
+        ranked as ranked,
     )
     from femubench.core.score.scoring import (
         frequency_error as frequency_error,
         predict_block as predict_block,
         score_model as score_model,
     )
+    from femubench.core.score.statistics import METHOD as METHOD, tell_apart as tell_apart
     from femubench.core.typing import (
         FloatArray as FloatArray,
         IntArray as IntArray,

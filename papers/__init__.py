@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from importlib import import_module
+from typing import TYPE_CHECKING
 
-from femubench import Study, Workbench
+if TYPE_CHECKING:
+    from femubench import Study, Workbench
 
 # Slug: the cases that a re-run works with.
 PAPERS = {
@@ -20,6 +22,5 @@ def study(paper: str, bench: Workbench) -> Study:
         paper: one of `PAPERS`.
         bench: with the cases that `PAPERS` lists for it, and the built-in strategies.
     """
-    found = import_module(f"femubench.papers.{paper}").study(bench)
-    assert isinstance(found, Study)
+    found: Study = import_module(f"femubench.papers.{paper}").study(bench)
     return found

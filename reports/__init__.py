@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from femubench import Reporter, hookimpl
-from femubench.reports.csvs import CsvReporter, ModesCsvReporter
-from femubench.reports.htmls import HtmlReporter
-from femubench.reports.jsons import JsonReporter
-from femubench.reports.markdown import MarkdownReporter
-from femubench.reports.parquets import ParquetReporter
-from femubench.reports.terminal import TerminalReporter
+from femubench import hookimpl
+
+CLASSES = {
+    "terminal": "terminal:TerminalReporter",
+    "html": "htmls:HtmlReporter",
+    "markdown": "markdown:MarkdownReporter",
+    "csv": "csvs:CsvReporter",
+    "modes-csv": "csvs:ModesCsvReporter",
+    "json": "jsons:JsonReporter",
+    "parquet": "parquets:ParquetReporter",
+}
 
 
 @hookimpl
-def femubench_reporters() -> list[Reporter]:
-    """Return the built-in reporters."""
-    return [
-        TerminalReporter(),
-        HtmlReporter(),
-        MarkdownReporter(),
-        CsvReporter(),
-        ModesCsvReporter(),
-        JsonReporter(),
-        ParquetReporter(),
-    ]
+def femubench_reporters() -> dict[str, str]:
+    """Return where the built-in reporters are."""
+    return {name: f"{__name__}.{place}" for name, place in CLASSES.items()}

@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from femubench import METHOD
 from femubench.reports.cells import NOTHING, fixed, plain, shortened
 from femubench.reports.markdown import escape, table
 from femubench.reports.site import environment
@@ -21,11 +22,7 @@ _LEGEND = (
     "Ratios B / A, less than 1 is better in B: skill; used, higher, modified (rms frequency error "
     "+ 0.05 %); seconds (sums). Means are geometric, over cases and seeds."
 )
-_EVIDENCE = (
-    "Wilcoxon's signed rank test over pairs (case, block, seed), Holm's correction over the "
-    "strategies; 95 % bootstrap interval of the mean ratio. Fewer than 6 pairs that differ say "
-    "nothing; jobs without a result in one of the runs are not in it."
-)
+_EVIDENCE = f"{METHOD} The interval of the mean ratio is by bootstrap."
 _SAYS = {"lost": "lost", "gained": "gained", "other": "changed"}
 _HEADS = ("strategy", "scenario", "jobs", *_RATIOS, "lost")
 
@@ -36,7 +33,8 @@ def comparison_text(data: Mapping[str, Any]) -> str:
     Arguments:
         data: what `bench compare --format json` writes.
     """
-    parts = [_wrapped(f"A {plain(data['before'])}, B {plain(data['after'])}: {headline(data)}")]
+    before, after = _sides(data)
+    parts = [_wrapped(f"A {before}, B {after}: {headline(data)}")]
     parts += _listed("Ended otherwise", [_change(item) for item in data["changes"]])
     parts += _listed("Beyond a threshold", [_excess(item) for item in data["excesses"]])
     rows = [
@@ -59,9 +57,10 @@ def comparison_text(data: Mapping[str, Any]) -> str:
 
 def comparison_markdown(data: Mapping[str, Any]) -> str:
     """Return a comparison in GitHub's Markdown."""
+    before, after = map(escape, _sides(data))
     parts = [
         f"# {escape(headline(data))}",
-        table(["", ""], (["A", escape(data["before"])], ["B", escape(data["after"])]), "ll"),
+        table(["", ""], (["A", before], ["B", after]), "ll"),
     ]
     parts += _bullets("Ended otherwise", [_change(item) for item in data["changes"]])
     parts += _bullets("Beyond a threshold", [_excess(item) for item in data["excesses"]])
@@ -78,10 +77,11 @@ def comparison_markdown(data: Mapping[str, Any]) -> str:
 def comparison_html(data: Mapping[str, Any]) -> str:
     """Return a comparison as one document that needs no script and no network."""
     found = environment().get_template("compare.html")
+    before, after = _sides(data)
     return found.render(
         headline=headline(data),
-        before=plain(data["before"]),
-        after=plain(data["after"]),
+        before=before,
+        after=after,
         worse=data["worse"],
         excesses=[plain(_excess(item)) for item in data["excesses"]],
         changes=[
@@ -96,6 +96,16 @@ def comparison_html(data: Mapping[str, Any]) -> str:
         legend=_LEGEND,
         evidence=_EVIDENCE,
     )
+
+
+def _sides(data: Mapping[str, Any]) -> tuple[str, str]:
+    """Return the names of A and B, with the strategies of two names that are compared."""
+    before, after = (
+        plain(data[side])
+        + (f" ({', '.join(plain(item[side]) for item in data['against'])})" * bool(data["against"]))
+        for side in ("before", "after")
+    )
+    return before, after
 
 
 def headline(data: Mapping[str, Any]) -> str:

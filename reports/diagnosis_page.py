@@ -6,15 +6,23 @@ Files of an earlier version, which hold no structure, give a page without the ma
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import partial
 from importlib.resources import files
 from typing import Any
 
 from markupsafe import Markup
 
+from femubench import InputError
+from femubench.plot import (
+    MOST_ROWS,
+    evidence,
+    residual_dots,
+    residuals,
+    strongest_places,
+    svg,
+)
 from femubench.reports.cells import NOTHING, plain
-from femubench.reports.diagnosis_charts import MOST_ROWS, dots, frequency_rows, shape_rows
-from femubench.reports.diagnosis_map import Spot, level, structure_map
 from femubench.reports.diagnosis_words import (
     CAUSES,
     GAINS,
@@ -37,8 +45,8 @@ from femubench.reports.templating import templates
 
 Data = Mapping[str, Any]
 
-_MOST_SPOTS, _MOST_DATA, _MOST_ADVICE, _MOST_TOP = 14, 2000, 8, 5
-_LEAST = 0.005  # what two decimals show
+_MOST_DATA, _MOST_ADVICE, _MOST_TOP, _MOST_TOLD = 2000, 8, 5, 12
+_MAP, _SMALL = (4.8, 3.7), (3.4, 2.4)  # inch
 
 
 def diagnosis_html(data: Data) -> str:
@@ -112,25 +120,31 @@ def _fit(data: Data) -> dict[str, Any]:
         }
         for title, pair in pairs
     ]
-    panels = []
-    for title, rows, one_sided in (
-        ("Frequencies", frequency_rows(data), False),
-        ("Mode shapes, rms over the sensors", shape_rows(data), True),
-    ):
-        if rows:
-            name = "Residuals of shapes" if one_sided else "Residuals of frequencies"
-            anchor = f"dots-{int(one_sided)}"
-            svg = dots(rows, one_sided=one_sided, name=name, anchor=anchor)
-            panels.append({"title": title, "svg": svg, "hidden": max(0, len(rows) - MOST_ROWS)})
-    residuals = data["residuals"]
+    panels = [
+        _panel(data, "frequency", "Frequencies"),
+        _panel(data, "shape", "Mode shapes, rms over the sensors"),
+    ]
+    rows = data["residuals"]
     return {
         "gains": gains,
-        "panels": panels,
-        "residuals": [_residual(row) for row in residuals[:_MOST_DATA]],
-        "hidden_residuals": max(0, len(residuals) - _MOST_DATA),
+        "panels": [panel for panel in panels if panel],
+        "residuals": [_residual(row) for row in rows[:_MOST_DATA]],
+        "hidden_residuals": max(0, len(rows) - _MOST_DATA),
         "chi2": [figure(value) for value in data["chi2"]],
         "data_count": data["data_count"],
     }
+
+
+def _panel(data: Data, kind: Any, title: str) -> dict[str, Any] | None:  # noqa: ANN401
+    """Return the residuals of one kind as a drawing; None where there are none."""
+    dots = residual_dots(data, kind)
+    if not dots:
+        return None
+    said = "; ".join(f"{dot.name} {dot.text}" for dot in dots[:_MOST_TOLD])
+    draw = partial(residuals, data, kind=kind)
+    size = 4.6, 1.0 + 0.27 * min(len(dots), MOST_ROWS)
+    found = svg(draw, name=f"dots-{kind}", title=title, caption=said, size=size, themed=True)
+    return {"title": title, "svg": Markup(found), "hidden": max(0, len(dots) - MOST_ROWS)}
 
 
 def _width(value: float | None, most: float) -> str:
@@ -152,72 +166,46 @@ def _residual(row: Data) -> list[tuple[str, float | None]]:
 
 def _where(data: Data) -> dict[str, Any]:
     """Return the map of the evidence and the other indicators."""
-    structure = data.get("structure")
-    spots = [] if data["verdict"] == "none" else _spots(data)
-    listed = ", ".join(f"{spot.place} {spot.value:.2f}" for spot in spots[:5])
+    spots = strongest_places(data)
+    listed = ", ".join(f"{spot.place} {spot.value:.2f}" for spot in spots[:_MOST_TOP])
     says = f"Evidence by place: {listed}." if listed else "No place stands out."
-    drawn = _drawn(structure, spots, "Evidence on the structure", says, "map")
+    indicators = dict.fromkeys(row["indicator"] for row in data["locations"])
     return {
-        "map": drawn,
+        "map": _map(data, "evidence", "map", "Evidence on the structure", says),
         "spots": [
             {"place": s.place, "value": f"{s.value:.2f}", "width": _width(s.value, 1.0)}
-            | {"causes": s.causes, "level": level(s.value)}
+            | {"causes": s.causes, "level": s.level}
             for s in spots
         ],
         "indicators": [
-            _indicator(name, rows, structure, number)
-            for number, (name, rows) in enumerate(_by_indicator(data).items())
+            _indicator(data, name, number)
+            for number, name in enumerate(indicators)
             if name != "evidence"
         ],
     }
 
 
-def _drawn(
-    structure: Data | None, spots: Sequence[Spot], name: str, says: str, anchor: str
-) -> Markup | None:
-    if structure is None:
+def _map(data: Data, indicator: str, name: str, title: str, says: str) -> Markup | None:
+    """Return the structure with an indicator; None where there is no geometry."""
+    whole = indicator == "evidence"
+    draw = partial(evidence, data, indicator=indicator, names=whole)
+    size = _MAP if whole else _SMALL
+    try:
+        return Markup(svg(draw, name=name, title=title, caption=says, size=size, themed=True))
+    except InputError:
         return None
-    names = anchor == "map"
-    return structure_map(structure, spots, name=name, says=says, anchor=anchor, names=names)
 
 
-def _by_indicator(data: Data) -> dict[str, list[Spot]]:
-    """Return the places of every indicator, strongest first."""
-    found: dict[str, list[Spot]] = {}
-    for row in data["locations"]:
-        value = min(1.0, max(0.0, row["value"] or 0.0))
-        found.setdefault(row["indicator"], []).append(Spot(row["place"], value))
-    return {name: sorted(rows, key=lambda spot: -spot.value) for name, rows in found.items()}
-
-
-def _spots(data: Data) -> list[Spot]:
-    """Return the places with evidence, strongest first, with the numbers of the causes there."""
-    causes: dict[str, list[str]] = {}
-    for number, cause in enumerate(data["causes"], 1):
-        causes.setdefault(cause["place"], []).append(str(number))
-    evidence = {spot.place: spot.value for spot in _by_indicator(data).get("evidence", ())}
-    for place in causes:
-        evidence.setdefault(place, 0.0)
-    ranked = sorted(evidence, key=lambda place: -evidence[place])
-    kept = [p for p in ranked[:_MOST_SPOTS] if evidence[p] >= _LEAST]
-    kept += [place for place in causes if place not in kept]
-    return [Spot(place, evidence[place], ", ".join(causes.get(place, ()))) for place in kept]
-
-
-def _indicator(
-    name: str, rows: Sequence[Spot], structure: Data | None, number: int
-) -> dict[str, Any]:
-    known = [spot for spot in rows if spot.value >= _LEAST]
-    top = ", ".join(f"{spot.place} {spot.value:.2f}" for spot in known[:_MOST_TOP]) or NOTHING
-    # Single elements and joints say more than the member that holds them.
-    fine = [spot for spot in known if "/" in spot.place] or known
-    points = known if fine is known else [*fine, *(s for s in known if _is_joint(s, structure))]
-    drawn = _drawn(structure, points, f"Indicator {name}", f"Highest: {top}.", f"where-{number}")
+def _indicator(data: Data, name: str, number: int) -> dict[str, Any]:
+    rows = [
+        (row["place"], row["value"])
+        for row in data["locations"]
+        if row["indicator"] == name and row["value"]
+    ]
+    rows.sort(key=lambda row: -row[1])
+    top = ", ".join(f"{place} {value:.2f}" for place, value in rows[:_MOST_TOP]) or NOTHING
+    drawn = _map(data, name, f"where-{number}", f"Indicator {name}", f"Highest: {top}.")
     return {"name": name, "means": INDICATORS.get(name, ""), "top": top, "svg": drawn}
-
-
-def _is_joint(spot: Spot, structure: Data | None) -> bool:
-    return structure is not None and any(j["name"] == spot.place for j in structure["joints"])
 
 
 def _explanations(data: Data) -> dict[str, Any]:

@@ -118,9 +118,7 @@ def parameter_rows(cause: Data) -> list[dict[str, str]]:
 def _share(item: Data) -> str:
     """Return a relative change in percent."""
     value, std = item["value"], item["std"]
-    if item["unit"] or not item["name"].startswith("change of") or value is None:
-        return ""
-    if not abs(value) < 10.0:
+    if item["wording"] != "change" or value is None or not abs(value) < 10.0:
         return ""
     spread = "" if std is None else f" ± {figure(100.0 * std, 2)}"
     return f" ({signed(100.0 * value)}{spread} %)"
@@ -128,11 +126,9 @@ def _share(item: Data) -> str:
 
 def change(item: Data) -> str:
     """Return an effect's size in percent where it is a share of something."""
-    size = item["size"]
-    shares = ("density", "youngs-modulus", "torsion-constant", "member-mass", "member-stiffness")
-    if item["unit"] or size is None or item["effect"] not in (*shares, "local-stiffness-loss"):
+    if item["wording"] == "value" or item["size"] is None:
         return ""
-    return f" ({figure(100.0 * size, 2)} %)"
+    return f" ({figure(100.0 * item['size'], 2)} %)"
 
 
 def odds(separation: float | None) -> str:

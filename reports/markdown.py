@@ -9,10 +9,9 @@ from dataclasses import replace
 from itertools import chain
 from typing import Any
 
-from femubench import JobResult, PairedMode, Run, leaderboard
+from femubench import JobResult, PairedMode, Run, leaderboard, tell_apart
 from femubench.reports.cells import NOTHING, fixed, hertz, interval, plain, whole
 from femubench.reports.page.papers import papers_of
-from femubench.reports.page.statistics import statistics
 from femubench.reports.summary import (
     Trouble,
     cases_of,
@@ -90,10 +89,10 @@ def _notes(run: Run) -> Iterator[str]:
 
 
 def _leaderboard(run: Run) -> Iterator[str]:
-    """Return the ranking with the groups that cannot be told apart, and what that rests on."""
+    """Return the ranking with the groups without a difference, and what they rest on."""
     board = leaderboard(run)
-    tested = statistics(run, board)
-    letters, names = tested.letters(), strategies_of(run)
+    tested = tell_apart(run, list(board["strategy"]))
+    letters = tested.letters()
     headers = [
         *("rank", "strategy", "skill", "unseen", "used %", "higher %", "modified %"),
         *("rigid lost", "negative", "parameters", "evaluations", "seconds", "ok", "group"),
@@ -113,7 +112,7 @@ def _leaderboard(run: Run) -> Iterator[str]:
             *(whole(row[key]) for key in ("parameters", "evaluations")),
             fixed(row["seconds"], 3, 7),
             _share_of_jobs(row),
-            letters.get(names.index(row["strategy"]), NOTHING),
+            letters.get(row["strategy"], NOTHING),
         ]
         if several:
             cells.insert(3, interval(row["skill_low"], row["skill_high"]))

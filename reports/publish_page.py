@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from femubench import ranked
 from femubench.reports.cells import NOTHING, fixed, plain, shortened
 from femubench.reports.site import environment
 
@@ -168,7 +169,9 @@ def _on_case(
         for row in item["versions"][0]["cases"]
         if (row["case"], row["digest"]) == (name, digest)
     ]
-    for _, _, row, item in sorted(found, key=lambda entry: (entry[2]["flags"] != [], *entry[:2])):
+    for _, (_, _, row, item) in ranked(
+        found, lambda entry: ((entry[2]["flags"] != [],), entry[0], entry[1])
+    ):
         yield {**row, "page": item["page"], "version": plain(item["versions"][0]["version"])}
 
 

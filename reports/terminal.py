@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from femubench import Run, leaderboard
+from femubench import Run, leaderboard, ranked
 from femubench.reports.cells import fixed, interval, plain, shortened, whole
 from femubench.reports.summary import Trouble, notes_of, spared, troubles, unconverged
 
@@ -130,9 +130,11 @@ def aligned_table(rows: list[list[str]], headers: tuple[str, ...], align: tuple[
 
 def _unseen(board: pd.DataFrame) -> str:
     """Return the order of the strategies on what they were not given."""
-    rows = sorted(board.to_dict("records"), key=lambda row: (row["skill_unseen"], row["strategy"]))
+    rows = ranked(
+        board.to_dict("records"), lambda row: ((), row["skill_unseen"], str(row["strategy"]))
+    )
     named = (
-        f"{_marks(row)}{plain(row['strategy'])} {fixed(row['skill_unseen'], 2)}" for row in rows
+        f"{_marks(row)}{plain(row['strategy'])} {fixed(row['skill_unseen'], 2)}" for _, row in rows
     )
     return textwrap.fill(f"skill on unseen data (higher, modified): {', '.join(named)}", WIDTH)
 

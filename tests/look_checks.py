@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from femubench import registered_effects
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
+from femubench.core.look import look as core_look
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.schema.diagnosis import LookWarning
+
+
+def look(
+    model: Model, measurement: Measurement, band: tuple[float, float] | None = None
+) -> tuple[LookWarning, ...]:
+    """Return what a diagnosis would show: the looks of all effects included."""
+    return core_look.look(model, measurement, band, registered_effects())
 
 
 def midpoints(frame: Frame) -> Sensors:

@@ -248,6 +248,45 @@ def test_a_frame_that_cannot_move(tmp_path: Path) -> None:
     assert (error.key, error.what) == ("model.supports", "nothing can move")
 
 
+SPRING = """[[model.joint_springs]]
+joint = "{}"
+member = "right"
+stiffness = {{ry = 3e5}}
+arm = {}
+"""
+RIGID = """[[model.rigid_ends]]
+joint = "{}"
+member = "{}"
+stiffness_length = {}
+mass_length = 0.0
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ("joint_springs", SPRING.format("D", 0.9), "joint_springs[0]"),
+        ("joint_springs", SPRING.format("D", 0.01), "joint_springs[1]"),
+        ("rigid_ends", RIGID.format("C", "girder", 0.9), "rigid_ends[0]"),
+        ("rigid_ends", RIGID.format("A", "left", 0.01), "rigid_ends[1]"),
+    ],
+)
+def test_of_several_like_parts_the_one_at_fault_is_named(
+    tmp_path: Path, old: str, new: str, key: str
+) -> None:
+    """Another one stands before that of the case, which is good or bad against it."""
+    folder = tmp_path / "case"
+    head = f"[[model.{old}]]"
+    broken_copy(folder, "in-plane", "case.toml", head, new + head)
+    if key.endswith("[1]"):
+        good = "arm = 0.02" if old == "joint_springs" else "stiffness_length = -0.01"
+        text = (folder / "case.toml").read_text()
+        (folder / "case.toml").write_text(text.replace(good, f"{good.split()[0]} = 0.9"))
+    error = message(folder)
+    assert error.key == f"model.{key}"
+    assert error.line is not None
+
+
 def test_empty_tables(tmp_path: Path) -> None:
     shutil.copytree(CASES / "in-plane", tmp_path / "case")
     for file, content in (("modes.csv", "mode,frequency\n"), ("sensors.csv", "")):

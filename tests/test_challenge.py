@@ -23,6 +23,8 @@ from femubench import (
     InputError,
     Model,
     PointMass,
+    Site,
+    Size,
     read_case,
 )
 from femubench.core.challenge import folder as folders
@@ -42,7 +44,6 @@ from femubench.core.challenge.truth import (
     Truth,
     fine_places,
     finer,
-    half_loss,
     scattered,
 )
 from femubench.core.challenge.visibility import delta_chi2
@@ -50,14 +51,16 @@ from femubench.core.cli.main import bench
 from femubench.core.errors import FemubenchError, ModelError
 from femubench.core.fem.frame import Place
 from femubench.core.modal.eigen import solve_modes
+from femubench.plugins.effects.local_stiffness_loss import LocalStiffnessLoss
 
 LADDER = structure_named("ladder")
 
 
 class ToyMass(FrameEffect):
-    """A point mass at a joint."""
+    """A point mass at a joint, with a range of its own."""
 
     name: ClassVar[str] = "added-mass"
+    sizes: ClassVar[Sequence[Size]] = (Size(0.005, 0.08, Site.mass),)
 
     def places(self, model: Model) -> Sequence[str]:
         return tuple(joint.name for joint in model.frame_structure.frame.joints)
@@ -199,7 +202,7 @@ def test_a_place_of_the_nominal_mesh_is_two_elements_of_the_finer_one() -> None:
 
 @pytest.mark.parametrize("loss", [0.1, 0.5, 0.7])
 def test_the_loss_in_half_an_element_is_as_flexible_as_that_in_the_whole(loss: float) -> None:
-    half = half_loss(loss)
+    (half,) = LocalStiffnessLoss().in_half((loss,))
     assert 0.5 * (1.0 + 1.0 / (1.0 - half)) == pytest.approx(1.0 / (1.0 - loss))
 
 

@@ -9,16 +9,18 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from scipy.stats import wilcoxon
 
 from femubench.core.cli.main import bench
 from femubench.core.errors import InputError
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.records import run_from_json, run_to_json
-from femubench.core.score.comparison import METRICS, Threshold, compare_runs
-from femubench.core.score.statistics import evidence_of
+from femubench.core.score.comparison import METRICS, Against, Threshold, compare_runs
+from femubench.core.score.statistics import evidence_of, holm
 from femubench.reports.compare_page import comparison_html, comparison_markdown, comparison_text
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
@@ -106,6 +108,119 @@ def test_evidence_needs_six_pairs_that_differ() -> None:
     assert better[0].p == pytest.approx(4 / 2**8)
     # What two machines round differently is no difference.
     assert evidence_of({"a": [1.0 + 1e-9 * k for k in range(1, 20)]})[0].verdict == "same"
+
+
+def test_holm_against_hand_figures() -> None:
+    """4 x 0.005, 3 x 0.01, 2 x 0.03; the last is no smaller than the one before it."""
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.6, 0.5]) == pytest.approx([1.0, 1.0])
+    assert len(holm([])) == 0
+
+
+def test_signed_ranks_with_ties_against_hand_figures() -> None:
+    """Ranks 1.5, 1.5, 3, 4, 5.5, 5.5, the second one falling: 3 of 64 sums are 1.5 or less."""
+    ratios = [2.0, 1 / 2.0, 4.0, 8.0, 16.0, 16.0]
+    (found,) = evidence_of({"s": [*ratios, 1.0]})
+    assert (found.pairs, found.differing) == (7, 6)
+    assert found.p == pytest.approx(2 * 3 / 64)
+
+
+@pytest.mark.parametrize("count", [12, 50, 80])
+def test_signed_ranks_are_those_of_scipy(count: int) -> None:
+    logs = np.random.default_rng(count).normal(0.15, 0.6, count).round(6)
+    (found,) = evidence_of({"s": np.exp(logs)})
+    expected = wilcoxon(logs, method="exact" if count <= 50 else "asymptotic")
+    assert found.p == pytest.approx(expected.pvalue, rel=1e-9)
+
+
+def test_seeds_are_averaged_but_in_a_run_of_one_case(data: Data) -> None:
+    """Draws of the noise on one structure say nothing about other structures."""
+    before, after = data, scaled(data, "softer", 1.5)
+    several = [json.loads(json.dumps(run)) for run in (before, after)]
+    for run in several:
+        run["results"] = [{**r, "seed": seed} for r in run["results"] for seed in (1, 2, 3)]
+
+    def pairs(*runs: Data) -> int:
+        (found,) = compared(*runs, strategies=["softer"])["evidence"]
+        return int(found["pairs"])
+
+    assert pairs(before, after) == pairs(*several) == 6
+    for run in several:
+        run["results"] = [r for r in run["results"] if r["case"] == "corner"]
+    assert pairs(*several) == 9
+
+
+VARIANT = "softer:factor=0.5"
+
+
+def test_two_variants_of_a_strategy_are_compared(data: Data, tmp_path: Path) -> None:
+    varied = renamed(scaled(data, "softer", 1.5), "softer", VARIANT)
+    found = compared(data, varied)
+    assert found["against"] == [{"before": "softer", "after": VARIANT}]
+    assert found["only_before"] == found["only_after"] == []
+    same = compared(data, scaled(data, "softer", 1.5))
+    assert row(found, VARIANT) == row(same, "softer")
+    assert row(found, "unchanged")["skill"] == 1.0
+    ours, theirs = ({e["strategy"]: e for e in f["evidence"]} for f in (found, same))
+    assert ours[VARIANT] == {**theirs["softer"], "strategy": VARIANT}
+    for form in ("terminal", "markdown", "html"):
+        answer = called_with(tmp_path, data, varied, "-f", form)
+        assert answer.exit_code == 1
+        text = answer.output.replace("\\", "")
+        assert "(softer)" in text
+        assert f"({VARIANT})" in " ".join(text.split())
+    assert called_with(tmp_path, varied, data).exit_code == 0
+    assert called_with(tmp_path, data, varied, "-s", "softer").exit_code == 1
+    assert called_with(tmp_path, data, varied, "-s", "unchanged").exit_code == 0
+
+
+def test_unlike_strategies_are_not_compared_unasked(data: Data) -> None:
+    found = compared(data, renamed(data, "softer", "harder"))
+    assert found["against"] == []
+    assert {job["strategy"] for job in found["only_before"]} == {"softer"}
+    assert {job["strategy"] for job in found["only_after"]} == {"harder"}
+    two = renamed(data, "unchanged", "softer:factor=2.0")
+    two = renamed(two, "softer", VARIANT)
+    with pytest.raises(InputError, match="no job in common"):
+        compared(data, two)
+    # Where each run has one strategy there is no doubt about what is asked.
+    for run in (alone := [renamed(data, "softer", name) for name in ("softer", "harder")]):
+        run["results"] = [r for r in run["results"] if r["strategy"] != "unchanged"]
+    assert compared(*alone)["against"] == [{"before": "softer", "after": "harder"}]
+
+
+def test_two_strategies_of_one_run(data: Data, tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    path.write_text(json.dumps(data))
+
+    def called_by(*words: str) -> Result:
+        return CliRunner().invoke(bench, ["compare", str(path), *words])
+
+    run = run_from_json(data)
+    found = compare_runs(run, run, against=Against("unchanged", "softer"))
+    assert (found.jobs, found.worse) == (2, False)
+    assert {row.strategy for row in found.rows} == {"softer"}
+    for block in ("used", "higher", "modified"):
+        ratio = next(row for row in found.rows if row.scenario == "corner").values[block]
+        rms = {
+            r.strategy: r.blocks[block].rms_percent + 0.05
+            for r in run.results
+            if r.case == "corner"
+        }
+        assert ratio == pytest.approx(rms["softer"] / rms["unchanged"], rel=1e-12)
+    assert called_by("--of", "unchanged", "--with", "softer").exit_code == 0
+    worse = called_by("--of", "softer", "--with", "unchanged")
+    assert worse.exit_code == 1
+    assert "B is worse than A: unchanged" in " ".join(worse.output.split())
+    for words, said in (
+        ([], "one run alone"),
+        (["--of", "softer"], "belong together"),
+        (["--of", "softer", "--with", "unchange"], "did you mean 'unchanged'"),
+        (["--of", "softer", "--with", "unchanged", "-s", "softer"], "without --strategy"),
+    ):
+        answer = called_by(*words)
+        assert answer.exit_code == 2
+        assert said in answer.stderr
 
 
 def test_what_ended_otherwise_comes_first(data: Data, tmp_path: Path) -> None:

@@ -176,8 +176,18 @@ def test_cases_of_the_user_count() -> None:
 @pytest.mark.usefixtures("here")
 @pytest.mark.parametrize(
     ("item", "fault"),
-    [(toys.Spring(), None), (toys.Elsewhere(), "places"), (toys.NeverNeutral(), "neutral")],
-    ids=["good", "elsewhere", "never-neutral"],
+    [
+        (toys.Spring(), None),
+        (toys.Elsewhere(), "places"),
+        (toys.NeverNeutral(), "neutral"),
+        (toys.Worded(), None),
+        (toys.Oversized(), "worded"),
+        (toys.Misread(), "worded"),
+        (toys.Foreign(), "worded"),
+        (toys.InPercent(), "worded"),
+        (toys.Overfilled(), "worded"),
+    ],
+    ids=lambda item: type(item).__name__ if isinstance(item, toys.Spring) else "",
 )
 def test_effects(item: object, fault: str | None) -> None:
     found = bad(verdicts("effect", item))

@@ -13,39 +13,18 @@ from click.testing import CliRunner
 
 from femubench.core.cli.main import bench
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
-from femubench.core.diagnosis.sketch import Sketch, sketch_of
+from femubench.core.drawing.places import placed_wireframe
 from femubench.core.errors import InputError
-from femubench.core.schema.diagnosis import Rival
-from femubench.reports.diagnosis_charts import Row, dots
-from femubench.reports.diagnosis_map import Spot, structure_map
+from femubench.core.schema.diagnosis import LocationRow, Rival
 from femubench.reports.diagnosis_page import diagnosis_html
 from femubench.reports.diagnosis_words import odds, times
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import diagnosis_toys as toys
 import harness_toys
+from diagnosis_toys import STRUCTURE, data_of
 
 VERDICTS = ("named", "none", "unknown", "ambiguous", "not-confirmed")
-STRUCTURE: dict[str, Any] = {
-    "plane": "in-plane",
-    "joints": [
-        {"name": "J1", "type": "L", "xyz": [0.0, 0.0, 0.0]},
-        {"name": "J3", "type": "T", "xyz": [1.0, 0.0, 0.5]},
-    ],
-    "members": [{"name": "beam", "ends": [0, 1], "elements": 4}],
-    "sensors": [{"label": "p2", "xyz": [0.5, 0.0, 0.25], "direction": "-z"}],
-    "supports": [{"xyz": [0.0, 0.0, 0.0], "fixed": ["x", "z"]}],
-    "places": [
-        {"place": "type:T", "kind": "joint", "spans": [], "points": [[1.0, 0.0, 0.5]]},
-        {"place": "all", "kind": "all", "spans": [], "points": []},
-        {
-            "place": "beam@J1",
-            "kind": "end",
-            "spans": [{"member": 0, "start": 0.0, "end": 0.125}],
-            "points": [],
-        },
-    ],
-}
 
 
 class Page(HTMLParser):
@@ -72,11 +51,6 @@ class Page(HTMLParser):
     @property
     def text(self) -> str:
         return " ".join("".join(self.words).split())
-
-
-def data_of(verdict: Any = "named", **changes: Any) -> dict[str, Any]:
-    data = diagnosis_to_json(toys.made(verdict, **changes))
-    return diagnosis_from_json({**data, "structure": STRUCTURE})
 
 
 def page_of(data: dict[str, Any]) -> Page:
@@ -187,53 +161,48 @@ class TestPage:
 
 
 class TestDrawings:
-    def test_dots_lie_in_the_band_or_out_of_it(self) -> None:
-        rows = [Row("1", -1.9, 0.0), Row("2", 2.1, 400.0), Row("3", None, None)]
-        svg = str(dots(rows, one_sided=False, name="Residuals", anchor="a"))
-        left, wide = (
-            float(v) for v in re.findall(r'<rect x="([\d.]+)".*?width="([\d.]+)"', svg)[0]
-        )
-        first, second = (float(v) for v in re.findall(r'<circle cx="([\d.]+)"', svg))
-        assert left < first < left + wide < second
-        assert svg.count("<polygon") == 2
-        assert "– → –" in svg
+    def test_the_map_speaks_and_leads_back_to_the_list(self) -> None:
+        page = page_of(data_of(locations=(LocationRow("evidence", "J1", 1.0),)))
+        assert "J1: 1.00" in page.text
+        assert "sensor p2, -z" in page.text
+        assert "held: x, z" in page.text
+        tied = [
+            attributes["data-at"]
+            for tag, attributes in page.tags
+            if tag == "g" and "data-at" in attributes
+        ]
+        listed = [
+            attributes["data-at"]
+            for tag, attributes in page.tags
+            if tag == "li" and "data-at" in attributes
+        ]
+        assert set(tied) == {"0", "1"} == set(listed)
 
-    def test_dots_of_any_size(self) -> None:
-        svg = str(dots([Row("1", 1e300, -1e300)], one_sided=False, name="r", anchor="a"))
-        assert all(abs(float(v)) < 1e4 for v in re.findall(r'x[12]="([^"]+)"', svg))
+    def test_the_map_follows_the_page_into_the_dark(self) -> None:
+        text = diagnosis_html(data_of())
+        drawings = re.findall(r"<svg .*?</svg>", text, flags=re.DOTALL)
+        assert len(drawings) == 4
+        for drawing in drawings:
+            assert not re.search(r"#[0-9a-fA-F]{6}\b", drawing)
+            assert "var(--" in drawing
+        styles = set(re.findall(r"(--[\w-]+):", text[: text.index("</style>")]))
+        assert set(re.findall(r"var\((--[\w-]+)\)", "".join(drawings))) <= styles
 
-    @pytest.mark.parametrize("plane", ["in-plane", "out-of-plane", "3d", "matrices"])
-    def test_places_are_found(self, plane: str) -> None:
-        words = ("all", "type:T", "beam@J1", "beam/2", "beam", "J1", "p2", "nowhere", "beam/9")
-        spots = [Spot(word, 0.5, "1") for word in words]
-        drawn = structure_map(
-            {**STRUCTURE, "plane": plane}, spots, name="Map", says="All.", anchor="m"
-        )
-        groups = re.findall(r'<g data-at="(\d)">(.*?)</g>', str(drawn))
-        shown = {words[int(at)] for at, inner in groups if 'class="spot' in inner}
-        assert shown == set(words) - {"all", "nowhere", "beam/9"}
-        assert 'class="everywhere"' in str(drawn)
-
-    @pytest.mark.parametrize("xyz", [[0.0, 0.0, 0.0], [1e308, -1e308, 1e308]])
-    def test_no_extent_no_drawing(self, xyz: list[float]) -> None:
-        joints = [{"name": "a", "type": "", "xyz": xyz}] * 2
-        joints += [{"name": "b", "type": "", "xyz": [-v for v in xyz]}]
-        bare = {**STRUCTURE, "joints": joints, "sensors": []}
-        assert structure_map(bare, [], name="Map", says="", anchor="m") is None
+    def test_the_same_text_every_time(self) -> None:
+        assert diagnosis_html(data_of()) == diagnosis_html(data_of())
 
 
-class TestSketch:
+class TestStructure:
     def test_places_of_a_case(self) -> None:
         case = harness_toys.tiny_case()
         frame = case.model.frame_structure.frame
         member, joint = frame.members[0], frame.joints[0]
         words = ["all", joint.name, member.name, f"{member.name}/1", f"{member.name}@0.25:z"]
-        rivals = tuple(Rival("a", word, 1.0, 0.1) for word in [*words, "no such place"])
-        sketch = sketch_of(case, toys.made("none", rivals=rivals))
-        assert isinstance(sketch, Sketch)
-        kinds = {place.place: place.kind for place in sketch.places}
+        placed = placed_wireframe(case, [*words, "no such place"])
+        kinds = {place.place: place.kind for place in placed.places}
         assert [kinds[word] for word in words] == ["all", "joint", "member", "element", "point"]
         assert kinds["no such place"] == "elsewhere"
+        rivals = tuple(Rival("a", word, 1.0, 0.1) for word in [*words, "no such place"])
         data = diagnosis_to_json(toys.made("none", rivals=rivals), case=case)
         assert diagnosis_from_json(data) == data
         assert [m["name"] for m in data["structure"]["members"]] == [m.name for m in frame.members]

@@ -7,13 +7,17 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
+from typing import Any
 
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.figure import Figure as Canvas
 
-from femubench import Bars, Curve, Curves, Figure, MatrixImage, StructureMap
-from femubench.reports.drawing import STYLES, drawn, figure_canvas
+from femubench import Bars, Curve, Curves, Figure, MatrixImage, StructureMap, Wireframe
+from femubench.core.drawing.wireframe import DrawnJoint, DrawnMember
+from femubench.core.plot.figure import draw_figure, drawn
+from femubench.core.plot.style import STYLES
 
 AWKWARD = 'a < b & "c" $x_1$ $'
 X = np.linspace(0.0, 1100.0, 50)
@@ -30,10 +34,14 @@ MATRIX = MatrixImage(
     "matrix", "Matrix", "caption", np.diag([1e6, -1e3, 10.0, 0.0]), "row", "column", "size, N/m",
     (2,),
 )  # fmt: skip
-MAP = StructureMap(
-    "map", "Map", "caption", np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[1.0, 0.0], [1.0, 0.5]]),
-    np.array([0.25, 0.0123]), "x, m", "y, m", "change", (("J1", 0.0, 0.0),),
+WIREFRAME = Wireframe(
+    "out-of-plane",
+    (DrawnJoint("J1", (0.0, 0.0, 0.0), node=0), DrawnJoint("J2", (1.0, 0.0, 0.0), node=1)),
+    (DrawnMember("a", (0, 1), 2),),
+    nodes=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.5, 0.0)), elements=((0, 1), (1, 2)),
+    element_labels=("a/1", "a/2"), member_of=(0, 0),
 )  # fmt: skip
+MAP = StructureMap("map", "Map", "caption", WIREFRAME, np.array([0.25, 0.0123]), "change")
 BARS = Bars(
     "bars", "Bars", "caption", ("one", "two"), (("a", (1.0, -2.0)), ("b & c", (0.5, 0.25))),
     "mode", "error, %", (("limit", 4.0),),
@@ -41,6 +49,12 @@ BARS = Bars(
 FIGURES = (CURVES, MATRIX, MAP, BARS)
 each = pytest.mark.parametrize("figure", FIGURES, ids=lambda f: f.name)
 SVG = "{http://www.w3.org/2000/svg}"
+
+
+def axes_of(figure: Figure) -> Any:
+    axes = Canvas(layout="constrained").subplots()
+    draw_figure(figure, axes)
+    return axes
 
 
 def texts(figure: Figure) -> list[str]:
@@ -68,7 +82,7 @@ def test_same_text_in_another_process() -> None:
     here = "\n".join(drawn(figure) for figure in (MATRIX, BARS))
     code = (
         "import sys, numpy as np; from femubench import Bars, MatrixImage;"
-        "from femubench.reports.drawing import drawn;"
+        "from femubench.core.plot.figure import drawn;"
         f"array = np.array; print(drawn({MATRIX!r}) + chr(10) + drawn({BARS!r}), end='')"
     )
     found = subprocess.run(
@@ -127,27 +141,27 @@ def test_labels_are_as_given() -> None:
     assert "Title < & $a$" in found
     assert "frequency, Hz" in found
     assert "receptance, dB re 1 m/N" in found
-    assert {"J1", "0.25", "0.012"} <= set(texts(MAP))
+    assert {"J1", "0.25", "0.012", "x, m", "y, m"} <= set(texts(MAP))
     assert "b & c" in texts(BARS)
     assert "10⁶" in texts(MATRIX)
 
 
 def test_curves_differ_without_colour() -> None:
-    lines = figure_canvas(CURVES).axes[0].get_lines()
-    looks = {(str(line._dash_pattern), line.get_marker()) for line in lines}  # type: ignore[attr-defined]
+    lines = axes_of(CURVES).get_lines()
+    looks = {(str(line._dash_pattern), line.get_marker()) for line in lines}
     assert len(looks) == len(CURVES.curves)
     assert len({str(style["linestyle"]) for style in STYLES.values()}) == len(STYLES)
 
 
 def test_bars_differ_without_colour() -> None:
     series = tuple((str(i), (1.0, 2.0)) for i in range(5))
-    patches = figure_canvas(replace(BARS, series=series)).axes[0].patches
+    patches = axes_of(replace(BARS, series=series)).patches
     assert len({patch.get_hatch() for patch in patches}) == len(series)
 
 
 def test_structure_keeps_its_proportions_and_matrix_its_values() -> None:
-    assert figure_canvas(MAP).axes[0].get_aspect() == 1.0
-    (image,) = figure_canvas(MATRIX).axes[0].images
+    assert axes_of(MAP).get_aspect() == 1.0
+    (image,) = axes_of(MATRIX).images
     values = image.get_array()
     assert values is not None
     shown = np.ma.getdata(values)
@@ -169,5 +183,5 @@ def test_plain_figures_are_drawn_too(figure: Figure) -> None:
 
 
 def test_matplotlib_is_imported_on_use_only() -> None:
-    code = "import sys, femubench.reports.drawing; sys.exit('matplotlib' in sys.modules)"
+    code = "import sys, femubench.core.plot.figure; sys.exit('matplotlib' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)

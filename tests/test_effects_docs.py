@@ -15,13 +15,14 @@ import numpy as np
 import pytest
 
 from femubench import Frame, Model, member_length, solve_modes
+from femubench.core.conformance.checking import findings, subjects
 from femubench.core.inference.hypothesis import hypotheses_of
-from femubench.core.plugin.loader import load_plugins
+from femubench.core.plugin.loader import Plugins, load_plugins
 from femubench.plugins.effects import femubench_effects
 
 TEXT = (Path(__file__).parents[1] / "docs" / "effects.md").read_text(encoding="utf-8")
 THERE, WRITES = "## The catalogue", "### Keys written, and possible confusions"
-EFFECTS: dict[str, Any] = {effect.name: effect() for effect in femubench_effects()}
+EFFECTS: dict[str, Any] = {name: load_plugins().effects[name] for name in femubench_effects()}
 RATIOS = ("ratio", "multiple")
 
 FrameBuilder = Callable[..., Frame]
@@ -112,6 +113,11 @@ def test_example_holds_what_lies_on_it(bedding: Any, ladder: FrameBuilder) -> No
     held = lift @ (extended.stiffness @ lift)
     np.testing.assert_allclose(held, 2e4 * member_length(frame, "BE"), rtol=1e-9)
     assert solve_modes(extended).rigid.sum() == 1  # the turn about the member
+
+
+def test_example_keeps_the_rules(bedding: Any) -> None:
+    (subject,) = subjects(bedding.name, Plugins(effects={bedding.name: bedding}))
+    assert [f for f in findings(subject) if f.verdict.status in ("fail", "warn")] == []
 
 
 def test_example_is_a_hypothesis_like_any_other(bedding: Any, ladder: FrameBuilder) -> None:

@@ -14,11 +14,15 @@ import pytest
 
 from femubench.core.case.case import Case
 from femubench.core.case.reader import read_case
-from femubench.core.exhibits import stage
-from femubench.core.exhibits.element_change import relative_changes
-from femubench.core.exhibits.exhibit import exhibit_of, frequency_axis, measured_receptances
-from femubench.core.exhibits.shelf import FOLDER, Exhibits
-from femubench.core.exhibits.stage import stage_of
+from femubench.core.drawing import wireframe
+from femubench.core.drawing.element_change import relative_changes
+from femubench.core.drawing.files import FOLDER, Exhibits
+from femubench.core.drawing.prediction import (
+    case_drawing,
+    exhibit_of,
+    frequency_axis,
+    measured_receptances,
+)
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.score.scoring import score_model
@@ -51,8 +55,8 @@ def peaks(hz: list[float], level: list[float]) -> list[float]:
     return [hz[i] for i in inner if level[i - 1] < level[i] > level[i + 1]]
 
 
-def test_a_stage_is_the_structure_and_what_was_measured(cases: dict[str, Case]) -> None:
-    found = stage_of(cases["hframe"])
+def test_a_drawing_is_the_structure_and_what_was_measured(cases: dict[str, Case]) -> None:
+    found = case_drawing(cases["hframe"])
     assert found is not None
     assert (found["plane"], len(found["nodes"]), len(found["elements"])) == ("in-plane", 65, 64)
     assert [joint["type"] for joint in found["joints"]].count("T") == 2
@@ -147,22 +151,22 @@ def test_the_measured_receptance_peaks_at_the_measured_frequencies(
 def test_what_is_too_large_is_not_drawn(
     cases: dict[str, Case], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stage, "MOST_NODES", 10)
-    assert stage_of(cases["frame"]) is None
+    monkeypatch.setattr(wireframe, "MOST_NODES", 10)
+    assert case_drawing(cases["frame"]) is None
 
 
-class TestShelf:
+class TestFiles:
     def test_what_is_put_is_found(self, cases: dict[str, Case], tmp_path: Path) -> None:
         exhibits = Exhibits(tmp_path)
         put = {
-            **(stage_of(cases["frame"]) or {}),
+            **(case_drawing(cases["frame"]) or {}),
             "receptance": measured_receptances(cases["frame"]),
             "nominal": None,
         }
-        exhibits.put_stage(KEY * 4, put)
+        exhibits.put_case(KEY * 4, put)
         exhibits.put(KEY, shown(cases["frame"], "baruch"))
         again = Exhibits(tmp_path)
-        assert again.stage(KEY * 4) == json.loads(json.dumps(put))
+        assert again.case(KEY * 4) == json.loads(json.dumps(put))
         found = again.of(KEY)
         assert found is not None
         assert found["modes"] == json.loads(json.dumps(shown(cases["frame"], "baruch")["modes"]))
@@ -190,12 +194,12 @@ class TestShelf:
             ("sensors", []),
         ],
     )
-    def test_a_stage_that_contradicts_itself_is_left_out(
+    def test_a_drawing_that_contradicts_itself_is_left_out(
         self, key: str, value: object, cases: dict[str, Case], tmp_path: Path
     ) -> None:
         exhibits = Exhibits(tmp_path)
-        exhibits.put_stage(KEY * 4, {**(stage_of(cases["frame"]) or {}), key: value})
-        assert exhibits.stage(KEY * 4) is None
+        exhibits.put_case(KEY * 4, {**(case_drawing(cases["frame"]) or {}), key: value})
+        assert exhibits.case(KEY * 4) is None
         assert len(exhibits.notes) == 1
 
     @pytest.mark.parametrize("part", ["values", "labels"])

@@ -19,9 +19,8 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from femubench import FemubenchError, Store, read_case
 from femubench.core.cli.main import bench
+from femubench.core.plugin.loader import load_plugins
 from femubench.core.schema.records import read_run
-from femubench.plugins.readers import femubench_readers
-from femubench.reports import femubench_reporters
 
 sys.path.insert(0, str(Path(__file__).parent / "fuzz"))
 from mutations import changed_json, edits, json_edits, mutated
@@ -32,8 +31,8 @@ FEW, MANY = 0.05, 1.0  # share of the inputs in the tests of every day
 INPUTS = {"toml": 6000, "csv": 5000, "mtx": 4000, "universal": 3500, "run": 2500, "store": 2000}
 MOST_CHARACTERS = 2500
 _CLI_SAMPLE = 12
-READERS = tuple(femubench_readers())
-REPORTERS = tuple(r for r in femubench_reporters() if r.name != "parquet")
+READERS = tuple(load_plugins().readers.values())
+REPORTERS = tuple(r for r in load_plugins().reporters.values() if r.name != "parquet")
 _PAGE_SHARE = 10  # the page takes longer than all other reports: one input in ten gets it
 
 

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 from femubench.core.fem.model import Model
+from femubench.core.plugin.loader import load_plugins
 from femubench.core.run import answers
 from femubench.core.run.answers import AnswerError, head_of, packed, unpacked
 from femubench.core.run.jobs import JobOutcome
-from femubench.plugins.effects import femubench_effects
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
@@ -43,8 +43,7 @@ def same(first: Model, second: Model) -> bool:
 def test_models_with_every_effect_get_through() -> None:
     """Effects use all that a frame can hold."""
     seen = 0
-    for offered in femubench_effects():
-        effect = offered() if isinstance(offered, type) else offered
+    for effect in load_plugins().effects.values():
         for place in list(effect.places(CASE.model))[:2]:
             values = [0.5 * (p.lower + p.upper) for p in effect.parameters(CASE.model, place)]
             values = [value if np.isfinite(value) else 1.0 for value in values]

@@ -53,7 +53,7 @@ def test_an_ok_job_returns_the_model_and_plain_figures() -> None:
 @pytest.mark.parametrize(
     ("strategy", "status", "reason"),
     [
-        (toys.Failing(), "failed", "used modes reproduced: measured 0.25, allowed 1e-08"),
+        (toys.Failing(), "failed", "used modes reproduced: off by 0.25, the method promises 1e-08"),
         (toys.Diverging(), "diverged", "step 7: the residual grew to 1e9"),
         (toys.Declining(), "not-applicable", "needs two modes of one kind"),
         (toys.Quitting(), "failed", "SystemExit: enough"),

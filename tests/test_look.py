@@ -21,14 +21,14 @@ from femubench.core.fem.sections import (
     solid_rectangle,
 )
 from femubench.core.fem.sensors import Sensors
-from femubench.core.look.look import look, mesh_bias
-from femubench.core.look.sections import estimated_torsion_constant, is_round
+from femubench.core.look.look import mesh_bias
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.schema.diagnosis import LookWarning
 from femubench.core.typing import FloatArray
+from femubench.plugins.effects.torsion_constant import estimated_torsion_constant, is_round
 
 sys.path.insert(0, str(Path(__file__).parent))
-from look_checks import measured, texts
+from look_checks import look, measured, texts
 
 FrameBuilder = Callable[..., Frame]
 
@@ -186,7 +186,7 @@ def test_large_models_are_not_solved_anew(
 ) -> None:
     model = Model.of(ladder(elements=elements))
     exact = look(model, measured(model))
-    for module in ("look_modes", "look_theory", "look_mesh"):
+    for module in ("look_modes", "look_mesh"):
         monkeypatch.setattr(f"femubench.core.diagnosis.{module}.SOLVED_LIMIT", 0)
     quick = look(model, measured(model))
     for effect, accuracy in (

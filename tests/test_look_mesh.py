@@ -17,12 +17,12 @@ from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.structure import Structure
 from femubench.core.inference.mesh_error import refined
-from femubench.core.look.look import look, mesh_bias
+from femubench.core.look.look import mesh_bias
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.typing import FloatArray
 
 sys.path.insert(0, str(Path(__file__).parent))
-from look_checks import measured, texts
+from look_checks import look, measured, texts
 
 FrameBuilder = Callable[..., Frame]
 

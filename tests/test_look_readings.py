@@ -13,10 +13,9 @@ import pytest
 from femubench.core.fem.frame import Factor, Frame, Place, PointMass
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
-from femubench.core.look.look import look
 
 sys.path.insert(0, str(Path(__file__).parent))
-from look_checks import measured, midpoints, texts
+from look_checks import look, measured, midpoints, texts
 
 FrameBuilder = Callable[..., Frame]
 

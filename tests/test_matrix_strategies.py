@@ -33,7 +33,7 @@ from femubench.core.update import entries as entry_update
 from femubench.core.update.dynamic import expand_measured_shapes, expand_one_by_dynamics
 from femubench.core.update.entries import EntryPattern, null_space, smallest_change
 from femubench.core.update.low_rank import total_change
-from femubench.core.update.promise import measure_residuals
+from femubench.core.update.promise import check_used_modes, measure_residuals
 from femubench.core.update.quasi import QuasiModes, quasi_measured_modes
 from femubench.plugins.strategies import baruch, berman
 from femubench.plugins.strategies.baruch import Baruch
@@ -394,7 +394,7 @@ def test_kabe_needs_a_pattern(frame_case: Case) -> None:
 def test_kabe_fails_with_its_residual_where_the_pattern_cannot_hold_the_modes(
     cases: dict[str, Case], strategy: Any
 ) -> None:
-    with pytest.raises(SelfCheckFailed, match=r"measured .*allowed 1e-08") as caught:
+    with pytest.raises(SelfCheckFailed, match=r"off by .*promises 1e-08") as caught:
         update(strategy, cases["hframe"])
     assert caught.value.measured > 1e-3
 
@@ -405,7 +405,8 @@ def test_a_broken_expansion_is_found(frame_case: Case, monkeypatch: pytest.Monke
         return replace(quasi, shapes=1.001 * quasi.shapes)
 
     monkeypatch.setattr(baruch, "quasi_measured_modes", stretched)
-    with pytest.raises(SelfCheckFailed, match="allowed 1e-08") as caught:
+    shown = r"measured mode at 226.8 Hz comes out at 227.03 Hz in the updated model \(\+0.1 %\)"
+    with pytest.raises(SelfCheckFailed, match=shown) as caught:
         update(Baruch, frame_case)
     assert caught.value.measured > 1e-4
 
@@ -418,8 +419,25 @@ def test_a_forgotten_mass_correction_is_found(
 
     berman_change = berman.mass_change
     monkeypatch.setattr(berman, "mass_change", forgotten)
-    with pytest.raises(SelfCheckFailed, match="allowed 1e-08"):
+    with pytest.raises(SelfCheckFailed, match=r"measured mode at .* Hz .*promises 1e-08"):
         update(Berman, frame_case)
+
+
+def test_the_reason_names_the_mode_that_is_off(frame_case: Case) -> None:
+    model, data = frame_case
+    updated = update(Baruch, frame_case).model
+    quasi = quasi_measured_modes(model, data)
+    wrong = quasi.eigenvalues * np.array([1.0, 1.0, 1.01**2])
+    measured = np.sqrt(wrong[2]) / (2 * np.pi)
+    with pytest.raises(SelfCheckFailed) as caught:
+        check_used_modes(updated, quasi.shapes, wrong)
+    assert str(caught.value).startswith(
+        f"the measured mode at {measured:.5g} Hz comes out at {measured / 1.01:.5g} Hz in the "
+        "updated model (-0.99 %)"
+    )
+    mixed = np.column_stack([quasi.shapes[:, 0] + 1e-3 * quasi.shapes[:, 1], quasi.shapes[:, 1:]])
+    with pytest.raises(SelfCheckFailed, match=r"226.8 Hz"):
+        check_used_modes(updated, mixed, quasi.eigenvalues)
 
 
 def test_berman_refuses_shapes_that_are_one(frame_case: Case) -> None:

@@ -13,9 +13,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import wilcoxon
 
-from femubench import Block, JobResult, PairedMode, Run, leaderboard, rank_results, run_to_json
+from femubench import (
+    Block,
+    JobResult,
+    PairedMode,
+    Run,
+    leaderboard,
+    rank_results,
+    run_to_json,
+    tell_apart,
+)
+from femubench.core.score.comparison import Against, compare_runs
+from femubench.core.score.statistics import Groups
 from femubench.papers.printed import printed
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.markdown import MarkdownReporter
@@ -24,7 +34,6 @@ from femubench.reports.page.data import page_data
 from femubench.reports.page.document import SCRIPTS, STYLES, asset, embedded_json
 from femubench.reports.page.papers import papers_of
 from femubench.reports.page.rounding import plain_data, rounded
-from femubench.reports.page.statistics import Statistics, scores_of, statistics
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 
@@ -41,14 +50,14 @@ def data_in(html: str) -> dict[str, Any]:
     return found
 
 
-def outcome_of(run: Run) -> Statistics:
-    return statistics(run, leaderboard(run))
+def outcome_of(run: Run) -> Groups:
+    return tell_apart(run, list(leaderboard(run)["strategy"]))
 
 
 def scored(table: Mapping[str, list[float]]) -> Run:
-    """Return a run with the given scores, a case a column."""
+    """Return a run with the given scores, a case of one block a column."""
     results = [
-        JobResult(f"case-{n}", name, 0, "ok", score=score)
+        JobResult(f"case-{n}", name, 0, "ok", score=score, blocks={"used": Block(score, None, ())})
         for name, scores in table.items()
         for n, score in enumerate(scores)
     ]
@@ -119,7 +128,7 @@ class TestNumbers:
         class Shelf:
             notes = ("one.json: a picture was left out",)
 
-            def stage(self, digest: str) -> dict[str, Any] | None:
+            def case(self, digest: str) -> dict[str, Any] | None:
                 return {"digest": digest, "nodes": [1], "elements": []}
 
             def of(self, key: str) -> dict[str, Any] | None:
@@ -141,76 +150,77 @@ class TestNumbers:
 
 
 class TestStatistics:
-    def test_letters_say_who_cannot_be_told_apart(self) -> None:
-        run = synthetic_run(12, 40)
-        found = outcome_of(run)
+    def test_letters_say_between_whom_a_difference_is_shown(self) -> None:
+        found = outcome_of(synthetic_run(12, 40))
         letters = found.letters()
         assert len(found.pairs) == 12 * 11 / 2
-        for i, j, p in found.pairs:
-            shared = set(letters[i].split()) & set(letters[j].split())
+        for first, second, p in found.pairs:
+            shared = set(letters[first].split()) & set(letters[second].split())
             assert bool(shared) == (p >= 0.05)
 
-    def test_holm_by_hand(self) -> None:
-        run = synthetic_run(4, 12, failing=0.0)
-        table = scores_of(run)
-        pairs = [(i, j) for i in range(4) for j in range(i + 1, 4)]
-        raw = [
-            float(wilcoxon(np.log(table[:, i] / table[:, j]), method="exact").pvalue)
-            for i, j in pairs
-        ]
-        order = np.argsort(raw)
-        holm, most = {}, 0.0
-        for place, index in enumerate(order):
-            most = max(most, min(1.0, (len(raw) - place) * raw[index]))
-            holm[pairs[index]] = most
-        assert {(i, j): p for i, j, p in outcome_of(run).pairs} == pytest.approx(holm)
-
-    def test_few_strategies_or_cases_are_not_tested(self) -> None:
-        for run in (synthetic_run(2, 12), scored({name: [1.0] * 4 for name in "abc"})):
-            found = outcome_of(run)
-            assert found.friedman is None
-            assert found.pairs == found.groups == ()
-            assert "not tested" in found.note
-
-    def test_strategies_that_score_the_same_are_one_group(self) -> None:
-        found = outcome_of(scored({name: [1.0, 0.5, 0.2, 2.0, 1.0] for name in "abcd"}))
-        assert found.friedman is None
-        assert found.groups == ((0, 1, 2, 3),)
-        assert "same on every case" in found.note
+    @pytest.mark.parametrize("seeds", [1, 3])
+    def test_the_page_and_compare_give_the_same_answer(self, seeds: int) -> None:
+        """Two strategies alone, so that Holm's correction is over one comparison in both."""
+        whole = synthetic_run(30, 9, seeds=seeds)
+        shown = set()
+        for first, second in (("strategy-003", "strategy-025"), ("strategy-010", "strategy-011")):
+            kept = tuple(r for r in whole.results if r.strategy in (first, second))
+            run = Run({**whole.meta, "strategies": [first, second]}, kept)
+            ((*_, p),) = outcome_of(run).pairs
+            (ours,) = compare_runs(run, run, against=Against(first, second)).evidence
+            assert p == ours.p
+            assert (len(outcome_of(run).groups) == 2) == (ours.verdict in ("better", "worse"))
+            shown.add(ours.verdict)
+        assert shown == {"worse", "no difference shown"}
 
     def test_no_difference_at_all_is_one_group(self) -> None:
         random = np.random.default_rng(1)
         found = outcome_of(scored({name: list(random.uniform(0.9, 1.1, 12)) for name in "abcd"}))
-        assert found.friedman is not None
-        assert found.friedman.p > 0.05
-        assert [sorted(group) for group in found.groups] == [[0, 1, 2, 3]]
-        assert found.pairs == ()
+        assert [sorted(group) for group in found.groups] == [list("abcd")]
 
-    def test_too_few_cases_to_tell_any_pair_apart_are_told(self) -> None:
+    def test_few_pairs_are_not_tested(self) -> None:
+        for step, cases in ((1.0, 5), (0.0, 12), (1e-9, 12)):
+            table = {name: [1.0 + step * k] * cases for k, name in enumerate("abc")}
+            found = outcome_of(scored(table))
+            assert found.pairs == found.groups == ()
+            assert "not tested" in found.note
+
+    def test_too_few_pairs_for_so_many_comparisons_are_told(self) -> None:
         steps = {name: [0.1 * 2**n] * 6 for n, name in enumerate("abcdef")}
         found = outcome_of(scored(steps))
         assert len(found.groups) == 1
         assert "however large the difference" in found.note
 
-    def test_a_missing_result_scores_as_a_failure(self) -> None:
-        whole = synthetic_run(4, 8, failing=0.0)
-        gone = [result for result in whole.results if result.strategy != "strategy-000"]
-        assert np.all(scores_of(Run(whole.meta, tuple(gone)))[:, 0] == 10.0)
+    def test_a_failure_counts_and_a_missing_result_is_no_pair(self) -> None:
+        whole = synthetic_run(4, 12, failing=0.0)
+        names = ["strategy-000", "strategy-001"]
+        broken = [
+            replace(r, status="failed", blocks={}) if r.strategy == names[0] else r
+            for r in whole.results
+        ]
+        gone = [r for r in whole.results if r.strategy != names[0]]
+        ((_, _, p),) = [
+            pair for pair in outcome_of(Run(whole.meta, tuple(broken))).pairs if {*names} <= {*pair}
+        ]
+        assert p < 0.05
+        ((_, _, p),) = [
+            pair for pair in outcome_of(Run(whole.meta, tuple(gone))).pairs if {*names} <= {*pair}
+        ]
+        assert p == 1.0
 
     def test_many_overlapping_groups_become_stretches(self) -> None:
         run = synthetic_run(120, 30)
         found = outcome_of(run)
         order = {name: place for place, name in enumerate(leaderboard(run)["strategy"])}
-        names = run.meta["strategies"]
-        places = [[order[names[index]] for index in group] for group in found.groups]
+        places = [[order[name] for name in group] for group in found.groups]
         assert all(group == list(range(group[0], group[-1] + 1)) for group in places)
-        assert {index for group in found.groups for index in group} == set(range(120))
+        assert {place for group in places for place in group} == set(range(120))
         assert "neighbours in the ranking" in found.note
 
     def test_markdown_has_groups_coverage_and_the_test(self) -> None:
         text = MarkdownReporter().render(SMALL)
         assert "| ok | group |" in text
-        assert "Friedman's test on 9 cases and 6 strategies" in text
+        assert "Wilcoxon's signed rank test" in text
 
 
 class TestPapers:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import sys
 import textwrap
@@ -157,6 +158,59 @@ def test_one_bad_entry_leaves_the_others(site: Path) -> None:
         "class int is not a subclass of femubench.Strategy",
         "the name 'fine' is taken by another of the strategies",
     ]
+
+
+REFERENCES = GOOD.replace("[Nothing]", "{{'nothing': __name__ + ':Nothing'}}")
+
+
+def test_an_offer_by_reference_is_loaded_when_it_is_used(site: Path) -> None:
+    distribution(site, "later", REFERENCES.format(name="nothing").replace("__name__", "'heavy'"))
+    plugins = from_site(site)
+    assert list(plugins.strategies) == ["nothing"]
+    assert dict(plugins.loaded[0].offers)["strategies"] == ("nothing",)
+    assert plugins.broken == ()
+    with pytest.raises(PluginError, match=re.escape("plugin 'later-entry' (later 1.0) in femu")):
+        plugins.strategies["nothing"]
+    source = textwrap.dedent(GOOD.format(name="nothing"))
+    (site / "heavy.py").write_text(source, encoding="utf-8")
+    importlib.invalidate_caches()
+    assert isinstance(plugins.strategies["nothing"], Strategy)
+    assert plugins.strategies["nothing"] is plugins.strategies["nothing"]
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (("'nothing':", "'other':"), "is named 'nothing' and offered as 'other'"),
+        ((":Nothing'", ":Strategy'"), "class Strategy does not override update()"),
+        ((":Nothing'", ":Nobody'"), "has no attribute 'Nobody'"),
+    ],
+)
+def test_a_wrong_reference_is_told_when_it_is_used(
+    site: Path, change: tuple[str, str], says: str
+) -> None:
+    distribution(site, "wrong", REFERENCES.format(name="nothing").replace(*change))
+    plugins = from_site(site)
+    assert plugins.broken == ()
+    (name,) = plugins.strategies
+    with pytest.raises(PluginError, match=re.escape(says)):
+        plugins.strategies[name]
+
+
+@pytest.mark.parametrize("value", ["3", "'no module'", "Nothing"])
+def test_what_is_no_reference_is_refused_at_once(site: Path, value: str) -> None:
+    source = GOOD.format(name="nothing").replace("[Nothing]", f"{{'nothing': {value}}}")
+    distribution(site, "wrong", source)
+    (fault,) = from_site(site).broken
+    assert fault.hook == "femubench_strategies"
+    assert "'nothing' is offered as" in fault.message
+
+
+def test_a_name_is_taken_by_a_reference_too(site: Path) -> None:
+    distribution(site, "a-first", REFERENCES.format(name="nothing"))
+    distribution(site, "b-second", GOOD.format(name="nothing"))
+    (fault,) = from_site(site).broken
+    assert (fault.plugin, fault.message[:21]) == ("b-second-entry", "the name 'nothing' is")
 
 
 def test_function_without_decorator_is_told() -> None:

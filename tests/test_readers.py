@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import pyuff
 
-from femubench import InputError, Reader, read_case
-from femubench.plugins.readers import femubench_readers
+from femubench import InputError, read_case
+from femubench.core.plugin.loader import load_plugins
 from femubench.plugins.readers.universal import UniversalReader
 
 CASES = Path(__file__).parent / "cases"
@@ -99,8 +99,7 @@ def modes(*shapes: Sequence[complex]) -> list[Dataset]:
 
 
 def test_hook_gives_the_reader() -> None:
-    (reader,) = femubench_readers()
-    assert isinstance(reader, Reader)
+    assert isinstance(load_plugins().readers["universal file"], UniversalReader)
 
 
 @pytest.mark.parametrize("nodes", [nodes_15(), nodes_2411()])
@@ -227,7 +226,7 @@ def test_one_file_for_sensors_and_modes(tmp_path: Path, sensors: str) -> None:
     sideways = {"r2": np.array([0.1, 0.1, 0.1])}  # y, which an in-plane model does not have
     datasets = [nodes_15(), mode_55(1, SHAPES[0], **sideways), mode_55(2, SHAPES[1])]
     write(folder / "test.uff", *datasets)
-    case = read_case(folder, readers=femubench_readers())
+    case = read_case(folder, readers=(UniversalReader(),))
     assert case.measurement.sensors.labels == ("11:x", "12:x", "20:x")
     np.testing.assert_allclose(case.measurement.shapes, SHAPES.T)
     np.testing.assert_allclose(case.measurement.shape_std, 0.02)
@@ -235,14 +234,14 @@ def test_one_file_for_sensors_and_modes(tmp_path: Path, sensors: str) -> None:
     assert case.model.observe(case.measurement.sensors).shape == (3, case.model.size)
     digest = case.digest
     write(folder / "test.uff", *datasets, mode_55(3, SHAPES[1]))
-    assert read_case(folder, readers=femubench_readers()).digest != digest
+    assert read_case(folder, readers=(UniversalReader(),)).digest != digest
 
 
 def test_nodes_in_another_file(tmp_path: Path) -> None:
     folder = case_with(tmp_path, 'sensors = "nodes.unv"', "test.uff")
     write(folder / "nodes.unv", nodes_2411())
     write(folder / "test.uff", *modes(*SHAPES))
-    measurement = read_case(folder, readers=femubench_readers()).measurement
+    measurement = read_case(folder, readers=(UniversalReader(),)).measurement
     assert measurement.sensors.labels == ("11:x", "12:x", "20:x")
     np.testing.assert_allclose(measurement.shapes, SHAPES.T)
 
@@ -251,11 +250,11 @@ def test_table_of_sensors_picks_from_the_file(tmp_path: Path) -> None:
     folder = case_with(tmp_path, 'sensors = "sensors.csv"', "test.uff")
     (folder / "sensors.csv").write_text("label,at,direction\n20:x,girder@0.5,x\n12:x,left@0.5,x\n")
     write(folder / "test.uff", *modes(*SHAPES))
-    measurement = read_case(folder, readers=femubench_readers()).measurement
+    measurement = read_case(folder, readers=(UniversalReader(),)).measurement
     np.testing.assert_allclose(measurement.shapes, SHAPES.T[[2, 1]])
     (folder / "sensors.csv").write_text("label,at,direction\nleft,left@0.5,x\n")
     with pytest.raises(InputError, match="no shape belongs to a sensor"):
-        read_case(folder, readers=femubench_readers())
+        read_case(folder, readers=(UniversalReader(),))
 
 
 def test_files_that_do_not_fit_the_case(tmp_path: Path) -> None:
@@ -268,6 +267,6 @@ def test_files_that_do_not_fit_the_case(tmp_path: Path) -> None:
     ]:
         write(folder / "test.uff", *datasets)
         with pytest.raises(InputError, match=what):
-            read_case(folder, readers=femubench_readers())
+            read_case(folder, readers=(UniversalReader(),))
     with pytest.raises(InputError, match=r"unknown kind of file 'test\.uff'"):
         read_case(folder)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import sys
-import types
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -56,9 +55,7 @@ def papers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Papers:
     stand_in = Papers()
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(femubench.papers, "study", stand_in.study)
-    drawing = types.ModuleType("femubench.reports.drawing")
-    drawing.drawn = stand_in.drawn  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, drawing.__name__, drawing)
+    monkeypatch.setattr("femubench.core.plot.figure.drawn", stand_in.drawn)
     return stand_in
 
 
@@ -161,6 +158,19 @@ class TestOutput:
         assert last.endswith(
             "new/out: reproduce.md, reproduce.html, reproduce.json, 4 figures in figures"
         )
+
+    @pytest.mark.parametrize("words", [["--output", "out"], ["--format", "html"]])
+    def test_without_matplotlib_it_says_what_to_install(
+        self, invoke: Invoke, papers: Papers, monkeypatch: pytest.MonkeyPatch, words: list[str]
+    ) -> None:
+        monkeypatch.setitem(sys.modules, "matplotlib", None)
+        result = invoke(*words)
+        assert result.exit_code == 2
+        assert result.stderr == (
+            "bench: drawing the figures needs matplotlib (expected pip install 'femubench[plot]')\n"
+        )
+        assert papers.asked == []
+        assert invoke().exit_code == 0
 
     def test_markdown_links_to_every_figure_by_its_title(self, invoke: Invoke) -> None:
         invoke("--output", "out")

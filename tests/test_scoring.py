@@ -16,7 +16,7 @@ from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal import eigen
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.schema.results import Block, JobResult, PairedMode, Run, Status
-from femubench.core.score.ranking import score_of
+from femubench.core.score.ranking import ranked, score_of
 from femubench.core.score.scoring import (
     Reference,
     frequency_error,
@@ -195,7 +195,7 @@ def test_score_of_a_job_without_model(status: str, score: float) -> None:
     assert score_of(result("s", status=status), REFERENCE["a"]) == score
 
 
-def test_ranks_go_by_physics_then_score_then_name() -> None:
+def test_ranks_go_by_physics_then_score() -> None:
     results = [
         result("zeta", rms=2.0),
         result("best", rms=0.1, rigid_body_modes=2, rigid_body_modes_expected=3),
@@ -204,24 +204,55 @@ def test_ranks_go_by_physics_then_score_then_name() -> None:
         result("gone", status="crashed"),
         result("zeta", rms=9.0, case="b"),
     ]
-    ranked = rank_results(results, REFERENCE)
-    places = [(item.strategy, item.rank) for item in ranked]
+    found = rank_results(results, REFERENCE)
+    places = [(item.strategy, item.rank) for item in found]
     assert places == [
-        ("zeta", 2),
+        ("zeta", 1),
         ("best", 3),
         ("negative", 4),
         ("alpha", 1),
         ("gone", 5),
         ("zeta", 1),
     ]
-    assert [item.score for item in rank_results(ranked)] == [item.score for item in ranked]
+    assert [item.score for item in rank_results(found)] == [item.score for item in found]
 
 
-def test_without_reference_the_result_of_unchanged_serves() -> None:
-    ranked = rank_results(
-        [result("unchanged", rms=2.0), result("good", rms=1.0), result("x", case="b")]
+def test_equal_scores_share_a_rank_whatever_their_rounding() -> None:
+    """As physical and nobari-rigid, which are one method on a ladder."""
+    for noise in (0.0, 1e-12, -1e-12):
+        rms = {"beta": 2.0 * (1.0 + noise), "last": 2.1, "alpha": 2.0, "first": 1.0}
+        results = [result(name, rms=value) for name, value in rms.items()]
+        assert {r.strategy: r.rank for r in rank_results(results, REFERENCE)} == {
+            "first": 1,
+            "alpha": 2,
+            "beta": 2,
+            "last": 4,
+        }
+        meta = {**META, "reference": {"a": REFERENCE["a"]}}
+        table = leaderboard(Run(meta, tuple(results)))
+        assert table["strategy"].tolist() == ["first", "alpha", "beta", "last"]
+        assert table["rank"].tolist() == [1, 2, 2, 4]
+
+
+def test_ties_are_transitive_and_end_at_a_gap() -> None:
+    scores = [1.0 + 0.9e-6 * k for k in range(4)] + [1.0 + 5e-6]
+    items = list(zip("dcbae", scores, strict=True))
+    for order in (items, items[::-1]):
+        found = ranked(order, lambda item: ((), item[1], item[0]))
+        assert [(rank, name) for rank, (name, _) in found] == [
+            *((1, name) for name in "abcd"),
+            (5, "e"),
+        ]
+    tiers = ranked(["x", "y"], lambda name: ((name == "x",), 1.0, name))
+    assert tiers == [(1, "y"), (2, "x")]
+
+
+def test_without_reference_the_result_of_the_baseline_serves() -> None:
+    found = rank_results(
+        [result("still", rms=2.0), result("good", rms=1.0), result("x", case="b")],
+        baseline="still",
     )
-    assert [item.score for item in ranked] == pytest.approx([1.0, 1.05 / 2.05, 10.0])
+    assert [item.score for item in found] == pytest.approx([1.0, 1.05 / 2.05, 10.0])
 
 
 def test_skill_weighs_every_block_of_every_case_alike() -> None:

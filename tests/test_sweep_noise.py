@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import pytest
 
 from femubench import Run, leaderboard, read_case, run_jobs
 from femubench.core.plugin.loader import load_plugins
+
+sys.path.insert(0, str(Path(__file__).parent))
+from printed_boards import assert_board_is_that_of
 
 pytestmark = pytest.mark.sweep
 SEEDS = tuple(range(1, 11))
@@ -20,6 +26,10 @@ def noisy() -> Run:
         for name, folder in scenario.cases.items()
     ]
     return run_jobs(cases, list(plugins.strategies.values()), seeds=SEEDS)
+
+
+def test_the_board_in_the_docs(noisy: Run) -> None:
+    assert_board_is_that_of(noisy, "docs/noise.md")
 
 
 def test_only_kabe_fails_and_only_on_the_h_frame(noisy: Run) -> None:

@@ -24,13 +24,11 @@ from femubench.core.typing import FloatArray
 
 # Relative standard deviations that a careful test reaches.
 _SCALES, _ANTIRESONANCE, _SHAPE, _DIAL = 0.002, 0.005, 0.015, 0.01
-_THERMOMETER = 1.0  # K
 _KNOWN_MASS = 0.02  # of the structure
 _MORE_MODES = 2
 _BAND = 0.25  # of the lowest used frequency: antiresonances may lie below the first resonance
 _ALIKE = (0.8, 1.25)  # two explanations mean the same antiresonance
 _LEVEL = "measure at twice the excitation level: a stiffness that falls with the amplitude"
-_SOFTENS = ("youngs-modulus", "member-stiffness", "joint-rotation")
 
 
 @dataclass(frozen=True)
@@ -181,12 +179,13 @@ def aligned(reference: FloatArray, shapes: FloatArray, spread: FloatArray) -> Pr
     return Predicted(values.ravel(), spread.reshape(values.size, spread.shape[2]))
 
 
-def _thermometer(group: Group) -> Iterator[Option]:
-    found = [view.parameter("K") for view in group.views]
-    if any(found):
-        nothing = [Predicted(np.zeros(1), np.zeros((1, len(view.state.x)))) for view in group.views]
-        predicted = [own or none for own, none in zip(found, nothing, strict=True)]
-        yield group.option("temperature", "read the temperature", predicted, _THERMOMETER)
+def _readings(group: Group) -> Iterator[Option]:
+    """Yield the instruments that read a parameter of one of the causes directly."""
+    causes = [hypothesis for view in group.views for hypothesis, _ in view.causes]
+    for reading in dict.fromkeys(getattr(cause.effect, "reading", None) for cause in causes):
+        if reading is not None:
+            predicted = [view.departure(reading) for view in group.views]
+            yield group.option(reading.text, reading.text, predicted, reading.std)
 
 
 def _deflection(group: Group) -> Iterator[Option]:
@@ -215,7 +214,7 @@ def second_level(group: Group) -> Option | None:
         now = np.sort(view.state.frequencies[view.state.partner])
         spread = view.frequencies(np.sort(view.state.partner)).spread / now[:, None]
         for hypothesis, columns in view.causes:
-            if hypothesis.name not in _SOFTENS:
+            if not getattr(hypothesis.effect, "softens", False):
                 continue
             stiff = view.without(columns)
             fall = 1.0 - np.sort(stiff.frequencies[stiff.partner]) / now
@@ -237,7 +236,7 @@ def _kilograms(mass: float) -> str:
 
 
 _KINDS: tuple[Callable[[Group], Iterator[Option]], ...] = (
-    _weighing, _more_modes, _masses, _antiresonances, _shapes, _thermometer, _deflection,
+    _weighing, _more_modes, _masses, _antiresonances, _shapes, _readings, _deflection,
 )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from femubench.core.effect.attachments import point_in, translation_rows
+from femubench.core.effect.words import Reading
 from femubench.core.fem.model import Model
 from femubench.core.inference.fit import Fit, Problem, State, signed_hz, state_at
 from femubench.core.inference.hypothesis import Hypothesis
@@ -192,17 +193,18 @@ class Outlook:
         softer = -np.einsum("sn,pnm,sm->sp", bent, self.stiffness_spread, bent)
         return Predicted((bent * self.seen).sum(axis=1), softer)
 
-    def parameter(self, unit: str) -> Predicted | None:
-        """Return the sum of all parameters in a unit, None where there is none."""
-        value, slope, found = 0.0, np.zeros(len(self.state.x)), False
+    def departure(self, reading: Reading) -> Predicted:
+        """Return by how much what an instrument reads departs from neutral, 0 without a cause."""
+        value, slope = 0.0, np.zeros(len(self.state.x))
         for hypothesis, columns in self.causes:
             for i, parameter in enumerate(hypothesis.parameters, start=columns.start):
-                if parameter.unit == unit:
+                own = getattr(hypothesis.effect, "reading", None) == reading
+                if own and parameter.name == reading.parameter:
                     ends = self.state.x[i] + _STEP * np.array([-1.0, 1.0])
                     low, high = parameter.value(ends)
-                    value, found = value + float(parameter.value(self.state.x[i])), True
+                    value += float(parameter.value(self.state.x[i])) - parameter.neutral
                     slope[i] = (high - low) / (2.0 * _STEP)
-        return Predicted(np.array([value]), slope[None] @ self.root) if found else None
+        return Predicted(np.array([value]), slope[None] @ self.root)
 
     def without(self, columns: slice) -> State:
         """Return the explanation with some coordinates of the causes at zero."""

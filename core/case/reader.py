@@ -36,18 +36,19 @@ from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.schema import CaseSpec, FrameSpec, ModificationSpec, parse_spec
 from femubench.core.case.tables import read_sensors
 from femubench.core.errors import InputError, ModelError
+from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.measurement import Measurement
 from femubench.core.plugin.roles import Reader
 
 _TABLES = (".csv", ".txt")
-# Key, what an error of the mesher calls its items, what would have been right.
-_MESHED = (
-    ("joint_springs", "joint spring", "a shorter one"),
-    ("rigid_ends", "rigid end", "a shorter one"),
-    ("preloads", "lack of fit", "a member of a ring with all constants of its section"),
-)
+_MESHED = "a frame that can be meshed"
+_EXPECTED = {
+    "joint_springs": "a shorter one",
+    "rigid_ends": "a shorter one",
+    "preloads": "a member of a ring with all constants of its section",
+}
 _MOST_CHANGED = 5_000_000  # every change is built once while the case is read
 # The look-behind and the possessive plus keep the search linear.
 _LONG_KEY = re.compile(r"""(?<![\w"'.-])(?:["'\w-]++[ \t]*+\.[ \t]*+){50}""")
@@ -154,11 +155,12 @@ class _Building:
         with at_key("model"), np.errstate(all="ignore"):
             if not isinstance(spec, FrameSpec):
                 return matrix_model(spec, self.files, self.readers)
+            frame = frame_of(spec)
             try:
-                model = Model.of(frame_of(spec))
+                model = Model.of(frame)
                 finite = all(np.isfinite(m.data).all() for m in (model.mass, model.stiffness))
             except ModelError as error:
-                key, expected = _key_of(str(error), spec)
+                key, expected = _key_of(error.item, frame)
                 raise Fault(key, str(error), expected) from None
             except ArithmeticError:
                 finite = False
@@ -258,13 +260,13 @@ class _Building:
         return Modification(spec.name, masses, springs, measurement)
 
 
-def _key_of(message: str, model: FrameSpec) -> tuple[KeyPath, str]:
-    """Return the key, below `model`, that an error of the mesher most likely means."""
-    for key, word, expected in _MESHED:
-        items = getattr(model, key)
-        if word in message and items:
-            named = [i for i, item in enumerate(items) if repr(item.member) in message]
-            one = named[:1] or list(range(len(items)))
-            return ((key, one[0]) if len(one) == 1 else (key,)), expected
-    named = [i for i, member in enumerate(model.members) if repr(member.name) in message]
-    return (("members", named[0]) if named else ()), "a frame that can be meshed"
+def _key_of(item: object, frame: Frame) -> tuple[KeyPath, str]:
+    """Return the key, below `model`, of a part of the frame, and what would have been right.
+
+    The tables of `[model]` are named as the frame's own lists, one entry for one.
+    """
+    for key, parts in vars(frame).items():
+        for i, part in enumerate(parts if isinstance(parts, tuple) else ()):
+            if part is item:
+                return (key, i), _EXPECTED.get(key, _MESHED)
+    return (), _MESHED

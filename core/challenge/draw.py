@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
@@ -14,22 +14,22 @@ import numpy as np
 from femubench.core.case.case import TOLERANCE, Case, Modification
 from femubench.core.challenge.measuring import QUALITY, Seen, chi2, record, see, weighed
 from femubench.core.challenge.outside import OUTSIDE, SENSOR_FAULTS
-from femubench.core.challenge.sizes import Site, draw_values
 from femubench.core.challenge.structures import Specimen, structure_named
 from femubench.core.challenge.truth import (
     HIDDEN,
     KINDS,
-    LOSS,
     DataKind,
     Hidden,
     TrueCause,
     Truth,
+    element_of,
     finer,
     scattered,
     with_causes,
 )
 from femubench.core.challenge.visibility import unexplained
-from femubench.core.effect.frame_effect import FrameEffect
+from femubench.core.effect.frame_effect import EffectParameter, FrameEffect
+from femubench.core.effect.sizes import Site, Size
 from femubench.core.errors import FemubenchError, InputError, ModelError
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
@@ -39,7 +39,7 @@ from femubench.core.typing import FloatArray
 
 VISIBLE = 30.0  # of chi-square on ideal data: for either of a pair, and for what is outside
 _LARGEST_MOVE = 0.4  # of a frequency
-_HALF = 0.3  # share of local losses that fill one half of their element
+_HALF = 0.3  # share of effects in one element that fill but one half of it
 Effects = Mapping[str, FrameEffect]
 
 
@@ -126,9 +126,12 @@ class Candidates:
     def cause(self, name: str) -> TrueCause:
         """Return an effect at a random place, of random size."""
         place = str(self.rng.choice(self.places[name]))
-        parameters = tuple(self.effects[name].parameters(self.specimen.model, place))
-        values = draw_values(name, parameters, Site(self.specimen, self.clean, place), self.rng)
-        half = name == LOSS and self.rng.random() < _HALF
+        effect = self.effects[name]
+        parameters = tuple(effect.parameters(self.specimen.model, place))
+        site = Site(self.specimen.frame, place, self.clean.mass, self.clean.frequencies)
+        values = draw_values(effect.sizes, parameters, site, self.rng)
+        narrow = element_of(place) is not None and effect.in_half(values) is not None
+        half = narrow and self.rng.random() < _HALF
         return TrueCause(
             effect=name,
             place=place,
@@ -215,6 +218,38 @@ class Candidates:
         moved = seen.frequencies[pairs[found]] / clean.frequencies[:used][found] - 1.0
         if 2 * found.sum() < used or np.abs(moved).max() > _LARGEST_MOVE:
             raise ModelError("the effect is absurdly large")
+
+
+def draw_values(
+    sizes: Sequence[Size],
+    parameters: Sequence[EffectParameter],
+    site: Site,
+    rng: np.random.Generator,
+) -> tuple[float, ...]:
+    """Return random values of an effect's parameters within their bounds.
+
+    Arguments:
+        sizes: ranges of the parameters, the last one for all that follow; where there are none
+            the values come from half a deviation to two of the prior.
+        parameters: of the effect.
+        site: where it sits.
+        rng: where the numbers come from.
+    """
+    ranges = [sizes[min(i, len(sizes) - 1)] if sizes else None for i in range(len(parameters))]
+    drawn = (
+        _from_prior(parameter, rng) if size is None else size.draw(site, rng)
+        for parameter, size in zip(parameters, ranges, strict=True)
+    )
+    return tuple(
+        float(np.clip(value, p.lower, p.upper)) for value, p in zip(drawn, parameters, strict=True)
+    )
+
+
+def _from_prior(parameter: EffectParameter, rng: np.random.Generator) -> float:
+    x = float(rng.uniform(0.5, 2.0))
+    if not parameter.one_sided and rng.random() < 0.5:
+        x = -x
+    return float(parameter.value(float(np.clip(x, *parameter.range))))
 
 
 _ATTEMPTS = 200

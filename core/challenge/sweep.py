@@ -22,7 +22,7 @@ Diagnose = Callable[[Case], Diagnosis]
 Record = dict[str, Any]
 
 LADDERS = ("ladder", "ladder-asymmetric")
-OTHERS = ("hframe", "portal", "table")
+OTHERS = tuple(name for name in STRUCTURES if name not in LADDERS)
 
 
 @dataclass(frozen=True)

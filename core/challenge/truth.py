@@ -15,7 +15,6 @@ DataKind = Literal["A", "B", "C"]
 Hidden = Literal["one", "none", "pair", "outside"]
 KINDS: tuple[DataKind, ...] = ("A", "B", "C")
 HIDDEN: tuple[Hidden, ...] = ("one", "none", "pair", "outside")
-LOSS = "local-stiffness-loss"
 _REFINEMENT = 2
 
 
@@ -29,7 +28,7 @@ class TrueCause:
         names: of its parameters.
         values: of its parameters, on the nominal mesh.
         units: of its parameters.
-        half: 0, or which half (1, 2) of the one nominal element has all of the loss.
+        half: 0, or which half (1, 2) of the one nominal element has all of the effect.
     """
 
     effect: str
@@ -113,20 +112,11 @@ def with_causes(
         ModelError: when an effect cannot sit where another one sits.
     """
     for cause in causes:
-        places, values = fine_places(cause.place), cause.values
-        if cause.half:
-            places, values = (places[cause.half - 1],), (half_loss(values[0]),)
-        for place in places:
-            frame = effects[cause.effect].frame(frame, place, values)
+        effect, places = effects[cause.effect], fine_places(cause.place)
+        values = (effect.in_half(cause.values) if cause.half else None) or cause.values
+        for place in places[cause.half - 1 : cause.half] if cause.half else places:
+            frame = effect.frame(frame, place, values)
     return frame
-
-
-def half_loss(whole: float) -> float:
-    """Return the loss in half an element that is as flexible as a loss in the whole.
-
-    1 / (1 - whole) = (1 + 1 / (1 - half)) / 2; twice the loss while it is small.
-    """
-    return 2.0 * whole / (1.0 + whole)
 
 
 def scattered(frame: Frame, scatter: float, rng: np.random.Generator) -> Frame:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from femubench.core.case.case import Case
-from femubench.core.case.reader import read_case
 from femubench.core.cli.registry import unknown
 from femubench.core.errors import InputError
-from femubench.core.plugin.loader import Plugins
-from femubench.core.plugin.roles import Scenario
+
+if TYPE_CHECKING:
+    from femubench.core.case.case import Case
+    from femubench.core.plugin.loader import Plugins
+    from femubench.core.plugin.roles import Scenario
 
 
 def read_cases(words: Sequence[str], plugins: Plugins) -> list[Case]:
@@ -23,21 +25,39 @@ def read_cases(words: Sequence[str], plugins: Plugins) -> list[Case]:
     Raises:
         InputError: for an unknown name or a faulty case, before anything is run.
     """
-    readers = tuple(plugins.readers.values())
-    # By resolved folder, so that each runs once; messages name it as it was typed.
-    wanted: dict[Path, tuple[str | None, Path]] = {}
-    for word in words or plugins.scenarios:
-        for name, folder in _folders(word, plugins.scenarios):
-            wanted.setdefault(folder.resolve(), (name, folder))
+    wanted = case_folders(words, plugins.scenarios)
     if not wanted:
         raise InputError("there is no case to run", expected="a case folder or a scenario plugin")
+    # Words are known to be right before what reads cases is loaded.
+    from femubench.core.case.reader import read_case
+
+    readers = tuple(plugins.readers.values())
     # A name is that of a scenario, whose folder came with a plugin.
     cases = [
-        read_case(folder, name, readers, installed=name is not None)
-        for name, folder in wanted.values()
+        read_case(folder, name, readers, installed=name is not None) for name, folder in wanted
     ]
     _check_names(cases)
     return cases
+
+
+def case_folders(
+    words: Sequence[str], scenarios: Mapping[str, Scenario]
+) -> list[tuple[str | None, Path]]:
+    """Return name and folder of every case that the words stand for, each once.
+
+    Arguments:
+        words: as in `read_cases`.
+        scenarios: the known ones.
+
+    Raises:
+        InputError: for an unknown name.
+    """
+    # By resolved folder, so that each runs once; messages name it as it was typed.
+    wanted: dict[Path, tuple[str | None, Path]] = {}
+    for word in words or scenarios:
+        for name, folder in _folders(word, scenarios):
+            wanted.setdefault(folder.resolve(), (name, folder))
+    return list(wanted.values())
 
 
 def _folders(word: str, scenarios: Mapping[str, Scenario]) -> Iterable[tuple[str | None, Path]]:

@@ -20,6 +20,7 @@ from femubench.core.schema.results import Run
 from femubench.core.score.comparison import (
     DEFAULT_THRESHOLDS,
     METRICS,
+    Against,
     Comparison,
     Threshold,
     compare_runs,
@@ -59,7 +60,7 @@ def _threshold(text: str, ctx: click.Context, parameter: click.Parameter) -> Thr
 
 @click.command("compare")
 @click.argument("before", metavar="A")
-@click.argument("after", metavar="B")
+@click.argument("after", metavar="[B]", required=False)
 @click.option(
     "-s",
     "--strategy",
@@ -67,6 +68,15 @@ def _threshold(text: str, ctx: click.Context, parameter: click.Parameter) -> Thr
     multiple=True,
     metavar="STRATEGY",
     help="Compare this strategy only; may be repeated.",
+)
+@click.option(
+    "--of",
+    "first",
+    metavar="X",
+    help="Compare strategy X of A, and none else, B being optional.",
+)
+@click.option(
+    "--with", "second", metavar="Y", help="With strategy Y of B, or of A where there is no B."
 )
 @click.option(
     "--fail",
@@ -104,8 +114,10 @@ def _threshold(text: str, ctx: click.Context, parameter: click.Parameter) -> Thr
 def compare(
     ctx: click.Context,
     before: str,
-    after: str,
+    after: str | None,
     strategies: tuple[str, ...],
+    first: str | None,
+    second: str | None,
     thresholds: tuple[Threshold, ...],
     form: str,
     output: Path | None,
@@ -114,15 +126,26 @@ def compare(
 ) -> None:
     """Compare run B with run A; exit with 1 if B is worse.
 
-    A and B are run ids in the store, their first letters, or files that run --json wrote.
+    A and B are run ids in the store, their first letters, or files that run --json wrote. With
+    --of X --with Y strategy Y of B is set beside strategy X of A, or both are taken from A.
     """
+    if (first is None) != (second is None) or (strategies and first is not None):
+        raise click.UsageError("--of and --with belong together, without --strategy", ctx)
+    if after is None and first is None:
+        raise click.UsageError("one run alone (expected A B, or A --of X --with Y)", ctx)
     if output is not None:
         check_writable(output)
     folder = store_folder(store)
-    runs = _find(before, folder), _find(after, folder)
-    known = dict.fromkeys(result.strategy for run in runs for result in run.results)
-    wanted = chosen("strategy", strategies, known)
-    found = compare_runs(*runs, thresholds=thresholds, strategies=wanted)
+    one = _find(before, folder)
+    other = one if after is None else _find(after, folder)
+    known = [[result.strategy for result in run.results] for run in (one, other)]
+    against = None
+    if first is not None and second is not None:
+        chosen("strategy", (first,), known[0])
+        chosen("strategy", (second,), known[1])
+        against = Against(first, second)
+    wanted = chosen("strategy", strategies, (*known[0], *known[1]))
+    found = compare_runs(one, other, thresholds=thresholds, strategies=wanted, against=against)
     if output is not None or not quiet:
         text = _writer(form)(found)
         if output is not None:

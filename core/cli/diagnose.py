@@ -19,7 +19,7 @@ from femubench.core.cli.files import (
 )
 from femubench.core.cli.progress import waiting
 from femubench.core.cli.registry import chosen, plugins_for
-from femubench.core.errors import FemubenchError, InputError, NotApplicable
+from femubench.core.errors import FemubenchError, InputError, NotApplicable, require
 
 if TYPE_CHECKING:
     from femubench.core.case.case import Case
@@ -85,7 +85,8 @@ def _share(ctx: click.Context, param: click.Parameter, value: float | None) -> f
     "report_file",
     type=REPORT,
     metavar="FILE",
-    help="Write the report to a file: .html is a page with drawings, .md is Markdown.",
+    help="Write the report to a file: .html is a page with drawings (needs femubench[plot]), "
+    ".md is Markdown.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
 @click.pass_context
@@ -106,8 +107,6 @@ def diagnose(
     CASE is a scenario with one case (bench scenarios list), one case of a scenario, or a folder
     with a case.toml. Held-out modes and design changes only judge the outcome.
     """
-    from femubench.core.diagnosis.serial import diagnosis_to_json
-
     plugins = plugins_for(ctx)
     names = _effects(effects, plugins)
     if json_file is not None and json_file != SCREEN:
@@ -117,6 +116,8 @@ def diagnose(
     if output is not None:
         _check_new(output)
     read = _one_case(case, plugins)
+    from femubench.core.diagnosis.serial import diagnosis_to_json
+
     if tolerance is not None:
         read = replace(read, tolerance=tolerance)
     with waiting(f"looking for what {read.name} lacks", quiet=quiet):
@@ -227,6 +228,8 @@ def _check_report(file: Path) -> None:
     if file.suffix.lower() not in _STYLES:
         known = " or ".join(_STYLES)
         raise InputError("does not say its format", file=file, expected=f"a name with {known}")
+    if _STYLES[file.suffix.lower()] == "html":
+        require("matplotlib", "plot", "a page with drawings")
     check_writable(file)
 
 

@@ -15,7 +15,7 @@ from femubench.core.plugin.validation import CHECKS, did_you_mean
 # What `new` writes, as in `KINDS` of the module that does it.
 _KINDS = ("strategy", "effect", "scenario", "reader")
 _NEXT = {
-    "strategy": "bench run frame -s {name} -s unchanged",
+    "strategy": "{trial}",
     "effect": "bench init portal && bench diagnose portal --effects {name}",
     "scenario": "bench run {name}",
     "reader": "bench run {folder}/tests/case",
@@ -104,13 +104,16 @@ def new(ctx: click.Context, name: str, kind: str, output: Path) -> None:
 
     NAME, of lower-case letters, digits and dashes, is also the name of the plugin.
     """
-    from femubench.core.plugin.new_package import write_package
+    from femubench.core.plugin.new_package import trial_of, write_package
 
-    for path in write_package(name, kind, output, plugins_for(ctx)):
+    found = plugins_for(ctx)
+    for path in write_package(name, kind, output, found):
         click.echo(f"wrote {path}")
     folder = output / name
     click.echo(f"Install it: pip install -e {folder}")
-    click.echo(f"then run:   {_NEXT[kind].format(name=name, folder=folder)}")
+    click.echo(
+        f"then run:   {_NEXT[kind].format(name=name, folder=folder, trial=trial_of(name, found))}"
+    )
 
 
 def _names(found: Plugins) -> list[str]:

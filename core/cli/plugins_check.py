@@ -5,16 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from femubench.core.cli.cases import read_cases
 from femubench.core.cli.files import check_writable, write_atomically
-from femubench.core.cli.registry import counted, plugins_for
-from femubench.core.conformance.checking import Finding, counts, findings, subjects, to_json
-from femubench.core.conformance.kit import SECONDS
-from femubench.core.conformance.problems import of_case
+from femubench.core.cli.registry import chosen, counted, plugins_for
+from femubench.core.conformance import SECONDS
+
+if TYPE_CHECKING:
+    from femubench.core.conformance.checking import Finding
 
 FILE = click.Path(path_type=Path, dir_okay=False)
 _WORDS = {"pass": "pass", "fail": "FAIL", "warn": "warn", "not-applicable": "-"}
@@ -52,6 +53,12 @@ def check(
     Every trial runs in a process of its own. Exit: 0 nothing failed, 1 something did.
     """
     plugins = plugins_for(ctx)
+    named = (plugins.strategies, plugins.effects, plugins.readers, plugins.scenarios)
+    known = [word for offered in named for word in offered]
+    chosen("strategy, effect, reader or scenario", [name.partition(":")[0]], known)
+    from femubench.core.conformance.checking import counts, findings, subjects, to_json
+    from femubench.core.conformance.problems import of_case
+
     if json_file is not None:
         check_writable(json_file)
     cases = [of_case(case) for case in read_cases(words, plugins)] if words else []
@@ -81,6 +88,8 @@ def _line(finding: Finding) -> str:
 
 
 def _last_line(found: Sequence[Finding]) -> str:
+    from femubench.core.conformance.checking import counts
+
     number = counts(found)
     parts = (
         f"{number['pass']} passed",

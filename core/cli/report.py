@@ -7,22 +7,23 @@ import webbrowser
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from femubench.core.cli.files import check_writable, make_folder, write_atomically
 from femubench.core.cli.registry import chosen, plugins_for, store_folder
-from femubench.core.cli.report_diagnosis import diagnosis_in, report_diagnosis
 from femubench.core.cli.reporting import (
     is_for_files,
     rendered,
     run_name,
     text_of,
 )
-from femubench.core.plugin.roles import Reporter
-from femubench.core.run.store import Store
-from femubench.core.schema.records import read_run
-from femubench.core.schema.results import Run
+from femubench.core.plugin.loader import load_plugins
+
+if TYPE_CHECKING:
+    from femubench.core.plugin.roles import Reporter
+    from femubench.core.schema.results import Run
 
 FOLDER = click.Path(path_type=Path, file_okay=False)
 _PAGE = "html"
@@ -40,6 +41,17 @@ class _Found:
     folder: Path
 
 
+class _Formats(click.Option):
+    """The option of the formats; its help names those that there are."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """Return the option and its help."""
+        short = {name: f"{name} ({word})" for word, name in _SHORT.items()}
+        names = ", ".join(short.get(name, name) for name in load_plugins().reporters)
+        self.help = f"{names}; several separated by commas. Default: terminal."
+        return super().get_help_record(ctx)
+
+
 @click.command("report")
 @click.argument("run", required=False)
 @click.option(
@@ -48,9 +60,7 @@ class _Found:
     "formats",
     multiple=True,
     metavar="FORMAT",
-    help="terminal, html, md, csv, modes-csv, parquet, json or a plugin's; several "
-    "separated by commas. "
-    "Default: terminal.",
+    cls=_Formats,
 )
 @click.option("--open", "opened", is_flag=True, help="Write the HTML page and open it.")
 @click.option(
@@ -83,10 +93,13 @@ def report(
     """
     plugins = plugins_for(ctx)
     words = list(dict.fromkeys([*_words(formats), *([_PAGE] if opened else [])])) or ["terminal"]
-    diagnosis = diagnosis_in(Path(run)) if run is not None and _is_file(run) else None
-    if diagnosis is not None:
-        report_diagnosis(diagnosis, Path(str(run)), words, output, opened=opened)
-        return
+    if run is not None and _is_file(run):
+        from femubench.core.cli.report_diagnosis import diagnosis_in, report_diagnosis
+
+        diagnosis = diagnosis_in(Path(run))
+        if diagnosis is not None:
+            report_diagnosis(diagnosis, Path(run), words, output, opened=opened)
+            return
     writers = [
         plugins.reporters[name] for name in chosen("report format", words, plugins.reporters)
     ]
@@ -111,6 +124,9 @@ def _is_file(word: str) -> bool:
 
 def _find(word: str | None, folder: Path) -> _Found:
     """Return a run from a file or from the store."""
+    from femubench.core.run.store import Store
+    from femubench.core.schema.records import read_run
+
     if word is not None and _is_file(word):
         file = Path(word)
         return _Found(read_run(file), None, file.parent)

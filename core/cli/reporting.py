@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from femubench.core.cli.registry import unknown
 from femubench.core.errors import FemubenchError, InputError, PluginError
-from femubench.core.plugin.loader import Plugins
-from femubench.core.plugin.roles import Reporter
-from femubench.core.schema.results import Run
+
+if TYPE_CHECKING:
+    from femubench.core.plugin.loader import Plugins
+    from femubench.core.plugin.roles import Reporter
+    from femubench.core.schema.results import Run
 
 # A strategy that a case has no room for is no failure.
 FINE = frozenset({"ok", "not-applicable"})
@@ -86,7 +89,7 @@ def reporter_for(plugins: Plugins, path: Path) -> Reporter:
         InputError: when none does.
     """
     # Of two formats with one suffix the first, of two suffixes that fit the longer.
-    suffixes = {found.suffix: found for found in reversed(plugins.reporters.values())}
+    suffixes = {found.suffix: found for found in reversed(list(plugins.reporters.values()))}
     for suffix, found in sorted(suffixes.items(), key=lambda item: -len(item[0])):
         if path.name.endswith(suffix):
             return found

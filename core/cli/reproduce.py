@@ -18,6 +18,7 @@ from femubench.core.cli.files import (
 )
 from femubench.core.cli.progress import waiting
 from femubench.core.cli.registry import chosen, counted, plugins_for, wrapped
+from femubench.core.errors import require
 
 if TYPE_CHECKING:
     from femubench.core.plugin.loader import Plugins
@@ -43,7 +44,7 @@ _STEM = "reproduce"
     "--output",
     type=FOLDER,
     metavar="DIR",
-    help="Write reproduce.md, .html, .json and the figures there.",
+    help="Write reproduce.md, .html, .json and the figures there; needs femubench[plot].",
 )
 @click.option(
     "-f",
@@ -76,6 +77,8 @@ def reproduce(
         check_writable(json_file)
     if output is not None:
         check_can_make(output)
+    if output is not None or style == "html":
+        require("matplotlib", "plot", "drawing the figures")
     with waiting(f"recomputing {' and '.join(papers)}", quiet=quiet):
         studies = _studies(papers, plugins_for(ctx))
     if json_file is not None and json_file != SCREEN:
@@ -147,7 +150,7 @@ def _write(studies: Sequence[Study], folder: Path) -> str:
 
 
 def _drawings(studies: Sequence[Study]) -> Iterator[tuple[str, str]]:
-    from femubench.reports.drawing import drawn
+    from femubench.core.plot.figure import drawn
 
     for study in studies:
         for figure in study.figures:

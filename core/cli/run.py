@@ -5,15 +5,16 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 import femubench
-from femubench.core.cli.cases import read_cases
+from femubench.core.cli.cases import case_folders, read_cases
 from femubench.core.cli.files import check_writable, make_folder, write_atomically
 from femubench.core.cli.progress import progress_bar
 from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of
-from femubench.core.cli.registry import counted, plugins_for, store_folder, wrapped
+from femubench.core.cli.registry import chosen, counted, plugins_for, store_folder, wrapped
 from femubench.core.cli.reporting import (
     exit_code,
     rendered,
@@ -22,23 +23,15 @@ from femubench.core.cli.reporting import (
     run_name,
     text_of,
 )
-from femubench.core.cli.request import (
-    DEFAULT_TIMEOUT,
-    Request,
-    case_words,
-    check_timeouts,
-    request_of,
-    strategy_words,
-)
 from femubench.core.errors import InputError, PluginError
-from femubench.core.plugin.loader import Plugins
-from femubench.core.plugin.roles import Reporter
-from femubench.core.plugin.variants import strategy_of
-from femubench.core.run.recording import Overwrite
-from femubench.core.run.runner import run_jobs
-from femubench.core.run.store import Store
-from femubench.core.schema.results import Run
-from femubench.core.score.repeatability import environment_differences, result_differences
+
+if TYPE_CHECKING:
+    from femubench.core.cli.request import Request
+    from femubench.core.plugin.loader import Plugins
+    from femubench.core.plugin.roles import Reporter
+    from femubench.core.run.recording import Overwrite
+    from femubench.core.run.store import Store
+    from femubench.core.schema.results import Run
 
 
 @dataclass(frozen=True)
@@ -157,12 +150,18 @@ def run(
 ) -> int:
     """Run strategies on cases and rank them.
 
-    A CASE is a scenario (bench scenarios list), one case of it such as design-change/PART, or a
-    folder with a case.toml. Without any, all built-in scenarios run.
+    A CASE is a scenario (bench scenarios list), one case of it as SCENARIO/PART, or a folder
+    with a case.toml. Without any, all built-in scenarios run.
     """
     plugins = plugins_for(ctx)
     if strict_plugins and plugins.broken:
         raise PluginError(f"{counted(len(plugins.broken), 'fault')} in plugins, see above")
+    # Words are known to be right before what runs them is loaded.
+    chosen("strategy", (word.partition(":")[0] for word in strategies), plugins.strategies)
+    case_folders(cases, plugins.scenarios)
+    from femubench.core.cli.request import DEFAULT_TIMEOUT, Request, request_of, strategy_words
+    from femubench.core.run.store import Store
+
     outputs = _outputs(plugins, json_file, csv_file, report_file)
     kept = Store(store_folder(store))
     default = timeouts.pop("", DEFAULT_TIMEOUT)
@@ -214,6 +213,10 @@ def _adjusted(ctx: click.Context, old: Request, given: Request) -> Request:
 
 def _run(request: Request, choice: Choice, plugins: Plugins, store: Store, *, quiet: bool) -> Run:
     """Run what is asked for."""
+    from femubench.core.cli.request import case_words, check_timeouts
+    from femubench.core.plugin.variants import strategy_of
+    from femubench.core.run.runner import run_jobs
+
     check_timeouts(request.timeouts, request.strategies)
     selected = [strategy_of(words, plugins.strategies) for words in request.strategies]
     read = read_cases(request.cases, plugins)
@@ -240,6 +243,8 @@ def _run(request: Request, choice: Choice, plugins: Plugins, store: Store, *, qu
 
 def _compare(old: Run, new: Run) -> int:
     """Say what differs between a run and its repetition; return 1 where a result does."""
+    from femubench.core.score.repeatability import environment_differences, result_differences
+
     around = environment_differences(old.meta, new.meta)
     results = result_differences(old, new)
     for title, lines in (("environment", around), ("results", results)):

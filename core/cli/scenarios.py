@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 import click
-import numpy as np
 
-from femubench.core.case.case import Case, Modification
 from femubench.core.cli.cases import read_cases
 from femubench.core.cli.registry import counted, plugins_for, wrapped
-from femubench.core.typing import FloatArray
+
+if TYPE_CHECKING:
+    from femubench.core.case.case import Case, Modification
+    from femubench.core.typing import FloatArray
 
 
 @click.group("scenarios")
@@ -84,6 +86,6 @@ def _model(case: Case) -> str:
 def _modes(numbers: Iterable[int], frequencies: FloatArray) -> str:
     """Return modes as ``modes 1 2 3 at 226.8 275.2 537.4 Hz``."""
     labels = [str(number) for number in numbers]
-    figures = [f"{hertz:.5g}" for hertz in np.asarray(frequencies)]
+    figures = [f"{hertz:.5g}" for hertz in frequencies]
     noun = "mode" if len(labels) == 1 else "modes"
     return f"{noun} {' '.join(labels)} at {' '.join(figures)} Hz"

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
 from femubench.core.conformance import (
+    SECONDS,
     effect_checks,
     other_checks,
     result_checks,
@@ -15,7 +16,6 @@ from femubench.core.conformance import (
 )
 from femubench.core.conformance.kit import (
     CHECKS,
-    SECONDS,
     Bench,
     Check,
     Role,
@@ -30,7 +30,6 @@ from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import did_you_mean
 from femubench.core.plugin.variants import strategy_of
 
-REFERENCE = "physical"
 # Importing them fills the list.
 _SOURCES = (strategy_checks, survival_checks, result_checks, effect_checks, other_checks)
 
@@ -124,12 +123,12 @@ def to_json(subject: Subject, found: Sequence[Finding]) -> dict[str, Any]:
     }
 
 
-def _of_role(role: Role, plugins: Plugins) -> dict[str, Any]:
-    by_role: dict[Role, dict[str, Any]] = {
-        "strategy": {**plugins.strategies},
-        "effect": {**plugins.effects},
-        "reader": {**plugins.readers},
-        "scenario": {**plugins.scenarios},
+def _of_role(role: Role, plugins: Plugins) -> Mapping[str, Any]:
+    by_role: dict[Role, Mapping[str, Any]] = {
+        "strategy": plugins.strategies,
+        "effect": plugins.effects,
+        "reader": plugins.readers,
+        "scenario": plugins.scenarios,
     }
     return by_role[role]
 
@@ -150,6 +149,7 @@ def _bench(
     seconds: float,
 ) -> Bench:
     if role == "strategy":
-        reference = plugins.strategies.get(REFERENCE)
+        named = plugins.strategies.values()
+        reference = next((s for s in named if getattr(s, "yardstick", False)), None)
         return Bench(item, reference=reference, cases=cases, seconds=seconds)
     return Bench(item, helpers=tuple(plugins.readers.values()), seconds=seconds)

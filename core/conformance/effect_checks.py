@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from typing import get_args
 
 import numpy as np
 
@@ -20,11 +21,16 @@ from femubench.core.conformance.place_words import known_place
 from femubench.core.conformance.problems import PLAIN, problem
 from femubench.core.conformance.results import Given, finite as finite_entries, symmetric
 from femubench.core.conformance.strategy_checks import own_doc
+from femubench.core.effect.attachments import total_mass
 from femubench.core.effect.frame_effect import EffectParameter
+from femubench.core.effect.sizes import Site, Size
+from femubench.core.effect.words import Reading, Wording
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.model import Model
+from femubench.core.look.modes import Seen
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.roles import Effect
+from femubench.core.schema.diagnosis import LookWarning
 from femubench.core.update.strategy import UpdateResult
 
 _PROBLEMS = (
@@ -98,6 +104,12 @@ def deterministic(bench: Bench) -> Verdict:
 def inputs(bench: Bench) -> Verdict:
     """Compare models before and after."""
     return _apart(bench, _inputs)
+
+
+@check("effect", "worded", "Sizes, hints, wording and looks are of use, where it brings any.")
+def worded(bench: Bench) -> Verdict:
+    """Read what is optional, and look at every model beside its measurement."""
+    return _apart(bench, _worded)
 
 
 def _values(parameters: tuple[EffectParameter, ...], x: float) -> list[float]:
@@ -227,3 +239,79 @@ def _inputs(effect: Effect) -> Verdict:
         if path:
             return failed(f"{where}: {path} was changed in place, expected a copy")
     return passed()
+
+
+def _worded(effect: Effect) -> Verdict:
+    hints = _hints(effect)
+    if hints:
+        return failed(hints)
+    for where, model, place in _spots(effect):
+        parameters = tuple(effect.parameters(model, place))
+        faults = [*_wordings(effect, parameters), *_sizes(effect, model, place, parameters)]
+        half = getattr(effect, "in_half", lambda values: None)(_values(parameters, 1.0))
+        if half is not None and not _within(half, parameters):
+            faults.append(f"in_half gives {half}, expected a value within bounds a parameter")
+        if faults:
+            return failed(f"{where}: {faults[0]}")
+    for name in _PROBLEMS:
+        given = problem(name)
+        for item in getattr(effect, "look", lambda seen: ())(Seen(given.model, given.measurement)):
+            if not isinstance(item, LookWarning) or item.effect != effect.name or not item.what:
+                expected = f"expected a LookWarning of {effect.name}"
+                return failed(f"{name}: look gives {item!r}, {expected}")
+    return passed()
+
+
+def _hints(effect: Effect) -> str:
+    """Return what is wrong with the words and hints that do not depend on the place."""
+    caution, softens = getattr(effect, "caution", ""), getattr(effect, "softens", False)
+    if not isinstance(caution, str) or (caution and caution[-1] not in ".!?"):
+        return f"caution is {caution!r}, expected a sentence"
+    if not isinstance(softens, bool):
+        return f"softens is {softens!r}, expected True or False"
+    reading = getattr(effect, "reading", None)
+    if reading is not None and not (isinstance(reading, Reading) and reading.std > 0.0):
+        return f"reading is {reading!r}, expected a Reading with std > 0"
+    sizes = getattr(effect, "sizes", ())
+    if not isinstance(sizes, Sequence) or not all(isinstance(item, Size) for item in sizes):
+        return f"sizes is {sizes!r}, expected a tuple of Size"
+    return ""
+
+
+def _wordings(effect: Effect, parameters: Sequence[EffectParameter]) -> Iterator[str]:
+    for item in parameters:
+        if item.wording not in get_args(Wording):
+            yield f"wording {item.wording!r}, expected one of {', '.join(get_args(Wording))}"
+        elif item.unit and item.wording != "value":
+            yield f"{item.name!r} is a {item.wording} in {item.unit}, expected no unit"
+    reading: Reading | None = getattr(effect, "reading", None)
+    read = [item for item in parameters if reading and item.name == reading.parameter]
+    if reading and not (read and np.isfinite(read[0].neutral)):
+        yield f"it reads {reading.parameter!r}, expected a parameter with a finite neutral value"
+
+
+def _sizes(
+    effect: Effect, model: Model, place: str, parameters: Sequence[EffectParameter]
+) -> Iterator[str]:
+    """Yield what is wrong with the ranges of hidden cases at a place of a frame."""
+    sizes: Sequence[Size] = getattr(effect, "sizes", ())
+    if len(sizes) > len(parameters):
+        yield f"{len(sizes)} sizes for {len(parameters)} parameters"
+    if model.structure is None:
+        return
+    hertz = solve_modes(model).elastic.natural_frequencies
+    site = Site(model.structure.frame, place, total_mass(model), hertz)
+    for size, item in zip(sizes, parameters, strict=False):
+        low, high = size.bounds(site)
+        inside = item.lower < high and low < item.upper
+        if not (0.0 <= low < high < np.inf and inside) or (size.log and low == 0.0):
+            yield (
+                f"sizes of {item.name!r} from {low:.3g} to {high:.3g}, expected two numbers, 0 or "
+                f"more, ascending, and some between them within {item.lower:g} .. {item.upper:g}"
+            )
+
+
+def _within(values: Sequence[float], parameters: Sequence[EffectParameter]) -> bool:
+    pairs = list(zip(values, parameters, strict=False))
+    fits = all(item.lower <= value <= item.upper for value, item in pairs)
+    return len(values) == len(parameters) and fits

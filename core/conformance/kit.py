@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
+from femubench.core.conformance import SECONDS
 from femubench.core.conformance.problems import PLAIN, Problem, problem
 from femubench.core.conformance.trial import Observation, Trial, observation_of, run_trial
 from femubench.core.run.jobs import one_line
@@ -19,7 +20,7 @@ from femubench.core.update.strategy import Strategy
 
 Status = Literal["pass", "fail", "warn", "not-applicable"]
 Role = Literal["strategy", "effect", "reader", "scenario"]
-SECONDS, MEMORY = 60.0, 1024 * MIB
+MEMORY = 1024 * MIB
 _ATTEMPTS = 3  # to start a process
 
 

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from femubench.core.conformance import SECONDS
+
 if TYPE_CHECKING:
     from femubench.core.conformance.checking import Subject
     from femubench.core.conformance.kit import Check
@@ -39,9 +41,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption(
         "--femubench-timeout",
         type=float,
-        default=60.0,
+        default=SECONDS,
         metavar="SECONDS",
-        help="What one trial of a check may take. Default: 60.",
+        help=f"What one trial of a check may take. Default: {SECONDS:g}.",
     )
 
 

@@ -187,7 +187,7 @@ def _withheld(bench: Bench) -> list[tuple[str, Want]]:
 @check(
     "strategy",
     "resources",
-    "Time and memory stay below 100 times those of `physical`.",
+    "Time and memory stay below 100 times those of the yardstick strategy.",
     wants=lambda bench: _measured(bench),
 )
 def resources(bench: Bench) -> Verdict:

@@ -38,7 +38,7 @@ from femubench.core.look.localisation import locate
 from femubench.core.look.look import look
 from femubench.core.plugin.loader import registered_effects
 from femubench.core.plugin.roles import Effect
-from femubench.core.schema.diagnosis import Advice, Cause, Gain
+from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning
 from femubench.core.score.scoring import score_model
 
 _SAME_MODEL = 0.3  # deviations by which the extended model may differ from the fit
@@ -77,13 +77,9 @@ def diagnose(
     begin = time.perf_counter()
     used = case.measurement.select(case.used)
     scatter = case.tolerance if tolerance is None else tolerance
-    examination = examine(
-        case.model,
-        used,
-        registered_effects() if effects is None else effects,
-        tolerance=scatter,
-        pairs=pairs,
-    )
+    registered = registered_effects()
+    known = registered if effects is None else tuple(effects)
+    examination = examine(case.model, used, known, tolerance=scatter, pairs=pairs)
     best = examination.best
     model = extended_by(case.model, best)
     proof = _proof(case, examination, best, model)
@@ -93,7 +89,10 @@ def diagnose(
         confirmed = stands(case, examination, best, model, proof.unseen)
         confirmed = confirmed or another_stands(case, examination)
     decision = decide(examination.posterior, examination.adequacy, confirmed=confirmed)
-    return _written(case, examination, decision, model, proof, begin)
+    # The look is no part of the search: whatever is sought, every effect may have its say.
+    all_known = {effect.name: effect for effect in (*registered, *known)}
+    looks = look(case.model, used, effects=all_known.values())
+    return _written(case, examination, decision, model, proof, looks, begin)
 
 
 def _proof(case: Case, examination: Examination, best: Explanation, model: Model) -> _Proof:
@@ -115,6 +114,7 @@ def _written(
     decision: Decision,
     model: Model,
     proof: _Proof,
+    looks: tuple[LookWarning, ...],
     begin: float,
 ) -> Diagnosis:
     best, posterior = examination.best, examination.posterior
@@ -141,7 +141,7 @@ def _written(
         data_count=len(examination.problem.data),
         adequacy_p=examination.adequacy,
         nothing=decision.nothing,
-        looks=look(case.model, used),
+        looks=looks,
         locations=(*evidence_rows(examination), *locate(case.model, used)),
         base=best.base.names if named else (),
         extended=model if named else case.model,
@@ -201,11 +201,8 @@ def _notes(examination: Examination, proof: _Proof, best: Explanation) -> tuple[
             f"The extended model takes {' and '.join(unearned)} at the textbook value too: "
             "these data neither ask for it nor speak against it."
         )
-    if "youngs-modulus" in {part.hypothesis.name for part in best.parts}:
-        notes.append(
-            "A stiffness that falls with the amplitude looks like youngs-modulus until a second "
-            "excitation level is measured."
-        )
+    cautions = (getattr(part.hypothesis.effect, "caution", "") for part in best.parts)
+    notes += dict.fromkeys(caution for caution in cautions if caution)
     if isinstance(examination.problem, LargeProblem) and best.parts:
         notes.append(
             "The causes were sought in modal coordinates: the extended model, solved anew, is "

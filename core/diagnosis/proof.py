@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2 as chi_square
+from scipy.special import chdtrc
 
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.verdict import inseparable
@@ -74,7 +74,7 @@ class Unseen:
         A cause is an idealisation: of what it changes, one part in twenty is its own error.
         """
         rest = self.after / np.hypot(self.std, _IDEAL * (self.before - self.after))
-        return float(chi_square.sf(rest @ rest, len(rest))) if len(rest) else 1.0
+        return float(chdtrc(len(rest), rest @ rest)) if len(rest) else 1.0
 
     def confirms(self, fitted: int) -> bool:
         """Tell whether unseen data bear the causes out, or cannot see them.

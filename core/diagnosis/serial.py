@@ -3,30 +3,33 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 import femubench
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.result import Diagnosis
-from femubench.core.diagnosis.sketch import PlaceKind, Plane, sketch_of
+from femubench.core.drawing.places import PlacedWireframe, placed_wireframe
+from femubench.core.effect.words import Wording
 from femubench.core.errors import InputError
+from femubench.core.fem.model import Model
 from femubench.core.schema.diagnosis import Verdict
 
 
 def diagnosis_to_json(
-    diagnosis: Diagnosis, *, written: Path | None = None, case: Case | None = None
+    diagnosis: Diagnosis, *, written: Path | None = None, case: Case | Model | None = None
 ) -> dict[str, Any]:
     """Return a diagnosis in the JSON contract of ``bench diagnose``; no NaN, no infinity in it.
 
     Arguments:
         diagnosis: what was found; its extended model is left out.
         written: folder of the extended case, if it was written.
-        case: what was diagnosed, for the drawing of its structure.
+        case: what was diagnosed, for the drawing of its structure; a model has no sensors.
     """
     names = [f.name for f in fields(diagnosis) if f.name != "extended"]
     tables = {name: _plain(getattr(diagnosis, name)) for name in names}
@@ -34,7 +37,7 @@ def diagnosis_to_json(
         look["changes"] = [{"mode": mode, "percent": change} for mode, change in look["changes"]]
     return {
         **tables,
-        "structure": None if case is None else _plain(sketch_of(case, diagnosis)),
+        "structure": None if case is None else _plain(placed_wireframe(case, _words(diagnosis))),
         "written": None if written is None else str(written),
         "version": femubench.__version__,
     }
@@ -51,11 +54,20 @@ def diagnosis_from_json(data: object, *, file: Path | str | None = None) -> dict
         InputError: naming the first field that is wrong.
     """
     try:
-        return _DiagnosisRecord.model_validate(data).model_dump()
+        return _DiagnosisRecord.model_validate(data).model_dump(mode="json")
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         path = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in first["loc"])
         raise InputError(first["msg"], file=file, key=path.lstrip(".") or None) from error
+
+
+def _words(diagnosis: Diagnosis) -> Iterator[str]:
+    """Yield every place that causes, rivals, visible effects and the evidence name."""
+    yield from (cause.place for cause in diagnosis.causes)
+    for rival in diagnosis.rivals:
+        yield from rival.place.split(" + ")
+    yield from (row.place for row in diagnosis.smallest_visible)
+    yield from (row.place for row in diagnosis.locations if row.indicator == "evidence")
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 - data of any form
@@ -86,6 +98,7 @@ class _ParameterRecord(_Record):
     std: _Number
     unit: str
     textbook: bool = False
+    wording: Wording = "value"
 
 
 class _CauseRecord(_Record):
@@ -114,6 +127,7 @@ class _VisibleRecord(_Record):
     place: str = ""
     size: _Number
     unit: str
+    wording: Wording = "value"
 
 
 class _ResidualRecord(_Record):
@@ -150,65 +164,6 @@ class _GainRecord(_Record):
     cross_validated_percent: _Pair | None = None
 
 
-_Index = Annotated[int, Field(ge=0)]
-_Station = Annotated[float, Field(ge=0.0, le=1.0)]
-_Point = Annotated[list[float], Field(min_length=3, max_length=3)]
-
-
-class _JointRecord(_Record):
-    name: str
-    type: str = ""
-    xyz: _Point
-
-
-class _MemberRecord(_Record):
-    name: str
-    ends: Annotated[list[_Index], Field(min_length=2, max_length=2)]
-    elements: Annotated[int, Field(ge=1)]
-
-
-class _SensorRecord(_Record):
-    label: str
-    xyz: _Point
-    direction: str = ""
-
-
-class _SupportRecord(_Record):
-    xyz: _Point
-    fixed: list[str] = []
-
-
-class _SpanRecord(_Record):
-    member: _Index
-    start: _Station
-    end: _Station
-
-
-class _PlaceRecord(_Record):
-    place: str
-    kind: PlaceKind
-    spans: list[_SpanRecord] = []
-    points: list[_Point] = []
-
-
-class _StructureRecord(_Record):
-    plane: Plane
-    joints: list[_JointRecord]
-    members: list[_MemberRecord]
-    sensors: list[_SensorRecord] = []
-    supports: list[_SupportRecord] = []
-    places: list[_PlaceRecord] = []
-
-    @model_validator(mode="after")
-    def _point_into_the_lists(self) -> _StructureRecord:
-        if any(end >= len(self.joints) for member in self.members for end in member.ends):
-            raise ValueError("a member ends at a joint that is not in the list")
-        spans = (span for place in self.places for span in place.spans)
-        if any(span.member >= len(self.members) for span in spans):
-            raise ValueError("a place lies on a member that is not in the list")
-        return self
-
-
 class _DiagnosisRecord(_Record):
     case: str = ""
     verdict: Verdict
@@ -229,6 +184,6 @@ class _DiagnosisRecord(_Record):
     base: list[str] = []
     notes: list[str] = []
     seconds: _Number = None
-    structure: _StructureRecord | None = None
+    structure: PlacedWireframe | None = None
     written: str | None = None
     version: str = ""

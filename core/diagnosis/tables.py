@@ -59,8 +59,7 @@ def causes_in(explanation: Explanation, share: float, earned: frozenset[str]) ->
     for name, h in book.items():
         if name in earned and name not in explanation.searched:
             fixed = tuple(
-                CauseParameter(p.name, float(p.textbook or 0.0), None, p.unit, textbook=True)
-                for p in h.parameters
+                _parameter(p, float(p.textbook or 0.0), None, textbook=True) for p in h.parameters
             )
             causes.append(Cause(h.name, h.place, fixed, share, _summary(h.effect)))
     x, spread = explanation.fit.state.x, explanation.fit.covariance
@@ -75,10 +74,16 @@ def causes_in(explanation: Explanation, share: float, earned: frozenset[str]) ->
                 # A relative change on top of the textbook's: what matters is the product.
                 textbook = 1.0 + float(book[h.name].parameters[i - start].textbook or 0.0)
                 value, std = textbook * (1.0 + value) - 1.0, textbook * std
-            fitted.append(CauseParameter(parameter.name, value, std, parameter.unit))
+            fitted.append(_parameter(parameter, value, std))
         start += len(h.parameters)
         causes.append(Cause(h.name, h.place, tuple(fitted), share, _summary(h.effect)))
     return causes
+
+
+def _parameter(
+    p: EffectParameter, value: float, std: float | None, *, textbook: bool = False
+) -> CauseParameter:
+    return CauseParameter(p.name, value, std, p.unit, textbook, p.wording)
 
 
 def _summary(effect: object) -> str:
@@ -135,7 +140,7 @@ def smallest_visible(found: Found) -> tuple[SmallestVisible, ...]:
         value = float(parameter.value(np.array(x)))
         neutral = parameter.neutral if np.isfinite(parameter.neutral) else 0.0
         size = value if parameter.scaling == "compliance" else abs(value - neutral)
-        row = SmallestVisible(h.name, h.place, size, parameter.unit)
+        row = SmallestVisible(h.name, h.place, size, parameter.unit, parameter.wording)
         softer = parameter.scaling == "compliance"
         old = best.get(h.name)
         if old is None or (row.size > old.size if softer else row.size < old.size):

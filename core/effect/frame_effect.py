@@ -9,6 +9,8 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from femubench.core.effect.sizes import Size
+from femubench.core.effect.words import Reading, Wording
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
@@ -37,6 +39,8 @@ class EffectParameter:
         scaling: how x becomes a value.
         one_sided: whether x >= 0.
         textbook: a value that physics gives without any fit, e.g. 1 for shear deformation.
+        wording: how a size is worded: in its `unit`, or as a relative ``change`` or a ``share``,
+            which have no unit and are told in percent too.
     """
 
     name: str
@@ -48,6 +52,7 @@ class EffectParameter:
     scaling: Scaling = "linear"
     one_sided: bool = False
     textbook: float | None = None
+    wording: Wording = "value"
 
     def value(self, x: Any) -> Any:  # noqa: ANN401 - numbers, arrays and complex steps alike
         """Return the value at a coordinate, bounds not applied; any shape."""
@@ -81,12 +86,22 @@ class FrameEffect(Effect):
     """Base class of effects on frames: override `places`, `parameters` and `frame`.
 
     Attributes:
-        name: a slug such as ``"joint-rotation"``.
-        summary: what the model lacks, as a clause: ``"the joints rotate"``.
+        name: a slug such as ``"loose-bolt"``.
+        summary: what the model lacks, as a clause: ``"a bolt is loose"``.
+        caution: a sentence for whoever finds this effect named; a note of the diagnosis.
+        softens: whether its stiffness may fall with the level of excitation, so that a second
+            level is worth measuring.
+        reading: the instrument that reads it directly; a proposal of the advice.
+        sizes: how large it is in hidden cases, one range a parameter; of more parameters the last
+            range goes on. Without one it is drawn from half a deviation of its prior to two.
     """
 
     name: ClassVar[str]
     summary: ClassVar[str] = ""
+    caution: ClassVar[str] = ""
+    softens: ClassVar[bool] = False
+    reading: ClassVar[Reading | None] = None
+    sizes: ClassVar[Sequence[Size]] = ()
 
     @abstractmethod
     def places(self, model: Model) -> Sequence[str]:
@@ -99,6 +114,13 @@ class FrameEffect(Effect):
     @abstractmethod
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the effect in it, written as ordinary keys of a case."""
+
+    def in_half(self, values: Sequence[float]) -> Sequence[float] | None:
+        """Return what half an element needs for as much effect as `values` have in the whole.
+
+        None, as here, where a hidden effect cannot fill one half of its element alone.
+        """
+        return None
 
     def extend(self, model: Model, place: str, values: Sequence[float]) -> Model:
         """Return the model with the effect in it.

@@ -22,16 +22,18 @@ def check_attachments(frame: Frame) -> None:
     """
     for brace in frame.braces:
         if frame.plane == "out-of-plane":
-            raise ModelError("a brace does nothing out of plane")
+            raise ModelError("a brace does nothing out of plane", brace)
         if brace.ends[0] == brace.ends[1] or not set(brace.ends) <= set(frame.joint_index):
-            raise ModelError(f"a brace needs two joints, not {' and '.join(brace.ends)}")
+            raise ModelError(f"a brace needs two joints, not {' and '.join(brace.ends)}", brace)
     allowed = [name for name in ACTIVE[frame.plane] if len(name) == 1]
     for item in frame.oscillators:
         if item.direction.lstrip("+-") not in allowed:
             expected = ", ".join(allowed)
-            raise ModelError(f"an oscillator moves in one of {expected}, not {item.direction!r}")
+            what = f"an oscillator moves in one of {expected}, not {item.direction!r}"
+            raise ModelError(what, item)
         if not (item.mass > 0.0 and item.frequency > 0.0):
-            raise ModelError(f"the oscillator at {item.at} needs a mass and a frequency above 0")
+            what = f"the oscillator at {item.at} needs a mass and a frequency above 0"
+            raise ModelError(what, item)
 
 
 def brace_ends(frame: Frame) -> IntArray:

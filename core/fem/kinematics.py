@@ -145,7 +145,8 @@ def build_kinematics(
     for support in frame.supports:
         node = _support_node(frame, mesh, support.at)
         if node is None or node in hanging:
-            raise ModelError(f"the support at {support.at} lies on the arm of a joint spring")
+            what = f"the support at {support.at} lies on the arm of a joint spring"
+            raise ModelError(what, support)
         free[node, [DIRECTIONS.index(name) for name in support.fixed]] = False
     own: list[tuple[int, FloatArray, tuple[str, ...]]] = []  # node, (6, k) basis, labels
     for node in hanging:

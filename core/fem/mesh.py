@@ -99,10 +99,10 @@ def member_axes(frame: Frame, member: Member) -> tuple[FloatArray, float]:
     start, stop = (np.array(frame.joint(name).xyz) for name in member.ends)
     length = float(np.linalg.norm(stop - start))
     if length < ON_MEMBER:
-        raise ModelError(f"member {member.name!r} has length zero")
+        raise ModelError(f"member {member.name!r} has length zero", member)
     normal = {"out-of-plane": 2, "in-plane": 1}.get(frame.plane)
     if normal is not None and abs(stop[normal] - start[normal]) > ON_MEMBER:
-        raise ModelError(f"member {member.name!r} leaves the plane of the frame")
+        raise ModelError(f"member {member.name!r} leaves the plane of the frame", member)
     x = (stop - start) / length
     if frame.plane == "out-of-plane":
         return np.array([x, np.cross([0.0, 0.0, 1.0], x), [0.0, 0.0, 1.0]]), length
@@ -112,7 +112,7 @@ def member_axes(frame: Frame, member: Member) -> tuple[FloatArray, float]:
     default = (1.0, 0.0, 0.0) if vertical else (0.0, 0.0, 1.0)
     y = np.cross(np.array(member.up if member.up is not None else default), x)
     if np.linalg.norm(y) < 1e-9:
-        raise ModelError(f"member {member.name!r}: `up` lies along the member")
+        raise ModelError(f"member {member.name!r}: `up` lies along the member", member)
     y /= np.linalg.norm(y)
     return np.array([x, y, np.cross(x, y)]), length
 
@@ -174,8 +174,10 @@ class _Builder:
         low, high = arm_1 / length, 1.0 - arm_2 / length
         regular = np.linspace(0.0, 1.0, member.elements + 1)[1:-1]
         if high <= low or (len(regular) and (regular[0] <= low or regular[-1] >= high)):
+            joint = member.ends[0 if low >= 1.0 - high else 1]  # where the longer arm is
             raise ModelError(
-                f"member {member.name!r}: the arm of a joint spring reaches past its end element"
+                f"member {member.name!r}: the arm of a joint spring reaches past its end element",
+                self.springs[member.name, joint],
             )
         grid = _stations([low, *regular, high], self.held.get(member.name, []), ON_MEMBER / length)
         stiff = [self.rigid_length(member, end) / length for end in (0, 1)]
@@ -246,7 +248,7 @@ def _check_ends(frame: Frame) -> None:
     wanted: tuple[JointSpring | RigidEnd, ...] = (*frame.joint_springs, *frame.rigid_ends)
     for spec in wanted:
         if (spec.member, spec.joint) not in ends:
-            raise ModelError(f"there is no member end {spec.member}@{spec.joint}")
+            raise ModelError(f"there is no member end {spec.member}@{spec.joint}", spec)
 
 
 def _stations(grid: Sequence[float] | FloatArray, new: list[float], apart: float) -> FloatArray:

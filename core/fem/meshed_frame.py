@@ -52,7 +52,12 @@ class MeshedFrame:
         p = self.properties
         for rigid in (p.rigid_1 + p.rigid_2, p.rigid_mass_1 + p.rigid_mass_2):
             if np.any(rigid >= p.length):
-                raise ModelError("a rigid end is longer than its element")
+                member = self.frame.members[self.mesh.member[int(np.argmax(rigid - p.length))]].name
+                own = [end for end in self.frame.rigid_ends if end.member == member]
+                raise ModelError(
+                    f"a rigid end of member {member!r} is longer than its element",
+                    max(own, key=lambda end: end.stiffness_length + end.mass_length, default=None),
+                )
 
     def __getstate__(self) -> dict[str, Any]:
         # Kept factorisations cannot be pickled; they are made again where they are wanted.

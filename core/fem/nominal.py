@@ -72,7 +72,7 @@ def _constants(frame: Frame, member: Member) -> tuple[float, ...]:
     shear = 1.0 if frame.beam == "timoshenko" else 0.0
     if shear and s.kappa is None:
         raise ModelError(
-            f"member {member.name!r}: a Timoshenko beam needs the shear coefficient kappa"
+            f"member {member.name!r}: a Timoshenko beam needs the shear coefficient kappa", member
         )
     ky, kz = s.kappa(m.nu) if s.kappa is not None else (1.0, 1.0)
     flex = shear / (m.G * s.A)
@@ -88,7 +88,7 @@ def _of_members(
     column = np.zeros(len(frame.members))
     for item in items:
         if item.member not in frame.member_index:
-            raise ModelError(f"there is no member {item.member!r}")
+            raise ModelError(f"there is no member {item.member!r}", item)
         column[frame.member_index[item.member]] += value(item)
     return column
 
@@ -109,9 +109,9 @@ def _parameter(structure: MeshedFrame, item: Factor) -> Parameter:
     name = f"factor on {item.quantity}"
     if item.quantity not in QUANTITIES or not QUANTITIES[item.quantity]:
         known = ", ".join(quantity for quantity, scaled in QUANTITIES.items() if scaled)
-        raise ModelError(f"there is no factor on {item.quantity!r}; there are {known}")
+        raise ModelError(f"there is no factor on {item.quantity!r}; there are {known}", item)
     if not (item.factor > 0.0 or (item.factor == 0.0 and item.quantity in MAY_VANISH)):
-        raise ModelError(f"{name}: {item.factor:g} is not positive")
+        raise ModelError(f"{name}: {item.factor:g} is not positive", item)
     places: list[str] = []
     for place in item.at:
         if place == "all":

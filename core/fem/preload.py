@@ -108,7 +108,8 @@ class Statics:
         scale = float(np.abs(misfit).max())
         if not np.isfinite(state.largest) or abs(tension) < _NO_FORCE * scale:
             raise ModelError(
-                f"nothing resists a lack of fit of member {member!r}: the frame is not redundant"
+                f"nothing resists a lack of fit of member {member!r}: the frame is not redundant",
+                next((item for item in structure.frame.preloads if item.member == member), None),
             )
         return state.scaled(np.sign(tension) / state.largest)
 
@@ -182,7 +183,8 @@ def _prepare(structure: MeshedFrame) -> Statics:
         frame = replace(frame, supports=_clamps(frame))
         flat = next((m.name for m in frame.members if m.section.Iz <= 0.0), None)
         if flat is not None:
-            raise ModelError(f"member {flat!r}: the stress of a lack of fit needs Iz")
+            what = f"member {flat!r}: the stress of a lack of fit needs Iz"
+            raise ModelError(what, next(iter(frame.preloads), None))
     kinematics = build_kinematics(frame, structure.mesh, directions)
     flat_structure = replace(structure, frame=frame, kinematics=kinematics)
     free = _free(flat_structure)

@@ -31,7 +31,7 @@ class Data:
     def __post_init__(self) -> None:
         std = self.measurement.frequency_std
         if not (np.isfinite(std) & (std > 0.0)).all():
-            raise NotApplicable("a used frequency has no standard deviation")
+            raise NotApplicable("not every used frequency has a standard deviation")
 
     def __len__(self) -> int:
         return len(self.measurement) + len(self.shape_rows[0]) + (self.mass is not None)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2 as chi_square
+from scipy.special import chdtrc
 
 from femubench.core.inference.extended_model import agreed, extended
 from femubench.core.inference.fit import Fit, Problem, State, fit, state_at
@@ -47,7 +47,7 @@ def adequacy(state: State, unknowns: int) -> float:
 
 def _tail(residual: FloatArray, unknowns: int) -> float:
     dof = max(len(residual) - unknowns, 1)
-    return float(chi_square.sf(residual @ residual, dof)) if len(residual) else 1.0
+    return float(chdtrc(dof, residual @ residual)) if len(residual) else 1.0
 
 
 _REFINED = 40  # hypotheses that are fitted exactly at most

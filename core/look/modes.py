@@ -20,11 +20,13 @@ from femubench.core.modal.frequency_changes import (
 )
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import Pairing, pair_modes
+from femubench.core.schema.diagnosis import LookWarning
 from femubench.core.typing import FloatArray
 
 _MOST_MODES = 40
 _MARGIN = 4  # modes beyond those wanted, so that a pair may cross the end of the list
 _RIGID = 6
+_NOTABLE, _NOTABLE_DEVIATIONS = 0.005, 2.0
 Changes = tuple[tuple[int, float], ...]
 
 
@@ -84,11 +86,43 @@ class Seen:
             other = Model.of(structure.rebuilt(frame))
             if other.size != self.model.size:
                 return None
-            if other.size > SOLVED_LIMIT:
+            if self.large:
                 return self._ritz(other)
             return frequency_changes(self.model, self.modes, other, self.count)
         except ModelError:
             return None
+
+    @property
+    def large(self) -> bool:
+        """Tell whether the model is too large for another one to be solved beside it."""
+        return self.model.size > SOLVED_LIMIT
+
+    def notable(self, effect: str, what: str, changes: FloatArray | None) -> list[LookWarning]:
+        """Return a warning about the whole structure where some mode changes notably; else none.
+
+        Arguments:
+            effect: slug of what the model lacks.
+            what: begin of the sentence, which goes on with the largest change.
+            changes: relative changes of the frequencies with the effect; None where not known.
+        """
+        if changes is None or not self.exceeds(changes, _NOTABLE, _NOTABLE_DEVIATIONS):
+            return []
+        worst = int(np.abs(changes).argmax())
+        said = f"{what}: it changes mode {worst + 1} by {100.0 * changes[worst]:+.2g} %."
+        return [self.warning(effect, said, changes)]
+
+    def warning(
+        self, effect: str, what: str, changes: FloatArray | None, where: str = "all"
+    ) -> LookWarning:
+        """Return a warning.
+
+        Arguments:
+            effect: slug of what the model lacks.
+            what: one sentence.
+            changes: relative changes of the frequencies with the effect; None where not known.
+            where: members, by comma, or ``all``.
+        """
+        return LookWarning(what, where, effect, () if changes is None else percent(changes))
 
     def _ritz(self, other: Model) -> FloatArray:
         """Return the changes by Rayleigh and Ritz in the space of the modes at hand."""

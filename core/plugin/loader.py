@@ -1,7 +1,8 @@
 """Find plugins through the entry-point group ``femubench`` and collect what they offer.
 
 Built-ins and third parties take the same way in. Every plugin is loaded, checked and called on its
-own: what is wrong with one is recorded in `Plugins.broken` and touches no other.
+own: what is wrong with one is recorded in `Plugins.broken` and touches no other. What is offered by
+reference is imported when it is used: a list of names costs none of the numerics behind them.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import pluggy
 
@@ -27,6 +28,8 @@ from femubench.core.update.strategy import Strategy
 
 PREFIX = f"{PROJECT}_"
 HOOKS = tuple(PREFIX + kind for kind in CHECKS)
+
+Made = TypeVar("Made")
 
 # A plugin that calls sys.exit() on import is as broken as one that raises; Ctrl-C is the user's.
 _FAULTS = (Exception, SystemExit)
@@ -64,15 +67,45 @@ class LoadedPlugin:
     offers: Mapping[str, tuple[str, ...]]
 
 
+class Offers(Mapping[str, Made]):
+    """What plugins offer of one kind, by name, in the order of the plugins.
+
+    Asking for an entry that was offered by reference loads it, and raises PluginError where that
+    fails or where the entry does not fill its role.
+    """
+
+    def __init__(self) -> None:
+        self._entries: dict[str, Made | _Reference] = {}
+
+    def __getitem__(self, name: str) -> Made:
+        entry = self._entries[name]
+        if isinstance(entry, _Reference):
+            entry = self._entries[name] = entry.load()
+        return entry
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._entries
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def add(self, name: str, entry: Made | _Reference) -> None:
+        """Take an entry whose name is not taken."""
+        self._entries[name] = entry
+
+
 @dataclass(frozen=True)
 class Plugins:
     """Everything that plugins offer, by name, and what is broken."""
 
-    strategies: dict[str, Strategy] = field(default_factory=dict)
-    scenarios: dict[str, Scenario] = field(default_factory=dict)
-    effects: dict[str, Effect] = field(default_factory=dict)
-    readers: dict[str, Reader] = field(default_factory=dict)
-    reporters: dict[str, Reporter] = field(default_factory=dict)
+    strategies: Mapping[str, Strategy] = field(default_factory=dict)
+    scenarios: Mapping[str, Scenario] = field(default_factory=dict)
+    effects: Mapping[str, Effect] = field(default_factory=dict)
+    readers: Mapping[str, Reader] = field(default_factory=dict)
+    reporters: Mapping[str, Reporter] = field(default_factory=dict)
     loaded: tuple[LoadedPlugin, ...] = ()
     broken: tuple[BrokenPlugin, ...] = ()
 
@@ -88,6 +121,29 @@ class _Source:
 
     def load(self) -> object:
         return self.given if self.entry_point is None else self.entry_point.load()
+
+
+@dataclass(frozen=True)
+class _Reference:
+    """A thing that a plugin offers as ``module:Class``, to be loaded when it is used."""
+
+    source: _Source
+    kind: str
+    target: EntryPoint
+
+    @property
+    def name(self) -> str:
+        return self.target.name
+
+    def load(self) -> Any:  # noqa: ANN401 - as the kind has it
+        try:
+            filled = CHECKS[self.kind](self.target.load())
+            if filled.name != self.name:
+                named = f"is named {filled.name!r} and offered as {self.name!r}"
+                raise PluginError(f"{self.target.value} {named}")
+        except _FAULTS as fault:
+            raise PluginError(str(_broken(self.source, fault, PREFIX + self.kind))) from fault
+        return filled
 
 
 def load_plugins(
@@ -107,7 +163,7 @@ def load_plugins(
     sources += [
         _Source(name, "given by hand", given=plugin) for name, plugin in (extra or {}).items()
     ]
-    plugins = Plugins()
+    found: dict[str, Offers[Any]] = {kind: Offers() for kind in CHECKS}
     loaded: list[LoadedPlugin] = []
     broken: list[BrokenPlugin] = []
     for source in sources:
@@ -116,17 +172,12 @@ def load_plugins(
         except _FAULTS as fault:
             broken.append(_broken(source, fault))
             continue
-        offers = {kind: tuple(_collect(source, manager, kind, plugins, broken)) for kind in CHECKS}
+        offers = {
+            kind: tuple(_collect(source, manager, kind, taken, broken))
+            for kind, taken in found.items()
+        }
         loaded.append(LoadedPlugin(source.name, source.distribution, offers))
-    return Plugins(
-        plugins.strategies,
-        plugins.scenarios,
-        plugins.effects,
-        plugins.readers,
-        plugins.reporters,
-        tuple(loaded),
-        tuple(broken),
-    )
+    return Plugins(**found, loaded=tuple(loaded), broken=tuple(broken))
 
 
 def registered_effects() -> tuple[Effect, ...]:
@@ -218,12 +269,11 @@ def _collect(
     source: _Source,
     manager: pluggy.PluginManager,
     kind: str,
-    plugins: Plugins,
+    taken: Offers[Any],
     broken: list[BrokenPlugin],
 ) -> Iterator[str]:
-    """Call one hook of one plugin; what passes the checks goes into `plugins`."""
+    """Call one hook of one plugin; what passes the checks goes into `taken`."""
     hook = PREFIX + kind
-    taken: dict[str, Any] = getattr(plugins, kind)
     try:
         offered = list(_call(manager, hook))
     except _FAULTS as fault:
@@ -231,13 +281,17 @@ def _collect(
         return
     for entry in offered:
         try:
-            filled = CHECKS[kind](entry)
+            filled = (
+                _Reference(source, kind, entry)
+                if isinstance(entry, EntryPoint)
+                else CHECKS[kind](entry)
+            )
             if filled.name in taken:
                 raise PluginError(f"the name {filled.name!r} is taken by another of the {kind}")
         except _FAULTS as fault:
             broken.append(_broken(source, fault, hook))
             continue
-        taken[filled.name] = filled
+        taken.add(filled.name, filled)
         yield filled.name
 
 
@@ -251,7 +305,13 @@ def _call(manager: pluggy.PluginManager, hook: str) -> Iterator[object]:
     for answer in answers:
         if isinstance(answer, (str, bytes)) or not isinstance(answer, Iterable):
             raise PluginError(f"returned {answer!r} instead of a list")
-        yield from answer
+        if not isinstance(answer, Mapping):
+            yield from answer
+            continue
+        for name, value in answer.items():
+            if not isinstance(value, str) or not EntryPoint.pattern.match(value):
+                raise PluginError(f"{name!r} is offered as {value!r}, not as 'module:Class'")
+            yield EntryPoint(name, value, hook)
 
 
 def _broken(source: _Source, fault: BaseException, hook: str = "") -> BrokenPlugin:

@@ -75,7 +75,7 @@ def write_package(name: str, kind: str, output: Path, plugins: Plugins) -> tuple
     part = output / f".{name}.{secrets.token_hex(6)}"
     try:
         part.mkdir()
-        for path, text in _files(name, kind):
+        for path, text in _files(name, kind, trial_of(name, plugins)):
             target = part / path
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_text(text, encoding="utf-8")
@@ -90,6 +90,13 @@ def write_package(name: str, kind: str, output: Path, plugins: Plugins) -> tuple
     finally:
         shutil.rmtree(part, ignore_errors=True)
     return tuple(sorted(path for path in folder.rglob("*") if path.is_file()))
+
+
+def trial_of(name: str, plugins: Plugins) -> str:
+    """Return the command that runs a strategy beside the baseline on the first scenario."""
+    scenario = next(iter(plugins.scenarios), "")
+    others = [s.name for s in plugins.strategies.values() if getattr(s, "baseline", False)]
+    return " ".join(["bench", "run", scenario, *(f"-s {word}" for word in (name, *others))])
 
 
 def module_of(name: str) -> str:
@@ -145,7 +152,7 @@ def _check_free(folder: Path) -> None:
         raise InputError("is not empty", file=folder, expected="a new or an empty folder")
 
 
-def _files(name: str, kind: str) -> Iterator[tuple[str, str]]:
+def _files(name: str, kind: str, trial: str) -> Iterator[tuple[str, str]]:
     """Return the path of every file that comes from a template, and its text."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -170,6 +177,7 @@ def _files(name: str, kind: str) -> Iterator[tuple[str, str]]:
         "module": module,
         "cls": _class_of(name, kind),
         "description": KINDS[kind][1],
+        "trial": trial,
     }
     for path, template in templates.items():
         yield path, room.get_template(f"{template}.jinja").render(words)

@@ -58,7 +58,7 @@ class Reporter(Protocol):
     A reporter may offer more than is asked here:
 
     - ``render_with(run, exhibits) -> str``: used instead of `render` where there is a store;
-      `exhibits` is None, or has ``stage(digest of the case)`` and ``of(key of the job)``, plain
+      `exhibits` is None, or has ``case(digest)`` of a case and ``of(key of the job)``, plain
       data to draw or None.
     - ``render_bytes(run) -> bytes``: used instead of `render`, for a format that is no text.
 
@@ -81,14 +81,18 @@ class Effect(Protocol):
 
     An effect may offer more than is asked here:
 
-    - ``summary``: what the model lacks, as a clause: ``"the joints rotate"``.
+    - ``summary``, ``caution``: what the model lacks, as a clause (``"a bolt is loose"``), and a
+      sentence for whoever finds the effect named.
     - ``change(model, place) -> Change``: what it does to mass and stiffness as fixed matrices with
       varying factors. Without it the diagnosis reads the change off `extend` at a few values.
+    - ``look(seen) -> Iterable[LookWarning]``: what a plain look at model and measurement, a `Seen`,
+      shows of it before any fit.
+    - ``softens``, ``reading``: hints for the advice, as in `FrameEffect`.
     """
 
     @property
     def name(self) -> str:
-        """Return a slug such as ``"joint-rotation"``; a plain attribute will do."""
+        """Return a slug such as ``"loose-bolt"``; a plain attribute will do."""
         ...
 
     def places(self, model: Model) -> Sequence[str]:

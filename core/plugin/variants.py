@@ -1,6 +1,6 @@
-"""Strategies with other options than their default ones: ``generic-ls:orthogonality=false``.
+"""Strategies with other options than their default ones: ``NAME:OPTION=VALUE``.
 
-Options of options have a dotted name: ``global:options.damping=0.01``, ``spring:stiffness.ry=3e6``.
+Options of options have a dotted name: ``NAME:options.damping=0.01``, ``NAME:stiffness.ry=3e6``.
 """
 
 from __future__ import annotations

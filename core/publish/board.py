@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from femubench.core.publish.agreement import Finding, References, findings_of, machine_of
 from femubench.core.publish.submissions import SCHEMA, Submission, slug
 from femubench.core.schema.results import BLOCKS, DONE
-from femubench.core.score.ranking import geometric_mean, score_of
+from femubench.core.score.ranking import geometric_mean, ranked as in_order, score_of
 
 
 class _Version(NamedTuple):
@@ -190,20 +190,20 @@ def _strategy_entries(
     for item in submissions:
         citations.update(item.run.meta["citations"])
 
-    def order(name: str) -> tuple[bool, bool, int, float, str]:
+    def order(name: str) -> tuple[tuple[float, ...], float, str]:
         row = described[latest[name]]
-        skill = 0.0 if row["skill"] is None else row["skill"]
-        return not row["complete"], row["unphysical"], -row["covered"], skill, name
+        tier = not row["complete"], row["unphysical"], -row["covered"]
+        return tier, 0.0 if row["skill"] is None else row["skill"], name
 
     entries = []
-    for place, name in enumerate(sorted(latest, key=order), start=1):
+    for rank, name in in_order(latest, order):
         history = [described[version] for version in described if version.strategy == name]
         entries.append(
             {
                 "name": name,
                 "citation": citations.get(name, ""),
                 "page": f"strategies/{slug(name)}.html",
-                "rank": place if described[latest[name]]["complete"] else None,
+                "rank": rank if described[latest[name]]["complete"] else None,
                 "cases": len(ranked),
                 "versions": history[::-1],
             }

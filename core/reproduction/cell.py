@@ -16,7 +16,7 @@ class Cell:
     """One figure that a paper prints.
 
     Arguments:
-        paper: slug, e.g. ``"frame"``.
+        paper: slug, the word after ``bench reproduce``.
         table: as the paper numbers it, e.g. ``"4d"``.
         row, column: what the paper calls them.
         printed: its figure; an imaginary frequency is a negative one.

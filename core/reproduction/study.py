@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from femubench.core.figure import Figure
+from femubench.core.plot.figure import Figure
 from femubench.core.reproduction.cell import VERDICTS, Cell, Verdict
 
 

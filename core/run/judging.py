@@ -58,7 +58,7 @@ def _exhibit(case: Case, outcome: JobOutcome, result: JobResult) -> dict[str, An
     """Return the pictures of a result; what goes wrong with them is no fault of the result."""
     if outcome.model is None or result.status != "ok":
         return None
-    from femubench.core.exhibits.exhibit import exhibit_of
+    from femubench.core.drawing.prediction import exhibit_of
 
     try:
         with warnings.catch_warnings():

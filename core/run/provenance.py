@@ -189,6 +189,7 @@ def run_meta(
         "cases": {case.name: {"title": case.title, "digest": case.digest} for case in cases},
         "strategies": [strategy.name for strategy in strategies],
         "citations": {strategy.name: strategy.citation for strategy in strategies},
+        "baseline": next((s.name for s in strategies if getattr(s, "baseline", False)), None),
         "reference": {name: item.rms_percent for name, item in references.items()},
     }
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any, Literal
 
-from femubench.core.exhibits.exhibit import keep_stages
+from femubench.core.drawing.prediction import keep_drawings
 from femubench.core.run.schedule import Show, Slot
 from femubench.core.run.store import Store
 from femubench.core.schema.results import DONE, JobResult
@@ -27,7 +27,7 @@ class Results:
         self._slots, self._store, self._run, self._progress = slots, store, run, progress
         self._found: dict[int, JobResult] = {}
         if store is not None:
-            keep_stages(store.exhibits, {slot.case.name: slot.case for slot in slots}.values())
+            keep_drawings(store.exhibits, {slot.case.name: slot.case for slot in slots}.values())
 
     @property
     def shelf(self) -> Show | None:

@@ -13,8 +13,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from femubench.core.drawing.files import Exhibits
 from femubench.core.errors import InputError
-from femubench.core.exhibits.shelf import Exhibits
 from femubench.core.files import read_bytes
 from femubench.core.schema.records import (
     LARGEST_STORE,
@@ -186,7 +186,7 @@ class Store:
         listed = tuple(results.values())
         check_extent(meta, listed, file=self.path)
         notes = [*notes, *damage.notes(self.path)]
-        return Run({**meta, "notes": notes}, rank_results(listed, reference))
+        return Run({**meta, "notes": notes}, rank_results(listed, reference, meta.get("baseline")))
 
     def by_key(self, run_id: str | None = None) -> dict[str, JobResult]:
         """Return the latest result of every job of a run, or of all, that has a key.

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from femubench.core.effect.words import Wording
+
 Verdict = Literal["named", "none", "unknown", "ambiguous", "not-confirmed"]
 
 
@@ -15,6 +17,7 @@ class CauseParameter:
     Arguments:
         std: standard deviation; None where the value is a textbook one that was not fitted.
         textbook: whether the value was taken from the textbook.
+        wording: how a size is worded, as in `EffectParameter`.
     """
 
     name: str
@@ -22,6 +25,7 @@ class CauseParameter:
     std: float | None
     unit: str
     textbook: bool = False
+    wording: Wording = "value"
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,7 @@ class SmallestVisible:
     place: str
     size: float
     unit: str
+    wording: Wording = "value"
 
 
 @dataclass(frozen=True)

@@ -105,6 +105,7 @@ class MetaRecord(BaseModel):
     seed: _Whole = 0
     seeds: Annotated[list[_Whole], Field(max_length=MOST_RESULTS)] = []
     strategies: Annotated[list[Name], Field(max_length=_MOST_NAMES)] = []
+    baseline: Name | None = None
     cases: dict[Name, _CaseMeta] = {}
     citations: dict[Name, _Text] | None = None
     reference: dict[Name, dict[Name, _Percent]] | None = None

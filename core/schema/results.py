@@ -64,7 +64,7 @@ class JobResult:
         negative_eigenvalues: of the updated model.
         parameter_count: unknowns that were free.
         evaluations: eigenvalue solutions that the strategy made.
-        score: geometric mean over the blocks of (rms + 0.05 %) / (rms of `unchanged` + 0.05 %).
+        score: geometric mean over the blocks of (rms + 0.05 %) / (nominal rms + 0.05 %).
         rank: within case and seed; 1 is best.
         parameters, history, diagnostics: as the strategy gave them, in plain data.
         traceback: of an exception, for whoever asks for it.

@@ -11,7 +11,8 @@ from femubench.core.errors import InputError
 from femubench.core.schema.results import BLOCKS, DONE, JobResult, Run
 from femubench.core.score.ranking import OFFSET_PERCENT, geometric_mean, score_of
 from femubench.core.score.repeatability import environment_differences
-from femubench.core.score.statistics import Evidence, evidence_of
+from femubench.core.score.statistics import Evidence, block_ratios, evidence_of, log_scores
+from femubench.core.typing import FloatArray
 
 Metric = Literal["skill", "used", "higher", "modified", "seconds", "failures"]
 METRICS: tuple[Metric, ...] = ("skill", "used", "higher", "modified", "seconds", "failures")
@@ -91,11 +92,20 @@ class Excess:
 
 
 @dataclass(frozen=True)
+class Against:
+    """A strategy of A and the one of B that is compared with it."""
+
+    before: str
+    after: str
+
+
+@dataclass(frozen=True)
 class Comparison:
     """Run B against run A.
 
     Arguments:
         before, after: names of the runs.
+        against: strategies compared under two names; elsewhere they have that of B.
         jobs: number that both have.
         changes: what ended otherwise, lost results first.
         rows: by strategy, all scenarios first.
@@ -109,6 +119,7 @@ class Comparison:
 
     before: str
     after: str
+    against: tuple[Against, ...]
     jobs: int
     changes: tuple[Change, ...]
     rows: tuple[Row, ...]
@@ -132,13 +143,14 @@ class Comparison:
 
 
 _ROUNDING = 1e-9  # relative; two machines may differ by it
-_Job = tuple[str, str, int]  # strategy, case, seed
+_Job = tuple[str, str, int]  # strategy, in B where A has another name for it, case, seed
 
 
 @dataclass(frozen=True)
 class _Pair:
     """One job in both runs; the errors of the nominal model stand for both."""
 
+    strategy: str
     before: JobResult
     after: JobResult
     reference: Mapping[str, float]
@@ -177,18 +189,25 @@ def compare_runs(
     *,
     thresholds: Sequence[Threshold] = DEFAULT_THRESHOLDS,
     strategies: Iterable[str] = (),
+    against: Against | None = None,
 ) -> Comparison:
     """Return what run `after` (B) does otherwise than run `before` (A).
+
+    Strategies are compared by their names. Where each run has one strategy, and where each has one
+    variant of a strategy that the other run lacks, these two are compared.
 
     Arguments:
         thresholds: what counts as worse.
         strategies: those to compare; all where there are none.
+        against: one strategy of each to compare, and nothing else; the runs may then be the same.
 
     Raises:
         InputError: when the runs have no job in common.
     """
+    names = _names(_strategies(before), _strategies(after), against)
     chosen = frozenset(strategies)
-    old, new = (_by_job(run, chosen) for run in (before, after))
+    names = {a: b for a, b in names.items() if not chosen or {a, b} & chosen}
+    old, new = _by_job(before, names), _by_job(after, {b: b for b in names.values()})
     shared = [job for job in old if job in new]
     other = [job for job in shared if _moved(before, old[job], after, new[job])]
     shared = [job for job in shared if job not in set(other)]
@@ -198,15 +217,16 @@ def compare_runs(
             expected="one (case, strategy, seed) with the same case files",
         )
     references = {**(after.meta.get("reference") or {}), **(before.meta.get("reference") or {})}
-    pairs = [_Pair(old[job], new[job], references.get(job[1]) or {}) for job in shared]
+    pairs = [_Pair(job[0], old[job], new[job], references.get(job[1]) or {}) for job in shared]
     rows = tuple(_rows(pairs))
     return Comparison(
         before=str(before.meta.get("run") or "A"),
         after=str(after.meta.get("run") or "B"),
+        against=tuple(Against(a, b) for a, b in names.items() if a != b),
         jobs=len(pairs),
         changes=_changes(pairs),
         rows=rows,
-        evidence=evidence_of(_ratios(pairs)),
+        evidence=evidence_of(_ratios(pairs, references)),
         only_before=tuple(Job(*job) for job in old if job not in new),
         only_after=tuple(Job(*job) for job in new if job not in old),
         other_cases=tuple(Job(*job) for job in other),
@@ -221,12 +241,32 @@ def compare_runs(
     )
 
 
-def _by_job(run: Run, chosen: frozenset[str]) -> dict[_Job, JobResult]:
-    return {
-        (item.strategy, item.case, item.seed): item
-        for item in run.results
-        if not chosen or item.strategy in chosen
-    }
+def _by_job(run: Run, names: Mapping[str, str]) -> dict[_Job, JobResult]:
+    return {(names[r.strategy], r.case, r.seed): r for r in run.results if r.strategy in names}
+
+
+def _strategies(run: Run) -> list[str]:
+    return list(dict.fromkeys(result.strategy for result in run.results))
+
+
+def _names(old: Sequence[str], new: Sequence[str], against: Against | None) -> dict[str, str]:
+    """Return from the strategies of A to those of B with which they are compared.
+
+    A strategy that the other run does not have stands for itself.
+    """
+    if against is not None:
+        return {against.before: against.after}
+    if len(old) == len(new) == 1:
+        return {old[0]: new[0]}
+    names = {name: name for name in (*old, *new)}
+    for base in dict.fromkeys(name.partition(":")[0] for name in old):
+        alone = [
+            [n for n in mine if n not in other and n.partition(":")[0] == base]
+            for mine, other in ((old, new), (new, old))
+        ]
+        if len(alone[0]) == len(alone[1]) == 1:
+            names[alone[0][0]] = alone[1][0]
+    return names
 
 
 def _digest(run: Run, result: JobResult) -> str:
@@ -266,7 +306,7 @@ def _changes(pairs: Iterable[_Pair]) -> tuple[Change, ...]:
             kind = "lost" if sound[0] else "gained"
         result = pair.before if kind == "gained" else pair.after
         reason = result.reason or ("" if not result.unphysical else _damage(result))
-        job = result.strategy, result.case, result.seed
+        job = pair.strategy, result.case, result.seed
         found.append(Change(*job, kind, *states, reason))
     places = {"lost": 0, "gained": 1, "other": 2}
     return tuple(sorted(found, key=lambda change: places[change.kind]))
@@ -279,18 +319,21 @@ def _damage(result: JobResult) -> str:
     )
 
 
-def _ratios(pairs: Iterable[_Pair]) -> dict[str, list[float]]:
-    """Return the ratios of all (case, block, seed) by strategy."""
-    found: dict[str, list[float]] = {}
-    for pair in pairs:
-        found.setdefault(pair.before.strategy, []).extend(pair.blocks.values())
-    return found
+def _ratios(
+    pairs: Sequence[_Pair], references: Mapping[str, Mapping[str, float]]
+) -> dict[str, FloatArray]:
+    """Return the ratios of the scores of all blocks by strategy."""
+    names = list(dict.fromkeys(pair.strategy for pair in pairs))
+    columns = [[pair.before for pair in pairs if pair.strategy == name] for name in names]
+    columns += [[pair.after for pair in pairs if pair.strategy == name] for name in names]
+    logs = log_scores(columns, references)
+    return {name: block_ratios(logs[k], logs[k + len(names)]) for k, name in enumerate(names)}
 
 
 def _rows(pairs: Iterable[_Pair]) -> Iterable[Row]:
     groups: dict[str, dict[str | None, list[_Pair]]] = {}
     for pair in pairs:
-        group = groups.setdefault(pair.before.strategy, {None: []})
+        group = groups.setdefault(pair.strategy, {None: []})
         group[None].append(pair)
         group.setdefault(pair.before.case.partition("/")[0], []).append(pair)
     for strategy, scenarios in groups.items():

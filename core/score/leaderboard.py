@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femubench.core.schema.results import BLOCKS, JobResult, Run
-from femubench.core.score.ranking import SCORE_OF_FAILURE, geometric_mean, rank_results, score_of
+from femubench.core.score.ranking import (
+    SCORE_OF_FAILURE,
+    geometric_mean,
+    rank_results,
+    ranked,
+    score_of,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -48,6 +54,8 @@ class _Grid:
 def leaderboard(run: Run) -> pd.DataFrame:
     """Return one row a strategy, best first: physical, then unphysical, then without any model.
 
+    Strategies of one skill share a rank.
+
     `skill` is the geometric mean over all blocks of all cases, and with several seeds the median
     over seeds, with a 95 % bootstrap interval in `skill_low` and `skill_high`; `skill_unseen` is
     that over all seeds without the block that the strategy was given. The three errors are the
@@ -62,21 +70,19 @@ def leaderboard(run: Run) -> pd.DataFrame:
 
     grid = _Grid.of(run)
     seed = int(run.meta.get("seed", 0))
-    ranked = rank_results(run.results, run.meta.get("reference") or None)
+    scored = rank_results(run.results, run.meta.get("reference") or None, run.meta.get("baseline"))
     names = list(run.meta.get("strategies", ()))
-    names += sorted({result.strategy for result in ranked} - set(names))
+    names += sorted({result.strategy for result in scored} - set(names))
     reference = run.meta.get("reference") or {}
-    rows = [_row(n, [r for r in ranked if r.strategy == n], grid, seed, reference) for n in names]
-    rows.sort(key=_order)
-    for place, row in enumerate(rows, start=1):
-        row["rank"] = place
-    return pd.DataFrame(rows, columns=list(COLUMNS))
+    rows = [_row(n, [r for r in scored if r.strategy == n], grid, seed, reference) for n in names]
+    listed = [{**row, "rank": rank} for rank, row in ranked(rows, _order)]
+    return pd.DataFrame(listed, columns=list(COLUMNS))
 
 
-def _order(row: dict[str, Any]) -> tuple[bool, bool, float, str]:
-    """Sort physical models first, then unphysical ones, then who never gave a model."""
+def _order(row: dict[str, Any]) -> tuple[tuple[bool, bool], float, str]:
+    """Put physical models first, then unphysical ones, then who never gave a model."""
     nothing = row["ok"] + row["not_applicable"] == 0
-    return nothing, row["unphysical"], row["skill"], row["strategy"]
+    return (nothing, row["unphysical"]), row["skill"], row["strategy"]
 
 
 def _row(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,10 +14,13 @@ from femubench.core.schema.results import JobResult
 OFFSET_PERCENT = 0.05
 SCORE_OF_FAILURE = 10.0
 SCORE_OF_NOTHING_DONE = 1.0
+TIE = 1e-6  # relative; scores that differ by less share a rank: rounding differs by 1e-9 or so
+
+_Item = TypeVar("_Item")
 
 
 def score_of(result: JobResult, reference: Mapping[str, float]) -> float:
-    """Return the geometric mean over blocks of (rms + 0.05 %) / (rms of `unchanged` + 0.05 %).
+    """Return the geometric mean over blocks of (rms + 0.05 %) / (nominal rms + 0.05 %).
 
     A job without a model scores 10. Where a strategy is not applicable the model stays as it
     was, which scores 1.
@@ -44,22 +48,56 @@ def geometric_mean(values: Iterable[float], weights: Iterable[float] | None = No
     return float(np.exp(np.average(np.log(numbers), weights=shares)))
 
 
+def ranked(
+    items: Iterable[_Item], key: Callable[[_Item], tuple[tuple[float, ...], float, str]]
+) -> list[tuple[int, _Item]]:
+    """Return the items with their ranks, best first; equal ones share a rank: 1, 2, 2, 4.
+
+    Sorted scores are split where the gap to the next one exceeds 1e-6 of it, so that whoever is
+    tied with one of a group is tied with all of it.
+
+    Arguments:
+        key: tier, score and name; the tier counts first, then the score, less being better. The
+            name orders those that share a rank.
+    """
+    keyed = sorted(((key(item), item) for item in items), key=lambda pair: pair[0])
+    groups: list[list[tuple[str, _Item]]] = []
+    last: tuple[tuple[float, ...], float] | None = None
+    for (tier, score, name), item in keyed:
+        if last is None or tier != last[0] or score - last[1] > TIE * abs(score):
+            groups.append([])
+        groups[-1].append((name, item))
+        last = tier, score
+    found: list[tuple[int, _Item]] = []
+    for group in groups:
+        rank = len(found) + 1
+        found += [(rank, item) for _, item in sorted(group, key=lambda pair: pair[0])]
+    return found
+
+
 def rank_results(
-    results: Iterable[JobResult], reference: Mapping[str, Mapping[str, float]] | None = None
+    results: Iterable[JobResult],
+    reference: Mapping[str, Mapping[str, float]] | None = None,
+    baseline: str | None = None,
 ) -> tuple[JobResult, ...]:
     """Return the results with their ranks within case and seed, and scores where missing.
 
     Physical models come first, then unphysical ones, then jobs without a model; within each the
-    score counts, then the name, so that no two ranks are equal.
+    score counts. Equal scores share a rank.
 
     Arguments:
         results: in any order, which is kept.
         reference: from case to the nominal rms errors by block; scores are computed anew from
             them. None keeps the scores that the results have; one that has none scores against
-            the result of `unchanged` in the same case and seed, or 10 where there is none.
+            the result of the baseline in the same case and seed, or 10 where there is none.
+        baseline: name of the strategy that leaves the model as it is, where one ran.
     """
     listed = tuple(results)
-    given = _of_unchanged(listed) if reference is None else {}
+    given = {
+        (item.case, item.seed): {name: block.rms_percent for name, block in item.blocks.items()}
+        for item in listed
+        if reference is None and item.strategy == baseline
+    }
     scored = []
     for result in listed:
         if reference is not None:
@@ -69,24 +107,18 @@ def rank_results(
         else:
             score = score_of(result, given.get((result.case, result.seed), {}))
         scored.append(replace(result, score=score))
-    ranks: dict[tuple[str, int, str], int] = {}
-    places: dict[tuple[str, int], int] = {}
-    for result in sorted(scored, key=_order):
-        group = (result.case, result.seed)
-        places[group] = places.get(group, 0) + 1
-        ranks[*group, result.strategy] = places[group]
+    groups: dict[tuple[str, int], list[JobResult]] = {}
+    for result in scored:
+        groups.setdefault((result.case, result.seed), []).append(result)
+    ranks = {
+        (*job, result.strategy): rank
+        for job, group in groups.items()
+        for rank, result in ranked(group, _order)
+    }
     return tuple(replace(r, rank=ranks[r.case, r.seed, r.strategy]) for r in scored)
 
 
-def _of_unchanged(results: Iterable[JobResult]) -> dict[tuple[str, int], dict[str, float]]:
-    return {
-        (result.case, result.seed): {name: b.rms_percent for name, b in result.blocks.items()}
-        for result in results
-        if result.strategy == "unchanged"
-    }
-
-
-def _order(result: JobResult) -> tuple[bool, bool, float, str]:
+def _order(result: JobResult) -> tuple[tuple[bool, bool], float, str]:
     assert result.score is not None
     nothing = result.status not in ("ok", "not-applicable")
-    return nothing, result.unphysical, result.score, result.strategy
+    return (nothing, result.unphysical), result.score, result.strategy

@@ -48,7 +48,9 @@ class EntryPattern:
             NotApplicable: when the stiffness has a low-rank term, which has no zeros to keep.
         """
         if model.stiffness_change is not None:
-            raise NotApplicable("a stiffness with a low-rank term has no pattern of zeros")
+            raise NotApplicable(
+                "the stiffness has a low-rank term, so that it has no pattern of zeros"
+            )
         upper = sp.triu(model.stiffness, format="coo")
         upper.sum_duplicates()
         kept = upper.data != 0.0
@@ -350,12 +352,16 @@ def _check_kept(model: Model, updated: Model, rigid: FloatArray) -> None:
     outside = (updated.stiffness != 0.0).astype(int) - (model.stiffness != 0.0).astype(int)
     grown = int((outside > 0).sum())
     if grown:
-        raise SelfCheckFailed("no entries outside the pattern of K", float(grown), 0.0)
+        raise SelfCheckFailed("number of zeros of K that are zero no more", float(grown), 0.0)
     if rigid.shape[1]:
         force = np.abs(updated.stiffness_times(rigid)).max()
         size = (np.abs(updated.stiffness) @ np.abs(rigid)).max()
         if not force <= ALLOWED * size:
-            raise SelfCheckFailed("rigid-body modes free of forces", float(force / size), ALLOWED)
+            raise SelfCheckFailed(
+                "rigid-body motions of the updated model free of forces",
+                float(force / size),
+                ALLOWED,
+            )
 
 
 def _next_quasi(
@@ -366,5 +372,8 @@ def _next_quasi(
     except StrategyFailure as lost:
         if not history:
             raise
-        promise = f"used modes reproduced, pattern of K kept (after step {len(history)}: {lost})"
+        promise = (
+            f"after step {len(history)} {lost}, with the zeros of K kept; stiffness forces against "
+            "inertia forces of the used modes"
+        )
         raise SelfCheckFailed(promise, history[-1]["residual"], ALLOWED) from lost

@@ -64,7 +64,9 @@ def nearest_positive(family: ElementFamily, normal: FloatArray, best: FloatArray
                 return x
             barrier *= _SHRINK
         x = moved
-    raise StrategyFailure(f"positive element stiffness: no convergence in {_MOST_STEPS} steps")
+    raise StrategyFailure(
+        f"no element stiffness without negative values found in {_MOST_STEPS} steps"
+    )
 
 
 def _newton(
@@ -292,7 +294,9 @@ def update_by_equation_error(
     Source: Ahmadian, Gladwell & Ismail (1997), section 4.
     """
     if len(family) > MOST_UNKNOWNS:
-        raise NotApplicable(f"{len(family)} unknowns, at most {MOST_UNKNOWNS} are solved for")
+        raise NotApplicable(
+            f"the elements have {len(family)} unknowns, at most {MOST_UNKNOWNS} are solved for"
+        )
     rigid = rigid_modes_of(model)
     if keep_rigid and rigid.shape[1] == 0:
         raise NotApplicable("the model has no free rigid-body modes that could be kept")
@@ -347,17 +351,20 @@ def _self_check(
         scale = np.linalg.norm(np.abs(model.stiffness) @ np.abs(rigid))
         checks["rigid_force"] = float(force / scale)
         if promised and checks["rigid_force"] > _RIGID_FORCE:
-            raise SelfCheckFailed("rigid-body modes kept", checks["rigid_force"], _RIGID_FORCE)
+            promise = "rigid-body motions of the updated model free of forces"
+            raise SelfCheckFailed(promise, checks["rigid_force"], _RIGID_FORCE)
     if family.cores is None:
         return checks
     checks["smallest_core"] = smallest_core_eigenvalue(family, x)
     if checks["smallest_core"] < 0.0:
-        raise SelfCheckFailed("element stiffness not negative", -checks["smallest_core"], 0.0)
+        promise = "stiffness of every element positive, relative to what it was"
+        raise SelfCheckFailed(promise, -checks["smallest_core"], 0.0)
     if model.size <= DENSE_LIMIT:
         stiffness = dense_matrices(model)[1]
         root = np.sqrt(np.diagonal(stiffness))
         lowest = float(la.eigvalsh(stiffness / np.outer(root, root), subset_by_index=(0, 0))[0])
         checks["smallest_eigenvalue"] = lowest
         if lowest < -_NEGATIVE:
-            raise SelfCheckFailed("stiffness positive semidefinite", -lowest, _NEGATIVE)
+            promise = "stiffness of the updated model without a negative eigenvalue"
+            raise SelfCheckFailed(promise, -lowest, _NEGATIVE)
     return checks

@@ -134,7 +134,9 @@ class WantedModes:
         """Return shapes of the smallest force residual, mass-normalised, (n, m)."""
         model, measured = self.nominal, self.measurement
         if model.size > DENSE_LIMIT:
-            raise NotApplicable(f"expansion by forces is for at most {DENSE_LIMIT} dofs")
+            raise NotApplicable(
+                f"expansion by forces is for {DENSE_LIMIT} dofs at most, the model has {model.size}"
+            )
         rows = measured_rows(measured.shapes)
         sensors = sp.csr_array(model.observe(measured.sensors))[rows]
         shapes = expand_by_dynamics(model, sensors, measured.shapes[rows], measured.eigenvalues)

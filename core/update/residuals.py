@@ -78,7 +78,7 @@ class Data:
             return np.ones(len(self.measurement))
         std = self.measurement.frequency_std
         if not (np.isfinite(std) & (std > 0.0)).all():
-            raise NotApplicable("a measured frequency has no standard deviation")
+            raise NotApplicable("not every measured frequency has a standard deviation")
         measured = self.measurement.eigenvalues
         return np.asarray(1.0 / (self.slope(measured) * 4.0 * np.pi * np.sqrt(measured) * std))
 

@@ -109,7 +109,7 @@ class _Iteration:
     def run(self) -> _Point:
         point = self.at(np.zeros(len(self.unknowns)))
         if not (point.prediction.partner >= 0).any():
-            raise StrategyFailure("no mode of the model matches any measured mode")
+            raise StrategyFailure("no mode of the model looks like any measured mode")
         data = self.data
         self.beta = self.options.damping * float(np.square(data.weight * data.target).sum())
         self.record(0, point, 0.0)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
+if TYPE_CHECKING:
+    import numpy as np
 
-from femubench.core.fem.model import Model
-from femubench.core.modal.measurement import Measurement
+    from femubench.core.fem.model import Model
+    from femubench.core.modal.measurement import Measurement
 
 CAPABILITIES = ("shapes", "elements", "geometry", "joints")
 
@@ -66,12 +67,16 @@ class Strategy(ABC):
             rebuilt with other parameters, ``joints`` places where members meet.
         promises: what every result keeps (of ``used-modes``, ``rigid-body-modes``,
             ``no-negative-eigenvalue``); `bench plugins check` measures it.
+        baseline: whether it is the one that leaves the model as it is, to compare with.
+        yardstick: whether `bench plugins check` compares time and memory with its own.
     """
 
     name: ClassVar[str]
     citation: ClassVar[str]
     needs: ClassVar[frozenset[str]] = frozenset()
     promises: ClassVar[frozenset[str]] = frozenset()
+    baseline: ClassVar[bool] = False
+    yardstick: ClassVar[bool] = False
 
     @abstractmethod
     def update(

@@ -18,6 +18,7 @@ from femubench import (
     generic_family,
     stiffness_difference,
     stiffness_matrices,
+    wireframe_of,
 )
 
 CASE = "frame"
@@ -138,17 +139,12 @@ def _joints(structure: Structure) -> str:
 
 def _element_figure(bench: Workbench, number: int, solution: str) -> StructureMap:
     structure, words = bench.cases[CASE].model.frame_structure, SOLUTIONS[solution]
-    mesh = structure.mesh
     return StructureMap(
         name=f"frame-figure-{number}",
         title=f"Fig. {number}: relative change of element stiffness, {solution} solution",
         caption=f"‖ΔKₑ‖/‖K₀ₑ‖ of every element, Frobenius norms on w, L dw/dx, L θ, strategy "
         f"{words}, modes 1-3. {_joints(structure)}. The shapes are a solid twin's, not the test's.",
-        starts=mesh.xyz[mesh.ends[:, 0], :2],
-        stops=mesh.xyz[mesh.ends[:, 1], :2],
+        structure=wireframe_of(bench.cases[CASE].model),
         values=solution_changes(bench, words),
-        x_label="x, m",
-        y_label="y, m",
         value_label="‖ΔKₑ‖/‖K₀ₑ‖, no unit",
-        joints=tuple((j.name, j.xyz[0], j.xyz[1]) for j in structure.frame.joints),
     )

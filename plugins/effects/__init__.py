@@ -2,52 +2,33 @@
 
 from __future__ import annotations
 
-from femubench import Effect, hookimpl
+from femubench import hookimpl
+
+CLASSES = {
+    "youngs-modulus": "youngs_modulus:YoungsModulus",
+    "density": "density:Density",
+    "torsion-constant": "torsion_constant:TorsionConstant",
+    "shear-deformation": "shear_deformation:ShearDeformation",
+    "rotary-inertia": "rotary_inertia:RotaryInertia",
+    "joint-rotation": "joint_rotation:JointRotation",
+    "joint-offset": "joint_offset:JointOffset",
+    "joint-mass": "joint_mass:JointMass",
+    "added-mass": "added_mass:AddedMass",
+    "grounding-spring": "grounding_spring:GroundingSpring",
+    "member-stiffness": "member_stiffness:MemberStiffness",
+    "member-mass": "member_mass:MemberMass",
+    "local-stiffness-loss": "local_stiffness_loss:LocalStiffnessLoss",
+    "axial-preload": "axial_preload:AxialPreload",
+    "mass-eccentricity": "mass_eccentricity:MassEccentricity",
+    "bending-torsion-coupling": "bending_torsion_coupling:BendingTorsionCoupling",
+    "brace-spring": "brace_spring:BraceSpring",
+    "attached-oscillator": "attached_oscillator:AttachedOscillator",
+    "amplitude-dependent-stiffness": "amplitude_dependent_stiffness:AmplitudeDependentStiffness",
+    "temperature": "temperature:Temperature",
+}
 
 
 @hookimpl
-def femubench_effects() -> tuple[type[Effect], ...]:
-    """Return the effects, those of the whole structure first."""
-    from femubench.plugins.effects.added_mass import AddedMass
-    from femubench.plugins.effects.amplitude_dependent_stiffness import AmplitudeDependentStiffness
-    from femubench.plugins.effects.attached_oscillator import AttachedOscillator
-    from femubench.plugins.effects.axial_preload import AxialPreload
-    from femubench.plugins.effects.bending_torsion_coupling import BendingTorsionCoupling
-    from femubench.plugins.effects.brace_spring import BraceSpring
-    from femubench.plugins.effects.density import Density
-    from femubench.plugins.effects.grounding_spring import GroundingSpring
-    from femubench.plugins.effects.joint_mass import JointMass
-    from femubench.plugins.effects.joint_offset import JointOffset
-    from femubench.plugins.effects.joint_rotation import JointRotation
-    from femubench.plugins.effects.local_stiffness_loss import LocalStiffnessLoss
-    from femubench.plugins.effects.mass_eccentricity import MassEccentricity
-    from femubench.plugins.effects.member_mass import MemberMass
-    from femubench.plugins.effects.member_stiffness import MemberStiffness
-    from femubench.plugins.effects.rotary_inertia import RotaryInertia
-    from femubench.plugins.effects.shear_deformation import ShearDeformation
-    from femubench.plugins.effects.temperature import Temperature
-    from femubench.plugins.effects.torsion_constant import TorsionConstant
-    from femubench.plugins.effects.youngs_modulus import YoungsModulus
-
-    return (
-        YoungsModulus,
-        Density,
-        TorsionConstant,
-        ShearDeformation,
-        RotaryInertia,
-        JointRotation,
-        JointOffset,
-        JointMass,
-        AddedMass,
-        GroundingSpring,
-        MemberStiffness,
-        MemberMass,
-        LocalStiffnessLoss,
-        AxialPreload,
-        MassEccentricity,
-        BendingTorsionCoupling,
-        BraceSpring,
-        AttachedOscillator,
-        AmplitudeDependentStiffness,
-        Temperature,
-    )
+def femubench_effects() -> dict[str, str]:
+    """Return where the effects are, those of the whole structure first."""
+    return {name: f"{__name__}.{place}" for name, place in CLASSES.items()}

@@ -13,6 +13,8 @@ from femubench import (
     FrameEffect,
     Model,
     PointMass,
+    Site,
+    Size,
     free_translations,
     mass_term,
     point_in,
@@ -30,6 +32,7 @@ class AddedMass(FrameEffect):
 
     name: ClassVar[str] = "added-mass"
     summary: ClassVar[str] = "a point carries a mass"
+    sizes: ClassVar[Sequence[Size]] = (Size(0.005, 0.08, Site.mass),)
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the points, or nodes, that can move."""

@@ -18,6 +18,8 @@ from femubench import (
     Model,
     Oscillator,
     RowOperator,
+    Site,
+    Size,
     Term,
     directed_places,
     directed_point,
@@ -39,6 +41,10 @@ class AttachedOscillator(FrameEffect):
 
     name: ClassVar[str] = "attached-oscillator"
     summary: ClassVar[str] = "something attached resonates by itself"
+    sizes: ClassVar[Sequence[Size]] = (
+        Size(0.005, 0.05, Site.mass),
+        Size(0.6, 1.0, Site.first_frequency, upper_unit=Site.eighth_frequency),
+    )
 
     def places(self, model: Model) -> Sequence[str]:
         """Return joints and the middles of members in each direction that they can move in."""

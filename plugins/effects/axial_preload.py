@@ -15,6 +15,8 @@ from femubench import (
     FrameEffect,
     Model,
     Preload,
+    Site,
+    Size,
     member_length,
     once_for,
     preload_stiffness,
@@ -37,6 +39,7 @@ class AxialPreload(FrameEffect):
 
     name: ClassVar[str] = "axial-preload"
     summary: ClassVar[str] = "a member was fitted under stress"
+    sizes: ClassVar[Sequence[Size]] = (Size(0.05, 0.40, Site.euler_load, signed=True),)
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the members that the rest of the frame resists, the 60 first to buckle at most."""

@@ -14,6 +14,7 @@ from femubench import (
     Frame,
     FrameEffect,
     Model,
+    Size,
     Term,
     coupling_matrices,
     elements_of,
@@ -28,6 +29,7 @@ class BendingTorsionCoupling(FrameEffect):
 
     name: ClassVar[str] = "bending-torsion-coupling"
     summary: ClassVar[str] = "a member twists when it bends"
+    sizes: ClassVar[Sequence[Size]] = (Size(0.05, 0.30, signed=True),)
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the members with a torsional rigidity."""

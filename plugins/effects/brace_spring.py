@@ -17,6 +17,8 @@ from femubench import (
     FrameEffect,
     Model,
     RowOperator,
+    Site,
+    Size,
     Term,
     elongation_row,
     member_length,
@@ -33,6 +35,7 @@ class BraceSpring(FrameEffect):
 
     name: ClassVar[str] = "brace-spring"
     summary: ClassVar[str] = "a brace ties two joints"
+    sizes: ClassVar[Sequence[Size]] = (Size(0.01, 1.0, Site.modal_stiffness, log=True),)
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the pairs of joints without a member between them, the nearest 300 at most."""

@@ -16,6 +16,8 @@ from femubench import (
     GroundSpring,
     Model,
     RowOperator,
+    Site,
+    Size,
     Term,
     directed_places,
     directed_point,
@@ -37,6 +39,7 @@ class GroundingSpring(FrameEffect):
 
     name: ClassVar[str] = "grounding-spring"
     summary: ClassVar[str] = "a spring holds the structure to ground"
+    sizes: ClassVar[Sequence[Size]] = (Size(0.002, 0.2, Site.modal_stiffness, log=True),)
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the points, or nodes, in each direction that they can move in."""

@@ -14,6 +14,8 @@ from femubench import (
     Model,
     Place,
     PointMass,
+    Site,
+    Size,
     joints_of,
     mass_term,
     proportional,
@@ -29,6 +31,7 @@ class JointMass(FrameEffect):
 
     name: ClassVar[str] = "joint-mass"
     summary: ClassVar[str] = "the joints carry mass"
+    sizes: ClassVar[Sequence[Size]] = (Size(0.005, 0.02, Site.mass),)
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the joint types that two joints at least are of."""

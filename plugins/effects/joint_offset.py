@@ -20,6 +20,8 @@ from femubench import (
     IntArray,
     Model,
     RigidEnd,
+    Site,
+    Size,
     Structure,
     Term,
     available_length,
@@ -47,6 +49,7 @@ class JointOffset(FrameEffect):
 
     name: ClassVar[str] = "joint-offset"
     summary: ClassVar[str] = "the joints are rigid over a length"
+    sizes: ClassVar[Sequence[Size]] = (Size(0.3, 1.5, Site.half_height),)
 
     def places(self, model: Model) -> Sequence[str]:
         """Return joint types of several joints, joints, and ends where three members meet."""

@@ -16,6 +16,8 @@ from femubench import (
     FrameEffect,
     JointSpring,
     Model,
+    Site,
+    Size,
     Structure,
     branch_places,
     end_arm,
@@ -41,6 +43,11 @@ class JointRotation(FrameEffect):
 
     name: ClassVar[str] = "joint-rotation"
     summary: ClassVar[str] = "the joints rotate"
+    softens: ClassVar[bool] = True
+    sizes: ClassVar[Sequence[Size]] = (
+        Size(0.3, 30.0, Site.bending_stiffness, log=True),
+        Size(0.3, 30.0, Site.torsional_stiffness, log=True),
+    )
 
     def places(self, model: Model) -> Sequence[str]:
         """Return joint types, what branches off there, joints, and ends where three meet."""

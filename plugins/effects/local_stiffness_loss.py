@@ -14,6 +14,7 @@ from femubench import (
     Frame,
     FrameEffect,
     Model,
+    Size,
     Term,
     element_labels,
     elements_of,
@@ -22,12 +23,15 @@ from femubench import (
     stiffness_matrices,
 )
 
+_LOSS = EffectParameter("loss", "", 0.3, lower=0.0, upper=0.95, one_sided=True, wording="share")
+
 
 class LocalStiffnessLoss(FrameEffect):
     """Take a fraction of EA, EI, GJ and GA from exactly one element."""
 
     name: ClassVar[str] = "local-stiffness-loss"
     summary: ClassVar[str] = "a member is damaged in one place"
+    sizes: ClassVar[Sequence[Size]] = (Size(0.10, 0.70),)
 
     def places(self, model: Model) -> Sequence[str]:
         """Return every element."""
@@ -35,12 +39,19 @@ class LocalStiffnessLoss(FrameEffect):
 
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return the fraction that is lost."""
-        return (EffectParameter("loss", "", 0.3, lower=0.0, upper=0.95, one_sided=True),)
+        return (_LOSS,)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the weaker element."""
         loss = (Factor("E", (place,), 1.0 - values[0]),) if values[0] else ()
         return replace(frame, factors=frame.factors + loss)
+
+    def in_half(self, values: Sequence[float]) -> Sequence[float]:
+        """Return the loss in half an element that is as flexible as a loss in the whole.
+
+        1 / (1 - whole) = (1 + 1 / (1 - half)) / 2; twice the loss while it is small.
+        """
+        return (2.0 * values[0] / (1.0 + values[0]),)
 
     def change(self, model: Model, place: str) -> Change:
         """Return the stiffness of the element with a minus sign."""

@@ -17,6 +17,8 @@ from femubench import (
     FrameEffect,
     Model,
     Section,
+    Site,
+    Size,
     Term,
     eccentric_mass_parts,
     elements_of,
@@ -34,6 +36,7 @@ class MassEccentricity(FrameEffect):
 
     name: ClassVar[str] = "mass-eccentricity"
     summary: ClassVar[str] = "a member's mass lies beside its axis"
+    sizes: ClassVar[Sequence[Size]] = (Size(0.05, 0.25, Site.width, signed=True),)
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the members."""

@@ -38,7 +38,9 @@ class MaterialEffect(FrameEffect):
 
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return the relative change."""
-        return (EffectParameter(f"change of {self.constant}", "", 0.1, lower=-0.9),)
+        return (
+            EffectParameter(f"change of {self.constant}", "", 0.1, lower=-0.9, wording="change"),
+        )
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with another material in the members."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar, Literal
 
-from femubench import Model, member_labels
+from femubench import Model, Size, member_labels
 from femubench.plugins.effects.material import MaterialEffect
 
 
@@ -14,6 +14,8 @@ class MemberStiffness(MaterialEffect):
 
     name: ClassVar[str] = "member-stiffness"
     summary: ClassVar[str] = "a member has another stiffness"
+    softens: ClassVar[bool] = True
+    sizes: ClassVar[Sequence[Size]] = (Size(0.05, 0.30, signed=True),)
     constant: ClassVar[Literal["E", "rho"]] = "E"
 
     def places(self, model: Model) -> Sequence[str]:

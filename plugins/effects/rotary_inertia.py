@@ -14,7 +14,10 @@ from femubench import (
     ElementOperator,
     Frame,
     FrameEffect,
+    LookWarning,
     Model,
+    Seen,
+    Size,
     Term,
     elements_of,
     mass_matrices,
@@ -27,6 +30,7 @@ class RotaryInertia(FrameEffect):
 
     name: ClassVar[str] = "rotary-inertia"
     summary: ClassVar[str] = "the cross sections have rotary inertia"
+    sizes: ClassVar[Sequence[Size]] = (Size(0.5, 3.0),)
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the whole frame."""
@@ -46,6 +50,14 @@ class RotaryInertia(FrameEffect):
         if share == frame.rotary_share:
             return frame
         return replace(frame, rotary_inertia=share if share not in (0.0, 1.0) else share == 1.0)
+
+    def look(self, seen: Seen) -> list[LookWarning]:
+        """Return whether a model without rotary inertia should have it."""
+        structure = seen.model.structure
+        if structure is None or structure.frame.rotary_share != 0.0:
+            return []
+        changes = seen.changes(self.frame(structure.frame, "all", (1.0,)))
+        return seen.notable(self.name, "The rotary inertia of the cross sections matters", changes)
 
     def change(self, model: Model, place: str) -> Change:
         """Return the mass matrix of the textbook's rotary inertia."""

@@ -17,7 +17,10 @@ from femubench import (
     FloatArray,
     Frame,
     FrameEffect,
+    LookWarning,
     Model,
+    Seen,
+    Size,
     Term,
     constant_kappa,
     mass_matrices,
@@ -40,6 +43,7 @@ class ShearDeformation(FrameEffect):
 
     name: ClassVar[str] = "shear-deformation"
     summary: ClassVar[str] = "the members deform in shear"
+    sizes: ClassVar[Sequence[Size]] = (Size(0.5, 3.0),)
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the whole frame."""
@@ -74,6 +78,18 @@ class ShearDeformation(FrameEffect):
         return replace(
             frame, beam="timoshenko", rotary_inertia=rotary, members=members, factors=others + own
         )
+
+    def look(self, seen: Seen) -> list[LookWarning]:
+        """Return whether members without shear flexibility should have it."""
+        structure = seen.model.structure
+        if structure is None or structure.frame.beam != "euler-bernoulli":
+            return []
+        unknown = any(m.section.kappa is None for m in structure.frame.members)
+        remark = " (kappa = 5/6 assumed where none is given)" if unknown else ""
+        frame = self.frame(structure.frame, "all", (1.0,))
+        changes = _by_flexibility(seen, frame) if seen.large else seen.changes(frame)
+        what = f"The members are stubby enough for shear to matter{remark}"
+        return seen.notable(self.name, what, changes)
 
     def change(self, model: Model, place: str) -> Change:
         """Return one set of terms a plane of bending and a value of phi."""
@@ -114,6 +130,25 @@ def present_share(frame: Frame) -> float:
     """Return the multiple of 1/(kappa G A) that a frame has now, 0 for Euler-Bernoulli."""
     own = [f.factor for f in frame.factors if (f.quantity, f.at) == ("shear", _AT_ALL)]
     return float(np.prod(own)) if frame.beam == "timoshenko" else 0.0
+
+
+def _by_flexibility(seen: Seen, frame: Frame) -> FloatArray:
+    """Return the changes of the frequencies by adding the flexibilities, (count,).
+
+    1/lambda grows by W / lambda^2, W the sum of L (Vy^2 / (kappa_y G A) + Vz^2 / (kappa_z G A))
+    over the elements with the shear forces V of the mode (Dunkerley's sum). The matrix at full
+    flexibility would not do: on a fine mesh shear takes over within an element, and the old nodal
+    displacements are far from the new ones.
+    """
+    structure = seen.model.frame_structure
+    whole = structure.rebuilt(frame).properties
+    modes = seen.modes.take(np.arange(seen.count))
+    local = np.asarray(structure.gather @ modes.shapes).reshape(len(whole), 12, -1)
+    force = stiffness_matrices(structure.properties)[:, 1:3] @ local
+    flexibility = np.column_stack([whole.flex_y, whole.flex_z])
+    length = whole.length - whole.rigid_1 - whole.rigid_2
+    work = np.einsum("e,ed,edm->m", length, flexibility, np.square(force))
+    return np.asarray(1.0 / np.sqrt(1.0 + work / modes.eigenvalues) - 1.0)
 
 
 def _share(multiple: FloatArray | float, rate: FloatArray) -> FloatArray:

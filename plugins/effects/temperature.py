@@ -16,6 +16,8 @@ from femubench import (
     FrameEffect,
     Member,
     Model,
+    Reading,
+    Size,
     Term,
     proportional,
     stiffness_matrices,
@@ -34,6 +36,8 @@ class Temperature(FrameEffect):
 
     name: ClassVar[str] = "temperature"
     summary: ClassVar[str] = "the structure was warmer or colder"
+    reading: ClassVar[Reading | None] = Reading("difference", "read the temperature", std=1.0)
+    sizes: ClassVar[Sequence[Size]] = (Size(10.0, 40.0, signed=True),)
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the whole frame."""

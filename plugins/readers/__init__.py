@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
-from femubench import Reader, hookimpl
-from femubench.plugins.readers.universal import UniversalReader
+from femubench import hookimpl
 
 
 @hookimpl
-def femubench_readers() -> Iterable[Reader]:
-    """Return the built-in readers."""
-    return (UniversalReader(),)
+def femubench_readers() -> dict[str, str]:
+    """Return where the built-in readers are."""
+    return {"universal file": f"{__name__}.universal:UniversalReader"}

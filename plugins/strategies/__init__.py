@@ -2,44 +2,29 @@
 
 from __future__ import annotations
 
-from femubench import Strategy, hookimpl
+from femubench import hookimpl
+
+CLASSES = {
+    "unchanged": "unchanged:Unchanged",
+    "baruch": "baruch:Baruch",
+    "berman": "berman:Berman",
+    "kabe": "kabe:Kabe",
+    "kabe-rigid": "kabe_rigid:KabeRigid",
+    "physical": "physical:Physical",
+    "nobari": "nobari:Nobari",
+    "nobari-rigid": "nobari_rigid:NobariRigid",
+    "generic-ls": "generic_ls:GenericLS",
+    "generic-adjusted": "generic_adjusted:GenericAdjusted",
+    "global": "global_:Global",
+    "local": "local:Local",
+    "spring": "spring:Spring",
+    "offset": "offset:Offset",
+    "bayesian": "bayesian:Bayesian",
+    "diagnosed": "diagnosed:Diagnosed",
+}
 
 
 @hookimpl
-def femubench_strategies() -> tuple[type[Strategy], ...]:
-    """Return the strategies of both papers in the papers' order, then `diagnosed`."""
-    from femubench.plugins.strategies.baruch import Baruch
-    from femubench.plugins.strategies.bayesian import Bayesian
-    from femubench.plugins.strategies.berman import Berman
-    from femubench.plugins.strategies.diagnosed import Diagnosed
-    from femubench.plugins.strategies.generic_adjusted import GenericAdjusted
-    from femubench.plugins.strategies.generic_ls import GenericLS
-    from femubench.plugins.strategies.global_ import Global
-    from femubench.plugins.strategies.kabe import Kabe
-    from femubench.plugins.strategies.kabe_rigid import KabeRigid
-    from femubench.plugins.strategies.local import Local
-    from femubench.plugins.strategies.nobari import Nobari
-    from femubench.plugins.strategies.nobari_rigid import NobariRigid
-    from femubench.plugins.strategies.offset import Offset
-    from femubench.plugins.strategies.physical import Physical
-    from femubench.plugins.strategies.spring import Spring
-    from femubench.plugins.strategies.unchanged import Unchanged
-
-    return (
-        Unchanged,
-        Baruch,
-        Berman,
-        Kabe,
-        KabeRigid,
-        Physical,
-        Nobari,
-        NobariRigid,
-        GenericLS,
-        GenericAdjusted,
-        Global,
-        Local,
-        Spring,
-        Offset,
-        Bayesian,
-        Diagnosed,
-    )
+def femubench_strategies() -> dict[str, str]:
+    """Return where the strategies are: of both papers in their order, then `diagnosed`."""
+    return {name: f"{__name__}.{place}" for name, place in CLASSES.items()}

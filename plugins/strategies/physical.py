@@ -20,6 +20,7 @@ class Physical(ElementStrategy):
         "Ahmadian, Gladwell & Ismail (1997), Parameter selection strategies in finite element "
         "model updating, section 4.2, table 3"
     )
+    yardstick: ClassVar[bool] = True
     promises: ClassVar[frozenset[str]] = frozenset({"no-negative-eigenvalue"})
 
     def family(self, structure: Structure) -> ElementFamily:

@@ -6,11 +6,19 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
-from femubench import OFFSET_PERCENT, SCORE_OF_FAILURE, JobResult, Run, leaderboard, rank_results
+from femubench import (
+    OFFSET_PERCENT,
+    SCORE_OF_FAILURE,
+    TIE,
+    JobResult,
+    Run,
+    leaderboard,
+    rank_results,
+    tell_apart,
+)
 from femubench.reports.cells import plain
 from femubench.reports.page.papers import papers_of
 from femubench.reports.page.rounding import clean, plain_data, rounded
-from femubench.reports.page.statistics import Statistics, statistics
 from femubench.reports.summary import (
     cases_of,
     first_seed,
@@ -31,7 +39,7 @@ _LONGEST_REASON = 500
 class Exhibits(Protocol):
     """What can be drawn of a run; either is None where nothing is known."""
 
-    def stage(self, digest: str) -> Mapping[str, Any] | None:
+    def case(self, digest: str) -> Mapping[str, Any] | None:
         """Return the structure of a case with what was measured on it."""
         ...
 
@@ -48,7 +56,8 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
     Arguments:
         exhibits: what the store has to draw.
     """
-    run = Run(run.meta, rank_results(run.results, run.meta.get("reference") or None))
+    reference, baseline = run.meta.get("reference") or None, run.meta.get("baseline")
+    run = Run(run.meta, rank_results(run.results, reference, baseline))
     cases, strategies = cases_of(run), strategies_of(run)
     board = leaderboard(run)
     listed = [_case(run, case, exhibits) for case in cases]
@@ -63,8 +72,10 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
         "blocks": list(BLOCKS),
         "offset_percent": OFFSET_PERCENT,
         "score_of_failure": SCORE_OF_FAILURE,
+        "tie": TIE,
         "seeds": seeds_of(run),
         "scenarios": list(dict.fromkeys(_scenario(case) for case in cases)),
+        "baseline": baseline,
         "strategies": _strategies(run, board.to_dict("records")),
         "cases": listed,
         "results": [
@@ -75,7 +86,7 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
             {str(key): clean(value) for key, value in row.items()}
             for row in board.to_dict("records")
         ],
-        "statistics": _statistics(statistics(run, board)),
+        "statistics": _statistics(run, list(board["strategy"])),
         "details": details,
         "papers": papers_of(run),
     }
@@ -108,7 +119,7 @@ def _strategies(run: Run, board: Iterable[Mapping[Any, Any]]) -> list[dict[str, 
 def _case(run: Run, case: str, exhibits: Exhibits | None) -> dict[str, Any]:
     about = (run.meta.get("cases") or {}).get(case) or {}
     digest = about.get("digest")
-    stage = exhibits.stage(digest) if exhibits is not None and isinstance(digest, str) else None
+    stage = exhibits.case(digest) if exhibits is not None and isinstance(digest, str) else None
     if stage is not None:
         stage = {**stage, "nominal": _fitting(stage.get("nominal"), stage)}
     reference = (run.meta.get("reference") or {}).get(case) or {}
@@ -151,19 +162,11 @@ def _short(text: str) -> str:
     return text if len(text) <= _LONGEST_REASON else f"{text[: _LONGEST_REASON - 1]}…"
 
 
-def _statistics(found: Statistics) -> dict[str, Any]:
-    friedman = found.friedman
+def _statistics(run: Run, order: list[str]) -> dict[str, Any]:
+    found, names = tell_apart(run, order), strategies_of(run)
     return {
-        "friedman": None
-        if friedman is None
-        else {
-            "chi2": rounded(friedman.chi2, 6),
-            "p": rounded(friedman.p, 4),
-            "cases": friedman.cases,
-            "strategies": friedman.strategies,
-        },
-        "pairs": [[i, j, rounded(p, 4)] for i, j, p in found.pairs],
-        "groups": [list(group) for group in found.groups],
+        "pairs": [[names.index(a), names.index(b), rounded(p, 4)] for a, b, p in found.pairs],
+        "groups": [[names.index(name) for name in group] for group in found.groups],
         "note": found.note,
     }
 

@@ -39,5 +39,5 @@ def papers_of(run: Run) -> dict[str, dict[str, dict[int, float]]]:
 
 @cache
 def _printed() -> dict[str, Any]:
-    text = files(__package__).joinpath("printed.toml").read_text(encoding="utf-8")
+    text = files("femubench.papers.printed").joinpath("columns.toml").read_text(encoding="utf-8")
     return tomllib.loads(text)

@@ -19,11 +19,16 @@ from femubench import (
     FrameEffect,
     GroundSpring,
     InputError,
+    LookWarning,
     LowRank,
     Measurement,
     Model,
     NotApplicable,
     Place,
+    Reading,
+    Seen,
+    Site,
+    Size,
     SparseArray,
     Strategy,
     StrategyFailure,
@@ -328,6 +333,54 @@ class NeverNeutral(Spring):
     """Leave a spring where there should be none."""
 
     start: ClassVar[float] = 5.0e4
+
+
+class Worded(Spring):
+    """Bring everything that is optional, as it should be."""
+
+    caution = "A hand on the structure looks like it."
+    softens = True
+    reading = Reading("stiffness", "press on it with a balance", 10.0)
+    sizes = (Size(0.01, 0.1, Site.modal_stiffness, log=True),)
+
+    def look(self, seen: Seen) -> Sequence[LookWarning]:
+        return [seen.warning(self.name, "It cannot be told by looking.", None)]
+
+    def in_half(self, values: Sequence[float]) -> Sequence[float]:
+        return values
+
+
+class Oversized(Worded):
+    """Hide sizes that the bounds forbid."""
+
+    sizes = (Size(-3.0, -1.0),)
+
+
+class Misread(Worded):
+    """Read what it has not."""
+
+    reading = Reading("weight", "weigh it", 0.1)
+
+
+class Foreign(Worded):
+    """Warn in the name of another effect."""
+
+    def look(self, seen: Seen) -> Sequence[LookWarning]:
+        return [seen.warning("toy-mass", "It weighs too much.", None)]
+
+
+class InPercent(Worded):
+    """Word N/m as a relative change."""
+
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+        return [replace(item, wording="change") for item in super().parameters(model, place)]
+
+
+class Overfilled(Worded):
+    """Put a negative stiffness into half an element."""
+
+    def in_half(self, values: Sequence[float]) -> Sequence[float]:
+        return [-value for value in values]
 
 
 class Reader:

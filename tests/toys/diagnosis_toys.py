@@ -9,6 +9,7 @@ from typing import Any
 import harness_toys
 
 from femubench.core.diagnosis.result import Diagnosis
+from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
 from femubench.core.schema.diagnosis import (
     Advice,
     Cause,
@@ -21,6 +22,27 @@ from femubench.core.schema.diagnosis import (
     SmallestVisible,
     Verdict,
 )
+
+STRUCTURE: dict[str, Any] = {
+    "plane": "in-plane",
+    "joints": [
+        {"name": "J1", "type": "L", "xyz": [0.0, 0.0, 0.0]},
+        {"name": "J3", "type": "T", "xyz": [1.0, 0.0, 0.5]},
+    ],
+    "members": [{"name": "beam", "ends": [0, 1], "elements": 4}],
+    "sensors": [{"label": "p2", "xyz": [0.5, 0.0, 0.25], "direction": "-z"}],
+    "supports": [{"xyz": [0.0, 0.0, 0.0], "fixed": ["x", "z"]}],
+    "places": [
+        {"place": "type:T", "kind": "joint", "spans": [], "points": [[1.0, 0.0, 0.5]]},
+        {"place": "all", "kind": "all", "spans": [], "points": []},
+        {
+            "place": "beam@J1",
+            "kind": "end",
+            "spans": [{"member": 0, "start": 0.0, "end": 0.125}],
+            "points": [],
+        },
+    ],
+}
 
 # What a name may hold that a terminal, a browser or Markdown would obey.
 NASTY = "<script>alert(1)</script> | a *b* _c_ `d` [e](http://x)\x1b[31m\n# red\u202e\x07"
@@ -115,3 +137,9 @@ def nasty() -> Diagnosis:
         base=(text,),
         notes=(text,),
     )
+
+
+def data_of(verdict: Any = "named", **changes: Any) -> dict[str, Any]:
+    """Return a diagnosis as its JSON, with a structure of one member."""
+    data = diagnosis_to_json(made(verdict, **changes))
+    return diagnosis_from_json({**data, "structure": STRUCTURE})

@@ -95,6 +95,7 @@ def matrices_only(model: Model) -> Model:
 
 class Unchanged(Strategy):
     name = "unchanged"
+    baseline = True
     citation = "none"
 
     def update(

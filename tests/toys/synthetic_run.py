@@ -65,6 +65,7 @@ def synthetic_run(
             for n, case in enumerate(cases)
         },
         "strategies": named,
+        "baseline": "unchanged",
         "citations": {name: f"A. Author (2001), {name}" for name in named},
         "reference": reference,
         "notes": [],

@@ -16,7 +16,7 @@
     ...(data && data.blocks ? data.blocks : []).map((block, k) => ({ key: `${block}_percent`, title: `${block} rms,\u00a0%`, block: k, hint: `median rms frequency error of the ${block} modes`, cell: (row) => value(row[`${block}_percent`], small) })),
     { key: "flags", title: "Flags", text: true, cell: flagCell },
     { key: "coverage", title: "Coverage", text: true, cell: coverageCell },
-    { key: "letters", title: "Group", text: true, hint: "strategies that share a letter cannot be told apart", cell: (row) => el("td", { class: "letters" }, letters[row.index] || (bench.overview.groups().length ? "alone" : "–")) },
+    { key: "letters", title: "Group", text: true, hint: "strategies that share a letter: no difference shown", cell: (row) => el("td", { class: "letters" }, letters[row.index] || (bench.overview.groups().length ? "alone" : "–")) },
     { key: "parameters", title: "Unknowns", hint: "free parameters, median over the cases", cell: (row) => value(row.parameters, bench.count) },
     { key: "seconds", title: "Time,\u00a0s", hint: "wall time, median over the cases", cell: (row) => value(row.seconds, small) },
   ];

@@ -78,11 +78,11 @@
   const markOf = (entry, state) => [entry === state.a && "A", entry === state.b && "B", entry.result.unphysical && "unphysical"].filter(Boolean).join(", ");
 
   // The nominal model: the strategy that leaves it as it is or, where that did not run, the case's own.
-  const nominalOf = (stage, entries) => entries.find((entry) => entry.name === "unchanged" && entry.exhibit)
+  const nominalOf = (stage, entries) => entries.find((entry) => entry.name === bench.data.baseline && entry.exhibit)
     ?? (stage && stage.nominal ? { name: "nominal model", exhibit: stage.nominal, nominal: true } : null);
 
   // A strategy looks alike in every chart.
-  const lookOf = (entry, state) => (entry.nominal || entry.name === "unchanged" ? { role: "nominal" } : { role: "predicted", style: entry === state.a ? 0 : 1 });
+  const lookOf = (entry, state) => (entry.nominal || entry.name === bench.data.baseline ? { role: "nominal" } : { role: "predicted", style: entry === state.a ? 0 : 1 });
 
   const failures = (entries) => {
     const failed = entries.filter((entry) => !entry.ok);
@@ -203,7 +203,7 @@
     const find = (name) => entries.find((entry) => entry.name === name);
     // The best whose model is a possible structure.
     const best = entries.find((entry) => entry.ok && !entry.result.unphysical) ?? entries[0];
-    const state = { a: best, b: find("unchanged") ?? entries[1] ?? entries[0] };
+    const state = { a: best, b: find(bench.data.baseline) ?? entries[1] ?? entries[0] };
     if (state.b === state.a) state.b = entries.find((entry) => entry !== best) ?? best;
     const [table, refill] = frequencySection(item, entries, state);
     const parts = [

@@ -39,7 +39,7 @@ bench.diagnosis = {
   tie(item) {
     const drawing = document.querySelector(".on-structure svg");
     const own = drawing ? [...drawing.querySelectorAll(`g[data-at="${item.dataset.at}"]`)] : [];
-    const parts = item.dataset.all ? [...drawing.querySelectorAll(".everywhere")] : own;
+    const parts = item.dataset.all ? [...drawing.querySelectorAll("[data-everywhere]")] : own;
     if (!parts.length) return;
     const light = (on) => [item, ...parts].forEach((part) => part.classList.toggle("lit", on));
     for (const part of [item, ...parts]) {

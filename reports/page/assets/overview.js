@@ -8,7 +8,7 @@
   // Return the share of problems within a factor of the best, strategy by strategy.
   function profile(rows, filter) {
     const shown = rows.slice(0, MOST_CURVES);
-    const nominal = rows.find((row) => row.strategy === "unchanged");
+    const nominal = rows.find((row) => row.strategy === data.baseline);
     if (nominal && !shown.includes(nominal)) shown.splice(-1, 1, nominal);
     const problems = bench.ranking.problems(rows, filter);
     if (!problems.length) return null;
@@ -32,7 +32,7 @@
         if (tau <= end && !(own[i + 1] <= tau * (1 + 1e-9))) push(tau, i + 1);
       });
       if (x[x.length - 1] < end) push(end, own.filter((tau) => tau <= end).length);
-      return { label: row.strategy, x, y, role: row.strategy === "unchanged" ? "nominal" : "other" };
+      return { label: row.strategy, x, y, role: row.strategy === data.baseline ? "nominal" : "other" };
     });
     const left = rows.length > shown.length ? ` Shown: the ${shown.length - (nominal && rows.indexOf(nominal) >= MOST_CURVES ? 1 : 0)} best${nominal ? " and the nominal model" : ""}; filter the strategies to see others.` : "";
     return bench.charts.profile({
@@ -63,7 +63,7 @@
     });
   }
 
-  // Return the groups that cannot be told apart; the n-th has the n-th letter.
+  // Return the groups without a difference shown; the n-th has the n-th letter.
   function groups() {
     return (data.statistics && data.statistics.groups) || [];
   }
@@ -77,8 +77,8 @@
     for (let c = 0; c < cases; c += 1) {
       const values = rows.map((row) => bench.median(row.logs.map((l) => l[c])));
       rows.forEach((row, k) => {
-        const below = values.filter((v) => v < values[k] - 1e-12).length;
-        const same = values.filter((v) => Math.abs(v - values[k]) <= 1e-12).length;
+        const below = values.filter((v) => v < values[k] - data.tie).length;
+        const same = values.filter((v) => Math.abs(v - values[k]) <= data.tie).length;
         totals.set(row.index, totals.get(row.index) + below + (same + 1) / 2);
       });
     }
@@ -88,7 +88,7 @@
   function sentence() {
     const { note, pairs } = data.statistics;
     const apart = (pairs || []).filter(([, , p]) => p < 0.05).length;
-    return [note, pairs && pairs.length ? `${apart} of ${bench.plural(pairs.length, "pair")} can be told apart.` : ""].filter(Boolean).join(" ");
+    return [note, pairs && pairs.length ? `${apart} of ${bench.plural(pairs.length, "pair")} differ.` : ""].filter(Boolean).join(" ");
   }
 
   // Draw mean ranks with a bar for every group, as a critical-difference diagram turned by 90 degrees.
@@ -154,8 +154,8 @@
     });
     const means = ranked.map((item) => el("li", {}, `${data.strategies[item.s].name}: ${item.rank.toFixed(2)}`));
     return el("figure", { class: "chart wide" },
-      el("figcaption", {}, el("strong", {}, "Who can be told apart"), el("span", {}, sentence()),
-        listed.length ? el("span", {}, "A bar joins strategies that these cases cannot tell apart; its dots are the members. Ranks are by score alone, and for the whole run whatever the filter.", ranked.length > MOST_RANKED ? ` Drawn: the first ${MOST_RANKED} of ${ranked.length}.` : "") : null,
+      el("figcaption", {}, el("strong", {}, "Which strategies differ by more than chance"), el("span", {}, sentence()),
+        listed.length ? el("span", {}, "A bar joins strategies without a difference shown; its dots are the members. Ranks are by score alone, and for the whole run whatever the filter.", ranked.length > MOST_RANKED ? ` Drawn: the first ${MOST_RANKED} of ${ranked.length}.` : "") : null,
         listed.length ? el("details", { class: "numbers" }, el("summary", {}, "Groups in words"), el("ul", { class: "groups" }, listed)) : null,
         means.length ? el("details", { class: "numbers" }, el("summary", {}, "Mean ranks"), el("ol", { class: "groups" }, means)) : null),
       plot);

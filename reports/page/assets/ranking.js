@@ -15,8 +15,8 @@
       perCase[result.c].push(result);
     }
     const scored = data.cases.some((c) => has(c.reference));
-    const unchanged = data.strategies.findIndex((s) => s.name === "unchanged");
-    return { seeds, found, perStrategy, perCase, scored, unchanged };
+    const baseline = data.strategies.findIndex((s) => s.name === data.baseline);
+    return { seeds, found, perStrategy, perCase, scored, baseline };
   }
   function has(reference) {
     return Boolean(reference) && Object.keys(reference).length > 0;
@@ -29,7 +29,7 @@
   function referenceOf(result) {
     const { reference } = data.cases[result.c];
     if (all.scored) return data.blocks.map((b) => (reference && b in reference ? reference[b] : null));
-    const base = all.unchanged < 0 ? null : resultAt(all.unchanged, result.c, result.seed);
+    const base = all.baseline < 0 ? null : resultAt(all.baseline, result.c, result.seed);
     return base ? base.rms : data.blocks.map(() => null);
   }
 
@@ -113,10 +113,17 @@
     }
     return median([...byCase.values()].map(median));
   }
-  // Put physical strategies first, then unphysical ones, then who never gave a model.
-  function better(a, b) {
-    const key = (r) => (r.ok + r.not_applicable === 0 ? 2 : 0) + (r.unphysical ? 1 : 0);
-    return key(a) - key(b) || a.skill - b.skill || (a.strategy < b.strategy ? -1 : 1);
+  // Put physical strategies first, then unphysical ones, then who never gave a model; those whose sorted
+  // skills lie no further apart than a tie share a rank, in the order of their names.
+  function ranked(rows) {
+    const tier = (r) => (r.ok + r.not_applicable === 0 ? 2 : 0) + (r.unphysical ? 1 : 0);
+    rows.sort((a, b) => tier(a) - tier(b) || a.skill - b.skill);
+    rows.forEach((row, k) => {
+      const before = rows[k - 1];
+      const tied = before && tier(row) === tier(before) && row.skill - before.skill <= data.tie * row.skill;
+      row.rank = tied ? before.rank : k + 1;
+    });
+    return rows.sort((a, b) => a.rank - b.rank || (a.strategy < b.strategy ? -1 : 1));
   }
 
   function rowsOf(filter) {
@@ -124,8 +131,7 @@
     const kept = new Set(grid.cases.map((item) => item.c));
     const rows = data.strategies.map((_, s) => s).filter((s) => filter.strategies.has(s)).map((s) => rowOf(s, grid, filter, kept));
     if (!grid.cases.length) return [];
-    rows.sort(better).forEach((row, k) => (row.rank = k + 1));
-    return rows;
+    return ranked(rows);
   }
 
   function generator(seed) {

@@ -202,7 +202,7 @@
     const frame = bench.scene.extent(stage.nodes);
     const canvas = el("canvas", { class: "case-canvas case-view", tabindex: "0", role: "application", "aria-roledescription": "structure view" });
     const told = el("p", { class: "case-told", role: "status" });
-    const show = { joints: true, sensors: false, attached: true, measured: true };
+    const show = { joints: stage.plane !== "matrices", sensors: false, attached: true, measured: true };
     let [entry, modes, at, now, amplitude] = [shown[0] ?? null, [], 0, null, 1];
     let ink = null;
     const paint = () => {

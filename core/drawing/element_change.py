@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from femubench.core.errors import FemubenchError
-from femubench.core.exhibits.stage import node_labels
 from femubench.core.fem.beam import stiffness_matrices
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
@@ -152,7 +151,7 @@ def difference_picture(nominal: Model, updated: Model) -> dict[str, Any] | None:
     with np.errstate(divide="ignore"):
         share = (np.log10(found) - lowest) / _DECADES
     levels = np.where(share > 0.0, 1 + np.round(_LEVELS * np.clip(share, 0.0, 1.0)), 0)
-    names = node_labels(nominal)
+    names = _node_labels(nominal)
     first = [int(np.flatnonzero(cell[np.argsort(nodes)] == k)[0]) for k in range(len(found))]
     return {
         "size": len(found),
@@ -163,6 +162,20 @@ def difference_picture(nominal: Model, updated: Model) -> dict[str, Any] | None:
         "highest": round(highest, 4),
         "unit": "N/m",
     }
+
+
+def _node_labels(model: Model) -> list[str]:
+    """Return a name for every node with dofs: a joint's, a member's with its place, a row's."""
+    present = np.unique(model.dofs.node)
+    if model.structure is None:
+        names = getattr(model.geometry, "names", ())
+        return [str(names[k]) if k < len(names) else str(k) for k in present]
+    frame, mesh = model.structure.frame, model.structure.mesh
+    found = {k: joint.name for k, joint in enumerate(frame.joints)}
+    for member, ends, stations in zip(mesh.member, mesh.ends, mesh.stations, strict=True):
+        for node, station in zip(ends, stations, strict=True):
+            found.setdefault(int(node), f"{frame.members[member].name}@{station:.3g}")
+    return [found.get(int(node), str(node)) for node in present]
 
 
 def stiffness_difference(nominal: Model, updated: Model) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Exhibits in files beside a store: one a job, one a case; nobody's but a picture's sake."""
+"""What is drawn of cases and jobs, in files beside a store that results do not depend on."""
 
 from __future__ import annotations
 
@@ -6,38 +6,33 @@ import base64
 import json
 import re
 import time
-from collections.abc import Iterable, Mapping, Sized
+from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, TypeVar
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from femubench.core.drawing.wireframe import Wireframe, adapter, check_same
 from femubench.core.errors import InputError
 from femubench.core.files import read_text, write_atomically
 from femubench.core.schema.records import parse_json
 
 FOLDER = "exhibits"
 MOST_BYTES = 4 * 2**20
+_CASE = "structure-"
 _KEY = re.compile(r"[0-9a-f]{8,64}")
 _MOST = 20_000
 _STALE = 60.0  # s; a file is written in a fraction of one
 
 Number = float | None
 Row = list[Number]
-_Ends = Annotated[list[int], Field(min_length=2, max_length=2)]
 _Point = Annotated[list[float], Field(min_length=3, max_length=3)]
 
 
 class _Part(BaseModel):
     model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
-
-
-class _Sensor(_Part):
-    label: str = Field(max_length=500)
-    xyz: _Point
-    axis: _Point
-    rotation: bool = False
 
 
 class _Measured(_Part):
@@ -46,29 +41,6 @@ class _Measured(_Part):
     modification: str | None = Field(default=None, max_length=500)
     hz: float
     shape: Row = Field(max_length=_MOST)
-
-
-class _Joint(_Part):
-    name: str = Field(max_length=500)
-    type: str | None = Field(default=None, max_length=500)
-    node: int
-
-
-class _Lump(_Part):
-    xyz: _Point
-    kg: float
-
-
-class _Spring(_Part):
-    xyz: _Point
-    axis: _Point
-    rotation: bool = False
-    stiffness: float
-
-
-class _Support(_Part):
-    xyz: _Point
-    fixed: list[str] = Field(max_length=6)
 
 
 class _Receptance(_Part):
@@ -92,9 +64,9 @@ class _Mac(_Part):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _same(self.values, self.rows)
+        check_same(self.values, self.rows)
         for row in self.values:
-            _same(row, self.columns)
+            check_same(row, self.columns)
         return self
 
 
@@ -109,8 +81,8 @@ class _Difference(_Part):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _same(self.labels, range(self.size))
-        _same(base64.b64decode(self.values, validate=True), range(self.size**2))
+        check_same(self.labels, range(self.size))
+        check_same(base64.b64decode(self.values, validate=True), range(self.size**2))
         return self
 
 
@@ -122,49 +94,21 @@ class _Exhibit(_Part):
     difference: _Difference | None = None
 
 
-class _Stage(_Part):
-    plane: Literal["out-of-plane", "in-plane", "3d", "matrices"]
-    nodes: list[_Point] = Field(max_length=_MOST)
-    elements: list[_Ends] = Field(max_length=_MOST)
-    element_labels: list[str] = Field(max_length=_MOST)
-    member_of: list[int] = Field(max_length=_MOST)
-    members: list[str] = Field(max_length=_MOST)
-    joints: list[_Joint] = Field(max_length=_MOST)
-    sensors: list[_Sensor] = Field(max_length=_MOST)
-    masses: list[_Lump] = Field(max_length=_MOST)
-    springs: list[_Spring] = Field(max_length=_MOST)
-    supports: list[_Support] = Field(max_length=_MOST)
-    measured: list[_Measured] = Field(max_length=1000)
+@dataclass(frozen=True)
+class _CaseDrawing(Wireframe):
+    measured: tuple[_Measured, ...] = ()
     drive: str | None = None
-    receptance: _Receptance = _Receptance()
+    receptance: _Receptance = field(default_factory=_Receptance)
     nominal: _Exhibit | None = None
 
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        nodes = {end for ends in self.elements for end in ends}
-        _within([*nodes, *(joint.node for joint in self.joints)], self.nodes)
-        _same(self.element_labels, self.elements)
-        _same(self.member_of, self.elements)
+    def __post_init__(self) -> None:
+        super().__post_init__()
         for mode in self.measured:
-            _same(mode.shape, self.sensors)
-        return self
-
-
-def _same(one: Sized, other: Sized) -> None:
-    if len(one) != len(other):
-        raise ValueError(f"{len(one)} entries instead of {len(other)}")
-
-
-def _within(places: Iterable[int], listed: Sized) -> None:
-    if not all(0 <= place < len(listed) for place in places):
-        raise ValueError("a place that is not there")
-
-
-_P = TypeVar("_P", bound=_Part)
+            check_same(mode.shape, self.sensors)
 
 
 class Exhibits:
-    """The exhibits of a store.
+    """What is drawn of the cases and jobs of a store.
 
     Arguments:
         folder: of the store.
@@ -178,9 +122,9 @@ class Exhibits:
         """Return the exhibit of a job by its key; None where there is none that is whole."""
         return self._read(key, _Exhibit)
 
-    def stage(self, digest: str) -> dict[str, Any] | None:
-        """Return the stage of a case by the digest of its files; None likewise."""
-        return self._read(f"case-{digest[:32]}", _Stage)
+    def case(self, digest: str) -> dict[str, Any] | None:
+        """Return the structure of a case by the digest of its files; None likewise."""
+        return self._read(_name(digest), _CaseDrawing)
 
     def tidy(self) -> None:
         """Remove what a killed process left half-written."""
@@ -189,34 +133,36 @@ class Exhibits:
                 if time.time() - part.stat().st_mtime > _STALE:
                     part.unlink()
 
-    def has_stage(self, digest: str) -> bool:
-        """Tell whether there is a stage of a case, or can be none."""
-        path = self._path(f"case-{digest[:32]}")
+    def has_case(self, digest: str) -> bool:
+        """Tell whether a case is drawn already, or cannot be."""
+        path = self._path(_name(digest))
         return path is None or path.exists()
 
     def put(self, key: str, exhibit: Mapping[str, Any]) -> None:
         """Keep the exhibit of a job; a store without room does without."""
         self._write(key, exhibit)
 
-    def put_stage(self, digest: str, stage: Mapping[str, Any]) -> None:
-        """Keep the stage of a case."""
-        self._write(f"case-{digest[:32]}", stage)
+    def put_case(self, digest: str, drawing: Mapping[str, Any]) -> None:
+        """Keep what is drawn of a case."""
+        self._write(_name(digest), drawing)
 
     def _path(self, name: str) -> Path | None:
-        known = _KEY.fullmatch(name.removeprefix("case-"))
+        known = _KEY.fullmatch(name.removeprefix(_CASE))
         return self._folder / f"{name}.json" if known else None
 
-    def _read(self, name: str, kind: type[_P]) -> dict[str, Any] | None:
+    def _read(self, name: str, kind: type) -> dict[str, Any] | None:
         path = self._path(name)
         if path is None or not path.is_file():
             return None
         try:
             data = parse_json(read_text(path, MOST_BYTES), file=path, expected="an exhibit")
-            return kind.model_validate(data).model_dump()
+            found = adapter(kind)
+            plain: dict[str, Any] = found.dump_python(found.validate_python(data), mode="json")
         except (InputError, ValidationError) as error:
             first = str(error).splitlines()[0] if isinstance(error, InputError) else "not whole"
             self.notes.append(f"{path.name}: a picture was left out: {first}")
             return None
+        return plain
 
     def _write(self, name: str, data: Mapping[str, Any]) -> None:
         path = self._path(name)
@@ -229,3 +175,7 @@ class Exhibits:
                 return
             self._folder.mkdir(parents=True, exist_ok=True)
             write_atomically(path, text)
+
+
+def _name(digest: str) -> str:
+    return f"{_CASE}{digest[:32]}"

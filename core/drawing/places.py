@@ -1,0 +1,133 @@
+"""Where the words for places lie on a wireframe: parts of members and points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from femubench.core.case.case import Case
+from femubench.core.drawing.wireframe import Point, Wireframe, check_within, to_point, wireframe_of
+from femubench.core.effect.places import ALL, ends_of, joints_of, pair_of, point_of, split_direction
+from femubench.core.errors import ModelError
+from femubench.core.fem.frame import Frame, Place
+from femubench.core.fem.mesh import place_xyz
+from femubench.core.fem.model import Model
+
+PlaceKind = Literal["all", "joint", "member", "element", "end", "point", "pair", "elsewhere"]
+_Station = Annotated[float, Field(ge=0.0, le=1.0)]
+
+_END = 0.125  # how much of its member an end takes in a drawing
+
+
+@dataclass(frozen=True)
+class Span:
+    """A part of a member, by its position in the list of members, between two stations 0..1."""
+
+    member: int
+    start: _Station
+    end: _Station
+
+
+@dataclass(frozen=True)
+class DrawnPlace:
+    """What the word of a place covers; nothing for ``all`` and for what is nowhere in space."""
+
+    place: str
+    kind: PlaceKind
+    spans: tuple[Span, ...] = ()
+    points: tuple[Point, ...] = ()
+
+
+@dataclass(frozen=True)
+class PlacedWireframe(Wireframe):
+    """A structure with the places that something is said of.
+
+    Arguments:
+        places: those that do not stand for themselves, as joints, members, ``member/k`` and
+            sensors do, may be found here alone.
+    """
+
+    places: tuple[DrawnPlace, ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_within((s.member for p in self.places for s in p.spans), self.members, "member")
+
+    def place(self, word: str) -> DrawnPlace:
+        """Return what the word of a place covers."""
+        listed = next((place for place in self.places if place.place == word), None)
+        return listed or _plain_place(self, word, split_direction(word)[0])
+
+
+def placed_wireframe(source: Case | Model, words: Iterable[str]) -> PlacedWireframe:
+    """Return a structure with the places that some words stand for.
+
+    Arguments:
+        source: of the structure.
+        words: in the grammar of places.
+    """
+    wireframe = wireframe_of(source)
+    structure = (source.model if isinstance(source, Case) else source).structure
+    frame = None if structure is None else structure.frame
+    places = tuple(_place(wireframe, frame, word) for word in dict.fromkeys(words))
+    return PlacedWireframe(**vars(wireframe), places=places)
+
+
+def _plain_place(wireframe: Wireframe, word: str, head: str) -> DrawnPlace:
+    """Return the place of a joint, a member, an element or a sensor by its name alone."""
+    if head == ALL:
+        return DrawnPlace(word, "all")
+    for joint in wireframe.joints:
+        if joint.name == head:
+            return DrawnPlace(word, "joint", points=(joint.xyz,))
+    name, _, number = head.rpartition("/")
+    for k, member in enumerate(wireframe.members):
+        if member.name == head:
+            return DrawnPlace(word, "member", (Span(k, 0.0, 1.0),))
+        count = member.elements
+        if member.name == name and number.isdecimal() and 0 < int(number[:7]) <= count:
+            span = Span(k, (int(number) - 1) / count, int(number) / count)
+            return DrawnPlace(word, "element", (span,))
+    points = tuple(sensor.xyz for sensor in wireframe.sensors if sensor.label == word)
+    return DrawnPlace(word, "point" if points else "elsewhere", points=points[:1])
+
+
+def _place(wireframe: Wireframe, frame: Frame | None, word: str) -> DrawnPlace:
+    head, _ = split_direction(word)
+    plain = _plain_place(wireframe, word, head)
+    if frame is not None and plain.kind != "all" and (joints := joints_of(frame, head)):
+        return DrawnPlace(word, "joint", points=_points(frame, joints))
+    if frame is None or plain.kind in ("all", "member", "element"):
+        return plain
+    readers: tuple[Callable[[Frame, str, str], DrawnPlace], ...] = (_ends, _at, _pair)
+    for reader in readers:
+        try:
+            return reader(frame, word, head)
+        except ModelError:
+            continue
+    return plain
+
+
+def _points(frame: Frame, joints: Iterable[str]) -> tuple[Point, ...]:
+    return tuple(to_point(place_xyz(frame, Place(joint=name))) for name in joints)
+
+
+def _ends(frame: Frame, word: str, head: str) -> DrawnPlace:
+    spans = []
+    for end in ends_of(frame, head):
+        name, _, joint = end.rpartition("@")
+        member = frame.member_index[name]
+        first = frame.members[member].ends[0] == joint
+        spans.append(Span(member, *((0.0, _END) if first else (1.0 - _END, 1.0))))
+    return DrawnPlace(word, "end", tuple(spans))
+
+
+def _at(frame: Frame, word: str, head: str) -> DrawnPlace:
+    return DrawnPlace(word, "point", points=(to_point(place_xyz(frame, point_of(frame, head))),))
+
+
+def _pair(frame: Frame, word: str, head: str) -> DrawnPlace:
+    return DrawnPlace(word, "pair", points=_points(frame, pair_of(frame, head)))

@@ -1,0 +1,348 @@
+"""What a model predicts of a case, and what was measured there, in plain data for drawing."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from femubench.core.case.case import Case
+from femubench.core.drawing.element_change import difference_picture, relative_changes
+from femubench.core.drawing.files import Exhibits
+from femubench.core.drawing.wireframe import MOST_NODES, node_positions, to_plain, wireframe_of
+from femubench.core.fem.model import Model
+from femubench.core.fem.sensors import Sensors
+from femubench.core.modal.correlation import mac, modal_scale_factor
+from femubench.core.modal.eigen import Modes, modes_of
+from femubench.core.modal.frf import modal_sum, receptance
+from femubench.core.modal.measurement import Measurement
+from femubench.core.modal.pairing import Pairing, pair_modes
+from femubench.core.typing import FloatArray
+
+DIGITS = 4
+_AXES = {"in-plane": ("x", "z"), "out-of-plane": ("z",), "3d": ("x", "y", "z")}
+MOST_MODES = 12
+MOST_CHANGED = 8  # of one modification
+_SHAPE_DECIMALS = 3  # of the largest component
+_ABOVE = 1.2  # modes up to this times the highest measured frequency are shown
+_POINTS = 400
+_DAMPING = 0.005  # where none was measured
+
+
+def case_drawing(case: Case) -> dict[str, Any] | None:
+    """Return the structure of a case and what was measured on it, in plain data.
+
+    Arguments:
+        case: its nominal model gives the picture.
+
+    Returns None for a model that is too large to draw.
+    """
+    wireframe = wireframe_of(case)
+    if not wireframe.nodes:
+        return None
+    return {
+        **to_plain(wireframe),
+        "measured": list(_measured(case)),
+        "drive": drive_sensor(case),
+    }
+
+
+def exhibit_of(
+    case: Case, model: Model, parameters: Sequence[Mapping[str, Any]] = ()
+) -> dict[str, Any] | None:
+    """Return what a model predicts, in plain data.
+
+    Arguments:
+        case: what it is compared with.
+        model: an updated model of the case.
+        parameters: of the update, as a result has them.
+
+    Returns None for a model that is too large to draw.
+
+    Raises:
+        ModelError: when the model cannot be solved or observed.
+    """
+    if len(node_positions(case.model)) > MOST_NODES:
+        return None
+    elements = relative_changes(case.model, model, parameters)
+    by_entries = elements is None or model.stiffness_change is not None
+    return {
+        **_modes(case, model),
+        "receptance": receptances(case, model),
+        "elements": elements,
+        "difference": difference_picture(case.model, model) if by_entries else None,
+    }
+
+
+def paired_with(model: Model, data: Measurement) -> tuple[Modes, FloatArray, Pairing]:
+    """Return the elastic modes of a model, their readings at the sensors, and the partners.
+
+    Arguments:
+        model: the structure as it was when it was measured.
+        data: measured modes.
+    """
+    elastic = modes_of(model).elastic
+    at_sensors = np.asarray(model.observe(data.sensors) @ elastic.shapes)
+    frequencies = elastic.natural_frequencies
+    return elastic, at_sensors, pair_modes(data.frequencies, data.shapes, frequencies, at_sensors)
+
+
+def _structures(case: Case, model: Model) -> Iterator[tuple[str, Model, Measurement]]:
+    """Yield the structure as tested (``""``) and with every modification, and what was measured."""
+    yield "", model, case.measurement.select((*case.used, *case.held_out))
+    for change in case.modifications:
+        yield change.name, model.attach(change.masses, change.springs), change.measurement
+
+
+def _modes(case: Case, model: Model) -> dict[str, Any]:
+    """Return the modes near the measured ones with their shapes, and the MAC matrix."""
+    drawn: list[dict[str, Any]] = []
+    likeness: dict[str, Any] = {}
+    for name, changed, data in _structures(case, model):
+        elastic, at_sensors, pairing = paired_with(changed, data)
+        frequencies = elastic.natural_frequencies
+        number = {int(k): n for k, n in zip(pairing.index, data.numbers, strict=True) if k >= 0}
+        shown = list(number)[: MOST_CHANGED if name else None]
+        if not name:
+            most = _ABOVE * float(data.frequencies.max(initial=0.0))
+            near = np.flatnonzero(frequencies <= most).tolist()
+            shown = sorted([*shown, *(k for k in near if k not in number)][:MOST_MODES])
+            likeness = {
+                "rows": list(data.numbers),
+                "columns": [float(frequencies[k]) for k in shown],
+                "values": rounded(mac(data.shapes, at_sensors[:, shown])),
+            }
+        motion = node_motions(changed, case.model, elastic.shapes[:, shown])
+        largest = np.abs(motion).max(axis=(0, 1), initial=0.0)
+        drawn += [
+            {
+                "hz": float(frequencies[k]),
+                "paired": number.get(k),
+                "modification": name or None,
+                "shape": (motion[..., j] / (largest[j] or 1.0)).round(_SHAPE_DECIMALS).tolist(),
+            }
+            for j, k in enumerate(shown)
+        ]
+    return {"modes": drawn, "mac": likeness}
+
+
+def frequency_axis(case: Case) -> FloatArray:
+    """Return the frequencies of the receptances of a case in Hz, (400,)."""
+    return np.linspace(2.0, _ABOVE * highest_measured(case), _POINTS)
+
+
+def damping_of(case: Case) -> float:
+    """Return the median of the measured damping ratios, a half per cent where there is none."""
+    known = case.measurement.damping[np.isfinite(case.measurement.damping)]
+    return float(np.median(known)) if len(known) else _DAMPING
+
+
+def _drive(case: Case, label: str | None = None) -> Sensors | None:
+    """Return the one sensor of a label, the drive sensor where none is given."""
+    label = label or drive_sensor(case)
+    if label is None:
+        return None
+    sensors = case.measurement.sensors
+    k = sensors.labels.index(label)
+    return Sensors((label,), sensors.xyz[[k]], (sensors.directions[k],))
+
+
+def receptances(case: Case, model: Model, sensor: str | None = None) -> dict[str, list[float]]:
+    """Return the receptances at one sensor in dB re 1 m/N, as tested (``""``) and modified.
+
+    Arguments:
+        case: gives the sensor, the frequencies, the damping and the modifications.
+        model: of the case, updated or not.
+        sensor: its label; None for the drive sensor.
+    """
+    drive = _drive(case, sensor)
+    if drive is None:
+        return {}
+    return {
+        name: _decibels(case, changed, modes_of(changed), drive)
+        for name, changed, _ in _structures(case, model)
+    }
+
+
+def _decibels(case: Case, model: Model, modes: Modes, drive: Sensors) -> list[float]:
+    row = model.observe(drive)
+    values = receptance(modes, row, row, frequency_axis(case), damping_of(case))[:, 0, 0]
+    return _level(values)
+
+
+def _level(values: FloatArray) -> list[float]:
+    levels = 20.0 * np.log10(np.maximum(np.abs(values), 1e-300))
+    return [round(float(level), 1) for level in levels]
+
+
+def measured_receptances(case: Case, sensor: str | None = None) -> dict[str, Any]:
+    """Return receptances made of the measured modes, scaled to mass by their nominal partners.
+
+    A test of free shapes does not tell modal masses: those of the nominal model stand in, as do
+    its rigid-body modes and its modes above the measured ones.
+    """
+    drive = _drive(case, sensor)
+    if drive is None:
+        return {}
+    measured: dict[str, list[float] | None] = {}
+    alone: list[str] = []
+    for name, changed, data in _structures(case, case.model):
+        _, at_sensors, pairing = paired_with(changed, data)
+        measured[name] = _stand_in(case, changed, data, drive, pairing, at_sensors)
+        if not name:
+            pairs = zip(data.numbers, pairing.index, strict=True)
+            alone = [str(number) for number, k in pairs if k < 0]
+    note = (
+        "Made of the measured modes; scaled to mass, and completed by rigid-body and higher modes, "
+        "with the nominal model."
+    )
+    if alone:
+        note += f" Measured modes without a partner there are not in it: {', '.join(alone)}."
+    return {
+        "hz": rounded(frequency_axis(case)),
+        "damping": damping_of(case),
+        "measured": {name: level for name, level in measured.items() if level is not None},
+        "note": note,
+    }
+
+
+def _stand_in(
+    case: Case,
+    nominal: Model,
+    data: Measurement,
+    drive: Sensors,
+    pairing: Pairing,
+    at_sensors: FloatArray,
+) -> list[float] | None:
+    modes = modes_of(nominal)
+    elastic = np.flatnonzero(~modes.rigid)
+    readings = np.asarray(nominal.observe(drive) @ modes.shapes)[0]
+    eigenvalues = modes.eigenvalues.copy()
+    known = data.sensors.labels
+    row = known.index(drive.labels[0]) if drive.labels[0] in known else -1
+    if row < 0 or not (pairing.index >= 0).any():
+        return None
+    for k, partner in enumerate(pairing.index):
+        shape = data.shapes[:, k]
+        if partner < 0 or not np.isfinite(shape[row]):
+            continue
+        own = elastic[partner]
+        there = np.isfinite(shape)
+        scale = modal_scale_factor(at_sensors[there, partner], shape[there])
+        readings[own] = float(np.real(scale).item()) * shape[row]
+        eigenvalues[own] = data.eigenvalues[k]
+    seen = readings[None]
+    values = modal_sum(eigenvalues, seen, seen, frequency_axis(case), damping_of(case))
+    return _level(values[:, 0, 0])
+
+
+def rounded(values: Any) -> Any:  # noqa: ANN401 - arrays of any shape
+    """Return numbers of an array as nested lists with four digits; None where there is none."""
+    array = np.asarray(values, dtype=float)
+    if array.ndim:
+        return [rounded(item) for item in array]
+    number = float(array)
+    return float(f"{number:.{DIGITS}g}") if np.isfinite(number) else None
+
+
+def node_motions(model: Model, nominal: Model, shapes: FloatArray) -> FloatArray:
+    """Return the displacements of the nodes of a picture, (k, 3, m).
+
+    Arguments:
+        model: whose shapes they are.
+        nominal: whose nodes are drawn.
+        shapes: on the dofs of `model`, (n, m).
+
+    Raises:
+        ModelError: when a node lies off the structure of `model`.
+    """
+    xyz = node_positions(nominal)
+    motion = np.zeros((len(xyz), 3, shapes.shape[1]))
+    if nominal.structure is None:
+        nodes = np.unique(nominal.dofs.node)
+        for row, (node, name) in enumerate(zip(model.dofs.node, model.dofs.direction, strict=True)):
+            if name in "xyz":
+                motion[np.searchsorted(nodes, node), "xyz".index(name)] += shapes[row]
+        return motion
+    for name in _AXES[nominal.structure.frame.plane]:
+        labels = tuple(str(i) for i in range(len(xyz)))
+        sensors = Sensors(labels, xyz, (name,) * len(xyz))
+        motion[:, "xyz".index(name)] = model.observe(sensors) @ shapes
+    return motion
+
+
+def drive_sensor(case: Case) -> str | None:
+    """Return the displacement sensor that sees all used modes best; None without shapes."""
+    sensors = case.measurement.sensors
+    moves = np.flatnonzero(["r" not in direction for direction in sensors.directions])
+    shapes = np.abs(case.measurement.select(case.used).shapes)[moves]
+    shapes = shapes[:, np.isfinite(shapes).any(axis=0)]
+    if shapes.size == 0:
+        return None
+    with np.errstate(divide="ignore", invalid="ignore"):
+        seen = np.log(shapes / np.nanmax(shapes, axis=0)).sum(axis=1)
+    best = int(np.argmax(np.where(np.isfinite(seen), seen, -np.inf)))
+    return sensors.labels[int(moves[best])]
+
+
+def measured_blocks(case: Case) -> list[tuple[str, str | None, Measurement]]:
+    """Return the measured modes by block and modification."""
+    tested = case.measurement
+    blocks: list[tuple[str, str | None, Measurement]] = [
+        ("used", None, tested.select(case.used)),
+        ("higher", None, tested.select(case.held_out)),
+    ]
+    blocks += [("modified", change.name, change.measurement) for change in case.modifications]
+    return [block for block in blocks if len(block[2])]
+
+
+def _measured(case: Case) -> Sequence[Mapping[str, Any]]:
+    return [
+        {
+            "mode": number,
+            "block": block,
+            "modification": change,
+            "hz": rounded(data.frequencies[k]) and float(data.frequencies[k]),
+            "shape": rounded(_unit(data.shapes[:, k])),
+        }
+        for block, change, data in measured_blocks(case)
+        for k, number in enumerate(data.numbers)
+    ]
+
+
+def _unit(shape: FloatArray) -> FloatArray:
+    """Return a shape whose largest component is 1 or -1."""
+    largest = np.nanmax(np.abs(shape)) if np.isfinite(shape).any() else 0.0
+    return np.asarray(shape / largest if largest > 0.0 else shape)
+
+
+def highest_measured(case: Case) -> float:
+    """Return the highest measured frequency in Hz, of the structure as tested and modified."""
+    found = chain.from_iterable(data.frequencies for _, _, data in measured_blocks(case))
+    return float(max(found, default=0.0))
+
+
+def keep_drawings(exhibits: Exhibits, cases: Iterable[Case]) -> None:
+    """Keep what is drawn of cases and their nominal models; no picture is worth a run.
+
+    Arguments:
+        exhibits: of the store.
+        cases: those of a run.
+    """
+    exhibits.tidy()
+    for case in cases:
+        if exhibits.has_case(case.digest):
+            continue
+        with suppress(Exception), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            drawing = case_drawing(case)
+            if drawing is not None:
+                more = {
+                    "receptance": measured_receptances(case),
+                    "nominal": exhibit_of(case, case.model),
+                }
+                exhibits.put_case(case.digest, {**drawing, **more})

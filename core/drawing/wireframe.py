@@ -1,0 +1,248 @@
+"""The wireframe of a structure: nodes, elements, joints, sensors and attachments, for drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence, Sized
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import ConfigDict, Field, TypeAdapter
+
+from femubench.core.case.case import Case
+from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.fem.mesh import place_xyz
+from femubench.core.fem.model import Model
+from femubench.core.fem.sensors import Sensors
+from femubench.core.fem.structure import Structure
+from femubench.core.typing import FloatArray
+
+Point = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
+Pair = tuple[int, int]
+Plane = Literal["in-plane", "out-of-plane", "3d", "matrices"]
+
+MOST_NODES = 3000  # more are no picture, and too much to keep for every job
+_DECIMALS = 9  # of a metre
+
+
+@dataclass(frozen=True)
+class DrawnJoint:
+    """A joint, or a named node of a model that came as matrices; xyz in m, `node` in the mesh."""
+
+    name: str
+    xyz: Point
+    type: str | None = ""
+    node: int = -1
+
+
+@dataclass(frozen=True)
+class DrawnMember:
+    """A straight member between two joints, by their positions in the list of joints."""
+
+    name: str
+    ends: Pair
+    elements: Annotated[int, Field(ge=1)]
+
+
+@dataclass(frozen=True)
+class DrawnSensor:
+    """A measured point with its signed direction, and that as a vector; xyz in m."""
+
+    label: str
+    xyz: Point
+    direction: str = ""
+    axis: Point = (0.0, 0.0, 0.0)
+    rotation: bool = False
+
+
+@dataclass(frozen=True)
+class DrawnMass:
+    """A known lump; xyz in m."""
+
+    xyz: Point
+    kg: float
+
+
+@dataclass(frozen=True)
+class DrawnSpring:
+    """A spring to ground along or about an axis; in N/m or N m/rad."""
+
+    xyz: Point
+    axis: Point
+    stiffness: float
+    rotation: bool = False
+
+
+@dataclass(frozen=True)
+class DrawnSupport:
+    """A point that is held in some directions; xyz in m."""
+
+    xyz: Point
+    fixed: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Wireframe:
+    """A structure as every drawing shows it, checked to be whole.
+
+    Arguments:
+        plane: in which it lies and moves; ``matrices`` where there are nodes alone.
+        joints, members: members are straight lines between joints.
+        sensors, masses, springs, supports: what sits on it.
+        nodes: of the mesh in m; empty where the mesh is too fine to draw.
+        elements: pairs of nodes; `element_labels` (``member/k``) and `member_of` go with them.
+    """
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(allow_inf_nan=False)
+
+    plane: Plane
+    joints: tuple[DrawnJoint, ...]
+    members: tuple[DrawnMember, ...]
+    sensors: tuple[DrawnSensor, ...] = ()
+    supports: tuple[DrawnSupport, ...] = ()
+    masses: tuple[DrawnMass, ...] = ()
+    springs: tuple[DrawnSpring, ...] = ()
+    nodes: tuple[Point, ...] = ()
+    elements: tuple[Pair, ...] = ()
+    element_labels: tuple[str, ...] = ()
+    member_of: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_within((end for m in self.members for end in m.ends), self.joints, "joint")
+        check_within((end for ends in self.elements for end in ends), self.nodes, "node")
+        if self.nodes:
+            check_within((joint.node for joint in self.joints), self.nodes, "node")
+        check_within(self.member_of, self.members, "member")
+        check_same(self.element_labels, self.elements)
+        check_same(self.member_of, self.elements)
+
+    @property
+    def points(self) -> FloatArray:
+        """Return all points with a name and all nodes in m, (n, 3)."""
+        named = [joint.xyz for joint in self.joints] + [sensor.xyz for sensor in self.sensors]
+        return np.array([*named, *self.nodes], dtype=float).reshape(-1, 3)
+
+    @property
+    def lines(self) -> FloatArray:
+        """Return the ends of all members, or of all elements where none has a name, (n, 2, 3)."""
+        if self.members:
+            ends = [[self.joints[end].xyz for end in member.ends] for member in self.members]
+        else:
+            ends = [[self.nodes[end] for end in pair] for pair in self.elements]
+        return np.array(ends, dtype=float).reshape(-1, 2, 3)
+
+
+def check_within(places: Iterable[int], listed: Sized, what: str) -> None:
+    """Check that positions are those of a list.
+
+    Raises:
+        ValueError: naming what is not there.
+    """
+    if not all(0 <= place < len(listed) for place in places):
+        raise ValueError(f"a {what} that is not in the list")
+
+
+def check_same(one: Sized, other: Sized) -> None:
+    """Check that two lists go in pairs.
+
+    Raises:
+        ValueError: when their lengths differ.
+    """
+    if len(one) != len(other):
+        raise ValueError(f"{len(one)} entries instead of {len(other)}")
+
+
+def to_plain(drawn: Any) -> Any:  # noqa: ANN401 - JSON data of any form
+    """Return a data class of this room as plain data for JSON."""
+    return adapter(drawn.__class__).dump_python(drawn, mode="json")
+
+
+@cache
+def adapter(kind: Any) -> TypeAdapter[Any]:  # noqa: ANN401 - any data class
+    """Return what reads a data class from plain data and writes it back."""
+    return TypeAdapter(kind)
+
+
+def wireframe_of(source: Case | Model) -> Wireframe:
+    """Return what to draw of a structure.
+
+    Arguments:
+        source: a case has sensors, a model has none.
+    """
+    model = source.model if isinstance(source, Case) else source
+    sensors = _sensors(source.measurement.sensors) if isinstance(source, Case) else ()
+    xyz = node_positions(model)
+    nodes = tuple(map(to_point, xyz)) if len(xyz) <= MOST_NODES else ()
+    if model.structure is not None:
+        return _of_frame(model.structure, nodes, sensors)
+    known = model.geometry.places if isinstance(model.geometry, MatrixGeometry) else {}
+    joints = tuple(
+        DrawnJoint(name, to_point(at), "", k) for k, (name, at) in enumerate(known.items())
+    )
+    return Wireframe("matrices", joints, (), sensors, nodes=nodes)
+
+
+def node_positions(model: Model) -> FloatArray:
+    """Return where the nodes of a picture are in m: those of the mesh, or of the dofs, (k, 3)."""
+    if model.structure is not None:
+        mesh = model.structure.mesh
+        return np.asarray(np.delete(mesh.xyz, mesh.oscillators, axis=0))
+    first = np.unique(model.dofs.node, return_index=True)[1]
+    return np.asarray(model.dofs.xyz[first])
+
+
+def to_point(xyz: Iterable[float]) -> Point:
+    """Return a point in m to nine decimals."""
+    return tuple(round(float(value), _DECIMALS) for value in xyz)
+
+
+def _sensors(sensors: Sensors) -> tuple[DrawnSensor, ...]:
+    rows = zip(sensors.labels, sensors.xyz, sensors.axes, sensors.directions, strict=True)
+    return tuple(
+        DrawnSensor(
+            label, to_point(xyz), direction, to_point(axes[3:] if turn else axes[:3]), rotation=turn
+        )
+        for label, xyz, axes, direction in rows
+        for turn in ("r" in direction,)
+    )
+
+
+def _of_frame(
+    structure: Structure, nodes: Sequence[Point], sensors: tuple[DrawnSensor, ...]
+) -> Wireframe:
+    frame, mesh = structure.frame, structure.mesh
+    index = frame.joint_index
+    kept = np.full(len(mesh.xyz), -1)
+    stays = np.setdiff1d(np.arange(len(mesh.xyz)), mesh.oscillators)
+    kept[stays] = np.arange(len(stays))
+    rows = range(len(mesh.ends)) if nodes else range(0)
+    return Wireframe(
+        plane=frame.plane,
+        joints=tuple(
+            DrawnJoint(joint.name, to_point(joint.xyz), joint.type, k)
+            for k, joint in enumerate(frame.joints)
+        ),
+        members=tuple(
+            DrawnMember(m.name, (index[m.ends[0]], index[m.ends[1]]), m.elements)
+            for m in frame.members
+        ),
+        sensors=sensors,
+        supports=tuple(
+            DrawnSupport(to_point(place_xyz(frame, s.at)), tuple(s.fixed)) for s in frame.supports
+        ),
+        masses=tuple(DrawnMass(to_point(place_xyz(frame, m.at)), m.mass) for m in frame.masses),
+        springs=tuple(
+            DrawnSpring(
+                to_point(place_xyz(frame, spring.at)),
+                tuple(float(name == spring.direction[-1]) for name in "xyz"),
+                spring.stiffness,
+                "r" in spring.direction,
+            )
+            for spring in frame.springs
+        ),
+        nodes=tuple(nodes),
+        elements=tuple((int(kept[mesh.ends[k, 0]]), int(kept[mesh.ends[k, 1]])) for k in rows),
+        element_labels=tuple(structure.labels[k] for k in rows),
+        member_of=tuple(int(mesh.member[k]) for k in rows),
+    )

@@ -1,0 +1,1 @@
+"""Drawings with matplotlib, which is imported where something is drawn."""

@@ -1,0 +1,371 @@
+"""A diagnosis as drawings: residuals against the band of noise, evidence on the structure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from pydantic import ValidationError
+
+from femubench.core.case.case import Case
+from femubench.core.diagnosis.result import Diagnosis
+from femubench.core.diagnosis.serial import diagnosis_to_json
+from femubench.core.drawing.places import DrawnPlace, PlacedWireframe
+from femubench.core.drawing.wireframe import adapter
+from femubench.core.errors import InputError
+from femubench.core.plot.structure import (
+    View,
+    draw_lines,
+    draw_names,
+    draw_sensors,
+    draw_structure,
+    frame_axes,
+    view_of,
+)
+from femubench.core.plot.style import (
+    AFTER,
+    BEFORE,
+    COLOURS,
+    INK,
+    PAGE,
+    SOFT,
+    name_of,
+    own_axes,
+    place_names,
+)
+from femubench.core.typing import FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Data = Mapping[str, Any]
+Kind = Literal["frequency", "shape"]
+
+BAND = 2.0  # sigmas within which 19 of 20 data of pure noise lie
+MOST_ROWS = 60
+_PLAIN = 8.0  # up to here the axis is the same everywhere
+_FARTHEST = 1e12
+_LEVELS = 5
+_MOST_SPOTS, _LEAST = 14, 0.005  # what two decimals show
+_MOST_BADGES = 4  # of one place
+
+
+@dataclass(frozen=True)
+class ResidualDot:
+    """A dot before and a dot after, in standard deviations; None where nothing pairs."""
+
+    name: str
+    before: float | None
+    after: float | None
+    one_sided: bool = False
+
+    @property
+    def text(self) -> str:
+        """Return both values."""
+        return " → ".join(
+            "–" if v is None else format(v, ".2g" if self.one_sided else _signed(v))
+            for v in (self.before, self.after)
+        )
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A place with a value 0..1 and, where it is a cause, its numbers in the list of causes."""
+
+    place: str
+    value: float
+    causes: str = ""
+
+    @property
+    def level(self) -> int:
+        """Return the step 1..5 of the scale."""
+        return min(_LEVELS, max(1, math.ceil(self.value * _LEVELS)))
+
+
+def _data(diagnosis: Diagnosis | Data, case: Case | None = None) -> Data:
+    if isinstance(diagnosis, Diagnosis):
+        return diagnosis_to_json(diagnosis, case=diagnosis.extended if case is None else case)
+    if isinstance(diagnosis, Mapping) and {"residuals", "locations", "causes"} <= set(diagnosis):
+        return diagnosis
+    what = f"{type(diagnosis).__name__} is no diagnosis"
+    raise InputError(what, expected="a Diagnosis, or its JSON as a mapping")
+
+
+def residual_dots(diagnosis: Diagnosis | Data, kind: Kind) -> list[ResidualDot]:
+    """Return what `residuals` draws: every frequency and the mass, or every mode's shape.
+
+    Arguments:
+        diagnosis: or its JSON as plain data.
+        kind: ``shape`` for the root mean square of every mode over its sensors.
+
+    Raises:
+        InputError: for what is no diagnosis, or no such kind.
+    """
+    rows = _data(diagnosis)["residuals"]
+    if kind == "frequency":
+        named = {"frequency": "{mode}: {measured:.4g} Hz", "mass": "mass {measured:.4g} kg"}
+        return [
+            ResidualDot(
+                text.format(mode=row["mode"], measured=row["measured"] or math.nan),
+                row["before"],
+                row["after"],
+            )
+            for name, text in named.items()
+            for row in rows
+            if row["kind"] == name
+        ]
+    if kind != "shape":
+        raise InputError(f"no residuals of kind {kind!r}", expected="frequency or shape")
+    modes: dict[Any, list[Data]] = {}
+    for row in rows:
+        if row["kind"] == "shape":
+            modes.setdefault(row["mode"], []).append(row)
+    return [
+        ResidualDot(f"{mode}: {len(own)} sensors", _rms(own, "before"), _rms(own, "after"), True)
+        for mode, own in modes.items()
+    ]
+
+
+def _signed(value: float) -> str:
+    return "+.1f" if abs(value) < 1e4 else "+.2e"
+
+
+def _near(value: float) -> float:
+    return float(np.clip(value, -_FARTHEST, _FARTHEST))
+
+
+def _rms(rows: Sequence[Data], key: str) -> float | None:
+    known = [_near(row[key]) for row in rows if row[key] is not None]
+    return float(np.sqrt(np.mean(np.square(known)))) if known else None
+
+
+def residuals(
+    diagnosis: Diagnosis | Data, *, kind: Kind = "frequency", ax: Axes | None = None
+) -> Axes:
+    """Draw residuals before (hollow circles) and after (diamonds) in standard deviations.
+
+    The band of two sigmas is shaded: 19 of 20 data of pure noise lie in it. Beyond 8 the axis goes
+    on with the logarithm outside of the band. At most 60 rows are drawn.
+
+    Arguments:
+        diagnosis: or its JSON as plain data.
+        kind: ``frequency`` (and the mass), or ``shape``: root mean squares over the sensors.
+        ax: to draw on; None for axes of a new figure.
+
+    Raises:
+        InputError: when there are no residuals of that kind.
+    """
+    dots = residual_dots(diagnosis, kind)[:MOST_ROWS]
+    if not dots:
+        raise InputError(f"the diagnosis has no residuals of kind {kind!r}")
+    ax = own_axes(ax, (5.2, 1.0 + 0.27 * len(dots)))
+    one_sided = dots[0].one_sided
+    ax.axvspan(0.0 if one_sided else -BAND, BAND, color=COLOURS["band"], linewidth=0.0)
+    rows = range(len(dots))
+    for row, dot in zip(rows, dots, strict=True):
+        pair = [_near(v) for v in (dot.before, dot.after) if v is not None]
+        if len(pair) == 2:
+            ax.plot(pair, [row, row], color=SOFT, linewidth=0.9, linestyle=(0, (2, 2)))
+    for name, face, edge, mark in (("before", "none", BEFORE, "o"), ("after", AFTER, PAGE, "D")):
+        known = [(_near(v), k) for k in rows if (v := getattr(dots[k], name)) is not None]
+        across, down = zip(*known, strict=True) if known else ((), ())
+        look: dict[str, Any] = {"markerfacecolor": face, "markeredgecolor": edge, "markersize": 7.0}
+        ax.plot(
+            across, down, linestyle="none", marker=mark,
+            markeredgewidth=1.6 if mark == "o" else 0.6, label=name, **look,
+        )  # fmt: skip
+    _residual_axis(ax, dots, one_sided)
+    ax.set_yticks(list(rows), [name_of(dot.name, 24) for dot in dots])
+    ax.set_ylim(len(dots) - 0.4, -0.6)
+    beside = ax.secondary_yaxis("right")
+    beside.set_yticks(list(rows), [dot.text for dot in dots])
+    for side in (ax, beside):
+        side.tick_params(axis="y", length=0)
+        side.spines[:].set_visible(False)
+    ax.set_xlabel("standard deviations of the measurement")
+    ax.annotate(
+        "before → after", (1.0, 1.0), xycoords="axes fraction", xytext=(4.0, 3.0),
+        textcoords="offset points", fontsize=8.5, color=SOFT,
+    )  # fmt: skip
+    return ax
+
+
+def _residual_axis(ax: Axes, dots: Sequence[ResidualDot], one_sided: bool) -> None:
+    values = [abs(_near(v)) for dot in dots for v in (dot.before, dot.after) if v is not None]
+    largest = 1.06 * max([1.4 * BAND, *values])
+    sizes = [BAND * k for k in range(1, 5) if BAND * k <= largest]
+    if largest > _PLAIN:
+        ax.set_xscale("symlog", linthresh=BAND, linscale=0.7, subs=[])
+        step = 1 if largest < 2e3 else 3
+        sizes = [BAND, *(10.0**k for k in range(1, 13, step) if 10.0**k <= largest)]
+    ticks = sizes if one_sided else [*(-size for size in reversed(sizes)), 0.0, *sizes]
+    ticks = [0.0, *ticks] if one_sided else ticks
+    signed = "{:g}" if one_sided else "{:+g}"
+    texts = [signed.format(t).replace("-", "\N{MINUS SIGN}") if t else "0" for t in ticks]
+    ax.set_xticks(ticks, texts)
+    ax.set_xticks([], minor=True)
+    # A whole dot inside of the axes.
+    far = largest * (1.6 if largest > _PLAIN else 1.06)
+    ax.set_xlim(-0.08 * BAND if one_sided else -far, far)
+    ax.grid(axis="x", color=COLOURS["grid"], linewidth=0.7)
+    ax.axvline(0.0, color=SOFT, linewidth=0.8)
+    ax.set_axisbelow(True)
+
+
+def strongest_places(diagnosis: Diagnosis | Data, indicator: str = "evidence") -> list[Spot]:
+    """Return what `evidence` draws: places with their values, strongest first.
+
+    Places of causes are numbered, and in the list of the evidence however weak they are; of
+    another indicator elements and joints are kept alone where it tells them, as they say more than
+    the member that holds them.
+
+    Arguments:
+        diagnosis: or its JSON as plain data.
+        indicator: ``evidence``, or one of the classical indicators.
+    """
+    data = _data(diagnosis)
+    values: dict[str, float] = {}
+    for row in data["locations"]:
+        if row["indicator"] == indicator:
+            values[row["place"]] = min(1.0, max(0.0, row["value"] or 0.0))
+    ranked = sorted(values, key=lambda place: -values[place])
+    if indicator != "evidence":
+        known = [Spot(place, values[place]) for place in ranked if values[place] >= _LEAST]
+        joints = {joint["name"] for joint in (data.get("structure") or {}).get("joints", ())}
+        fine = [spot for spot in known if "/" in spot.place or spot.place in joints]
+        return fine if any("/" in spot.place for spot in known) else known
+    if data["verdict"] == "none":
+        return []
+    causes: dict[str, list[str]] = {}
+    for number, cause in enumerate(data["causes"], 1):
+        causes.setdefault(cause["place"], []).append(str(number))
+        values.setdefault(cause["place"], 0.0)
+    kept = [place for place in ranked[:_MOST_SPOTS] if values[place] >= _LEAST]
+    kept += [place for place in causes if place not in kept]
+    return [Spot(place, values[place], ", ".join(causes.get(place, ()))) for place in kept]
+
+
+def evidence(
+    diagnosis: Diagnosis | Data,
+    *,
+    case: Case | None = None,
+    indicator: str = "evidence",
+    names: bool = True,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw the structure with the places where something is missing: the thicker, the more likely.
+
+    A planar structure is drawn in its plane, any other one in a parallel projection from above a
+    corner. Places of causes carry the causes' numbers, a halo stands for evidence everywhere.
+
+    Arguments:
+        diagnosis: or its JSON as plain data, which holds the structure.
+        case: what was diagnosed, for its sensors; else the extended model is drawn.
+        indicator: ``evidence`` (probability of a cause at each place, 1 at the largest), or one of
+            the classical indicators.
+        names: whether joints, members, sensors and numbers of causes are drawn.
+        ax: to draw on; None for axes of a new figure.
+
+    Raises:
+        InputError: when there is no structure, or none with an extent.
+    """
+    data = _data(diagnosis, case)
+    structure = _structure(data.get("structure"))
+    spots = strongest_places(data, indicator)
+    return draw_spots(own_axes(ax, (6.0, 4.6)), structure, spots, names=names)
+
+
+def _structure(data: Data | None) -> PlacedWireframe:
+    if data is None:
+        raise InputError("the diagnosis holds no structure to draw")
+    try:
+        found: PlacedWireframe = adapter(PlacedWireframe).validate_python(data)
+    except ValidationError as error:
+        raise InputError(error.errors(include_url=False)[0]["msg"], key="structure") from error
+    return found
+
+
+def draw_spots(
+    ax: Axes, structure: PlacedWireframe, spots: Sequence[Spot], *, names: bool = True
+) -> Axes:
+    """Draw a structure with places of different strength.
+
+    Arguments:
+        spots: strongest first.
+        names: whether joints, members, sensors and numbers of causes are drawn.
+
+    Raises:
+        InputError: when the structure has no extent.
+    """
+    view = view_of(structure)
+    places = [structure.place(spot.place) for spot in spots]
+    if any(place.kind == "all" for place in places):
+        lines = view.flat(structure.lines)
+        draw_lines(ax, lines, colors=COLOURS["halo"], linewidths=11.0, gid="everywhere-1",
+                   label="_evidence for something everywhere")  # fmt: skip
+    draw_structure(ax, structure, view)
+    # Weak ones first, so that strong ones lie on top.
+    for number in reversed(range(len(spots))):
+        _draw_spot(ax, structure, view, spots[number], places[number], number)
+    room = 0.15 if names else 0.06
+    frame_axes(ax, view, view.flat(structure.points), pad=room, scales=False, directions=names)
+    if names:
+        draw_sensors(ax, structure, view)
+        taken = draw_names(ax, structure, view)
+        at, numbers = _badges(structure, view, spots, places)
+        badge = {"boxstyle": "round,pad=0.25,rounding_size=0.7", "facecolor": INK}
+        place_names(ax, at, numbers, avoid=taken, size=8.5, color=PAGE, weight="bold",
+                    bbox={**badge, "edgecolor": PAGE}, zorder=5)  # fmt: skip
+    return ax
+
+
+def _lines_of(structure: PlacedWireframe, view: View, place: DrawnPlace) -> FloatArray:
+    """Return the lines of a place on the page, (n, 2, 2)."""
+    if place.kind == "pair" and len(place.points) == 2:
+        return view.flat([place.points])
+    members = view.flat(structure.lines)
+    found = [
+        [(1.0 - s) * members[span.member, 0] + s * members[span.member, 1] for s in ends]
+        for span in place.spans
+        for ends in ((span.start, span.end),)
+    ]
+    return np.array(found).reshape(-1, 2, 2)
+
+
+def _draw_spot(
+    ax: Axes, structure: PlacedWireframe, view: View, spot: Spot, place: DrawnPlace, number: int
+) -> None:
+    colour, width = COLOURS[f"e{spot.level}"], 2.2 + 1.5 * spot.level
+    said: dict[str, Any] = {
+        "gid": f"at-{number}",
+        "label": f"_{name_of(spot.place)}: {spot.value:.2f}",
+    }
+    lines = _lines_of(structure, view, place)
+    if len(lines):
+        dashed = {"linestyles": (0, (1.2, 0.8)), "capstyle": "butt"}
+        more: dict[str, Any] = dashed if place.kind == "pair" else {}
+        draw_lines(ax, lines, colors=colour, linewidths=width, zorder=2.5, **said, **more)
+    if place.points and place.kind != "pair":
+        ax.plot(
+            *view.flat(place.points).T, linestyle="none", marker="o",
+            markersize=4.0 + 2.4 * spot.level, markerfacecolor=colour,
+            markeredgecolor=PAGE, markeredgewidth=0.8, zorder=2.6, **said,
+        )  # fmt: skip
+
+
+def _badges(
+    structure: PlacedWireframe, view: View, spots: Sequence[Spot], places: Sequence[DrawnPlace]
+) -> tuple[list[FloatArray], list[str]]:
+    """Return where the numbers of causes belong, at most four times each."""
+    at: list[FloatArray] = []
+    numbers: list[str] = []
+    for spot, place in zip(spots, places, strict=True):
+        anchors = list(_lines_of(structure, view, place).mean(axis=1))
+        anchors += [] if place.kind == "pair" else list(view.flat(place.points or np.empty((0, 3))))
+        if spot.causes:
+            at += anchors[:_MOST_BADGES]
+            numbers += [spot.causes] * len(anchors[:_MOST_BADGES])
+    return at, numbers

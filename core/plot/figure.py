@@ -1,0 +1,254 @@
+"""Figures of papers: what they show (curves, matrices, maps of a structure, bars), and as SVG."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from textwrap import fill
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from femubench.core.drawing.wireframe import Wireframe
+from femubench.core.plot.structure import draw_element_values
+from femubench.core.plot.style import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY,
+    SOFT,
+    curve_style,
+    figure_of,
+)
+from femubench.core.plot.svg import svg
+from femubench.core.typing import FloatArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+WIDTH = 7.3  # inch: 700 px at 96 px an inch
+_FILLS = (
+    *(("#FFFFFF", "////"), (ORANGE, ""), (SKY, "||||")),
+    *((GREEN, "\\\\\\\\"), (PURPLE, "xxxx"), (BLUE, "..")),
+)
+_MOST_LABELLED = 24  # bars with their value above them; more have no room
+_DECADES = 4
+_TITLE = 85  # characters on a line
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+Role = Literal["measured", "predicted", "nominal", "other"]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One line of a plot.
+
+    Arguments:
+        label: in the legend.
+        x, y: in the units of the axes, (n,).
+        role: decides the line's style, so that curves are told apart without colour.
+    """
+
+    label: str
+    x: FloatArray
+    y: FloatArray
+    role: Role = "predicted"
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Lines over one pair of axes.
+
+    Arguments:
+        name: slug, the stem of the file.
+        title, caption: a line, and what it shows and where it comes from.
+        x_label, y_label: with units.
+        curves: the lines.
+        log_y: whether the y axis is logarithmic.
+    """
+
+    name: str
+    title: str
+    caption: str
+    x_label: str
+    y_label: str
+    curves: tuple[Curve, ...]
+    log_y: bool = False
+
+
+@dataclass(frozen=True)
+class MatrixImage:
+    """Size of the entries of a matrix.
+
+    Arguments:
+        matrix: (n, m); drawn by absolute value on a logarithmic scale.
+        row_label, column_label, value_label: with units.
+        separators: indices before which a thin line is drawn, e.g. where a member ends.
+    """
+
+    name: str
+    title: str
+    caption: str
+    matrix: FloatArray
+    row_label: str
+    column_label: str
+    value_label: str
+    separators: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class StructureMap:
+    """A value for every element, drawn on the structure.
+
+    Arguments:
+        structure: with its mesh.
+        values: one an element, >= 0, (n,); printed beside the element too.
+        value_label: with unit.
+    """
+
+    name: str
+    title: str
+    caption: str
+    structure: Wireframe
+    values: FloatArray
+    value_label: str
+
+
+@dataclass(frozen=True)
+class Bars:
+    """Groups of bars.
+
+    Arguments:
+        groups: labels along the axis, (n,).
+        series: label and values, (n,) each; told apart by hatching.
+        value_label: with unit.
+        lines: horizontal marks, label and value.
+    """
+
+    name: str
+    title: str
+    caption: str
+    groups: tuple[str, ...]
+    series: tuple[tuple[str, tuple[float, ...]], ...]
+    group_label: str
+    value_label: str
+    lines: tuple[tuple[str, float], ...] = ()
+
+
+Figure = Curves | MatrixImage | StructureMap | Bars
+
+
+def drawn(figure: Figure) -> str:
+    """Return a figure as one ``<svg>`` element that needs no other file.
+
+    Arguments:
+        figure: what it shows.
+    """
+    draw = partial(draw_figure, figure)
+    return svg(draw, name=figure.name, title=figure.title, caption=figure.caption)
+
+
+def draw_figure(figure: Figure, ax: Axes) -> None:
+    """Draw a figure on axes, and set title and size of the figure that they lie in.
+
+    Arguments:
+        figure: what it shows.
+    """
+    painters: dict[type, Callable[[Any, Axes], None]] = {
+        Curves: _curves,
+        MatrixImage: _matrix,
+        StructureMap: _structure,
+        Bars: _bars,
+    }
+    title = fill(figure.title, _TITLE)
+    figure_of(ax).suptitle(title, x=0.01, ha="left", fontsize=11.0, parse_math=False)
+    painters[type(figure)](figure, ax)
+
+
+def _curves(figure: Curves, ax: Axes) -> None:
+    figure_of(ax).set_size_inches(WIDTH, 4.4)
+    seen: dict[str, int] = {}
+    for curve in figure.curves:
+        rank = seen.setdefault(curve.role, 0)
+        seen[curve.role] += 1
+        style = curve_style(curve.role, rank, len(curve.x))
+        ax.plot(curve.x, curve.y, label=curve.label, **style)
+    if figure.log_y:
+        ax.set_yscale("log")
+    ax.set_xlabel(figure.x_label)
+    ax.set_ylabel(figure.y_label)
+    ax.margins(x=0.01)
+    ax.grid(color="0.88", linewidth=0.6)
+    columns = min(len(figure.curves), 3)
+    figure_of(ax).legend(loc="outside lower center", ncols=columns, handlelength=3.6)
+
+
+def _structure(figure: StructureMap, ax: Axes) -> None:
+    draw_element_values(ax, figure.structure, figure.values, figure.value_label)
+    wide, tall = np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())
+    figure_of(ax).set_size_inches(WIDTH, min(8.0, max(3.2, 1.7 + 6.0 * tall / wide)))
+
+
+def _matrix(figure: MatrixImage, ax: Axes) -> None:
+    from matplotlib.colors import LogNorm
+    from matplotlib.ticker import FuncFormatter
+
+    rows, columns = figure.matrix.shape
+    figure_of(ax).set_size_inches(WIDTH, min(9.0, 1.1 + 5.3 * rows / columns))
+    size = np.abs(figure.matrix)
+    top = float(size.max()) or 1.0
+    image = ax.imshow(
+        np.ma.masked_less_equal(size, 0.0),
+        norm=LogNorm(top / 10.0**_DECADES, top),
+        cmap="Blues",
+        interpolation="nearest",
+        extent=(0.5, columns + 0.5, rows + 0.5, 0.5),
+    )
+    for index in figure.separators:
+        ax.axhline(index + 0.5, color="black", linewidth=0.5)
+        ax.axvline(index + 0.5, color="black", linewidth=0.5)
+    ax.set_xlabel(figure.column_label)
+    ax.set_ylabel(figure.row_label)
+    beside = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
+    bar = figure_of(ax).colorbar(image, cax=beside, extend="min", format=FuncFormatter(_power))
+    bar.set_label(figure.value_label)
+
+
+def _power(value: float, position: int | None) -> str:
+    exponent = round(np.log10(value))
+    return "10" + str(exponent).translate(_RAISED)
+
+
+def _bars(figure: Bars, ax: Axes) -> None:
+    figure_of(ax).set_size_inches(WIDTH, 4.6)
+    count = len(figure.series)
+    width = 0.86 / count
+    where: FloatArray = np.arange(len(figure.groups), dtype=float)
+    for rank, (label, values) in enumerate(figure.series):
+        colour, hatch = _FILLS[rank % len(_FILLS)]
+        place = where + (rank - 0.5 * (count - 1)) * width
+        bars = ax.bar(
+            place, values, 0.92 * width,
+            label=label, color=colour, hatch=hatch, edgecolor="black", linewidth=0.8,
+        )  # fmt: skip
+        texts = [f"{value:.1f}".replace("-", "−") for value in values]
+        if count * len(figure.groups) <= _MOST_LABELLED:
+            ax.bar_label(bars, texts, padding=2.0, fontsize=9.0)
+    for rank, (label, value) in enumerate(figure.lines):
+        style = ("--", ":", "-.")[rank % 3]
+        ax.axhline(value, color=SOFT, linewidth=1.2, linestyle=style, label=label, zorder=0)
+    ax.axhline(0.0, color="black", linewidth=0.8)
+    ax.set_xticks(where, list(figure.groups))
+    ax.set_xlabel(figure.group_label)
+    ax.set_ylabel(figure.value_label)
+    ax.margins(x=0.01, y=0.1)
+    handles, labels = ax.get_legend_handles_labels()
+    order = [*range(len(figure.lines), len(labels)), *range(len(figure.lines))]
+    figure_of(ax).legend(
+        [handles[i] for i in order],
+        [labels[i] for i in order],
+        loc="outside lower center",
+        ncols=2,
+    )

@@ -1,0 +1,90 @@
+"""Receptances over frequency: of the measured modes, of the nominal model and of updated ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from femubench.core.case.case import Case
+from femubench.core.drawing.prediction import (
+    drive_sensor,
+    frequency_axis,
+    measured_receptances,
+    receptances,
+)
+from femubench.core.errors import InputError
+from femubench.core.fem.model import Model
+from femubench.core.plot.style import check_kind, curve_style, name_of, own_axes
+from femubench.core.update.strategy import UpdateResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Updated = Model | UpdateResult
+
+
+def receptance(
+    case: Case,
+    models: Updated | Mapping[str, Updated] | None = None,
+    *,
+    sensor: str | None = None,
+    modification: str | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw displacement over force at one sensor, force at the same place, in dB re 1 m/N.
+
+    The measured curve is made of the measured modes; a test of shapes without scale gives no modal
+    masses, so that those of the nominal model stand in, as do its rigid-body and higher modes.
+
+    Arguments:
+        case: its measured modes and its nominal model are drawn.
+        models: updated models of the case, by name.
+        sensor: label of a sensor of a displacement; None for the one that sees all used modes best.
+        modification: name of a known change of the structure; None for the structure as tested.
+        ax: to draw on; None for axes of a new figure.
+
+    Raises:
+        InputError: when there is no such sensor or modification, or no measured shape.
+    """
+    check_kind(case, (Case,), "receptance")
+    label = _sensor(case, sensor)
+    known = {change.name: change.name for change in case.modifications}
+    if modification is not None and modification not in known:
+        expected = ", ".join(known) or "none: the case has no modifications"
+        raise InputError(f"there is no modification {modification!r}", expected=expected)
+    change = modification or ""
+    named = models if isinstance(models, Mapping) else {} if models is None else {"updated": models}
+    measured = measured_receptances(case, label)["measured"].get(change)
+    curves = [("measured modes", "measured", measured)] if measured is not None else []
+    curves.append(("nominal model", "nominal", receptances(case, case.model, label)[change]))
+    for name, item in named.items():
+        check_kind(item, (Model, UpdateResult), "receptance")
+        model = item.model if isinstance(item, UpdateResult) else item
+        curves.append((name, "predicted", receptances(case, model, label)[change]))
+    ax = own_axes(ax, (7.0, 4.0))
+    hz = frequency_axis(case)
+    for k, (name, role, levels) in enumerate(curves):
+        rank = sum(other == role for _, other, _ in curves[:k])
+        ax.plot(hz, levels, label=name_of(name), **curve_style(role, rank, len(hz)))
+    ax.set_xlabel("frequency, Hz")
+    ax.set_ylabel(f"receptance at {name_of(label)}, dB re 1 m/N")
+    ax.margins(x=0.01)
+    ax.grid(color="0.88", linewidth=0.6)
+    ax.legend(fontsize=8.5, handlelength=3.6)
+    return ax
+
+
+def _sensor(case: Case, sensor: str | None) -> str:
+    sensors = case.measurement.sensors
+    moving = [
+        label
+        for label, name in zip(sensors.labels, sensors.directions, strict=True)
+        if "r" not in name
+    ]
+    if sensor is not None and sensor not in moving:
+        expected = f"one of {', '.join(moving)}"
+        raise InputError(f"there is no displacement sensor {sensor!r}", expected=expected)
+    label = sensor or drive_sensor(case)
+    if label is None:
+        raise InputError("the case has no measured shape", expected="a sensor that sees a mode")
+    return label

@@ -1,0 +1,144 @@
+"""An effect of somebody else is worded, drawn, swept, advised and looked for like ours."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent / "toys"))
+from stranger_effects import CAUTION, SUMMARY, Bare, Plain, Skin
+
+from femubench import Diagnosis, Effect, Model, diagnose, registered_effects
+from femubench.core.case.case import Case
+from femubench.core.challenge import draw
+from femubench.core.challenge.draw import BlindCase, draw_case
+from femubench.core.challenge.sweep import Task, run_task
+from femubench.core.conformance.checking import findings, subjects
+from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
+from femubench.core.look.look import look
+from femubench.core.plugin.loader import load_plugins
+from femubench.reports.diagnosis import diagnosis_text
+from femubench.reports.diagnosis_page import diagnosis_html
+from femubench.reports.figures import figure, signed
+
+OURS = ("youngs-modulus", "density", "torsion-constant")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Install the package of the stranger, as pip would."""
+    folder = tmp_path_factory.mktemp("site")
+    info = folder / "strangers-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: strangers\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[femubench]\nstrangers = stranger_effects\n")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(folder)
+        draw.registered_effects.cache_clear()
+        yield
+    draw.registered_effects.cache_clear()
+
+
+def known(*names: str) -> list[Effect]:
+    return [effect for effect in registered_effects() if effect.name in names]
+
+
+@pytest.fixture(scope="module")
+def blind() -> BlindCase:
+    return draw_case(3, "A", effect=Skin.name)
+
+
+@pytest.fixture(scope="module")
+def found(blind: BlindCase) -> Diagnosis:
+    return diagnose(blind.case, known(Skin.name, *OURS))
+
+
+def test_it_keeps_the_rules() -> None:
+    plugins = load_plugins()
+    assert plugins.broken == ()
+    for name in (Skin.name, Bare.name, Plain.name):
+        (subject,) = subjects(name, plugins)
+        faults = [f for f in findings(subject) if f.verdict.status in ("fail", "warn")]
+        assert faults == []
+
+
+def test_it_is_drawn_from_its_own_range() -> None:
+    sizes = [draw_case(seed, "C", effect=Skin.name).truth.causes[0].values[0] for seed in range(8)]
+    assert all(0.2 <= size <= 0.3 for size in sizes)
+    assert len(set(sizes)) == 8
+
+
+def test_without_a_range_it_is_drawn_from_its_prior() -> None:
+    sizes = [draw_case(seed, "C", effect=Bare.name).truth.causes[0].values[0] for seed in range(8)]
+    assert all(0.05 <= size <= 0.2 for size in sizes)
+
+
+def test_it_is_named_with_its_clause_caution_and_size_in_percent(
+    blind: BlindCase, found: Diagnosis
+) -> None:
+    assert found.verdict == "named"
+    assert found.sentence.startswith("The model lacks stiff-skin (probability ")
+    (cause,) = found.causes
+    (size,) = cause.parameters
+    assert (cause.effect, cause.summary, size.wording) == (Skin.name, SUMMARY, "change")
+    assert size.value == pytest.approx(blind.truth.causes[0].values[0], abs=0.02)
+    assert CAUTION in found.notes
+    data: dict[str, Any] = diagnosis_from_json(diagnosis_to_json(found, case=blind.case))
+    page, text = diagnosis_html(data).replace("\xa0", " "), diagnosis_text(data)
+    assert SUMMARY in " ".join(text.split())
+    assert CAUTION in " ".join(text.split())
+    assert f"({signed(100.0 * size.value)} ±" in page
+    assert f"{SUMMARY[0].upper()}{SUMMARY[1:]}" in page
+    (visible,) = [row for row in found.smallest_visible if row.effect == Skin.name]
+    assert f"({figure(100.0 * visible.size, 2)} %)" in page
+
+
+def test_its_own_look_is_taken(blind: BlindCase, found: Diagnosis) -> None:
+    (warning,) = [item for item in found.looks if item.effect == Skin.name]
+    assert warning.what.startswith("A skin of a tenth of the stiffness would show: it changes mode")
+    # Ten per cent of bending stiffness are at most half of that in a frequency.
+    changes = np.array([percent for _, percent in warning.changes])
+    assert 2.0 < changes.max() <= 100.0 * (np.sqrt(1.1) - 1.0) + 1e-9
+    alone = look(blind.case.model, blind.case.used_measurement(), effects=[Skin()])
+    assert [item for item in alone if item.effect] == [warning]
+
+
+def test_the_advice_reads_it_and_asks_for_a_second_level() -> None:
+    """Another cause with the same matrices stands beside it: only a reading tells them apart."""
+    case = draw_case(3, "A", effect=Skin.name).case
+    both = diagnose(case, known(Skin.name, Plain.name))
+    assert both.verdict == "ambiguous"
+    assert {cause.effect for cause in both.causes} == {Skin.name, Plain.name}
+    assert next(c for c in both.causes if c.effect == Plain.name).summary == ""
+    texts = [item.measurement for item in both.advice]
+    assert texts[0] == "measure the skin with a gauge"
+    # What is stiffer than the model has not softened with the amplitude.
+    assert not any("looks like" in text for text in texts)
+    soft = softer(case)
+    level = [item.measurement for item in soft.advice if "looks like" in item.measurement]
+    assert level == [
+        "measure at twice the excitation level: a stiffness that falls with the amplitude looks "
+        "like stiff-skin"
+    ]
+
+
+def softer(case: Case) -> Diagnosis:
+    """Return the diagnosis of data that ask for less bending stiffness than the model has."""
+    frame = Skin().frame(case.model.frame_structure.frame, "all", [0.6])
+    model = Model.of(case.model.frame_structure.rebuilt(frame))
+    return diagnose(replace(case, model=model), known(Skin.name, Plain.name))
+
+
+def test_the_sweep_draws_it_by_itself_and_judges_what_is_said_of_it() -> None:
+    drawn = (Task("A", k, 500 + k, "A", "ladder", "one", 0.0) for k in range(400))
+    task = next(t for t in drawn if t.draw().truth.causes[0].effect == Skin.name)
+    record = run_task(task, lambda case: diagnose(case, known(Skin.name, *OURS)))
+    assert record["effects"] == record["named"] == [Skin.name]
+    assert record["right"]
+    assert record["verdict"] == "named"

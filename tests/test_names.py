@@ -1,0 +1,58 @@
+"""No name of a particular effect, strategy or scenario stands in the core or in the reports."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from femubench.core.plugin.loader import Plugins, load_plugins
+
+ROOT = Path(__file__).parents[1]
+SUFFIXES = (".py", ".js", ".html", ".jinja")
+# Words of models and of English that are names too, and what a line says that may have them.
+ALLOWED = {
+    "frame": r"kind\b|'frame' or 'matrices'|`parameters` and `frame`",  # kind of model, a method
+    "density": r"rhoA|\"E\"",  # a quantity of elements, beside the others
+    "spring": r"quantity|properties|lookup|weights|name|property|rigid|: \(\)|counted",  # likewise
+    "offset": r"`offset` \(global",  # where a point mass sits
+    "hframe": r"\"hframe\": _hframe",  # a structure of the challenge; in its seeds
+    "physical": r"\"unphysical\"",  # a label beside its contrary
+}
+
+
+def names_of(plugins: Plugins) -> set[str]:
+    cases = {case for scenario in plugins.scenarios.values() for case in scenario.cases}
+    return {*plugins.effects, *plugins.strategies, *plugins.scenarios, *cases}
+
+
+def found_in(text: str, names: set[str]) -> Iterator[tuple[int, str]]:
+    """Return line numbers and names: in quotes of any kind, those with a dash also without."""
+    quoted = re.compile("[\"'`](" + "|".join(map(re.escape, names)) + ")[\"'`]")
+    dashed = "|".join(re.escape(name) for name in sorted(names, key=len)[::-1] if "-" in name)
+    bare = re.compile(rf"(?<![\w-])({dashed})(?![\w-])")
+    for number, line in enumerate(text.splitlines(), start=1):
+        for match in (*quoted.finditer(line), *bare.finditer(line)):
+            name = match[1]
+            if name not in ALLOWED or not re.search(ALLOWED[name], line):
+                yield number, name
+
+
+def test_core_and_reports_know_no_plugin_by_name() -> None:
+    names = names_of(load_plugins())
+    assert len(names) > 40
+    files = [p for room in ("core", "reports") for p in (ROOT / room).rglob("*")]
+    texts = {p: p.read_text(encoding="utf-8") for p in files if p.suffix in SUFFIXES}
+    assert len(texts) > 150
+    met = [
+        f"{path.relative_to(ROOT)}:{number}: {name}"
+        for path, text in sorted(texts.items())
+        for number, name in found_in(text, names)
+    ]
+    assert met == []
+
+
+def test_the_search_itself_finds_names() -> None:
+    names = {"kabe-rigid", "frame", "density", "unchanged"}
+    text = "x = 'unchanged'\nkind = \"frame\"\nlike kabe-rigid, said\ny = `frame`\nnot-kabe-rigid-2"
+    assert list(found_in(text, names)) == [(1, "unchanged"), (3, "kabe-rigid"), (4, "frame")]

@@ -1,0 +1,159 @@
+"""What a start loads and what an install brings: no clock, but the imports that cost."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from femubench import InputError
+from femubench.core.cli.main import bench
+from femubench.core.plot.style import own_axes, report_style
+from femubench.core.plugin.loader import load_plugins
+from femubench.core.plugin.validation import CHECKS
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+ROOMS = ("core", "papers", "plugins", "reports", "scenarios", "femubench")
+FILES = sorted({path.resolve() for room in ROOMS for path in (ROOT / room).rglob("*.py")})
+# What a list of names has no use for.
+HEAVY = {
+    *("scipy", "pandas", "matplotlib", "pydantic", "pydantic_core", "rich", "jinja2", "psutil"),
+    *("tabulate", "threadpoolctl", "tomlkit", "pyuff", "pyarrow"),
+}
+# Imported under a name of its own, as the package that brings it documents.
+PART_OF = {"pydantic_core": "pydantic", "markupsafe": "jinja2"}
+RUN = """
+import sys
+from femubench.core.cli.main import bench
+try:
+    bench(sys.argv[1:])
+except SystemExit as end:
+    print("\\n" + " ".join(sys.modules))
+    raise
+"""
+
+
+def started(words: str) -> tuple[int, str, set[str]]:
+    """Return exit code, stderr and modules of ``bench`` in a fresh interpreter."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    command = [sys.executable, "-c", RUN, *words.split()]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    return done.returncode, done.stderr, set(done.stdout.splitlines()[-1].split())
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("plugins list", ""),
+        ("scenarios list", ""),
+        ("run --help", ""),
+        ("report --help", ""),
+        ("run frmae", "no case 'frmae'; did you mean 'frame'"),
+        ("run -s barcuh", "no strategy 'barcuh'; did you mean 'baruch'"),
+        ("scenarios show nosuch", "no case 'nosuch'"),
+        ("diagnose nosuch", "no case 'nosuch'"),
+        ("diagnose frame --effects desnity", "no effect 'desnity'; did you mean 'density'"),
+        ("report -f htlm", "no report format 'htlm'; did you mean 'html'"),
+        ("reproduce fram", "no paper 'fram'; did you mean 'frame'"),
+        ("plugins show barcuh", "no plugin offers 'barcuh'; did you mean 'baruch'"),
+        ("plugins check barcuh", "'barcuh'; did you mean 'baruch'"),
+    ],
+)
+def test_names_are_looked_up_without_the_numerics(words: str, says: str) -> None:
+    code, stderr, modules = started(words)
+    assert code == (2 if says else 0), stderr
+    assert says in stderr
+    assert "femubench.core.plugin.loader" in modules
+    assert not {module.partition(".")[0] for module in modules} & HEAVY
+    own = re.compile(r"femubench\.(plugins\.\w+|reports|scenarios)\.\w+")
+    assert not [module for module in modules if own.fullmatch(module)]
+
+
+def test_every_builtin_loads_under_the_name_it_is_offered_by() -> None:
+    plugins = load_plugins()
+    for kind in CHECKS:
+        offered = getattr(plugins, kind)
+        assert len(offered) > 0
+        assert [offer.name for offer in offered.values()] == list(offered)
+
+
+def third_party(path: Path) -> Iterator[tuple[str, bool]]:
+    """Return the packages of others that a file imports, and whether as soon as it is loaded."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    skipped = {
+        inner
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+        for inner in ast.walk(node)
+    }
+    inside = {
+        inner
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef)
+        for inner in ast.walk(node)
+    }
+    for node in ast.walk(tree):
+        if node in skipped or not isinstance(node, ast.Import | ast.ImportFrom):
+            continue
+        modules = (
+            [alias.name for alias in node.names]
+            if isinstance(node, ast.Import)
+            else [node.module or ""]
+        )
+        for module in modules:
+            name = module.partition(".")[0]
+            if name not in sys.stdlib_module_names and name != "femubench":
+                yield PART_OF.get(name, name), node not in inside
+
+
+def names(requirements: list[str]) -> set[str]:
+    """Return the packages that requirements name."""
+    return {re.split(r"[^\w-]", text)[0].lower().replace("-", "_") for text in requirements}
+
+
+def test_dependencies_are_what_is_imported() -> None:
+    found = {entry for path in FILES for entry in third_party(path)}
+    extras = PROJECT["optional-dependencies"]
+    needed = names(PROJECT["dependencies"])
+    optional = names([*extras["parquet"], *extras["plot"]])
+    # pytest loads the plugin for pytest itself.
+    assert {name for name, _ in found} == needed | optional | {"pytest"}
+    assert not {name for name, at_once in found if at_once} & optional
+
+
+def test_help_names_every_report_format() -> None:
+    text = " ".join(CliRunner().invoke(bench, ["report", "--help"]).output.split())
+    (listed,) = re.findall(r"FORMAT (.*?); several with commas", text)
+    assert [word.split()[0] for word in listed.split(", ")] == list(load_plugins().reporters)
+
+
+def test_without_matplotlib_a_page_with_drawings_is_refused_before_the_search(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.setattr("femubench.core.cli.diagnose._diagnosed", None)
+    page = tmp_path / "page.html"
+    result = CliRunner().invoke(bench, ["diagnose", "frame", "--report", str(page)])
+    assert (result.exit_code, page.exists()) == (2, False)
+    assert result.stderr == (
+        "bench: a page with drawings needs matplotlib (expected pip install 'femubench[plot]')\n"
+    )
+
+
+def test_without_matplotlib_a_drawing_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(InputError, match=re.escape("pip install 'femubench[plot]'")):
+        own_axes(None)
+    with pytest.raises(InputError, match="a drawing needs matplotlib"), report_style("mac"):
+        pass
