@@ -4,6 +4,7 @@
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV ?= .venv
 ARGS ?=
+KERNELS ?= SkylakeX Haswell Nehalem Sandybridge Zen
 
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
@@ -13,7 +14,7 @@ $(error femubench/core is no link to the folder core: clone once more with \
   `git clone -c core.symlinks=true` (on Windows, in developer mode))
 endif
 
-.PHONY: run test docs bench sweep fuzz format clean
+.PHONY: run test docs kernels bench sweep fuzz format clean
 .DELETE_ON_ERROR:
 
 run: $(VENV)/.installed
@@ -30,6 +31,19 @@ test: $(VENV)/.installed-test
 docs: $(VENV)/.installed-test
 	$(BIN)/sphinx-build -q -E -W --keep-going -c docs -b html . build/site $(ARGS)
 	@echo "build/site/index.html"
+
+# Tests whose figures go through linear algebra; KERNELS are those of OpenBLAS, of which a processor
+# without AVX-512 runs all but SkylakeX, and every x86-64 runs Nehalem.
+NUMERICAL := $(addprefix tests/test_,advice*.py assembly.py asymmetric_frame.py attach*.py \
+	beam_elements.py challenge.py close_modes.py condensation.py diagnos*.py effects_*.py eigen.py \
+	element_strategies.py exhibits.py expansion.py frame_extensions.py frf.py kernels.py \
+	localisation.py look*.py matrix_strategies.py pairing.py papers_*.py preload.py rigid_modes.py \
+	scenarios.py scoring.py sections.py sensitiv*.py sparse_eigen.py)
+
+kernels: $(VENV)/.installed-test
+	for kernel in $(KERNELS); do \
+		echo "OPENBLAS_CORETYPE=$$kernel"; \
+		OPENBLAS_CORETYPE=$$kernel $(BIN)/pytest $(or $(ARGS),$(NUMERICAL)) || exit 1; done
 
 bench: $(VENV)/.installed-test
 	$(BIN)/pytest benchmarks -o addopts="--import-mode=importlib -ra" --benchmark-only $(ARGS)

@@ -2,6 +2,7 @@
 
     python benchmarks/diagnosis_sweep.py run --jobs 2          # appends, goes on where it stopped
     python benchmarks/diagnosis_sweep.py tables                # table, confusion, calibration
+    python benchmarks/diagnosis_sweep.py kernels --cases 13    # does rounding change an answer?
 
 The figures need `pip install femubench[figures]`.
 """
@@ -11,6 +12,8 @@ from __future__ import annotations
 import argparse
 import json
 import multiprocessing
+import os
+import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterable, Sequence
@@ -78,6 +81,29 @@ def run(path: Path, wanted: Sequence[Task], jobs: int) -> None:
             mark = "right" if record["right"] else "WRONG"
             line = f"{i}/{len(rest)} {mark} {record['group']} {record['seed']}"
             print(f"{line}: {record['truth']} -> {record['verdict']}", file=sys.stderr)
+
+
+def run_kernels(path: Path, kernels: Sequence[str], arguments: Sequence[str]) -> list[Path]:
+    """Run the sweep under several kernels of OpenBLAS; return the results file of each."""
+    files = [path.with_stem(f"{path.stem}-{kernel}") for kernel in kernels]
+    for kernel, file in zip(kernels, files, strict=True):
+        command = [sys.executable, __file__, "run", *arguments, "--results", str(file)]
+        subprocess.run(command, check=True, env={**os.environ, "OPENBLAS_CORETYPE": kernel})
+    return files
+
+
+def differing(first: Sequence[Record], second: Sequence[Record]) -> tuple[int, list[str]]:
+    """Return how many cases two results share, and a line for each that they answer differently."""
+    others = {(record["group"], record["number"]): record for record in second}
+    both = [(a, others[key]) for a in first if (key := (a["group"], a["number"])) in others]
+    lines = []
+    for one, two in both:
+        for what in ("truth", "verdict", "named", "named_places"):
+            if one.get(what) != two.get(what):
+                where = f"{one['group']} {one['seed']}: {what}"
+                lines.append(f"{where} {one.get(what)} / {two.get(what)}")
+                break
+    return len(both), lines
 
 
 def group_rows(records: Sequence[Record]) -> list[dict[str, str]]:
@@ -250,7 +276,8 @@ several effects which the data cannot distinguish, and how many on average.
 def main() -> None:
     """Run the sweep, or write its page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("run", "tables"))
+    parser.add_argument("what", choices=("run", "tables", "kernels"))
+    parser.add_argument("--kernels", nargs=2, default=("Nehalem", "Haswell"), help="of OpenBLAS")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     parser.add_argument("--cases", type=int, default=None, help="at most so many of each group")
     parser.add_argument("--groups", default="", help="groups by name, parted by semicolons")
@@ -265,6 +292,13 @@ def main() -> None:
         chosen = [group for group in GROUPS if not names or group.name in names]
         run(options.results, tasks(chosen, options.cases), options.jobs)
         return
+    if options.what == "kernels":
+        given = ["--jobs", str(options.jobs), "--groups", options.groups]
+        given += ["--cases", str(options.cases)] if options.cases is not None else []
+        files = run_kernels(options.results, options.kernels, given)
+        count, lines = differing(*map(read_records, files))
+        print(*lines, f"{len(lines)} of {count} answers differ", sep="\n")
+        sys.exit(bool(lines))
     records = read_records(options.results)
     if not records:
         parser.error(f"no results in {options.results}: run the sweep first")

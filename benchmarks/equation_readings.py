@@ -13,7 +13,9 @@ import numpy as np
 import scipy.linalg as la
 from ladder_settings import Setting, patterns, setting
 
-from femubench import FloatArray, StrategyFailure, pair_modes
+from femubench import StrategyFailure
+from femubench.fem import FloatArray
+from femubench.modal import pair_modes
 
 SOFT = 1e4  # rad2/s2: makes K + s M of a free structure invertible
 

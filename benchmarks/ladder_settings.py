@@ -11,23 +11,12 @@ import numpy as np
 import scipy.linalg as la
 
 import femubench.scenarios
-from femubench import (
-    ElementFamily,
-    FloatArray,
-    Frame,
-    Model,
-    Sensors,
-    Structure,
-    generic_family,
-    nobari_family,
-    physical_family,
-    read_case,
-    rectangular_tube,
-    rigid_modes_of,
-    solve_modes,
-)
+from femubench import Model, Sensors, read_case, solve_modes
+from femubench.fem import FloatArray, Frame, Structure, rectangular_tube
+from femubench.modal import rigid_modes_of
 from femubench.scenarios.generate import ladder_sensors
 from femubench.scenarios.structures import HALF_SIDE, RUNG, ladder_truth
+from femubench.update import ElementFamily, generic_family, nobari_family, physical_family
 
 FRAME = Path(femubench.scenarios.__file__).parent / "frame"
 BREDT = 2.9033e-8  # m4

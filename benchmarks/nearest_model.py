@@ -8,7 +8,8 @@ from equation_readings import Reading, expanded, modes_of, nominal_of, system
 from ladder_settings import patterns
 from scipy.optimize import least_squares
 
-from femubench import FloatArray, StrategyFailure
+from femubench import StrategyFailure
+from femubench.fem import FloatArray
 
 
 def nearest_with(reading: Reading, target: FloatArray) -> tuple[float, float, float, float]:

@@ -22,7 +22,8 @@ from open_cells_choices import ALONE, AXES, CLOSING, EXPANSIONS, WEIGHTS
 from open_cells_numbering import DIRECTIONS, SHAPES, direction
 from threadpoolctl import threadpool_limits
 
-from femubench import FloatArray, StrategyFailure
+from femubench import StrategyFailure
+from femubench.fem import FloatArray
 from femubench.papers.printed import printed
 
 PAGE = Path(__file__).parents[1] / "docs" / "open-cells.md"

@@ -16,21 +16,11 @@ from unittest.mock import patch
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from femubench import (
-    Case,
-    Effect,
-    FemubenchError,
-    JobResult,
-    Model,
-    NotApplicable,
-    Run,
-    Strategy,
-    leaderboard,
-    read_case,
-    score_model,
-)
+from femubench import Case, FemubenchError, Model, NotApplicable, Run, Strategy, read_case
 from femubench.core.plugin.loader import load_plugins
+from femubench.effect import Effect
 from femubench.plugins.strategies import diagnosed
+from femubench.results import JobResult, leaderboard, score_model
 
 FIGURES = Path(__file__).parents[1] / "docs" / "figures" / "textbook-start.json"
 

@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from femubench import Study, Workbench
+    from femubench.reproduction import Study, Workbench
 
 # Slug: the cases that a re-run works with.
 PAPERS = {

@@ -6,8 +6,9 @@ import io
 import json
 from typing import NoReturn
 
-from femubench import InputError, Run, results_frame
+from femubench import InputError, Run
 from femubench.reports.summary import notes_of
+from femubench.results import results_frame
 
 
 class ParquetReporter:

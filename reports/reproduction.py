@@ -5,7 +5,6 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from femubench import Cell, Extra, Figure, Study, verdict_counts
 from femubench.reports.blocks import (
     Block,
     Column,
@@ -21,6 +20,7 @@ from femubench.reports.digits import Digits, off
 from femubench.reports.html import to_html
 from femubench.reports.markdown import escape
 from femubench.reports.terminal import WIDTH
+from femubench.reproduction import Cell, Extra, Figure, Study, verdict_counts
 
 Drawings = Mapping[str, str]  # name of a figure -> SVG
 

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from femubench import JobResult, PairedMode, Run, frequency_error
+from femubench import Run
 from femubench.reports.cells import plain
+from femubench.results import JobResult, PairedMode, frequency_error
 
 FINE = ("ok", "not-applicable")
 

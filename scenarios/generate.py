@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from femubench import GroundSpring, Model, Place, PointMass, Sensors, rectangular_tube, solve_modes
+from femubench import Model, Sensors, solve_modes
+from femubench.fem import GroundSpring, Place, PointMass, rectangular_tube
 from femubench.scenarios.structures import HALF_SIDE, RUNG, ladder_truth
 from femubench.scenarios.twin_data import loaded_shapes, twin_modes
 

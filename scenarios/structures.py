@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from femubench import Frame, Joint, JointSpring, Material, Member, Section
+from femubench.fem import Frame, Joint, JointSpring, Material, Member, Section
 
 HALF_SIDE = 0.2921  # m, centre line
 RUNG = 0.2794  # m, centre line

@@ -11,7 +11,9 @@ import numpy.typing as npt
 import pandas as pd
 import scipy.linalg as la
 
-from femubench import Model, PointMass, Sensors, read_case, rigid_modes_of
+from femubench import Model, Sensors, read_case
+from femubench.fem import PointMass
+from femubench.modal import rigid_modes_of
 
 TWIN = Path(__file__).parent / "twin"
 Array = npt.NDArray[np.float64]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from femubench import Case, FloatArray, Frame, Measurement, Model, Sensors, solve_modes, total_mass
+from femubench import Case, Measurement, Model, Sensors, solve_modes
 from femubench.core.case.modes import NO_SENSORS
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.inference.examine import posed
@@ -21,6 +21,8 @@ from femubench.core.inference.projection import Projection
 from femubench.core.inference.residuals import Data
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.roles import Effect
+from femubench.effect import total_mass
+from femubench.fem import FloatArray, Frame
 
 FREQUENCY_STD, SHAPE_STD, MASS_STD = 0.002, 0.015, 0.002
 

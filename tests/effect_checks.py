@@ -7,9 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femubench import Change, Effect, FloatArray, Model, Sensors, once_for, solve_modes
+from femubench import Model, Sensors, solve_modes
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.modal.eigen import solve_dense
+from femubench.effect import Change, Effect, once_for
+from femubench.fem import FloatArray
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from femubench import registered_effects
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
@@ -12,6 +11,7 @@ from femubench.core.look import look as core_look
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.schema.diagnosis import LookWarning
+from femubench.diagnosis import registered_effects
 
 
 def look(

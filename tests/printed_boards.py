@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from femubench import Run, leaderboard
+from femubench import Run
+from femubench.results import leaderboard
 
 ROOT = Path(__file__).parents[1]
 # Counts of evaluations and seconds are those of one machine.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,14 +11,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from femubench import (
-    Frame,
-    Model,
-)
+from femubench import Model
 from femubench.core.advise.advice import advise
 from femubench.core.inference.fit import fit
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.residuals import Data
+from femubench.fem import Frame
 from femubench.plugins.effects.density import Density
 from femubench.plugins.effects.joint_rotation import JointRotation
 from femubench.plugins.effects.shear_deformation import ShearDeformation
@@ -148,14 +145,3 @@ class TestGroups:
         assert nothing is not None
         bare = advise(symmetric, [above, plain], [nothing, fits[1]], tolerance=0.0)
         assert bare[0].separation > 50.0
-
-    def test_quick_enough(self, symmetric: Model) -> None:
-        truth = JointRotation().extend(symmetric, "A", [3000.0])
-        problem = posed(symmetric, truth, [JointRotation()])
-        fits = [fitted(problem, JointRotation(), place) for place in ("A", "C", "D", "F")]
-        spent = []
-        for _ in range(3):
-            begin = time.perf_counter()
-            advised(symmetric, problem, fits)
-            spent.append(time.perf_counter() - begin)
-        assert min(spent) < 0.15

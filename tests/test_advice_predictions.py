@@ -13,17 +13,7 @@ import scipy.linalg as la
 from numpy.testing import assert_allclose
 from scipy.special import logsumexp
 
-from femubench import (
-    FloatArray,
-    Frame,
-    Model,
-    Place,
-    PointMass,
-    Support,
-    point_in,
-    solve_modes,
-    translation_rows,
-)
+from femubench import Model, solve_modes
 from femubench.core.advise import point_attachments as advice_points
 from femubench.core.advise.advice import aligned
 from femubench.core.advise.point_attachments import antiresonances, loaded_frequencies
@@ -31,6 +21,8 @@ from femubench.core.advise.prediction import Outlook, Points, Predicted, distanc
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.fem.model import Dofs
 from femubench.core.inference.fit import Fit, fit, state_at
+from femubench.effect import point_in, translation_rows
+from femubench.fem import FloatArray, Frame, Place, PointMass, Support
 from femubench.plugins.effects.added_mass import AddedMass
 from femubench.plugins.effects.attached_oscillator import AttachedOscillator
 from femubench.plugins.effects.grounding_spring import GroundingSpring

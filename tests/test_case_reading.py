@@ -12,13 +12,14 @@ from click.testing import CliRunner
 from hypothesis import given, settings, strategies as st
 from pydantic import BaseModel
 
-from femubench import Case, InputError, read_case, real_modes, solve_modes
+from femubench import Case, InputError, read_case, solve_modes
 from femubench.core.case.example import write_example
 from femubench.core.case.faults import key_lines, line_of
 from femubench.core.case.schema import CaseSpec
 from femubench.core.cli.init import init
 from femubench.core.fem.frame import Frame, GroundSpring, JointSpring, Place, PointMass, RigidEnd
 from femubench.core.fem.sections import rectangular_tube
+from femubench.modal import real_modes
 
 CASES = Path(__file__).parent / "cases"
 DOCS = Path(__file__).parent.parent / "docs"

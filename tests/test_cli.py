@@ -660,7 +660,7 @@ def test_no_sizes(text: str) -> None:
 
 
 def test_progress_only_where_someone_watches(monkeypatch: pytest.MonkeyPatch) -> None:
-    from femubench import JobResult
+    from femubench.results import JobResult
 
     with progress.progress_bar() as report:
         assert report is None

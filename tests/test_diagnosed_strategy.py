@@ -13,33 +13,33 @@ import pytest
 
 from femubench import (
     Case,
+    Measurement,
+    Model,
+    NotApplicable,
+    Run,
+    Sensors,
+    UpdateResult,
+    read_case,
+    solve_modes,
+)
+from femubench.core.plugin.loader import load_plugins
+from femubench.core.plugin.variants import strategy_of
+from femubench.fem import (
     Frame,
     GroundSpring,
     Joint,
     Material,
-    Measurement,
     Member,
-    Model,
-    NotApplicable,
     Place,
     Preload,
-    Run,
-    Sensors,
     Support,
-    UpdateResult,
-    check_used_modes,
-    leaderboard,
-    read_case,
     rectangular_tube,
-    rigid_modes_of,
-    run_jobs,
-    solve_modes,
-    with_measured_frequencies,
 )
-from femubench.core.plugin.loader import load_plugins
-from femubench.core.plugin.variants import strategy_of
+from femubench.modal import rigid_modes_of
 from femubench.plugins.strategies.diagnosed import Diagnosed
+from femubench.results import leaderboard, run_jobs
 from femubench.scenarios import HERE
+from femubench.update import check_used_modes, with_measured_frequencies
 
 FrameBuilder = Callable[..., Frame]
 USED, ALL = (1, 2, 3), (1, 2, 3, 4, 5, 6, 7, 8)

@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femubench import Case, Diagnosis, GroundSpring, Measurement, Model, Place, PointMass, diagnose
+from femubench import Case, Diagnosis, Measurement, Model, diagnose
 from femubench.core.case.case import Modification
 from femubench.core.challenge.structures import structure_named
 from femubench.core.diagnosis.proof import Unseen, gain_of, modified
 from femubench.core.score.scoring import score_model
+from femubench.fem import GroundSpring, Place, PointMass
 
 sys.path.insert(0, str(Path(__file__).parent))
 from diagnosis_problems import case_of, effects_named, measured

@@ -12,7 +12,7 @@ import pytest
 import scipy.sparse as sp
 from numpy.testing import assert_allclose
 
-from femubench import Effect, Frame, Measurement, Model, Sensors, solve_modes
+from femubench import Measurement, Model, Sensors, solve_modes
 from femubench.core.case.case import Case
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.diagnosis.diagnose import diagnose
@@ -28,6 +28,8 @@ from femubench.core.inference.projection import Projection, Projector
 from femubench.core.inference.residuals import Data
 from femubench.core.inference.screening import with_shortlist
 from femubench.core.inference.static_response import Basis, LargeProblem, enriched, placed
+from femubench.effect import Effect
+from femubench.fem import Frame
 from femubench.plugins.effects.added_mass import AddedMass
 from femubench.plugins.effects.attached_oscillator import AttachedOscillator
 from femubench.plugins.effects.grounding_spring import GroundingSpring

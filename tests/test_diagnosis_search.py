@@ -13,7 +13,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from femubench import EffectParameter, Frame, FrameEffect, Model, PointMass
+from femubench import Model
 from femubench.core.challenge.structures import structure_named
 from femubench.core.fem.frame import Place
 from femubench.core.inference.examine import examine
@@ -27,6 +27,8 @@ from femubench.core.inference.prior import (
     log_prior,
     textbook_bases,
 )
+from femubench.effect import EffectParameter, FrameEffect
+from femubench.fem import Frame, PointMass
 
 sys.path.insert(0, str(Path(__file__).parent))
 from diagnosis_problems import catalogue, effects_named, measured, part_at, problem_of

@@ -12,16 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from femubench import (
-    Case,
-    Diagnosis,
-    Effect,
-    Frame,
-    Measurement,
-    Model,
-    NotApplicable,
-    diagnose,
-)
+from femubench import Case, Diagnosis, Measurement, Model, NotApplicable, diagnose
 from femubench.core.case.modes import NO_SENSORS
 from femubench.core.challenge.structures import structure_named
 from femubench.core.diagnosis.verdict import (
@@ -34,6 +25,8 @@ from femubench.core.diagnosis.verdict import (
 from femubench.core.inference.posterior import Posterior
 from femubench.core.inference.residuals import Data
 from femubench.core.inference.search import adequacy
+from femubench.effect import Effect
+from femubench.fem import Frame
 
 sys.path.insert(0, str(Path(__file__).parent))
 from diagnosis_problems import case_of, catalogue, effects_named, measured

@@ -17,9 +17,10 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from femubench import JobResult, Run, leaderboard, read_case, run_jobs
+from femubench import Run, read_case
 from femubench.core.cli.main import bench
 from femubench.core.plugin.loader import load_plugins
+from femubench.results import JobResult, leaderboard, run_jobs
 
 sys.path.insert(0, str(Path(__file__).parent))
 from printed_boards import ROOT, as_printed, assert_board_is_that_of, text_of

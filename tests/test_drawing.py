@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as Canvas
 
-from femubench import Bars, Curve, Curves, Figure, MatrixImage, StructureMap, Wireframe
+from femubench import Wireframe
 from femubench.core.drawing.wireframe import DrawnJoint, DrawnMember
 from femubench.core.plot.figure import draw_figure, drawn
 from femubench.core.plot.style import STYLES
+from femubench.reproduction import Bars, Curve, Curves, Figure, MatrixImage, StructureMap
 
 AWKWARD = 'a < b & "c" $x_1$ $'
 X = np.linspace(0.0, 1100.0, 50)

@@ -12,27 +12,13 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
-from femubench import (
-    FloatArray,
-    Frame,
-    FrameEffect,
-    GroundSpring,
-    Model,
-    ModelError,
-    NotApplicable,
-    Place,
-    Sensors,
-    Support,
-    directed_point,
-    elastic_band,
-    rigid_body_vectors,
-    solve_modes,
-    total_mass,
-    translation_rows,
-)
+from femubench import Model, NotApplicable, Sensors, solve_modes
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.fem.model import Dofs
 from femubench.core.modal.eigen import counted_evaluations, solve_dense
+from femubench.effect import FrameEffect, directed_point, elastic_band, total_mass, translation_rows
+from femubench.fem import FloatArray, Frame, GroundSpring, ModelError, Place, Support
+from femubench.modal import rigid_body_vectors
 from femubench.plugins.effects.added_mass import AddedMass
 from femubench.plugins.effects.amplitude_dependent_stiffness import AmplitudeDependentStiffness
 from femubench.plugins.effects.attached_oscillator import AttachedOscillator

@@ -14,10 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from femubench import Frame, Model, member_length, solve_modes
+from femubench import Model, solve_modes
 from femubench.core.conformance.checking import findings, subjects
 from femubench.core.inference.hypothesis import hypotheses_of
 from femubench.core.plugin.loader import Plugins, load_plugins
+from femubench.effect import member_length
+from femubench.fem import Frame
 from femubench.plugins.effects import femubench_effects
 
 TEXT = (Path(__file__).parents[1] / "docs" / "effects.md").read_text(encoding="utf-8")

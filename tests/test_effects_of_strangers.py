@@ -14,7 +14,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 from stranger_effects import CAUTION, SUMMARY, Bare, Plain, Skin
 
-from femubench import Diagnosis, Effect, Model, diagnose, registered_effects
+from femubench import Diagnosis, Model, diagnose
 from femubench.core.case.case import Case
 from femubench.core.challenge import draw
 from femubench.core.challenge.draw import BlindCase, draw_case
@@ -23,6 +23,8 @@ from femubench.core.conformance.checking import findings, subjects
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
 from femubench.core.look.look import look
 from femubench.core.plugin.loader import load_plugins
+from femubench.diagnosis import registered_effects
+from femubench.effect import Effect
 from femubench.reports.diagnosis import diagnosis_text
 from femubench.reports.diagnosis_page import diagnosis_html
 from femubench.reports.figures import figure, signed

@@ -12,34 +12,34 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from femubench import (
-    Frame,
+from femubench import Model, NotApplicable, solve_modes
+from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.effect.places import match, pair_of
+from femubench.core.fem.frame import Coupling, Factor
+from femubench.core.fem.model import Dofs, LowRank
+from femubench.effect import (
     FrameEffect,
+    elements_of,
+    ends_of,
+    joint_types,
+    point_of,
+    point_places,
+    rate_nodes,
+    split_direction,
+    type_place,
+)
+from femubench.fem import (
+    Frame,
     JointSpring,
-    Model,
     ModelError,
-    NotApplicable,
     Place,
     PointMass,
     RigidEnd,
     Structure,
     constant_kappa,
-    elements_of,
-    ends_of,
-    joint_types,
     mass_matrices,
-    point_of,
-    point_places,
-    rate_nodes,
-    solve_modes,
-    split_direction,
     stiffness_matrices,
-    type_place,
 )
-from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.effect.places import match, pair_of
-from femubench.core.fem.frame import Coupling, Factor
-from femubench.core.fem.model import Dofs, LowRank
 from femubench.plugins.effects.density import Density
 from femubench.plugins.effects.joint_offset import JointOffset
 from femubench.plugins.effects.joint_rotation import JointRotation

@@ -151,7 +151,10 @@ class TestFactors:
         same(more, replace(plain, factors=(Factor("rotary", ("all",), 1.4),)))
         same(replace(plain, rotary_inertia=0.0), replace(plain, rotary_inertia=False))
         same(replace(plain, rotary_inertia=1.0), plain)
-        assert frequencies(more)[-1] < frequencies(plain)[-1]
+        # What stretches knows nothing of it, what bends or twists is slower.
+        ratio = frequencies(more) / frequencies(plain)
+        assert ratio.max() < 1.0 + 1e-9
+        assert ratio.min() < 1.0 - 1e-4
 
 
 def properties(**changes: float) -> BeamProperties:

@@ -17,10 +17,11 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from femubench import FemubenchError, Store, read_case
+from femubench import FemubenchError, read_case
 from femubench.core.cli.main import bench
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.schema.records import read_run
+from femubench.results import Store
 
 sys.path.insert(0, str(Path(__file__).parent / "fuzz"))
 from mutations import changed_json, edits, json_edits, mutated

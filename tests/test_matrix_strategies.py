@@ -11,16 +11,11 @@ import pytest
 import scipy.sparse as sp
 
 from femubench import (
-    Frame,
-    JointSpring,
     Measurement,
     Model,
     NotApplicable,
-    Place,
-    SelfCheckFailed,
     Sensors,
     StrategyFailure,
-    Support,
     UpdateResult,
     solve_modes,
 )
@@ -35,12 +30,14 @@ from femubench.core.update.entries import EntryPattern, null_space, smallest_cha
 from femubench.core.update.low_rank import total_change
 from femubench.core.update.promise import check_used_modes, measure_residuals
 from femubench.core.update.quasi import QuasiModes, quasi_measured_modes
+from femubench.fem import Frame, JointSpring, Place, Support
 from femubench.plugins.strategies import baruch, berman
 from femubench.plugins.strategies.baruch import Baruch
 from femubench.plugins.strategies.berman import Berman
 from femubench.plugins.strategies.kabe import Kabe
 from femubench.plugins.strategies.kabe_rigid import KabeRigid
 from femubench.plugins.strategies.unchanged import Unchanged
+from femubench.update import SelfCheckFailed
 
 PAPER = np.array([226.8, 275.2, 537.4])  # Hz, measured modes 1-3 of the paper's ladder
 FrameBuilder = Callable[..., Frame]

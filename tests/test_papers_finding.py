@@ -5,21 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from femubench import (
-    Bars,
-    Curves,
-    MatrixImage,
-    Place,
-    StructureMap,
-    Workbench,
-    receptance,
-    stiffness_difference,
-)
 from femubench.core.case.reader import read_case
 from femubench.core.fem.frame import GroundSpring, PointMass
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
+from femubench.fem import Place
+from femubench.modal import receptance
 from femubench.papers import PAPERS
 from femubench.papers.frame.causes import CAUSES, JOINTS, TORSION, Ladder, best_factor, shares_of
 from femubench.papers.frame.changes import (
@@ -37,6 +29,8 @@ from femubench.papers.frame.receptances import (
     receptance_sentences,
 )
 from femubench.papers.printed import printed
+from femubench.reproduction import Bars, Curves, MatrixImage, StructureMap, Workbench
+from femubench.results import stiffness_difference
 from femubench.scenarios import HERE
 
 TABLE = printed("frame")["table1"]
@@ -137,7 +131,7 @@ def test_difference_matrix_is_symmetric_and_in_one_unit(bench: Workbench) -> Non
 
 @pytest.mark.parametrize("words", SOLUTIONS.values())
 def test_element_matrices_are_recovered_from_the_parameters(bench: Workbench, words: str) -> None:
-    from femubench import generic_family
+    from femubench.update import generic_family
 
     model = bench.cases["frame"].model
     structure = model.frame_structure
@@ -149,7 +143,7 @@ def test_element_matrices_are_recovered_from_the_parameters(bench: Workbench, wo
 
 
 def test_a_factor_on_all_elements_is_their_relative_change(bench: Workbench) -> None:
-    from femubench import stiffness_matrices
+    from femubench.fem import stiffness_matrices
 
     structure = bench.cases["frame"].model.frame_structure
     change = 0.07 * np.asarray(stiffness_matrices(structure.properties))

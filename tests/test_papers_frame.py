@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from femubench import Cell, Extra, InputError, Study, Workbench, read_case, solve_modes
+from femubench import InputError, read_case, solve_modes
 from femubench.core.plugin.loader import load_plugins
 from femubench.papers import PAPERS, study
 from femubench.papers.frame import (
@@ -22,6 +22,7 @@ from femubench.papers.frame import (
 )
 from femubench.papers.frame.common import CASE, TRUTH, rigid_modes, strain_modes
 from femubench.papers.printed import printed
+from femubench.reproduction import Cell, Extra, Study, Workbench
 
 Key = tuple[str, str, str]
 MEASURED = np.array([226.8, 275.2, 537.4])

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from femubench import Bars, Cell, Model, Study, Workbench, read_case
+from femubench import Model, read_case
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.variants import strategy_of
 from femubench.core.reproduction.study import verdict_counts
@@ -19,6 +19,7 @@ from femubench.papers.hframe.physical import physical_model, shape_paired_errors
 from femubench.papers.hframe.rows import FREE_EI, ROWS, at_printed, parameter_values, row_of, run
 from femubench.papers.hframe.shapes import expanded_mac, shape_cells
 from femubench.papers.printed import printed
+from femubench.reproduction import Bars, Cell, Study, Workbench
 from femubench.scenarios import HERE
 
 Cells = dict[tuple[str, str, str], Cell]

@@ -16,13 +16,11 @@ from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 
 from femubench import (
-    Block,
     Case,
     Model,
     ParameterEstimate,
     Run,
     UpdateResult,
-    mac,
     plot,
     read_case,
     solve_modes,
@@ -34,6 +32,8 @@ from femubench.core.errors import InputError
 from femubench.core.plot.style import COLOURS, place_names
 from femubench.core.schema.diagnosis import LocationRow, ResidualRow
 from femubench.core.schema.results import JobResult
+from femubench.modal import mac
+from femubench.results import Block
 from femubench.scenarios import HERE
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))

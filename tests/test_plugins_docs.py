@@ -11,12 +11,14 @@ from typing import Any
 
 import pytest
 
-from femubench import Effect, FrameEffect, Reader, Reporter, Scenario, Strategy, UpdateResult
+from femubench import Reader, Scenario, Strategy, UpdateResult
 from femubench.core.cli.plugins import plugins
 from femubench.core.plugin import hookspecs
 from femubench.core.plugin.loader import HOOKS, load_plugins
 from femubench.core.plugin.new_package import KINDS, write_package
 from femubench.core.update.strategy import CAPABILITIES
+from femubench.effect import Effect, FrameEffect
+from femubench.results import Reporter
 
 DOCS = Path(__file__).parents[1] / "docs"
 TEXT = (DOCS / "plugins.md").read_text(encoding="utf-8")

@@ -13,12 +13,12 @@ from urllib.parse import unquote
 import pytest
 from click.testing import CliRunner, Result
 
-from femubench import leaderboard
 from femubench.core.cli.main import bench
 from femubench.core.publish import publishing
 from femubench.core.publish.submissions import slug
 from femubench.core.run.runner import run_jobs
 from femubench.core.schema.records import read_run, run_from_json, run_to_json
+from femubench.results import leaderboard
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys

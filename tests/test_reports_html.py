@@ -11,7 +11,6 @@ from xml.etree import ElementTree
 
 import pytest
 
-from femubench import Page, Study
 from femubench.reports.blocks import Drawing, Items, Section, to_markdown, to_terminal
 from femubench.reports.digits import Digits, off
 from femubench.reports.html import to_html
@@ -21,6 +20,7 @@ from femubench.reports.reproduction import (
     reproduction_text,
 )
 from femubench.reports.svg import embedded
+from femubench.reproduction import Page, Study
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import reproduction_toys as toys

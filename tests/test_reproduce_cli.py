@@ -13,11 +13,11 @@ import pytest
 from click.testing import CliRunner, Result
 
 import femubench.papers
-from femubench import Page, Study, Workbench
 from femubench.core.cli.main import bench
 from femubench.core.errors import StrategyFailure
 from femubench.core.reproduction.cell import VERDICTS
 from femubench.core.reproduction.study import cells_to_json
+from femubench.reproduction import Page, Study, Workbench
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import reproduction_toys as toys

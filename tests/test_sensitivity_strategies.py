@@ -13,48 +13,52 @@ from scipy import stats
 
 from femubench import (
     Diverged,
-    Frame,
-    GroundSpring,
-    Joint,
-    JointSpring,
-    Material,
     Measurement,
-    Member,
     Model,
     NotApplicable,
-    Parameter,
-    Place,
-    PointMass,
-    Section,
     Sensors,
     Strategy,
     StrategyFailure,
-    Structure,
-    Support,
-    Unknown,
-    UpdateOptions,
     UpdateResult,
-    carried_by,
-    global_stiffness,
-    groups_within,
-    half_depth,
-    joint_groups,
-    rectangular_tube,
-    sensitivity_update,
     solve_modes,
-    spring_estimates,
-    with_joint_springs,
 )
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.fem.sections import constant_kappa
 from femubench.core.modal.eigen import counted_evaluations
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
 from femubench.core.update.residuals import Data, predict
+from femubench.fem import (
+    Frame,
+    GroundSpring,
+    Joint,
+    JointSpring,
+    Material,
+    Member,
+    Parameter,
+    Place,
+    PointMass,
+    Section,
+    Structure,
+    Support,
+    rectangular_tube,
+)
 from femubench.plugins.strategies.bayesian import Bayesian
 from femubench.plugins.strategies.global_ import Global
 from femubench.plugins.strategies.local import Local
 from femubench.plugins.strategies.offset import Offset
 from femubench.plugins.strategies.spring import Spring
+from femubench.update import (
+    Unknown,
+    UpdateOptions,
+    carried_by,
+    global_stiffness,
+    groups_within,
+    half_depth,
+    joint_groups,
+    sensitivity_update,
+    spring_estimates,
+    with_joint_springs,
+)
 
 RNG = np.random.default_rng(0)
 HFRAME_HZ = np.array([77.13, 137.60, 300.90, 404.98, 482.23])

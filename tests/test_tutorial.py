@@ -22,7 +22,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 TUTORIAL = ROOT / "docs" / "tutorial.md"
-ROOMS = ("core", "papers", "plugins", "reports", "scenarios")
+ROOMS = ("core", "femubench", "papers", "plugins", "reports", "scenarios")
 ALL_TIME = 540.0  # s, for a machine that hangs; nothing is said about how long it takes
 CACHES = shutil.ignore_patterns("__pycache__", "*.egg-info")
 

@@ -20,6 +20,7 @@ from femubench.core.fem.model import Model
 from femubench.core.inference.fit import Fit, Problem
 from femubench.core.inference.residuals import Data
 from femubench.core.schema.diagnosis import Advice
+from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray
 
 # Relative standard deviations that a careful test reaches.
@@ -143,7 +144,7 @@ def _antiresonances(group: Group) -> Iterator[Option]:
             text = f"measure the antiresonance {where} at {sensor}"
             found.append(group.option("zero", text, [own, *rivals], relative * own.values))
         if found:
-            yield max(found, key=lambda option: min(option.distances))
+            yield in_order(found, lambda option: -min(option.distances))[0]
 
 
 def _shapes(group: Group) -> Iterator[Option]:
@@ -224,7 +225,7 @@ def second_level(group: Group) -> Option | None:
             size = distance(Predicted(fall, spread), none, np.full(len(now), std))
             text = f"{_LEVEL} looks like {hypothesis.name}"
             found.append(Option("level", text, (size,)))
-    return max(found, key=lambda option: option.distances[0], default=None)
+    return next(iter(in_order(found, lambda option: -option.distances[0])), None)
 
 
 def _hertz(frequency: float) -> str:
@@ -291,7 +292,8 @@ def _ranked(
     """Return the best options; those that clearly tell the first explanation from all lead."""
     rows = [(option, *_told(option, labels)) for option in options]
     # Clearly all comes before very clearly some.
-    rows.sort(key=lambda row: (min(row[0].distances) < _CLEAR, -row[2]))
+    rows = in_order(rows, lambda row: -row[2])
+    rows.sort(key=lambda row: min(row[0].distances) < _CLEAR)
     seen: dict[str, int] = {}
     chosen: list[Advice] = []
     for option, text, size in rows:

@@ -18,6 +18,7 @@ from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.inference.residuals import Data
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.measurement import Measurement
+from femubench.core.ties import least
 from femubench.core.typing import FloatArray, SparseArray
 from femubench.core.update.residuals import total_mass
 
@@ -127,7 +128,8 @@ def record(
     shapes = np.zeros((0, len(frequencies)))
     if len(sensors):
         raw = seen.readings[:, :count]
-        largest = np.take_along_axis(raw, np.abs(raw).argmax(axis=0)[None, :], axis=0)
+        # Of two mirrored points that move alike the first, or rounding would choose the sign.
+        largest = np.take_along_axis(raw.T, least(-np.abs(raw.T), 0.0)[:, None], axis=1).T
         shapes = raw / largest
     if rng is not None:
         noise = rng.standard_normal(len(frequencies)), rng.standard_normal(shapes.shape)

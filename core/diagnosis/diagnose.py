@@ -40,6 +40,7 @@ from femubench.core.plugin.loader import registered_effects
 from femubench.core.plugin.roles import Effect
 from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning
 from femubench.core.score.scoring import score_model
+from femubench.core.ties import alike, in_order
 
 _SAME_MODEL = 0.3  # deviations by which the extended model may differ from the fit
 
@@ -162,7 +163,8 @@ def _group_causes(posterior: Posterior, options: Iterable[Iterable[Cause]]) -> l
     for cause in (cause for option in options for cause in option):
         likely = cause.probability * posterior.inclusion(cause.effect)
         found.setdefault(cause.effect, replace(cause, probability=likely))
-    return sorted(found.values(), key=lambda cause: -cause.probability)
+    fitted_first = sorted(found.values(), key=lambda c: all(p.textbook for p in c.parameters))
+    return in_order(fitted_first, lambda cause: -cause.probability)
 
 
 def _reason(decision: Decision) -> str:
@@ -201,6 +203,8 @@ def _notes(examination: Examination, proof: _Proof, best: Explanation) -> tuple[
             f"The extended model takes {' and '.join(unearned)} at the textbook value too: "
             "these data neither ask for it nor speak against it."
         )
+    if tied := tied_places(examination.posterior, best):
+        notes.append(f"These data cannot tell {best.place} from {' or '.join(tied)} at all.")
     cautions = (getattr(part.hypothesis.effect, "caution", "") for part in best.parts)
     notes += dict.fromkeys(caution for caution in cautions if caution)
     if isinstance(examination.problem, LargeProblem) and best.parts:
@@ -209,6 +213,17 @@ def _notes(examination: Examination, proof: _Proof, best: Explanation) -> tuple[
             f"{departure(best.fit):.1g} standard deviations of all data together from the fit."
         )
     return tuple(notes)
+
+
+def tied_places(posterior: Posterior, best: Explanation) -> tuple[str, ...]:
+    """Return the other places at which the causes of an explanation are exactly as probable."""
+    tied = (
+        e.place
+        for e in posterior.explanations
+        if (e.base.names, e.searched) == (best.base.names, best.searched)
+        and alike(e.log_weight, best.log_weight)
+    )
+    return tuple(dict.fromkeys(place for place in tied if place != best.place))
 
 
 __all__ = ["diagnose", "extended_by"]

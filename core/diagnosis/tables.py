@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from femubench.core.diagnosis.verdict import angle_between
@@ -20,6 +18,7 @@ from femubench.core.schema.diagnosis import (
     Rival,
     SmallestVisible,
 )
+from femubench.core.ties import alike, by_probability
 from femubench.core.typing import FloatArray
 
 TOO_SMALL = 12.0  # of chi-square: an effect below is too small to see
@@ -110,7 +109,7 @@ def rivals_of(examination: Examination, best: Explanation | None) -> tuple[Rival
         totals[label] = totals.get(label, 0.0) + p
         first.setdefault(label, explanation)
     own = (" + ".join(best.searched), best.place) if best is not None else ("", "")
-    ranked = sorted((label for label in totals if label != own), key=lambda k: -totals[k])
+    ranked = [label for label in by_probability(totals) if label != own]
     return tuple(
         Rival(
             *label,
@@ -143,7 +142,8 @@ def smallest_visible(found: Found) -> tuple[SmallestVisible, ...]:
         row = SmallestVisible(h.name, h.place, size, parameter.unit, parameter.wording)
         softer = parameter.scaling == "compliance"
         old = best.get(h.name)
-        if old is None or (row.size > old.size if softer else row.size < old.size):
+        better = old is None or (row.size > old.size if softer else row.size < old.size)
+        if old is None or (better and not alike(row.size, old.size)):
             best[h.name] = row
     return tuple(best[name] for name in sorted(best))
 
@@ -172,7 +172,7 @@ def evidence_rows(examination: Examination) -> tuple[LocationRow, ...]:
             place = part.hypothesis.place
             totals[place] = totals.get(place, 0.0) + p
     top = max(totals.values(), default=0.0)
-    ranked: Sequence[str] = sorted(totals, key=lambda k: -totals[k])
+    ranked = by_probability(totals)
     return tuple(
         LocationRow("evidence", place, totals[place] / top)
         for place in ranked

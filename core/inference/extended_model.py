@@ -40,8 +40,8 @@ def raw_residual(problem: Problem, model: Model) -> FloatArray:
     modes = solve_modes(model, enough_modes(model, 2 * len(data.measurement)))
     order = np.argsort(modes.eigenvalues)
     hertz = signed_hz(modes.eigenvalues[order])[None]
-    hertz = data.corrected(hertz, problem.space.zero)
     seen = np.asarray(model.observe(data.measurement.sensors) @ modes.shapes[:, order])[None]
+    hertz, seen = data.predicted(hertz, seen, problem.space.zero)
     partner = data.pair(hertz, seen)[0]
     mass = total_mass(model.structure) if model.structure is not None else 0.0
     residual = data.residual(hertz[:, partner], seen[:, :, partner], np.array([mass]))

@@ -91,9 +91,10 @@ class State:
 
     @cached_property
     def readings(self) -> FloatArray:
-        """Return the readings of the partners at the sensors, (n_sensors, m)."""
-        seen = self.problem.space.padded_readings(len(self.vectors))
-        return np.asarray(seen @ self.vectors[:, self.partner])
+        """Return the readings of the partners at the sensors, 0 of still ones, (n_sensors, m)."""
+        space = self.problem.space
+        seen = space.padded_readings(len(self.vectors)) @ self.vectors[:, self.partner]
+        return np.where(space.still(self.eigenvalues[self.partner]), 0.0, seen)
 
     @cached_property
     def jacobian(self) -> FloatArray:
@@ -143,10 +144,10 @@ def state_at(problem: Problem, parts: Sequence[Projection], x: FloatArray) -> St
     values, vectors = solve_pencil(stiffness, mass)
     data = problem.data
     count = min(len(values), problem.space.rigid + 2 * len(data.measurement) + 8)
-    hertz = data.corrected(signed_hz(values[None, :count]), problem.space.zero)
     seen = problem.space.padded_readings(len(vectors)) @ vectors[:, :count]
-    partner = data.pair(hertz, seen[None])[0]
-    raw = data.residual(hertz[:, partner], seen[None][:, :, partner], np.array([weight]))[0]
+    hertz, seen = data.predicted(signed_hz(values[None, :count]), seen[None], problem.space.zero)
+    partner = data.pair(hertz, seen)[0]
+    raw = data.residual(hertz[:, partner], seen[:, :, partner], np.array([weight]))[0]
     raw = raw + problem.offset
     return State(problem, tuple(parts), x, values, vectors, partner, weight, raw)
 

@@ -16,6 +16,7 @@ from femubench.core.inference.fit import Problem, State, signed_hz
 from femubench.core.inference.modal_basis import Space
 from femubench.core.inference.noise import marginal
 from femubench.core.inference.projection import Projection
+from femubench.core.ties import in_order, least
 from femubench.core.typing import FloatArray
 
 
@@ -82,15 +83,15 @@ def interpolated(
 
 def _best_of_grid(projection: Projection, residuals: FloatArray) -> Screened:
     grid = projection.hypothesis.grid
-    point, least = _in_cells(grid, residuals)
-    evidence = -0.5 * least - 0.5 * _spread(residuals, grid)
-    return Screened(projection, grid, residuals, point, least, float(evidence))
+    point, cost = _in_cells(grid, residuals)
+    evidence = -0.5 * cost - 0.5 * _spread(residuals, grid)
+    return Screened(projection, grid, residuals, point, cost, float(evidence))
 
 
 def _in_cells(grid: FloatArray, residuals: FloatArray) -> tuple[FloatArray, float]:
     """Return the best point of a grid in two coordinates, residuals linear within its cells."""
     cost = np.square(residuals).sum(axis=1) + np.square(grid).sum(axis=1)
-    best = int(cost.argmin())
+    best = int(least(cost))
     axes = [np.unique(column) for column in grid.T]
     rows = residuals.reshape(*map(len, axes), -1)
     corner = np.stack(np.meshgrid(*(axis[:-1] for axis in axes), indexing="ij"), axis=2)
@@ -106,7 +107,7 @@ def _in_cells(grid: FloatArray, residuals: FloatArray) -> tuple[FloatArray, floa
     value = np.square(left).sum(axis=2) + np.square(x).sum(axis=2)
     if value.size == 0 or value.min() >= cost[best]:
         return grid[best], float(cost[best])
-    cell = np.unravel_index(value.argmin(), value.shape)
+    cell = np.unravel_index(least(value.ravel()), value.shape)
     return x[cell], float(value[cell])
 
 
@@ -128,7 +129,7 @@ def _on_chords(
     b = np.einsum("hgi,hgi->hg", chord, rows[:, :-1]) + width * x[:, :-1]
     t = np.clip(-b / a, 0.0, 1.0)
     cost = np.square(rows[:, :-1]).sum(axis=2) + np.square(x[:, :-1]) + 2 * b * t + a * t**2
-    best = np.arange(len(x)), cost.argmin(axis=1)
+    best = np.arange(len(x)), least(cost)
     place = x[best] + t[best] * width[best]
     curvature = a[best] / np.square(width[best])
     evidence = -0.5 * cost[best] - 0.5 * np.log(curvature)
@@ -194,8 +195,9 @@ def likely(
     both = np.concatenate([item.residuals for item in screened]) + (state.residual - still)
     seen = marginal(both, state.jacobian), marginal(state.residual, state.jacobian)
     rows = interpolated(projections, *seen)
-    promising = [row for row in rows if state.chi2 - row.cost > least]
-    promising.sort(key=lambda row: row.cost)
+    promising = in_order(
+        (row for row in rows if state.chi2 - row.cost > least), lambda row: row.cost
+    )
     return [row.projection for row in promising[:_LIKELY]]
 
 
@@ -223,7 +225,7 @@ def _residuals(problem: Problem, projections: Sequence[Projection], top: int) ->
         rows = np.concatenate([np.arange(first[i], first[i + 1]) for i in members])
         own = [projections[i] for i in members]
         hertz[rows], seen[rows] = _modes(space, own, chosen, low)
-    hertz = data.corrected(hertz, space.zero)
+    hertz, seen = data.predicted(hertz, seen, space.zero)
     partner = data.pair(hertz, seen)
     mass = [space.mass + p.hypothesis.grid_factors @ p.weights for p in projections]
     each = np.arange(len(partner))[:, None]

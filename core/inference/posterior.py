@@ -13,6 +13,7 @@ from scipy.special import logsumexp
 from femubench.core.inference.fit import Fit
 from femubench.core.inference.prior import PRIOR_BEYOND_TEXTBOOK, PRIOR_OF_COUNT, Base, log_prior
 from femubench.core.inference.projection import Projection
+from femubench.core.ties import by_probability, in_order
 
 # From this probability on the verdict is that nothing is missing.
 LIKELY_NOTHING = 0.5
@@ -69,6 +70,11 @@ class Explanation:
         return " + ".join(place for _, place in pairs)
 
 
+def by_weight(explanations: Iterable[Explanation]) -> list[Explanation]:
+    """Return explanations, most probable first; those that tie as they came."""
+    return in_order(explanations, lambda e: -e.log_weight)
+
+
 @dataclass(frozen=True)
 class Posterior:
     """All explanations with their probabilities.
@@ -84,7 +90,7 @@ class Posterior:
     @classmethod
     def of(cls, explanations: Iterable[Explanation]) -> Posterior:
         """Weigh explanations against each other by prior and evidence."""
-        ranked = sorted(explanations, key=lambda e: -e.log_weight)
+        ranked = by_weight(explanations)
         weights = np.array([e.log_weight for e in ranked])
         shares = np.exp(weights - logsumexp(weights))
         return cls(tuple(ranked), tuple(float(p) for p in shares))
@@ -132,7 +138,7 @@ class Posterior:
         for e, p in zip(self.explanations, self.probabilities, strict=True):
             key = self.key(e)
             totals[key] = totals.get(key, 0.0) + p
-        return dict(sorted(totals.items(), key=lambda item: -item[1]))
+        return {key: totals[key] for key in by_probability(totals)}
 
     def inclusion(self, name: str) -> float:
         """Return the probability that an effect is part of the name."""

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from femubench.core.errors import NotApplicable
+from femubench.core.modal.correlation import UNSEEN, seen_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray, IntArray
 
@@ -46,7 +47,7 @@ class Data:
         """Return 1/sigma of every shape component, 0 where there is none, (n_sensors, m)."""
         shapes, std = self.measurement.shapes, self.measurement.shape_std
         known = np.isfinite(shapes) & np.isfinite(std) & (std > 0.0)
-        known &= known.sum(axis=0) > 1
+        known &= (known.sum(axis=0) > 1) & seen_modes(shapes)
         return np.where(known, 1.0 / np.where(known, std, 1.0), 0.0)
 
     @cached_property
@@ -97,11 +98,17 @@ class Data:
         Arguments:
             readings: of the partners, (g, n_sensors, m).
         """
-        square = np.square(self.weight)
-        seen = np.einsum("sm,gsm->gm", square * self.shapes, readings)
-        norm = np.einsum("sm,gsm->gm", square, np.square(readings))
-        factor = seen / np.where(norm > 0.0, norm, 1.0)
+        seen = np.einsum("sm,gsm->gm", np.square(self.weight) * self.shapes, readings)
+        factor = seen * self._inverse_norm(readings)
         return readings * factor[:, None, :], factor
+
+    def _inverse_norm(self, readings: FloatArray) -> FloatArray:
+        """Return 1 / p'Wp of shapes at the sensors, 0 where they are rounding alone, (g, m)."""
+        square = np.square(self.weight)
+        norm = np.einsum("sm,gsm->gm", square, np.square(readings))
+        largest = np.square(readings).max(axis=(1, 2), initial=0.0)[:, None]
+        seen = norm > np.square(UNSEEN) * largest * square.sum(axis=0)
+        return np.asarray(np.where(seen, 1.0 / np.where(seen, norm, 1.0), 0.0))
 
     def residual(
         self, frequencies: FloatArray, readings: FloatArray, mass: FloatArray
@@ -136,16 +143,32 @@ class Data:
         square = np.square(self.weight)
         mode, sensor = self.shape_rows
         scaled, factor = self.scaled(readings[None])
-        norm = np.einsum("sm,sm->m", square, np.square(readings))
         rest = self.shapes - 2.0 * scaled[0]
         slip = np.einsum("sm,smp->mp", square * rest, turn)
-        slip = slip / np.where(norm > 0.0, norm, 1.0)[:, None]
+        slip = slip * self._inverse_norm(readings[None])[0][:, None]
         change = factor[0][None, :, None] * turn + readings[:, :, None] * slip[None]
         change = self.weight[:, :, None] * change
         parts = [frequency / self.measurement.frequency_std[:, None], change[sensor, mode]]
         if self.mass is not None:
             parts.append(mass[None, :] / self.mass[1])
         return np.vstack(parts)
+
+    def predicted(
+        self, frequencies: FloatArray, readings: FloatArray, rigid: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return frequencies corrected for the mesh, and readings without rigid-body motions.
+
+        Motions of zero frequency have no shapes of their own: any basis of them is as good, and
+        rounding would choose one.
+
+        Arguments:
+            frequencies: ascending, (g, q).
+            readings: at the sensors, (g, n_sensors, q).
+            rigid: what counts as zero in Hz.
+        """
+        still = np.abs(frequencies) <= rigid
+        hertz = np.where(still, 0.0, self.corrected(frequencies, rigid))
+        return hertz, np.where(still[:, None], 0.0, readings)
 
     def corrected(self, frequencies: FloatArray, rigid: float) -> FloatArray:
         """Return frequencies with the correction for the mesh, counted from the first elastic one.

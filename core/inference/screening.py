@@ -20,6 +20,7 @@ from femubench.core.inference.hypothesis import Hypothesis
 from femubench.core.inference.noise import marginal
 from femubench.core.inference.projection import Projection, Projector
 from femubench.core.inference.static_response import LargeProblem, enriched, magnitudes
+from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray
 
 _MOST, _OF_A_NAME, _PARTNERS = 240, 12, 60
@@ -84,7 +85,7 @@ def _tried(problem: LargeProblem, projection: Projection) -> Screened | None:
         points.append(x)
     if not states:
         return None
-    best = min(states, key=lambda state: state.cost)
+    best = in_order(states, lambda state: state.cost)[0]
     found = fit(own, parts, best.x, steps=_STEPS)
     assert found is not None
     residuals = np.array([state.residual for state in states])
@@ -119,12 +120,12 @@ def beside(problem: Problem, seed: Fit) -> Problem:
 def _chosen(ranked: Sequence[Ranked], most: int, of_a_name: int) -> list[Hypothesis]:
     """Return the best of all, of every name, the most visible of it, and the textbook effects."""
     names: dict[str, list[Ranked]] = {}
-    for item in sorted(ranked, key=lambda item: -item.gain):
+    rest = in_order(ranked, lambda item: -item.gain)
+    for item in rest:
         names.setdefault(item.hypothesis.name, []).append(item)
     must = [item for own in names.values() for item in own[:of_a_name]]
-    must += [max(own, key=lambda item: item.visible) for own in names.values()]
+    must += [in_order(own, lambda item: -item.visible)[0] for own in names.values()]
     must += [item for item in ranked if item.hypothesis.textbook is not None]
-    rest = sorted(ranked, key=lambda item: -item.gain)
     found = {id(item.hypothesis): item.hypothesis for item in must}
     for item in rest:
         if len(found) >= most:

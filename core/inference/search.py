@@ -12,12 +12,13 @@ from femubench.core.inference.extended_model import agreed, extended
 from femubench.core.inference.fit import Fit, Problem, State, fit, state_at
 from femubench.core.inference.grid_search import Screened, likely, screen
 from femubench.core.inference.hypothesis import hypotheses_of
-from femubench.core.inference.posterior import Explanation, Posterior
+from femubench.core.inference.posterior import Explanation, Posterior, by_weight
 from femubench.core.inference.prior import Base, selection_cost, textbook_bases
 from femubench.core.inference.projection import Projection
 from femubench.core.inference.screening import beside, screened, with_shortlist
 from femubench.core.inference.static_response import Basis, LargeProblem, enriched, placed
 from femubench.core.plugin.roles import Effect
+from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray
 
 
@@ -79,7 +80,7 @@ class Found:
     @property
     def best(self) -> Explanation:
         """Return the most probable explanation."""
-        return max(self.explanations, key=lambda e: e.log_weight)
+        return _best(self.explanations)
 
 
 class Search:
@@ -120,7 +121,7 @@ class Search:
 
     def borne_out(self, explanations: list[Explanation]) -> list[Explanation]:
         """Return explanations, the best cause fitted until its own model agrees with it."""
-        best = max(explanations, key=lambda e: e.log_weight)
+        best = _best(explanations)
         if not best.parts:
             return explanations
         others = [e for e in explanations if e is not best]
@@ -129,7 +130,7 @@ class Search:
     def promising(self, bare: Sequence[Explanation], plain: Found) -> list[Base]:
         """Return the textbook sets that come nearer to the data than the model as drawn."""
         nothing = plain.explanations[0].chi2
-        ranked = sorted(bare, key=lambda e: e.chi2 - 2.0 * e.base.log_prior)
+        ranked = in_order(bare, lambda e: e.chi2 - 2.0 * e.base.log_prior)
         better = [e.base for e in ranked if e.chi2 < nothing - 6.0]
         return better[: 1 if self.adequate(plain.best) else 2]
 
@@ -166,8 +167,10 @@ class Search:
         lowest = min(s.cost for s in screened)
         explained = start.state.chi2 - lowest
         limit = lowest + _NEAR + _CURVED * max(explained, 0.0)
-        near = [s for s in screened if s.cost <= limit]
-        near.sort(key=lambda s: np.log(s.projection.hypothesis.places) - s.log_evidence)
+        near = in_order(
+            (s for s in screened if s.cost <= limit),
+            lambda s: np.log(s.projection.hypothesis.places) - s.log_evidence,
+        )
         fits: list[Fit] = []
         best = start.state.cost
         for item in near[:_REFINED]:
@@ -181,8 +184,7 @@ class Search:
     def combined(self, found: Sequence[Found]) -> list[Explanation]:
         """Return explanations with two causes, then greedily more while that is worth it."""
         by_base = {item.base.names: item for item in found}
-        singles = [e for item in found for e in item.explanations if e.parts]
-        singles.sort(key=lambda e: -e.log_weight)
+        singles = by_weight(e for item in found for e in item.explanations if e.parts)
         seeds = singles[: _SINGLES_FOR_PAIRS if not self.enough(found) else 1]
         result: list[Explanation] = []
         tried: set[tuple[object, ...]] = set()
@@ -190,15 +192,14 @@ class Search:
             result += self.grown(by_base[seed.base.names], seed, tried)
         if not result:
             return result
-        best = max(result, key=lambda e: e.log_weight)
+        best = _best(result)
         result += self.swapped(by_base[best.base.names], best, tried)
         while True:
-            best = max(result, key=lambda e: e.log_weight)
+            best = _best(result)
             if len(best.parts) >= _MOST_CAUSES or self.adequate(best):
                 return result
-            more = self.grown(by_base[best.base.names], best, tried)
-            result += more
-            if not more or max(e.log_weight for e in more) <= best.log_weight:
+            result += self.grown(by_base[best.base.names], best, tried)
+            if _best(result) is best:
                 return result
 
     def enough(self, found: Sequence[Found]) -> bool:
@@ -217,7 +218,7 @@ class Search:
         originals = {id(p.hypothesis): p for p in problem.space.projections}
         taken = {id(part.hypothesis) for part in seed.parts}
         free = [p for p in above.space.projections if id(p.hypothesis) not in taken]
-        ranked = sorted(screen(above, start.state, free, state.jacobian), key=lambda s: s.cost)
+        ranked = in_order(screen(above, start.state, free, state.jacobian), lambda s: s.cost)
         result = []
         for item in ranked[:_PARTNERS]:
             if start.state.chi2 - item.cost < floor:
@@ -262,6 +263,10 @@ class Search:
                 seed = Explanation(found.base, alone, self.names)
                 result += self.grown(found, seed, tried)
         return result
+
+
+def _best(explanations: Sequence[Explanation]) -> Explanation:
+    return by_weight(explanations)[0]
 
 
 def worthwhile(found: Found, seed: Explanation, least: float) -> Problem:

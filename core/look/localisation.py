@@ -18,6 +18,7 @@ from femubench.core.look.shape_expansion import Comparison, Expansion, expand
 from femubench.core.modal.correlation import modal_scale_factor
 from femubench.core.modal.measurement import Measurement
 from femubench.core.schema.diagnosis import LocationRow
+from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 Values = Mapping[str, float]
@@ -271,4 +272,4 @@ def _rows(indicator: str, kinds: Iterable[Values]) -> list[LocationRow]:
         largest = max(values.values(), default=0.0)
         if largest > _NOTHING[indicator]:
             rows += [LocationRow(indicator, place, v / largest) for place, v in values.items()]
-    return sorted(rows, key=lambda row: -row.value)
+    return in_order(rows, lambda row: -row.value)

@@ -8,6 +8,22 @@ import numpy as np
 
 from femubench.core.typing import BoolArray, FloatArray
 
+UNSEEN = 1e-9  # of the largest reading of any mode
+
+
+def seen_modes(readings: Any) -> BoolArray:  # noqa: ANN401 - real or complex arrays
+    """Tell which modes the sensors see, (m,).
+
+    What is left of a mode that moves across all sensors is rounding, of which a MAC, or a scale
+    of its own, would make a shape like any other.
+
+    Arguments:
+        readings: real or complex shapes with scales of one order, (n_sensors, m); nan where
+            missing.
+    """
+    largest = np.abs(_columns(readings)[0]).max(axis=0, initial=0.0)
+    return np.asarray(largest > UNSEEN * largest.max(initial=0.0))
+
 
 def mac(a: Any, b: Any) -> FloatArray:  # noqa: ANN401 - real or complex arrays
     """Return the modal assurance criterion |a'b|^2 / (a'a b'b) of every pair, (m_a, m_b).

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from femubench.core.modal.correlation import mac
+from femubench.core.modal.correlation import mac, seen_modes
 from femubench.core.typing import BoolArray, FloatArray, IntArray
 
 # Two shapes with a MAC below one half have more in what differs than in what they share; any
@@ -26,6 +26,7 @@ WINDOW_WITHOUT_SHAPE = 1.4
 FREQUENCY_WEIGHT = 0.25
 # Any gain by shape outweighs all gains by frequency alone.
 _WITHOUT_SHAPE = 1e-4
+_IN_ORDER = 1e-3
 _TINY = 1e-9  # an admissible pair, however poor, is better than none
 
 
@@ -61,7 +62,7 @@ def pair_modes(
     MAC >= 0.5 and the frequencies lie within a factor of two. A mode with fewer sensors, or with
     a frequency alone, pairs by |ln(f_p / f_m)| within a factor of 1.4, and only among what modes
     with shapes leave. An imaginary frequency (negative here) pairs by shape alone, as if at the
-    edge of the window.
+    edge of the window. A mode that the sensors do not see has no shape.
 
     Arguments:
         measured_frequencies: Hz, (m,).
@@ -78,8 +79,9 @@ def pair_modes(
     if m == 0 or p == 0:
         return Pairing(np.full(m, -1, dtype=np.int64), np.full(m, np.nan))
     distance = _distance(measured, predicted)
-    likeness = mac(measured_shapes, predicted_shapes)
-    by_shape = _comparable(measured_shapes, predicted_shapes)
+    shaped = seen_modes(measured_shapes)[:, None]
+    likeness = np.where(seen_modes(predicted_shapes), mac(measured_shapes, predicted_shapes), 0.0)
+    by_shape = shaped & _comparable(measured_shapes, predicted_shapes)
     gain = np.where(
         by_shape,
         _gain_by_shape(likeness, distance, predicted < 0.0, least_mac, window),
@@ -126,5 +128,8 @@ def _gain_by_shape(
 def _gain_by_frequency(distance: FloatArray, window: float) -> FloatArray:
     edge = float(np.log(window))
     admissible = distance <= edge
-    gain = _WITHOUT_SHAPE * (edge - np.where(admissible, distance, edge))
+    near = edge - np.where(admissible, distance, edge)
+    # Of two modes above two others, either may go with either at the same sum of distances: a
+    # trace of their squares keeps the order.
+    gain = _WITHOUT_SHAPE * near * (1.0 + _IN_ORDER * (2.0 * edge - near))
     return np.where(admissible, gain + _TINY, -1.0)

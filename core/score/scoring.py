@@ -12,6 +12,7 @@ import scipy.linalg as la
 from femubench.core.case.case import Case, Modification
 from femubench.core.fem.model import Model
 from femubench.core.modal.close_modes import align_close_modes
+from femubench.core.modal.correlation import seen_modes
 from femubench.core.modal.eigen import (
     DENSE_LIMIT,
     Modes,
@@ -42,7 +43,6 @@ __all__ = [
     "score_of",
 ]
 
-_UNSEEN = 1e-9  # of the largest reading of any mode: the sensors do not see this one
 _SAME_MOTION = 0.9  # squared cosine between a zero mode and the nominal rigid-body motions
 
 
@@ -176,10 +176,7 @@ def _predict(
 ) -> tuple[PairedMode, ...]:
     elastic = modes.elastic
     readings = np.asarray(model.observe(measurement.sensors) @ elastic.shapes)
-    # Mass-normalised shapes have a common scale: what is left of an unseen one is roundoff, of
-    # which a MAC would make a shape like any other.
-    largest = np.abs(readings).max(axis=0, initial=0.0)
-    readings = np.where(largest > _UNSEEN * largest.max(initial=0.0), readings, 0.0)
+    readings = np.where(seen_modes(readings), readings, 0.0)
     frequencies = elastic.natural_frequencies
     # Modes within two standard deviations of each other are one to the test.
     closeness = 2.0 * float(np.median(measurement.frequency_std / measurement.frequencies))

@@ -14,7 +14,7 @@ from femubench.core.fem.derivatives import Derivatives, derivatives
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.structure import Structure
-from femubench.core.modal.correlation import modal_scale_factor
+from femubench.core.modal.correlation import modal_scale_factor, seen_modes
 from femubench.core.modal.eigen import Modes, enough_modes, solve_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import pair_modes
@@ -86,7 +86,7 @@ class Data:
     def shape_weight(self) -> FloatArray:
         """Return 1/sigma of every shape component, 0 where there is none, (n_sensors, m)."""
         shapes, std = self.measurement.shapes, self.measurement.shape_std
-        known = np.isfinite(shapes) & np.isfinite(std) & (std > 0.0)
+        known = np.isfinite(shapes) & np.isfinite(std) & (std > 0.0) & seen_modes(shapes)
         return np.where(known, 1.0 / np.where(known, std, 1.0), 0.0)
 
 

@@ -16,6 +16,7 @@ from femubench.core.update.strategy import ParameterEstimate, UpdateResult
 from femubench.core.update.unknowns import Scaling, Unknown, UpdateOptions
 
 _SMALLEST_STEP = 1e-9
+_ROUNDING = 1e-10  # relative, of a modal quantity: some ten times what linear algebra leaves
 _NO_GAIN = 1e-6
 _PATIENCE = 3
 
@@ -90,8 +91,17 @@ class _Iteration:
         cost = point.cost(np.isfinite(point.prediction.residual), self.scaling.precision)
         return float(1.0 - (after @ after + rest) / cost) if cost > 0.0 else 0.0
 
+    def rounding(self, cost: float) -> float:
+        """Return how much two costs near a given one may differ by rounding alone."""
+        blur = _ROUNDING * float(np.linalg.norm(self.data.weight * self.data.target))
+        return blur * (2.0 * float(np.sqrt(cost)) + blur)
+
     def advance(self, point: _Point, step: FloatArray) -> _Point | None:
-        """Return the next point, the step halved until the cost does not grow; None for none."""
+        """Return the next point, the step halved until the cost does not grow; None for none.
+
+        Costs that differ by no more than rounding are equal, so that the last steps towards an
+        optimum, too short for the cost to show, are taken on every processor.
+        """
         precision = self.scaling.precision
         for halving in range(self.options.halvings + 1):
             q = np.clip(point.q + step / 2**halving, self.scaling.lower, self.scaling.upper)
@@ -102,7 +112,8 @@ class _Iteration:
             except ModelError:
                 continue
             rows = common_rows(point.prediction, trial.prediction)
-            if rows.any() and trial.cost(rows, precision) <= point.cost(rows, precision):
+            cost = point.cost(rows, precision)
+            if rows.any() and trial.cost(rows, precision) <= cost + self.rounding(cost):
                 return trial
         return None
 

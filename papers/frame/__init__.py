@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from femubench import Study, Workbench
 from femubench.papers.frame.changes import change_figures
 from femubench.papers.frame.common import CASE, PAPER, TRUTH, strain_modes
 from femubench.papers.frame.counts import count_cells, largest_difference
@@ -22,6 +21,7 @@ from femubench.papers.frame.receptances import receptance_figures
 from femubench.papers.frame.spaces import spaces_extra
 from femubench.papers.frame.tables import table_cells
 from femubench.papers.printed import printed
+from femubench.reproduction import Study, Workbench
 
 
 def study(bench: Workbench) -> Study:

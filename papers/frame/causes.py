@@ -9,16 +9,9 @@ from math import factorial
 
 import numpy as np
 
-from femubench import (
-    Factor,
-    FloatArray,
-    Frame,
-    Model,
-    Section,
-    Workbench,
-    rectangular_tube,
-    solve_modes,
-)
+from femubench import Model, solve_modes
+from femubench.fem import Factor, FloatArray, Frame, Section, rectangular_tube
+from femubench.reproduction import Workbench
 from femubench.scenarios.structures import ladder_truth
 
 WALL = 0.00238  # m, of the tube as the paper gives it

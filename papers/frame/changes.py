@@ -4,22 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from femubench import (
-    ElementFamily,
-    Figure,
-    FloatArray,
-    MatrixImage,
-    Model,
-    Structure,
-    StructureMap,
-    UpdateResult,
-    Workbench,
-    element_norms,
-    generic_family,
-    stiffness_difference,
-    stiffness_matrices,
-    wireframe_of,
-)
+from femubench import Model, UpdateResult, wireframe_of
+from femubench.fem import FloatArray, Structure, stiffness_matrices
+from femubench.reproduction import Figure, MatrixImage, StructureMap, Workbench
+from femubench.results import element_norms, stiffness_difference
+from femubench.update import ElementFamily, generic_family
 
 CASE = "frame"
 SOLUTIONS = {"least squares": "generic-ls", "adjusted": "generic-adjusted"}

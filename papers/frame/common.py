@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from femubench import FloatArray, Modes, Workbench, solve_modes
+from femubench import Modes, solve_modes
+from femubench.fem import FloatArray
+from femubench.reproduction import Workbench
 
 PAPER = "frame"
 CASE = "frame"

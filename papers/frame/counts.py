@@ -7,17 +7,11 @@ from collections import Counter
 import numpy as np
 import scipy.sparse as sp
 
-from femubench import (
-    Cell,
-    IntArray,
-    Page,
-    Structure,
-    Workbench,
-    generic_family,
-    physical_family,
-)
+from femubench.fem import IntArray, Structure
 from femubench.papers.frame.common import CASE, PAPER, modes_of, rigid_modes, strain_modes
 from femubench.papers.printed import printed
+from femubench.reproduction import Cell, Page, Workbench
+from femubench.update import generic_family, physical_family
 
 _NAMES = {
     "joints_L": "L joints",

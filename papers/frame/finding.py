@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from femubench import Bars, Extra, Figure, FloatArray, Workbench
+from femubench.fem import FloatArray
 from femubench.papers.frame.causes import (
     CAUSES,
     FURTHER,
@@ -21,6 +21,7 @@ from femubench.papers.frame.causes import (
 )
 from femubench.papers.frame.changes import change_sentences
 from femubench.papers.frame.receptances import receptance_sentences
+from femubench.reproduction import Bars, Extra, Figure, Workbench
 
 TEXTBOOK_YOUNG, SOLID_YOUNG = 70e9, 68e9  # Pa, of aluminium; of the solid model
 _TEXTBOOK = (TORSION, SHEAR)

@@ -6,17 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from femubench import (
-    Cell,
-    FloatArray,
-    Measurement,
-    Model,
-    Page,
-    Workbench,
-    expand_by_dynamics,
-)
+from femubench import Measurement, Model
+from femubench.fem import FloatArray
+from femubench.modal import expand_by_dynamics
 from femubench.papers.frame.common import CASE, PAPER
 from femubench.papers.printed import printed
+from femubench.reproduction import Cell, Page, Workbench
 
 _DRAWS = 20
 _TRIAL = 0.01  # of the largest component

@@ -7,20 +7,13 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg as la
 
-from femubench import (
-    Extra,
-    FloatArray,
-    Model,
-    Structure,
-    Symmetry,
-    Workbench,
-    generic_family,
-    quasi_measured_modes,
-    solve_modes,
-)
+from femubench import Model, solve_modes
+from femubench.fem import FloatArray, Structure
 from femubench.papers.frame.common import CASE, PAPER, listed, strain_modes
 from femubench.papers.frame.spaces import Spaces
 from femubench.papers.printed import printed
+from femubench.reproduction import Extra, Workbench
+from femubench.update import Symmetry, generic_family, quasi_measured_modes
 
 _TORSION_FACTOR = 140.0
 

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femubench import Extra, FloatArray, PairedMode, Workbench, predict_block
+from femubench.fem import FloatArray
 from femubench.papers.frame.common import CASE, TRUTH, one
+from femubench.reproduction import Extra, Workbench
+from femubench.results import PairedMode, predict_block
 
 MATRIX = ("unchanged", "baruch", "berman", "kabe", "kabe-rigid")
 ELEMENT = ("physical", "nobari", "nobari-rigid", "generic-ls", "generic-adjusted")

@@ -6,13 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from femubench import (
-    Extra,
-    QuasiModes,
-    Workbench,
-    generic_family,
-    quasi_measured_modes,
-)
 from femubench.papers.frame.common import (
     CASE,
     TRUTH,
@@ -23,6 +16,8 @@ from femubench.papers.frame.common import (
     rigid_modes,
     strain_modes,
 )
+from femubench.reproduction import Extra, Workbench
+from femubench.update import QuasiModes, generic_family, quasi_measured_modes
 
 SEARCH = "docs/open-cells.md has the search"
 CUTOFFS = (0.1, 0.03, 0.01, 0.001, 0.0003, 0.0001, 0.00001)

@@ -9,20 +9,11 @@ from typing import Literal
 import numpy as np
 import scipy.linalg as la
 
-from femubench import (
-    Curve,
-    Curves,
-    Figure,
-    FloatArray,
-    Model,
-    Modes,
-    Sensors,
-    SparseArray,
-    Workbench,
-    receptance,
-    solve_modes,
-)
+from femubench import Model, Modes, Sensors, solve_modes
+from femubench.fem import FloatArray, SparseArray
+from femubench.modal import receptance
 from femubench.papers.frame.causes import Ladder
+from femubench.reproduction import Curve, Curves, Figure, Workbench
 
 CASE, POINT = "frame-beam", "6Z"
 DAMPING = 0.002

@@ -8,19 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from femubench import (
-    ElementFamily,
-    Extra,
-    FloatArray,
-    IntArray,
-    Model,
-    Workbench,
-    generic_family,
-    nobari_family,
-    physical_family,
-    rigid_modes_of,
-)
+from femubench import Model
+from femubench.fem import FloatArray, IntArray
+from femubench.modal import rigid_modes_of
 from femubench.papers.frame.common import CASE
+from femubench.reproduction import Extra, Workbench
+from femubench.update import ElementFamily, generic_family, nobari_family, physical_family
 
 _RANK = 1e-9  # of the largest singular value
 _UNCOUPLED = ("k11", "k12", "k22", "k33")  # generic beam and generic rod, without coupling

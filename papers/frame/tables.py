@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from femubench import Cell, FloatArray, Page, Workbench
+from femubench.fem import FloatArray
 from femubench.papers.frame import readings
 from femubench.papers.frame.common import (
     PAPER,
@@ -18,6 +18,7 @@ from femubench.papers.frame.common import (
     strain_modes,
 )
 from femubench.papers.printed import printed
+from femubench.reproduction import Cell, Page, Workbench
 
 _EXACT = 0.1  # percent: of what a method promises to meet, or what follows from the model alone
 _SHAPED = 0.5  # percent: of what depends on shapes that are not the test's

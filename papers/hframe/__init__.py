@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from femubench import Study, Workbench
 from femubench.papers.hframe.beyond import compare, extras, held_out_bars
 from femubench.papers.hframe.findings import findings, premises
 from femubench.papers.hframe.meshes import mesh_cells
 from femubench.papers.hframe.shapes import mac_extra, shape_cells
 from femubench.papers.hframe.updates import update_cells
+from femubench.reproduction import Study, Workbench
 
 
 def study(bench: Workbench) -> Study:

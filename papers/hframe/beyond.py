@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femubench import Bars, Extra, FloatArray, Workbench
+from femubench.fem import FloatArray
 from femubench.papers.hframe.meshes import frequencies
 from femubench.papers.hframe.physical import (
     Physical,
@@ -18,6 +18,7 @@ from femubench.papers.hframe.physical import (
 from femubench.papers.hframe.rows import FREE_EI, ROWS, Row, at_printed, parameter_values, run
 from femubench.papers.hframe.updates import USED, misprinted, unit_of
 from femubench.papers.printed import printed
+from femubench.reproduction import Bars, Extra, Workbench
 
 DIAGNOSED = "diagnosed:meet_frequencies=false"
 BUILT, PHYSICAL = "C_a as built", "shear, k_theta, E"

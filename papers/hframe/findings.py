@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from femubench import Workbench
 from femubench.papers.hframe.beyond import BUILT, PHYSICAL, Comparison
 from femubench.papers.hframe.physical import ARM
 from femubench.papers.hframe.rows import FREE_EI, parameter_values, row_of, run
 from femubench.papers.hframe.shapes import OUT_OF_PLANE, expanded_mac, partner
 from femubench.papers.hframe.updates import USED, element_lengths
 from femubench.papers.printed import printed
+from femubench.reproduction import Workbench
 
 
 def premises(bench: Workbench) -> tuple[str, ...]:

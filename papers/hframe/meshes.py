@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from femubench import Case, Cell, FloatArray, Model, Page, solve_modes
+from femubench import Case, Model, solve_modes
+from femubench.fem import FloatArray
 from femubench.papers.printed import printed
+from femubench.reproduction import Cell, Page
 
 MODES = 8
 RECOVERED = (

@@ -6,18 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femubench import (
-    Case,
-    FloatArray,
-    Measurement,
-    Model,
-    Parameter,
+from femubench import Case, Measurement, Model, solve_modes
+from femubench.fem import FloatArray, Parameter
+from femubench.modal import pair_modes
+from femubench.update import (
     Unknown,
     UpdateOptions,
     all_elements,
-    pair_modes,
     sensitivity_update,
-    solve_modes,
     with_joint_springs,
 )
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from femubench import Case, Model, Parameter, UpdateResult, Workbench
+from femubench import Case, Model, UpdateResult
+from femubench.fem import Parameter
 from femubench.papers.printed import printed
+from femubench.reproduction import Workbench
 
 # The printed springs, arms and rigidities; the case knows the half depth of 20 mm.
 SPRINGS = "stiffness.x=3.30e9,stiffness.z=4.48e9,stiffness.ry=3.02e6"

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from femubench import Case, Cell, Extra, FloatArray, Page, expand_by_serep, mac, solve_modes
+from femubench import Case, solve_modes
+from femubench.fem import FloatArray
+from femubench.modal import expand_by_serep, mac
 from femubench.papers.hframe.meshes import MODES, RECOVERED, frequencies
 from femubench.papers.printed import printed
+from femubench.reproduction import Cell, Extra, Page
 
 OUT_OF_PLANE = 7
 POINTS = 1.0

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from femubench import Cell, Model, Page, Workbench, spring_estimates
+from femubench import Model
 from femubench.papers.hframe.meshes import RECOVERED, frequencies
 from femubench.papers.hframe.rows import (
     ROWS,
@@ -19,6 +19,8 @@ from femubench.papers.hframe.rows import (
     run,
 )
 from femubench.papers.printed import printed
+from femubench.reproduction import Cell, Page, Workbench
+from femubench.update import spring_estimates
 
 INITIAL, UPDATED, LIMIT = 0.01, 0.05, 0.1  # of frequencies and of parameters, in percent
 DIGITS = {"k_x": -7, "k_z": -7}  # printed with three digits

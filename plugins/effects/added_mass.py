@@ -6,15 +6,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-from femubench import (
+from femubench import Model, Site, Size
+from femubench.effect import (
     Change,
     EffectParameter,
-    Frame,
     FrameEffect,
-    Model,
-    PointMass,
-    Site,
-    Size,
     free_translations,
     mass_term,
     point_in,
@@ -23,6 +19,7 @@ from femubench import (
     proportional,
     total_mass,
 )
+from femubench.fem import Frame, PointMass
 
 _SHARE = 0.005  # of the structure's mass
 

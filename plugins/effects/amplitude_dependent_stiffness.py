@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-from femubench import EffectParameter, Frame, FrameEffect, Model
+from femubench import Model
+from femubench.effect import EffectParameter, FrameEffect
+from femubench.fem import Frame
 
 
 class AmplitudeDependentStiffness(FrameEffect):

@@ -9,17 +9,12 @@ from typing import ClassVar
 import numpy as np
 import scipy.sparse as sp
 
-from femubench import (
+from femubench import Model, Site, Size
+from femubench.effect import (
     Change,
     EffectParameter,
-    FloatArray,
-    Frame,
     FrameEffect,
-    Model,
-    Oscillator,
     RowOperator,
-    Site,
-    Size,
     Term,
     directed_places,
     directed_point,
@@ -29,6 +24,7 @@ from femubench import (
     translation_rows,
     with_extra,
 )
+from femubench.fem import FloatArray, Frame, Oscillator
 
 _SHARE = 0.005  # of the structure's mass
 

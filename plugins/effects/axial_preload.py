@@ -8,23 +8,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
+from femubench import Model, Site, Size
+from femubench.effect import (
     Change,
     EffectParameter,
-    Frame,
     FrameEffect,
-    Model,
-    Preload,
-    Site,
-    Size,
     member_length,
     once_for,
-    preload_stiffness,
-    preload_stiffnesses,
     proportional,
-    redundant_members,
     sparse_term,
 )
+from femubench.fem import Frame, Preload, preload_stiffness, preload_stiffnesses, redundant_members
 
 _SCALE, _BOUND = 0.15, 0.6  # of the Euler load
 _MOST = 60

@@ -6,20 +6,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-from femubench import (
+from femubench import Model, Size
+from femubench.effect import (
     Change,
-    Coupling,
     EffectParameter,
     ElementOperator,
-    Frame,
     FrameEffect,
-    Model,
-    Size,
     Term,
-    coupling_matrices,
     elements_of,
     proportional,
 )
+from femubench.fem import Coupling, Frame, coupling_matrices
 
 _BOUND = 0.8
 

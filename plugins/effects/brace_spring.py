@@ -9,22 +9,19 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
-    Brace,
+from femubench import Model, Site, Size
+from femubench.effect import (
     Change,
     EffectParameter,
-    Frame,
     FrameEffect,
-    Model,
     RowOperator,
-    Site,
-    Size,
     Term,
     elongation_row,
     member_length,
     pair_of,
     proportional,
 )
+from femubench.fem import Brace, Frame
 
 _SHARE = 0.01  # of the mean EA / L of the members
 _MOST = 300

@@ -7,7 +7,9 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from femubench import FloatArray, LookWarning, Model, Seen, Size, total_mass
+from femubench import LookWarning, Model, Seen, Size
+from femubench.effect import total_mass
+from femubench.fem import FloatArray
 from femubench.plugins.effects.material import MaterialEffect
 
 _SURE = 3.0  # standard deviations of the weighed mass

@@ -8,16 +8,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
+from femubench import Model, Site, Size
+from femubench.effect import (
     Change,
     EffectParameter,
-    Frame,
     FrameEffect,
-    GroundSpring,
-    Model,
     RowOperator,
-    Site,
-    Size,
     Term,
     directed_places,
     directed_point,
@@ -27,6 +23,7 @@ from femubench import (
     total_mass,
     translation_rows,
 )
+from femubench.fem import Frame, GroundSpring
 
 _SHARE = 0.01  # of the squared lowest elastic frequency
 

@@ -6,22 +6,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-from femubench import (
+from femubench import Model, Site, Size
+from femubench.effect import (
     Change,
     EffectParameter,
-    Frame,
     FrameEffect,
-    Model,
-    Place,
-    PointMass,
-    Site,
-    Size,
     joints_of,
     mass_term,
     proportional,
     total_mass,
     type_places,
 )
+from femubench.fem import Frame, Place, PointMass
 
 _SHARE = 0.02  # of the structure's mass, over all joints
 

@@ -9,32 +9,31 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
-    BeamProperties,
+from femubench import Model, Site, Size
+from femubench.effect import (
     Change,
     EffectParameter,
     ElementOperator,
-    FloatArray,
-    Frame,
     FrameEffect,
-    IntArray,
-    Model,
-    RigidEnd,
-    Site,
-    Size,
-    Structure,
     Term,
-    available_length,
     chebyshev_nodes,
     end_places,
     ends_of,
-    half_depth,
     joints_with_members,
     member_length,
     once_for,
-    stiffness_matrices,
     type_places,
 )
+from femubench.fem import (
+    BeamProperties,
+    FloatArray,
+    Frame,
+    IntArray,
+    RigidEnd,
+    Structure,
+    stiffness_matrices,
+)
+from femubench.update import available_length, half_depth
 
 _SHARE = 0.02  # of the member, where sections are numbers
 _DIGITS = 9

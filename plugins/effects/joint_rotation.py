@@ -8,17 +8,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
-    ACTIVE,
+from femubench import Model, Site, Size
+from femubench.effect import (
     Change,
     EffectParameter,
-    Frame,
     FrameEffect,
-    JointSpring,
-    Model,
-    Site,
-    Size,
-    Structure,
     branch_places,
     end_arm,
     end_places,
@@ -29,6 +23,7 @@ from femubench import (
     member_length,
     type_places,
 )
+from femubench.fem import ACTIVE, Frame, JointSpring, Structure
 
 _SOFTEST = 1e-3  # of the scale
 _TORSION, _BENDING = ("rx",), ("ry", "rz")

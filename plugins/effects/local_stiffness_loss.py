@@ -6,22 +6,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-from femubench import (
+from femubench import Model, Size
+from femubench.effect import (
     Change,
     EffectParameter,
     ElementOperator,
-    Factor,
-    Frame,
     FrameEffect,
-    Model,
-    Size,
     Term,
     element_labels,
     elements_of,
     once_for,
     proportional,
-    stiffness_matrices,
 )
+from femubench.fem import Factor, Frame, stiffness_matrices
 
 _LOSS = EffectParameter("loss", "", 0.3, lower=0.0, upper=0.95, one_sided=True, wording="share")
 

@@ -8,22 +8,17 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from femubench import (
+from femubench import Model, Site, Size
+from femubench.effect import (
     Change,
-    Eccentricity,
     EffectParameter,
     ElementOperator,
-    Frame,
     FrameEffect,
-    Model,
-    Section,
-    Site,
-    Size,
     Term,
-    eccentric_mass_parts,
     elements_of,
     once_for,
 )
+from femubench.fem import Eccentricity, Frame, Section, eccentric_mass_parts
 
 _SCALE, _BOUND = 0.15, 1.0  # of the size of the section
 

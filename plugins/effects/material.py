@@ -7,24 +7,19 @@ from dataclasses import replace
 from functools import partial
 from typing import ClassVar, Literal
 
-from femubench import (
+from femubench import Model
+from femubench.effect import (
     Change,
     EffectParameter,
     ElementOperator,
-    Frame,
     FrameEffect,
     MatrixOperator,
-    Member,
-    Model,
-    ModelError,
-    SparseArray,
     Term,
     elements_of,
-    mass_matrices,
     once_for,
     proportional,
-    stiffness_matrices,
 )
+from femubench.fem import Frame, Member, ModelError, SparseArray, mass_matrices, stiffness_matrices
 
 
 class MaterialEffect(FrameEffect):

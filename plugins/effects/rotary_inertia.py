@@ -8,21 +8,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
+from femubench import LookWarning, Model, Seen, Size
+from femubench.effect import (
     Change,
     EffectParameter,
     ElementOperator,
-    Frame,
     FrameEffect,
-    LookWarning,
-    Model,
-    Seen,
-    Size,
     Term,
     elements_of,
-    mass_matrices,
     proportional,
 )
+from femubench.fem import Frame, mass_matrices
 
 
 class RotaryInertia(FrameEffect):

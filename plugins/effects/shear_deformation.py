@@ -8,24 +8,23 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from femubench import (
-    BeamProperties,
+from femubench import LookWarning, Model, Seen, Size
+from femubench.effect import (
     Change,
     EffectParameter,
     ElementOperator,
+    FrameEffect,
+    Term,
+    proportional,
+    rate_nodes,
+)
+from femubench.fem import (
+    BeamProperties,
     Factor,
     FloatArray,
     Frame,
-    FrameEffect,
-    LookWarning,
-    Model,
-    Seen,
-    Size,
-    Term,
     constant_kappa,
     mass_matrices,
-    proportional,
-    rate_nodes,
     stiffness_matrices,
 )
 

@@ -8,20 +8,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
+from femubench import Model, Reading, Size
+from femubench.effect import (
     Change,
     EffectParameter,
     ElementOperator,
-    Frame,
     FrameEffect,
-    Member,
-    Model,
-    Reading,
-    Size,
     Term,
     proportional,
-    stiffness_matrices,
 )
+from femubench.fem import Frame, Member, stiffness_matrices
 
 _STEEL = 150e9  # Pa: stiffer is taken for steel, softer for aluminium
 _STEEL_SLOPE, _ALUMINIUM_SLOPE = -2.4e-4, -3.6e-4  # of E in 1/K, around room temperature

@@ -9,21 +9,19 @@ from typing import ClassVar
 import numpy as np
 from scipy.optimize import brentq
 
-from femubench import (
+from femubench import LookWarning, Model, Seen, Size, bredt
+from femubench.effect import (
     Change,
     EffectParameter,
     ElementOperator,
-    Frame,
     FrameEffect,
-    LookWarning,
-    Model,
-    Section,
-    Seen,
-    Size,
     Term,
-    bredt,
     elements_of,
     proportional,
+)
+from femubench.fem import (
+    Frame,
+    Section,
     rectangular_tube,
     round_tube,
     solid_rectangle,

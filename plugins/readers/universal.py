@@ -14,7 +14,8 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from femubench import InputError, Measurement, Sensors, real_modes
+from femubench import InputError, Measurement, Sensors
+from femubench.modal import real_modes
 
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _COORDINATES, _UNITS, _SYSTEMS, _SHAPES = (15, 2411), 164, (18, 2420), (55, 2414)

@@ -7,15 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
+from femubench import Measurement, Model, Strategy, UpdateResult
+from femubench.fem import FloatArray, LowRank
+from femubench.update import (
     ITERATIONS,
-    FloatArray,
-    LowRank,
-    Measurement,
-    Model,
     QuasiModes,
-    Strategy,
-    UpdateResult,
     check_used_modes,
     force_scale,
     quasi_measured_modes,

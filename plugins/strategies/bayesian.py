@@ -7,15 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
-    Measurement,
-    Model,
-    Parameter,
-    Strategy,
-    Structure,
+from femubench import Measurement, Model, Strategy, UpdateResult
+from femubench.fem import Parameter, Structure
+from femubench.update import (
     Unknown,
     UpdateOptions,
-    UpdateResult,
     all_elements,
     global_stiffness,
     joint_groups,

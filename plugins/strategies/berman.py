@@ -8,19 +8,10 @@ from typing import ClassVar
 import numpy as np
 import scipy.linalg as la
 
-from femubench import (
-    FloatArray,
-    LowRank,
-    Measurement,
-    Model,
-    Strategy,
-    StrategyFailure,
-    UpdateResult,
-    check_used_modes,
-    expand_measured_shapes,
-    rigid_modes_of,
-    total_change,
-)
+from femubench import Measurement, Model, Strategy, StrategyFailure, UpdateResult
+from femubench.fem import FloatArray, LowRank
+from femubench.modal import rigid_modes_of
+from femubench.update import check_used_modes, expand_measured_shapes, total_change
 
 # Below this share of independent motion two expanded shapes are one.
 _DEPENDENT = 1e-6

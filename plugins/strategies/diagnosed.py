@@ -8,8 +8,6 @@ from typing import ClassVar
 import numpy as np
 
 from femubench import (
-    Examination,
-    Explanation,
     FemubenchError,
     Measurement,
     Model,
@@ -17,14 +15,18 @@ from femubench import (
     ParameterEstimate,
     Strategy,
     UpdateResult,
+    solve_modes,
+)
+from femubench.diagnosis import (
+    Examination,
+    Explanation,
     causes_in,
     examine,
     extended_by,
     registered_effects,
-    rigid_modes_of,
-    solve_modes,
-    with_measured_frequencies,
 )
+from femubench.modal import rigid_modes_of
+from femubench.update import with_measured_frequencies
 
 # Of the first elastic eigenvalue of the nominal model, as the harness counts them.
 _NEGATIVE = 1e-6

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from femubench import ElementFamily, ElementStrategy, Structure, Symmetry, generic_family
+from femubench.fem import Structure
+from femubench.update import ElementFamily, ElementStrategy, Symmetry, generic_family
 
 
 @dataclass(frozen=True)

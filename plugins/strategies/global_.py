@@ -7,15 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
-    Measurement,
-    Model,
-    Strategy,
-    UpdateOptions,
-    UpdateResult,
-    global_stiffness,
-    sensitivity_update,
-)
+from femubench import Measurement, Model, Strategy, UpdateResult
+from femubench.update import UpdateOptions, global_stiffness, sensitivity_update
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import InputError, Measurement, Model, Strategy, UpdateResult, update_entries
+from femubench import InputError, Measurement, Model, Strategy, UpdateResult
+from femubench.update import update_entries
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import Measurement, Model, Strategy, UpdateResult, rigid_modes_of, update_entries
+from femubench import Measurement, Model, Strategy, UpdateResult
+from femubench.modal import rigid_modes_of
+from femubench.update import update_entries
 
 
 class KabeRigid(Strategy):

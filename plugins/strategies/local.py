@@ -7,16 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
-    Measurement,
-    Model,
-    Strategy,
-    UpdateOptions,
-    UpdateResult,
-    groups_within,
-    joint_stiffness,
-    sensitivity_update,
-)
+from femubench import Measurement, Model, Strategy, UpdateResult
+from femubench.update import UpdateOptions, groups_within, joint_stiffness, sensitivity_update
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from femubench import ElementFamily, ElementStrategy, Structure, nobari_family
+from femubench.fem import Structure
+from femubench.update import ElementFamily, ElementStrategy, nobari_family
 
 
 @dataclass(frozen=True)

@@ -7,16 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import (
+from femubench import Measurement, Model, Strategy, UpdateResult
+from femubench.fem import Parameter, Structure
+from femubench.update import (
     JointGroup,
-    Measurement,
-    Model,
-    Parameter,
-    Strategy,
-    Structure,
     Unknown,
     UpdateOptions,
-    UpdateResult,
     available_length,
     carried_by,
     global_stiffness,

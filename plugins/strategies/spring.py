@@ -8,17 +8,12 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from femubench import (
+from femubench import Measurement, Model, NotApplicable, Strategy, UpdateResult
+from femubench.fem import Parameter, Structure
+from femubench.update import (
     JointGroup,
-    Measurement,
-    Model,
-    NotApplicable,
-    Parameter,
-    Strategy,
-    Structure,
     Unknown,
     UpdateOptions,
-    UpdateResult,
     all_elements,
     carried_by,
     flexible_ends,

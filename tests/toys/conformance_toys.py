@@ -14,27 +14,22 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench import (
-    EffectParameter,
-    Frame,
-    FrameEffect,
-    GroundSpring,
     InputError,
     LookWarning,
-    LowRank,
     Measurement,
     Model,
     NotApplicable,
-    Place,
     Reading,
     Seen,
     Site,
     Size,
-    SparseArray,
     Strategy,
     StrategyFailure,
     UpdateResult,
     solve_modes,
 )
+from femubench.effect import EffectParameter, FrameEffect
+from femubench.fem import Frame, GroundSpring, LowRank, Place, SparseArray
 
 
 def scaled(model: Model, factor: float = 0.95) -> Model:

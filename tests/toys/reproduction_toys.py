@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from femubench import Bars, Curve, Curves, Extra, Figure, Page, Study
+from femubench.reproduction import Bars, Curve, Curves, Extra, Figure, Page, Study
 
 EVIL = "<script>alert(1)</script> | *x* & `y` [z](w)"
 CONVENTION = "with the words frame:weight=30, which the text does not give"

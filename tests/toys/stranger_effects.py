@@ -5,18 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from femubench import (
-    EffectParameter,
-    Factor,
-    Frame,
-    FrameEffect,
-    LookWarning,
-    Model,
-    Reading,
-    Seen,
-    Size,
-    hookimpl,
-)
+from femubench import LookWarning, Model, Reading, Seen, Size, hookimpl
+from femubench.effect import EffectParameter, FrameEffect
+from femubench.fem import Factor, Frame
 
 CAUTION = "A skin that peels off looks like a thinner one."
 SUMMARY = "a skin stiffens the members in bending"
