@@ -25,20 +25,14 @@ sys.path.insert(0, str(ROOT))
 
 import femubench  # noqa: E402 - from this clone, whatever else is installed
 
-# The modules of public names, with what each is for; one that this clone lacks has no page.
-_THERE = {"femubench", *(f"femubench.{module.name}" for module in iter_modules(femubench.__path__))}
-MODULES = {
-    name: title
-    for name, title in {
-        "femubench": "Cases, strategies, runs and diagnoses",
-        "femubench.fem": "Finite elements",
-        "femubench.modal": "Modal analysis",
-        "femubench.update": "Tools for updating strategies",
-        "femubench.effect": "Tools for effects",
-        "femubench.plot": "Figures",
-    }.items()
-    if name in _THERE
-}
+# The modules of public names: the package itself, then its own modules in the order of the work.
+_ORDER = ["fem", "modal", "update", "effect", "diagnosis", "results", "plot"]
+_FOUND = [m.name for m in iter_modules(femubench.__path__) if not m.ispkg and m.name[0] != "_"]
+MODULES = [
+    "femubench",
+    *(f"femubench.{name}" for name in _ORDER if name in _FOUND),
+    *(f"femubench.{name}" for name in _FOUND if name not in _ORDER),
+]
 
 project = "femubench"
 author = "The femubench developers"
@@ -63,6 +57,8 @@ autodoc_type_aliases = {
 python_maximum_signature_line_length = 80
 python_use_unqualified_type_names = True
 add_module_names = False
+# A type in a signature that is public under two names leads to one of them; which one is no fault.
+suppress_warnings = ["ref.python"]
 
 html_theme = "furo"
 html_title = f"femubench {version}"
@@ -95,9 +91,9 @@ def write_api(app: Sphinx) -> None:
     folder = DOCS / "api"
     folder.mkdir(exist_ok=True)
     pages = {}
-    for name, title in MODULES.items():
+    for name in MODULES:
         module = import_module(name)
-        heading = f"{title}: `{name}`"
+        heading = f"`{name}`"
         entries = [entry(module, public) for public in public_names(module)]
         about = inspect.getdoc(module) or ""
         pages[f"{name}.rst"] = "\n".join([heading, "=" * len(heading), "", about, "", *entries])
@@ -136,17 +132,36 @@ def as_restructured_text(
     app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
 ) -> None:
     """Escape what is plain text in a docstring of ours and markup to Sphinx, such as |x|."""
-    for index, line in enumerate(lines):
-        escaped = re.sub(r"(`[^`]*`)|[|*\\]|(?<=\w)_(?!\w)", _escaped, line)
-        lines[index] = re.sub(r"^Source: ", "**Source:** ", escaped)
+    text = re.sub(r"(`[^`]*`)(\w?)|[|*\\]|(?<=\w)_(?!\w)", _escaped, "\n".join(lines))
+    lines[:] = re.sub(r"^Source: ", "**Source:** ", text, flags=re.MULTILINE).split("\n")
 
 
 def _escaped(match: re.Match[str]) -> str:
-    return match[0] if match[1] else f"\\{match[0]}"
+    if match[1]:  # `Case`s
+        return f"{match[1]}\\ {match[2]}" if match[2] else match[0]
+    return f"\\{match[0]}"
+
+
+def name_aliases(
+    app: Sphinx,
+    what: str,
+    name: str,
+    obj: object,
+    options: object,
+    arguments: str | None,
+    returned: str | None,
+) -> tuple[str | None, str | None] | None:
+    """Write the alias of a type inside another type as the source does: tuple[FloatArray, ...]."""
+    if "TypeAliasForwardRef" not in f"{arguments}{returned}":
+        return None
+    alias = re.compile(r"TypeAliasForwardRef\('(\w+)'\)")
+    arguments, returned = (text and alias.sub(r"\1", text) for text in (arguments, returned))
+    return arguments, returned
 
 
 def setup(app: Sphinx) -> None:
     """Connect the steps of this build."""
     app.connect("builder-inited", write_api)
     app.connect("source-read", add_navigation)
+    app.connect("autodoc-process-signature", name_aliases)
     app.connect("autodoc-process-docstring", as_restructured_text, priority=400)  # 500: napoleon
