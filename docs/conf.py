@@ -17,6 +17,7 @@ from pkgutil import iter_modules
 from types import ModuleType
 
 from sphinx.application import Sphinx
+from sphinx.util.inspect import TypeAliasForwardRef
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
@@ -54,6 +55,8 @@ autodoc_preserve_defaults = True
 autodoc_type_aliases = {
     name: name for name in ("AnyArray", "BoolArray", "FloatArray", "IntArray", "SparseArray")
 }
+# Inside another type, as in tuple[FloatArray, ...], Sphinx writes the repr of an alias.
+TypeAliasForwardRef.__repr__ = lambda self: self.name  # type: ignore[method-assign]
 python_maximum_signature_line_length = 80
 python_use_unqualified_type_names = True
 add_module_names = False
@@ -142,26 +145,8 @@ def _escaped(match: re.Match[str]) -> str:
     return f"\\{match[0]}"
 
 
-def name_aliases(
-    app: Sphinx,
-    what: str,
-    name: str,
-    obj: object,
-    options: object,
-    arguments: str | None,
-    returned: str | None,
-) -> tuple[str | None, str | None] | None:
-    """Write the alias of a type inside another type as the source does: tuple[FloatArray, ...]."""
-    if "TypeAliasForwardRef" not in f"{arguments}{returned}":
-        return None
-    alias = re.compile(r"TypeAliasForwardRef\('(\w+)'\)")
-    arguments, returned = (text and alias.sub(r"\1", text) for text in (arguments, returned))
-    return arguments, returned
-
-
 def setup(app: Sphinx) -> None:
     """Connect the steps of this build."""
     app.connect("builder-inited", write_api)
     app.connect("source-read", add_navigation)
-    app.connect("autodoc-process-signature", name_aliases)
     app.connect("autodoc-process-docstring", as_restructured_text, priority=400)  # 500: napoleon
