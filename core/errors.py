@@ -56,6 +56,15 @@ class InputError(FemubenchError):
         return _input_error, (self.what, self.file, self.line, self.key, self.expected)
 
 
+class UnknownNameError(InputError, KeyError):
+    """A name that is not there, with the near matches; a KeyError to who looks it up."""
+
+    __str__ = Exception.__str__  # that of KeyError quotes the whole sentence
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return UnknownNameError, (self.what,)
+
+
 def _input_error(
     what: str,
     file: Path | str | None,

@@ -4,6 +4,7 @@ No function touches pyplot: ``ax.get_figure().savefig("mode.svg")`` writes what 
 function raises `InputError` for what it cannot draw.
 """
 
+from femubench.core.drawing.wireframe import Wireframe, wireframe_of
 from femubench.core.plot.cost import error_against_cost
 from femubench.core.plot.diagnosis import (
     MOST_ROWS,
@@ -24,6 +25,7 @@ __all__ = [
     "MOST_ROWS",
     "ResidualDot",
     "Spot",
+    "Wireframe",
     "convergence",
     "error_against_cost",
     "evidence",
@@ -35,4 +37,5 @@ __all__ = [
     "residuals",
     "strongest_places",
     "svg",
+    "wireframe_of",
 ]

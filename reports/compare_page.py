@@ -7,11 +7,11 @@ import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
-from femubench import METHOD
 from femubench.reports.cells import NOTHING, fixed, plain, shortened
 from femubench.reports.markdown import escape, table
 from femubench.reports.site import environment
 from femubench.reports.terminal import WIDTH, aligned_table
+from femubench.results import METHOD
 
 _RATIOS = ("skill", "used", "higher", "modified", "seconds")
 _NAME = 26

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from femubench import Run
-from femubench.results import modes_frame, results_frame
+from femubench.results import Run, modes_frame, results_frame
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from femubench import Run
 from femubench.reports.page.data import Exhibits, page_data
 from femubench.reports.page.document import document
+from femubench.results import Run
 
 
 class HtmlReporter:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 
-from femubench import Run
-from femubench.results import run_to_json
+from femubench.results import Run, run_to_json
 
 
 class JsonReporter:

@@ -9,7 +9,6 @@ from dataclasses import replace
 from itertools import chain
 from typing import Any
 
-from femubench import Run, tell_apart
 from femubench.reports.cells import NOTHING, fixed, hertz, interval, plain, whole
 from femubench.reports.page.papers import papers_of
 from femubench.reports.summary import (
@@ -24,7 +23,7 @@ from femubench.reports.summary import (
     troubles,
     unconverged,
 )
-from femubench.results import JobResult, PairedMode, leaderboard
+from femubench.results import JobResult, PairedMode, Run, leaderboard, tell_apart
 
 _SPECIAL = re.compile(r"([\\`*_\[\]|~])")
 _ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}

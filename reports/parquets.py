@@ -6,9 +6,9 @@ import io
 import json
 from typing import NoReturn
 
-from femubench import InputError, Run
+from femubench import InputError
 from femubench.reports.summary import notes_of
-from femubench.results import results_frame
+from femubench.results import Run, results_frame
 
 
 class ParquetReporter:

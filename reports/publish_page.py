@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from femubench import ranked
 from femubench.reports.cells import NOTHING, fixed, plain, shortened
 from femubench.reports.site import environment
+from femubench.results import ranked
 
 _BLOCKS = ("used", "higher", "modified")
 _WIDTH, _HEIGHT, _LEFT, _BOTTOM = 640.0, 220.0, 56.0, 34.0

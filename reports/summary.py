@@ -7,9 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from femubench import Run
 from femubench.reports.cells import plain
-from femubench.results import JobResult, PairedMode, frequency_error
+from femubench.results import JobResult, PairedMode, Run, frequency_error
 
 FINE = ("ok", "not-applicable")
 

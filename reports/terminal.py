@@ -6,10 +6,9 @@ import textwrap
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from femubench import Run, ranked
 from femubench.reports.cells import fixed, interval, plain, shortened, whole
 from femubench.reports.summary import Trouble, notes_of, spared, troubles, unconverged
-from femubench.results import leaderboard
+from femubench.results import Run, leaderboard, ranked
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -21,7 +21,7 @@ from femubench.core.inference.modal_basis import nominal_space
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.projection import Projection
 from femubench.core.inference.residuals import Data
-from femubench.core.plugin.roles import Effect
+from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import Advice
 
 STD = 0.002

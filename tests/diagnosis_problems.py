@@ -20,7 +20,7 @@ from femubench.core.inference.noise import Noise
 from femubench.core.inference.projection import Projection
 from femubench.core.inference.residuals import Data
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.plugin.roles import Effect
+from femubench.core.roles import Effect
 from femubench.effect import total_mass
 from femubench.fem import FloatArray, Frame
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from femubench import Case, Diagnosis, InputError, Model, Site, Size, read_case
+from femubench import Case, Diagnosis, InputError, Model, read_case
 from femubench.core.challenge import folder as folders
 from femubench.core.challenge.answer import Answer, AnswerCause, read_answer
 from femubench.core.challenge.draw import draw_case, registered_effects
@@ -39,7 +39,7 @@ from femubench.core.cli.main import bench
 from femubench.core.errors import FemubenchError, ModelError
 from femubench.core.fem.frame import Place
 from femubench.core.modal.eigen import solve_modes
-from femubench.effect import EffectParameter, FrameEffect
+from femubench.effect import EffectParameter, FrameEffect, Site, Size
 from femubench.fem import Frame, PointMass
 from femubench.plugins.effects.local_stiffness_loss import LocalStiffnessLoss
 

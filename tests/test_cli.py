@@ -19,9 +19,9 @@ from click.testing import CliRunner, Result
 
 import femubench
 from femubench.core.cli import progress
-from femubench.core.cli.files import write_atomically
 from femubench.core.cli.main import VERBS, bench
 from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of
+from femubench.core.files import write_atomically
 from femubench.core.run.store import Store
 
 CASE = """\
@@ -700,8 +700,8 @@ class Faulty:
 
 
 def test_a_reporter_that_raises_is_named() -> None:
-    from femubench.core.cli.reporting import rendered
     from femubench.core.errors import PluginError
+    from femubench.core.library.report import rendered
     from femubench.core.schema.results import Run
 
     with pytest.raises(PluginError, match="reporter 'faulty' failed: ZeroDivisionError"):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import statistics
 import sys
-import types
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +16,12 @@ from click.testing import CliRunner, Result
 from femubench.core.case.case import TOLERANCE, Case
 from femubench.core.case.example import write_example
 from femubench.core.case.reader import read_case
-from femubench.core.cli.cases import read_cases
 from femubench.core.cli.main import bench
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.serial import diagnosis_from_json
 from femubench.core.errors import InputError, NotApplicable
+from femubench.core.library import diagnose as library
+from femubench.core.library.cases import read_cases
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.score.scoring import frequency_error, score_model
@@ -31,7 +32,6 @@ import diagnosis_toys as toys
 
 Invoke = Callable[..., Result]
 Told = tuple[str, Result, dict[str, Any], Path]
-SEARCH, WRITING = "femubench.core.diagnosis.diagnose", "femubench.core.case.writing"
 
 EFFECTS = """
 from femubench import hookimpl
@@ -67,7 +67,7 @@ class Search:
         self.calls.append((case, [effect.name for effect in effects], pairs))
         if isinstance(self.found, Exception):
             raise self.found
-        return self.found
+        return replace(self.found, subject=case)
 
     def write_case(
         self, folder: Path, case: Case, model: object, *, comment: list[str], name: str
@@ -99,10 +99,8 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def search(monkeypatch: pytest.MonkeyPatch) -> Search:
     """Put a stand-in where the search and the writer of cases are imported from."""
     stand_in = Search()
-    for module, name in ((SEARCH, "diagnose"), (WRITING, "write_case")):
-        made = types.ModuleType(module)
-        setattr(made, name, getattr(stand_in, name))
-        monkeypatch.setitem(sys.modules, module, made)
+    monkeypatch.setattr(library, "search", stand_in.diagnose)
+    monkeypatch.setattr(library, "write_case", stand_in.write_case)
     return stand_in
 
 

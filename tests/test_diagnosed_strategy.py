@@ -16,7 +16,6 @@ from femubench import (
     Measurement,
     Model,
     NotApplicable,
-    Run,
     Sensors,
     UpdateResult,
     read_case,
@@ -37,7 +36,7 @@ from femubench.fem import (
 )
 from femubench.modal import rigid_modes_of
 from femubench.plugins.strategies.diagnosed import Diagnosed
-from femubench.results import leaderboard, run_jobs
+from femubench.results import Run, leaderboard, run_jobs
 from femubench.scenarios import HERE
 from femubench.update import check_used_modes, with_measured_frequencies
 

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as Canvas
 
-from femubench import Wireframe
 from femubench.core.drawing.wireframe import DrawnJoint, DrawnMember
 from femubench.core.plot.figure import draw_figure, drawn
 from femubench.core.plot.style import STYLES
+from femubench.plot import Wireframe
 from femubench.reproduction import Bars, Curve, Curves, Figure, MatrixImage, StructureMap
 
 AWKWARD = 'a < b & "c" $x_1$ $'

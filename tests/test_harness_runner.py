@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -32,13 +33,13 @@ FOLDER, NAME = "/nowhere/zq104729104729", "zq271828182845"
 
 
 class Local(toys.Strategy):
-    """Lives where no worker finds it."""
+    """Holds what cannot be sent to a worker."""
 
     name = "local"
     citation = "none"
 
     def __init__(self) -> None:
-        self.lock = lambda: None
+        self.lock = threading.Lock()  # which no process can be given
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator

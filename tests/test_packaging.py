@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import tomllib
 from importlib.metadata import entry_points
@@ -20,7 +21,7 @@ SETUPTOOLS = PYPROJECT["tool"]["setuptools"]
 
 def test_version_stands_in_one_place() -> None:
     assert "version" in PYPROJECT["project"]["dynamic"]
-    assert SETUPTOOLS["dynamic"]["version"] == {"attr": "femubench.__version__"}
+    assert SETUPTOOLS["dynamic"]["version"] == {"attr": "femubench.core.version.__version__"}
     changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     assert f"## {femubench.__version__}" in changelog
 
@@ -40,10 +41,9 @@ def test_entry_points_are_installed_and_load(group: str) -> None:
 
 
 def test_facade_gives_every_name_that_it_lists() -> None:
-    names = [name for name in dir(femubench) if not name.startswith("_")]
-    assert {"Strategy", "Scenario", "UpdateResult", "hookimpl", "solve_modes"} <= set(names)
-    for name in names:
+    for name in femubench.__all__:
         assert getattr(femubench, name) is not None
+    assert set(femubench.__all__) <= set(dir(femubench))
     with pytest.raises(AttributeError, match="no attribute 'Stratgy'"):
         femubench.Stratgy  # noqa: B018
 
@@ -58,6 +58,21 @@ def test_citation_says_what_the_project_says() -> None:
     assert citation["license"] == project["license"]
     assert citation["keywords"] == project["keywords"]
     assert citation["authors"] == project["authors"]
+
+
+def test_facade_says_the_same_to_python_and_to_type_checkers() -> None:
+    tree = ast.parse((ROOT / "femubench" / "__init__.py").read_text(encoding="utf-8"))
+    checked = {
+        alias.name: node.module
+        for block in tree.body
+        if isinstance(block, ast.If) and ast.unparse(block.test) == "TYPE_CHECKING"
+        for node in ast.walk(block)
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert checked == femubench._HOME
+    assert {*checked, "__version__"} == set(femubench.__all__)
+    assert len(femubench.__all__) <= 45
 
 
 def test_index_of_the_docs_names_every_page() -> None:

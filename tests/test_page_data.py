@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from femubench import Run, tell_apart
 from femubench.core.score.comparison import Against, compare_runs
 from femubench.core.score.statistics import Groups
 from femubench.papers.printed import printed
@@ -25,7 +24,16 @@ from femubench.reports.page.data import page_data
 from femubench.reports.page.document import SCRIPTS, STYLES, asset, embedded_json
 from femubench.reports.page.papers import papers_of
 from femubench.reports.page.rounding import plain_data, rounded
-from femubench.results import Block, JobResult, PairedMode, leaderboard, rank_results, run_to_json
+from femubench.results import (
+    Block,
+    JobResult,
+    PairedMode,
+    Run,
+    leaderboard,
+    rank_results,
+    run_to_json,
+    tell_apart,
+)
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 

@@ -24,7 +24,6 @@ from femubench import (
     plot,
     read_case,
     solve_modes,
-    wireframe_of,
 )
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.drawing.places import placed_wireframe
@@ -33,6 +32,7 @@ from femubench.core.plot.style import COLOURS, place_names
 from femubench.core.schema.diagnosis import LocationRow, ResidualRow
 from femubench.core.schema.results import JobResult
 from femubench.modal import mac
+from femubench.plot import wireframe_of
 from femubench.results import Block
 from femubench.scenarios import HERE
 

@@ -135,7 +135,7 @@ def test_third_party_cannot_take_a_builtin_name(site: Path) -> None:
         ("raise RuntimeError('no licence')", "RuntimeError: no licence"),
         ("raise SystemExit", "SystemExit"),
         ("yield Nothing\n        raise OSError('half way')", "OSError: half way"),
-        ("return [object()]", "a object is not a subclass of femubench.Strategy"),
+        ("return [object()]", "a object is not a femubench.Strategy: update() is missing"),
         ("return [Strategy]", "class Strategy does not override update()"),
     ],
 )
@@ -155,7 +155,7 @@ def test_one_bad_entry_leaves_the_others(site: Path) -> None:
     plugins = from_site(site)
     assert list(plugins.strategies) == ["fine"]
     assert [fault.message for fault in plugins.broken] == [
-        "class int is not a subclass of femubench.Strategy",
+        "class int is not a femubench.Strategy: update() is missing",
         "the name 'fine' is taken by another of the strategies",
     ]
 

@@ -13,10 +13,10 @@ import pytest
 
 from femubench import Reader, Scenario, Strategy, UpdateResult
 from femubench.core.cli.plugins import plugins
+from femubench.core.library.new_package import KINDS, write_package
 from femubench.core.plugin import hookspecs
 from femubench.core.plugin.loader import HOOKS, load_plugins
-from femubench.core.plugin.new_package import KINDS, write_package
-from femubench.core.update.strategy import CAPABILITIES
+from femubench.core.roles import CAPABILITIES
 from femubench.effect import Effect, FrameEffect
 from femubench.results import Reporter
 

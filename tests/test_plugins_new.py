@@ -21,9 +21,9 @@ from click.testing import CliRunner, Result
 import femubench
 from femubench import InputError
 from femubench.core.cli.main import bench
-from femubench.core.plugin import new_package
+from femubench.core.library import new_package
+from femubench.core.library.new_package import KINDS, write_package
 from femubench.core.plugin.loader import load_plugins
-from femubench.core.plugin.new_package import KINDS, write_package
 
 SITE = Path(str(femubench.__file__)).parents[1]
 LONGEST = "a-method-that-has-got-a-rather-long-name"

@@ -16,13 +16,13 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
-from femubench import InputError, Run
+from femubench import InputError
 from femubench.core.cli.main import bench
 from femubench.reports.csvs import CsvReporter
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.markdown import MarkdownReporter
 from femubench.reports.terminal import TerminalReporter
-from femubench.results import Store, results_frame, run_to_json
+from femubench.results import Run, Store, results_frame, run_to_json
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 

@@ -11,8 +11,7 @@ from dataclasses import replace
 
 import pytest
 
-from femubench import Run
-from femubench.core.cli.reporting import rendered
+from femubench.core.library.report import rendered
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.validation import check_reporter
 from femubench.reports import femubench_reporters
@@ -22,7 +21,7 @@ from femubench.reports.jsons import JsonReporter
 from femubench.reports.markdown import MarkdownReporter, escape
 from femubench.reports.summary import change_errors, rms_percent
 from femubench.reports.terminal import TerminalReporter
-from femubench.results import Block, JobResult, PairedMode
+from femubench.results import Block, JobResult, PairedMode, Run
 
 NOMINAL = {"used": 10.0, "higher": 8.0, "modified": 5.0}
 

@@ -175,7 +175,7 @@ def test_what_belongs_to_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
         key(version="2"),
         keys.job_key(CASE, "s", b"c", "1", 1),
     ]
-    monkeypatch.setattr("femubench.__version__", "9.9")
+    monkeypatch.setattr(keys, "__version__", "9.9")
     others.append(key())
     monkeypatch.undo()
     assert len({key(), *others}) == 7

@@ -140,7 +140,7 @@ def test_without_matplotlib_a_page_with_drawings_is_refused_before_the_search(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    monkeypatch.setattr("femubench.core.cli.diagnose._diagnosed", None)
+    monkeypatch.setattr("femubench.core.library.diagnose.diagnosis_of", None)
     page = tmp_path / "page.html"
     result = CliRunner().invoke(bench, ["diagnose", "frame", "--report", str(page)])
     assert (result.exit_code, page.exists()) == (2, False)

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from femubench import Run, read_case
+from femubench import read_case
 from femubench.core.plugin.loader import load_plugins
-from femubench.results import leaderboard, run_jobs
+from femubench.results import Run, leaderboard, run_jobs
 
 sys.path.insert(0, str(Path(__file__).parent))
 from printed_boards import assert_board_is_that_of

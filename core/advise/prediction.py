@@ -11,7 +11,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from femubench.core.effect.attachments import point_in, translation_rows
-from femubench.core.effect.words import Reading
+from femubench.core.effect.reading import Reading
 from femubench.core.fem.model import Model
 from femubench.core.inference.fit import Fit, Problem, State, signed_hz, state_at
 from femubench.core.inference.hypothesis import Hypothesis

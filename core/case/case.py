@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from femubench.core.display import Shown, counted, modes_line
 from femubench.core.fem.frame import GroundSpring, PointMass
 from femubench.core.fem.model import Model
 from femubench.core.modal.measurement import Measurement
@@ -23,9 +24,14 @@ class Modification:
     springs: tuple[GroundSpring, ...]
     measurement: Measurement
 
+    def __str__(self) -> str:
+        attached = counted(len(self.masses), "mass"), counted(len(self.springs), "spring")
+        modes = modes_line(self.measurement.numbers, self.measurement.frequencies)
+        return f"{self.name}: {', '.join(attached)}; {modes}"
 
-@dataclass(frozen=True)
-class Case:
+
+@dataclass(frozen=True, repr=False)
+class Case(Shown):
     """Everything that a case folder says.
 
     Arguments:
@@ -56,6 +62,22 @@ class Case:
     band: tuple[float, float] | None = None
     digest: str = ""
     tolerance: float = TOLERANCE
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Return where the case is from, its model, and what was measured on it."""
+        measured = self.measurement
+        found = [
+            (self.name, self.title),
+            ("source", self.source),
+            ("folder", str(self.folder)),
+            ("model", self.model.rows()[0][1]),
+            ("sensors", str(len(measured.sensors))),
+            ("used", modes_line(self.used, measured.select(self.used).frequencies)),
+        ]
+        if self.held_out:
+            held_out = measured.select(self.held_out).frequencies
+            found.append(("held out", modes_line(self.held_out, held_out)))
+        return [*found, *(("modified", str(change)) for change in self.modifications)]
 
     def used_measurement(self, seed: int = 0) -> Measurement:
         """Return what a strategy may know: the used modes, noise added for a seed other than 0.

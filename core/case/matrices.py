@@ -23,7 +23,7 @@ from femubench.core.case.schema import LARGEST, GroupSpec, MatricesSpec
 from femubench.core.errors import FemubenchError, InputError
 from femubench.core.fem.model import Model
 from femubench.core.files import MIB, open_regular
-from femubench.core.plugin.roles import Reader
+from femubench.core.roles import Reader
 from femubench.core.typing import SparseArray
 
 _OPENERS: dict[str, Callable[..., Any]] = {".gz": gzip.open, ".bz2": bz2.open}

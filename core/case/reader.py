@@ -40,7 +40,7 @@ from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.measurement import Measurement
-from femubench.core.plugin.roles import Reader
+from femubench.core.roles import Reader
 
 _TABLES = (".csv", ".txt")
 _MESHED = "a frame that can be meshed"
@@ -183,7 +183,11 @@ class _Building:
             raise Fault(key, f"unknown kind of file {name!r}", ", ".join(known))
         if path not in self.readings:
             with reading_with(reader, path):
-                self.readings[path] = reader.read_modes(path)
+                found = reader.read_modes(path)
+            if not isinstance(found, Measurement):
+                what = f"{reader.name} gave {type(found).__name__}"
+                raise Fault(key, what, "femubench.Measurement")
+            self.readings[path] = found
         return path, self.readings[path]
 
     def measurement(self, site: Site) -> Measurement:

@@ -18,7 +18,7 @@ from femubench.core.inference.hypothesis import hypotheses_of
 from femubench.core.inference.projection import Projection
 from femubench.core.inference.search import Search
 from femubench.core.modal.measurement import Measurement
-from femubench.core.plugin.roles import Effect
+from femubench.core.roles import Effect
 
 
 def delta_chi2(case: Case, truth: Truth, effects: Mapping[str, FrameEffect]) -> tuple[float, ...]:

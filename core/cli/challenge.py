@@ -60,19 +60,13 @@ def new(
     sealed: Path | None,
 ) -> None:
     """Write a blind case into FOLDER, which must be new or empty, and a sealed truth."""
-    from femubench.core.challenge.folder import any_hidden, write_blind
+    from femubench.core.library.challenge import challenge as blind
 
-    path, commitment = write_blind(
-        folder,
-        seed,
-        kind,
-        structure=structure,
-        hidden=any_hidden(seed) if hidden == "any" else hidden,
-        scatter=scatter,
-        sealed=sealed,
+    made = blind(
+        folder, seed, kind=kind, structure=structure, hidden=hidden, scatter=scatter, truth=sealed
     )
     click.echo(f"wrote {folder}")
-    click.echo(f"wrote {path}, the sealed truth, sha256 {commitment}")
+    click.echo(f"wrote {made.truth}, the sealed truth, sha256 {made.commitment}")
     click.echo(f"Now say what the model lacks: bench diagnose {folder} --json answer.json")
 
 
@@ -88,12 +82,12 @@ def new(
 @click.option("--json", "json_file", type=click.Path(path_type=Path), help="Write the judgement.")
 def score(folder: Path, answer: Path, sealed: Path | None, json_file: Path | None) -> None:
     """Score ANSWER, a file written by `bench diagnose --json`, for the blind case in FOLDER."""
-    from femubench.core.challenge.folder import score_folder
-    from femubench.core.cli.files import check_writable, write_atomically
+    from femubench.core.files import check_writable, write_atomically
+    from femubench.core.library.challenge import score_challenge
 
     if json_file is not None:
         check_writable(json_file)
-    scored = score_folder(folder, answer, sealed)
+    scored = score_challenge(folder, answer, truth=sealed)
     if json_file is not None:
         write_atomically(json_file, scored.to_json())
     click.echo(f"hidden: {scored.truth}")

@@ -11,8 +11,8 @@ import click
 @click.argument("folder", type=click.Path(path_type=Path))
 def init(folder: Path) -> None:
     """Write a commented example case into FOLDER, which must be new or empty."""
-    from femubench.core.case.example import write_example
+    from femubench.core.library.plugins import init_case
 
-    for path in write_example(folder):
+    for path in init_case(folder):
         click.echo(f"wrote {path}")
     click.echo(f"Now change it to your structure, and run: bench run {folder}")

@@ -17,8 +17,8 @@ from typing import Any, NoReturn
 import click
 from click.shell_completion import CompletionItem
 
-import femubench
 from femubench.core.errors import FemubenchError, InputError, PluginError
+from femubench.core.version import __version__
 
 DONE, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 
@@ -131,7 +131,7 @@ def _exit_code(call: Callable[[], Any], kwargs: dict[str, Any]) -> int:
 
 
 @click.group(cls=Bench, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(femubench.__version__, prog_name="femubench")
+@click.version_option(__version__, prog_name="femubench")
 @click.option(
     "--traceback", is_flag=True, help="Show where an error or a broken plugin comes from."
 )

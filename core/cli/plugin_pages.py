@@ -9,10 +9,9 @@ from dataclasses import fields, is_dataclass
 
 from femubench.core.cli.registry import wrapped
 from femubench.core.plugin.loader import LoadedPlugin, Plugins
-from femubench.core.plugin.roles import Effect, Reader, Reporter, Scenario
 from femubench.core.plugin.validation import CHECKS
 from femubench.core.plugin.variants import options_of
-from femubench.core.update.strategy import Strategy
+from femubench.core.roles import Effect, Reader, Reporter, Scenario, Strategy, declared
 
 Row = tuple[str, str]
 
@@ -88,9 +87,9 @@ def _about(offered: object) -> Iterator[str]:
 
 def _strategy(strategy: Strategy) -> Iterator[Row]:
     yield "citation", strategy.citation
-    yield "needs", ", ".join(sorted(strategy.needs)) or "nothing but frequencies"
-    if strategy.promises:
-        yield "promises", ", ".join(sorted(strategy.promises))
+    yield "needs", ", ".join(sorted(declared(strategy, "needs"))) or "nothing but frequencies"
+    if promises := declared(strategy, "promises"):
+        yield "promises", ", ".join(sorted(promises))
     options = [f"{name} = {_value(value)}" for name, value in options_of(strategy).items()]
     options += [f"{name}.KEY = (none)" for name in _open_mappings(strategy)]
     for number, line in enumerate(options or ["none"]):

@@ -104,7 +104,7 @@ def new(ctx: click.Context, name: str, kind: str, output: Path) -> None:
 
     NAME, of lower-case letters, digits and dashes, is also the name of the plugin.
     """
-    from femubench.core.plugin.new_package import trial_of, write_package
+    from femubench.core.library.new_package import trial_of, write_package
 
     found = plugins_for(ctx)
     for path in write_package(name, kind, output, found):

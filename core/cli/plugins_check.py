@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from femubench.core.cli.cases import read_cases
-from femubench.core.cli.files import check_writable, write_atomically
-from femubench.core.cli.registry import chosen, counted, plugins_for
+from femubench.core.cli.registry import plugins_for
 from femubench.core.conformance import SECONDS
+from femubench.core.display import counted
+from femubench.core.files import check_writable, write_atomically
+from femubench.core.library.cases import read_cases
+from femubench.core.plugin.validation import chosen
 
 if TYPE_CHECKING:
     from femubench.core.conformance.checking import Finding

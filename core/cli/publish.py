@@ -6,8 +6,7 @@ from pathlib import Path
 
 import click
 
-from femubench.core.cli.files import check_can_make
-from femubench.core.cli.registry import counted
+from femubench.core.display import counted
 
 
 @click.command("publish")
@@ -22,11 +21,9 @@ def publish(folder: Path, files: tuple[Path, ...], quiet: bool) -> None:
     A FILE is written by run --json, here or on another machine. DIR is new, empty, or written by
     an earlier publish, and then the files are added. If one file is invalid, nothing is written.
     """
-    from femubench.core.publish.publishing import publish as merge
-    from femubench.reports.publish_page import pages_of
+    from femubench.core.library.publish import publish as merge
 
-    check_can_make(folder.resolve().parent)
-    done = merge(folder, files, pages_of)
+    done = merge(folder, files)
     if quiet:
         return
     runs, index = len(done.index["runs"]), folder / "index.html"

@@ -1,19 +1,13 @@
-"""What the verbs share: plugins with a line for every broken one, and names looked up kindly."""
+"""What the verbs share: plugins with a line for every broken one, and lines of 80 columns."""
 
 from __future__ import annotations
 
-import os
 import textwrap
 from collections.abc import Iterable
-from pathlib import Path
 
 import click
 
-from femubench.core.errors import InputError
 from femubench.core.plugin.loader import BrokenPlugin, Plugins, load_plugins
-from femubench.core.plugin.validation import did_you_mean
-
-DEFAULT_STORE = "femubench-results"
 
 
 def plugins_for(ctx: click.Context) -> Plugins:
@@ -29,40 +23,6 @@ def warn(broken: Iterable[BrokenPlugin], *, with_traceback: bool) -> None:
         click.echo(f"bench: {fault}", err=True)
         if with_traceback:
             click.echo(fault.traceback, err=True, nl=False)
-
-
-def chosen(kind: str, names: Iterable[str], known: Iterable[str]) -> tuple[str, ...]:
-    """Return the names without repetition.
-
-    Raises:
-        InputError: for a name that is not known, with the near matches.
-    """
-    known = tuple(known)
-    unique = tuple(dict.fromkeys(names))
-    for name in unique:
-        if name not in known:
-            raise InputError(unknown(kind, name, known))
-    return unique
-
-
-def unknown(kind: str, name: str, known: Iterable[str]) -> str:
-    """Return a message on an unknown name with the near matches, or with all names."""
-    known = tuple(dict.fromkeys(known))
-    near = did_you_mean(name, known) or f"; there are {', '.join(known) or 'none'}"
-    return f"no {kind} {name!r}{near}"
-
-
-def store_folder(folder: Path | None) -> Path:
-    """Return the folder of the results: given, from FEMUBENCH_STORE, or the default here."""
-    return folder or Path(os.environ.get("FEMUBENCH_STORE") or DEFAULT_STORE)
-
-
-def counted(number: int, noun: str) -> str:
-    """Return ``1 case``, ``3 cases``, ``2 strategies``."""
-    if number == 1:
-        return f"1 {noun}"
-    stem, ending = (noun[:-1], "ies") if noun.endswith("y") else (noun, "s")
-    return f"{number} {stem}{'es' if noun.endswith('s') else ending}"
 
 
 def wrapped(text: str, *, indent: int = 0, hanging: int) -> str:

@@ -4,41 +4,29 @@ from __future__ import annotations
 
 import os
 import webbrowser
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from femubench.core.cli.files import check_writable, make_folder, write_atomically
-from femubench.core.cli.registry import chosen, plugins_for, store_folder
-from femubench.core.cli.reporting import (
-    is_for_files,
-    rendered,
-    run_name,
-    text_of,
-)
+from femubench.core.cli.registry import plugins_for
+from femubench.core.errors import InputError
+from femubench.core.files import check_writable, make_folder, write_atomically
 from femubench.core.plugin.loader import load_plugins
+from femubench.core.plugin.validation import chosen
 
 if TYPE_CHECKING:
-    from femubench.core.plugin.roles import Reporter
+    from femubench.core.roles import Reporter
     from femubench.core.schema.results import Run
 
 FOLDER = click.Path(path_type=Path, file_okay=False)
 _PAGE = "html"
-_SHORT = {"md": "markdown"}
 # Formats that tell of what was left out themselves.
 _TELLING = frozenset({"terminal", "markdown", _PAGE})
 
 
-@dataclass(frozen=True)
-class _Found:
-    """A run, what the store has to draw of it, and the folder that its files go to by default."""
-
-    run: Run
-    exhibits: object
-    folder: Path
+_SHORT = {"md": "markdown"}
 
 
 class _Formats(click.Option):
@@ -93,45 +81,56 @@ def report(
     """
     plugins = plugins_for(ctx)
     words = list(dict.fromkeys([*_words(formats), *([_PAGE] if opened else [])])) or ["terminal"]
-    if run is not None and _is_file(run):
-        from femubench.core.cli.report_diagnosis import diagnosis_in, report_diagnosis
+    file = Path(run) if run is not None and os.path.isfile(run) else None
+    if file is None:  # names are known to be right before what reads runs is loaded
+        chosen("report format", words, plugins.reporters)
+    from femubench.core.library.rank import read_run, store_in
+    from femubench.core.library.report import diagnosis_in
 
-        diagnosis = diagnosis_in(Path(run))
-        if diagnosis is not None:
-            report_diagnosis(diagnosis, Path(run), words, output, opened=opened)
-            return
-    writers = [
-        plugins.reporters[name] for name in chosen("report format", words, plugins.reporters)
-    ]
-    found = _find(run, store_folder(store))
+    diagnosis = None if file is None else diagnosis_in(file)
     if output is not None:
         make_folder(output)
-    _tell(found.run, writers)
-    written = _write(found, writers, output)
-    if opened:
-        _open(written[_PAGE])
+    if file is not None and diagnosis is not None:
+        written = _write_diagnosis(diagnosis, file, words, output)
+    else:
+        writers = [plugins.reporters[w] for w in chosen("report format", words, plugins.reporters)]
+        kept = store_in(store)
+        found = read_run(run, kept, lenient=True)
+        _tell(found, writers)
+        exhibits = kept.exhibits if file is None else None
+        above = kept.folder if file is None else file.parent
+        written = _write(found, exhibits, writers, above, output)
+    if opened and not webbrowser.open(written[_PAGE].resolve().as_uri()):
+        click.echo(f"bench: there is no browser here; open {written[_PAGE]} in one", err=True)
+
+
+def _write_diagnosis(
+    data: Mapping[str, Any], path: Path, formats: Iterable[str], output: Path | None
+) -> dict[str, Path]:
+    """Show a diagnosis, or write it beside its file; return the files by format."""
+    from femubench.core.library.report import SUFFIXES, rendering
+
+    files = {}
+    for name in formats:
+        if name not in SUFFIXES:
+            expected = f"one of {', '.join(SUFFIXES)}"
+            raise InputError(f"a diagnosis has no format {name!r}", file=path, expected=expected)
+    for name in formats:
+        text = rendering(data, name)
+        if output is None and name != _PAGE:
+            click.echo(text)
+            continue
+        files[name] = (output or path.parent) / f"{path.stem}{SUFFIXES[name]}"
+        check_writable(files[name])
+        write_atomically(files[name], text)
+        click.echo(f"{name}: {files[name]}")
+    return files
 
 
 def _words(formats: Iterable[str]) -> list[str]:
     """Return the formats that the words of the user stand for."""
     parts = [part.strip() for word in formats for part in word.split(",")]
     return [_SHORT.get(part, part) for part in parts if part]
-
-
-def _is_file(word: str) -> bool:
-    return os.path.exists(word) and not os.path.isdir(word)
-
-
-def _find(word: str | None, folder: Path) -> _Found:
-    """Return a run from a file or from the store."""
-    from femubench.core.run.store import Store
-    from femubench.core.schema.records import read_run
-
-    if word is not None and _is_file(word):
-        file = Path(word)
-        return _Found(read_run(file), None, file.parent)
-    store = Store(folder)
-    return _Found(store.load(word, lenient=True), store.exhibits, folder)
 
 
 def _tell(run: Run, writers: Sequence[Reporter]) -> None:
@@ -143,10 +142,14 @@ def _tell(run: Run, writers: Sequence[Reporter]) -> None:
             click.echo(f"bench: {note}", err=True)
 
 
-def _write(found: _Found, writers: Sequence[Reporter], output: Path | None) -> dict[str, Path]:
+def _write(
+    run: Run, exhibits: object, writers: Sequence[Reporter], folder: Path, output: Path | None
+) -> dict[str, Path]:
     """Write files or show texts; return the files by format."""
+    from femubench.core.library.report import is_for_files, rendered, run_name, text_of
+
     files = {
-        writer.name: (output or found.folder) / f"{run_name(found.run)}{writer.suffix}"
+        writer.name: (output or folder) / f"{run_name(run)}{writer.suffix}"
         for writer in writers
         if output is not None or is_for_files(writer)
     }
@@ -155,16 +158,10 @@ def _write(found: _Found, writers: Sequence[Reporter], output: Path | None) -> d
     # What is shown may be on its way into a file: then nothing else must be in it.
     aside = len(files) < len(writers)
     for writer in writers:
-        content = rendered(writer, found.run, found.exhibits)
+        content = rendered(writer, run, exhibits)
         if writer.name not in files:
             click.echo(text_of(writer, content))
             continue
         write_atomically(files[writer.name], content)
         click.echo(f"{writer.name}: {files[writer.name]}", err=aside)
     return files
-
-
-def _open(path: Path) -> None:
-    """Show a page in the browser."""
-    if not webbrowser.open(path.resolve().as_uri()):
-        click.echo(f"bench: there is no browser here; open {path} in one", err=True)

@@ -2,46 +2,29 @@
 
 from __future__ import annotations
 
-import os
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-import femubench
-from femubench.core.cli.cases import case_folders, read_cases
-from femubench.core.cli.files import check_writable, make_folder, write_atomically
 from femubench.core.cli.progress import progress_bar
 from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of
-from femubench.core.cli.registry import chosen, counted, plugins_for, store_folder, wrapped
-from femubench.core.cli.reporting import (
-    exit_code,
-    rendered,
-    reporter,
-    reporter_for,
-    run_name,
-    text_of,
-)
+from femubench.core.cli.registry import plugins_for, wrapped
+from femubench.core.display import counted
 from femubench.core.errors import InputError, PluginError
+from femubench.core.files import check_writable, write_atomically
+from femubench.core.library.cases import case_folders
+from femubench.core.plugin.validation import chosen
+from femubench.core.version import __version__
 
 if TYPE_CHECKING:
-    from femubench.core.cli.request import Request
+    from femubench.core.library.rank import Plan
     from femubench.core.plugin.loader import Plugins
-    from femubench.core.plugin.roles import Reporter
+    from femubench.core.roles import Reporter
     from femubench.core.run.recording import Overwrite
     from femubench.core.run.store import Store
     from femubench.core.schema.results import Run
-
-
-@dataclass(frozen=True)
-class Choice:
-    """How a run is gone about; none of it decides on results."""
-
-    workers: int
-    overwrite: Overwrite | None
-    resume: bool
-
 
 FILE = click.Path(path_type=Path, dir_okay=False)
 FOLDER = click.Path(path_type=Path, file_okay=False)
@@ -153,92 +136,79 @@ def run(
     A CASE is a scenario (bench scenarios list), one case of it as SCENARIO/PART, or a folder
     with a case.toml. Without any, all built-in scenarios run.
     """
-    plugins = plugins_for(ctx)
-    if strict_plugins and plugins.broken:
-        raise PluginError(f"{counted(len(plugins.broken), 'fault')} in plugins, see above")
-    # Words are known to be right before what runs them is loaded.
-    chosen("strategy", (word.partition(":")[0] for word in strategies), plugins.strategies)
-    case_folders(cases, plugins.scenarios)
-    from femubench.core.cli.request import DEFAULT_TIMEOUT, Request, request_of, strategy_words
-    from femubench.core.run.store import Store
+    plugins = _checked(ctx, cases, strategies)
+    from femubench.core.library.rank import store_in
+    from femubench.core.library.report import reporter, run_name
+    from femubench.core.run.runner import worker_count
+    from femubench.core.schema.results import DONE
 
     outputs = _outputs(plugins, json_file, csv_file, report_file)
-    kept = Store(store_folder(store))
-    default = timeouts.pop("", DEFAULT_TIMEOUT)
-    request, old = Request(cases, strategies, seeds, seed, default, timeouts, memory), None
-    if locked is not None:
-        _check_locked(ctx)
-        old = kept.load(locked)
-        request = request_of(old)
-    elif resume and not cases and not strategies and kept.runs():
-        request = _adjusted(ctx, request_of(kept.load()), request)
-    request = replace(request, strategies=strategy_words(request.strategies, plugins))
-    choice = Choice(jobs or len(os.sched_getaffinity(0)), overwrite, resume)
-    outcome = _run(request, choice, plugins, kept, quiet=quiet)
+    kept = store_in(store)
+    old = None if locked is None else kept.load(locked)
+    plan = _plan(ctx, plugins, kept) if old is None else _repeated(ctx, plugins, old)
+    if not quiet:
+        click.echo(wrapped(_header(plan, worker_count(jobs)), hanging=2))
+    with progress_bar(quiet=quiet) as progress:
+        outcome = plan.run(jobs, kept, overwrite=overwrite, resume=resume, progress=progress)
     if report_file is None:
         for writer in (reporter(plugins, name) for name in ("html", "markdown")):
             outputs[kept.folder / f"{run_name(outcome)}{writer.suffix}"] = writer
     screen = None if quiet else reporter(plugins, "terminal")
     _finish(outcome, kept.exhibits, outputs, screen)
-    return exit_code(outcome) if old is None else _compare(old, outcome)
+    if old is not None:
+        return _compare(old, outcome)
+    return int(any(result.status not in DONE for result in outcome.results))
 
 
-def _check_locked(ctx: click.Context) -> None:
-    """Refuse words that would make it another run.
+def _checked(ctx: click.Context, cases: Iterable[str], strategies: Iterable[str]) -> Plugins:
+    """Return the plugins; words are known to be right before what runs them is loaded."""
+    plugins = plugins_for(ctx)
+    if ctx.params["strict_plugins"] and plugins.broken:
+        raise PluginError(f"{counted(len(plugins.broken), 'fault')} in plugins, see above")
+    chosen("strategy", (word.partition(":")[0] for word in strategies), plugins.strategies)
+    case_folders(cases, plugins.scenarios)
+    return plugins
+
+
+def _given(ctx: click.Context, name: str) -> Any:  # noqa: ANN401 - of any option
+    """Return the value of an option; None where it has its default."""
+    default = ctx.get_parameter_source(name) is click.core.ParameterSource.DEFAULT
+    return None if default else ctx.params[name]
+
+
+def _plan(ctx: click.Context, plugins: Plugins, store: Store) -> Plan:
+    """Return what the words of the user stand for."""
+    from femubench.core.library.rank import plan_of
+
+    words = ctx.params
+    limits = dict(words["timeouts"])
+    return plan_of(
+        words["cases"],
+        words["strategies"],
+        plugins,
+        seeds=words["seeds"],
+        seed=_given(ctx, "seed"),
+        timeout=limits.pop("", None),
+        timeouts=limits,
+        memory=words["memory"],
+        resumed=store if words["resume"] else None,
+    )
+
+
+def _repeated(ctx: click.Context, plugins: Plugins, old: Run) -> Plan:
+    """Return what a stored run was asked for.
 
     Raises:
-        InputError: naming the first of them.
+        InputError: for words that would make it another run, naming the first of them.
     """
+    from femubench.core.library.rank import repeated, request_of
+
     default = click.core.ParameterSource.DEFAULT
     words = ("cases", "strategies", "seeds", "seed", "timeouts", "memory", "resume", "overwrite")
     for name in words:
         if ctx.get_parameter_source(name) is not default:
             raise InputError(f"--locked repeats a run as it was; {name} cannot be given beside it")
-
-
-def _adjusted(ctx: click.Context, old: Request, given: Request) -> Request:
-    """Return what a run was asked for, under the limits that are given now.
-
-    Raises:
-        InputError: for words that would make it another run.
-    """
-    default = click.core.ParameterSource.DEFAULT
-    for name in ("seeds", "seed"):
-        if ctx.get_parameter_source(name) is not default:
-            raise InputError(f"--resume alone goes on as before; {name} needs CASE or -s beside it")
-    if ctx.get_parameter_source("timeouts") is not default:
-        old = replace(old, timeout=given.timeout, timeouts=given.timeouts)
-    return old if given.memory is None else replace(old, memory=given.memory)
-
-
-def _run(request: Request, choice: Choice, plugins: Plugins, store: Store, *, quiet: bool) -> Run:
-    """Run what is asked for."""
-    from femubench.core.cli.request import case_words, check_timeouts
-    from femubench.core.plugin.variants import strategy_of
-    from femubench.core.run.runner import run_jobs
-
-    check_timeouts(request.timeouts, request.strategies)
-    selected = [strategy_of(words, plugins.strategies) for words in request.strategies]
-    read = read_cases(request.cases, plugins)
-    make_folder(store.folder)
-    if not quiet:
-        click.echo(wrapped(_header(request, len(read), choice.workers), hanging=2))
-    with progress_bar(quiet=quiet) as progress:
-        return run_jobs(
-            read,
-            selected,
-            seeds=tuple(request.all_seeds),
-            jobs=choice.workers,
-            timeout=request.timeout,
-            timeouts=request.timeouts,
-            memory=request.memory,
-            store=store,
-            overwrite=choice.overwrite,
-            resume=choice.resume,
-            progress=progress,
-            run_seed=request.seed,
-            request=replace(request, cases=case_words(request.cases, plugins)).to_json(),
-        )
+    return repeated(request_of(old), plugins)
 
 
 def _compare(old: Run, new: Run) -> int:
@@ -258,6 +228,8 @@ def _outputs(
     plugins: Plugins, json_file: Path | None, csv_file: Path | None, report_file: Path | None
 ) -> dict[Path, Reporter]:
     """Return who writes which file; all of them can be written to."""
+    from femubench.core.library.report import reporter, reporter_for
+
     outputs: dict[Path, Reporter] = {}
     for path, name in ((json_file, "json"), (csv_file, "csv"), (report_file, None)):
         if path is None:
@@ -269,14 +241,15 @@ def _outputs(
     return outputs
 
 
-def _header(request: Request, cases: int, workers: int) -> str:
+def _header(plan: Plan, workers: int) -> str:
     """Return one line with everything that decides on the outcome."""
-    seeds, strategies = request.all_seeds, len(request.strategies)
+    request, cases, strategies = plan.request, len(plan.cases), len(plan.strategies)
+    seeds = request.all_seeds
     named = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]}-{seeds[-1]}"
     meaning = "data as recorded" if seeds == range(1) else "noise added"
     own = "".join(f", {name} {spoken(limit)}" for name, limit in request.timeouts.items())
     return (
-        f"femubench {femubench.__version__}: {counted(cases, 'case')}, "
+        f"femubench {__version__}: {counted(cases, 'case')}, "
         f"{counted(strategies, 'strategy')}, {named} ({meaning}), "
         f"{counted(cases * strategies * len(seeds), 'job')}, {counted(workers, 'worker')}, "
         f"timeout {spoken(request.timeout)}{own}"
@@ -287,6 +260,8 @@ def _finish(
     run: Run, exhibits: object, outputs: dict[Path, Reporter], screen: Reporter | None
 ) -> None:
     """Write the files, then show the ranking and where the files are."""
+    from femubench.core.library.report import rendered, text_of
+
     written, broken = [], None
     for path, writer in outputs.items():
         try:

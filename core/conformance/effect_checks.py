@@ -22,14 +22,13 @@ from femubench.core.conformance.problems import PLAIN, problem
 from femubench.core.conformance.results import Given, finite as finite_entries, symmetric
 from femubench.core.conformance.strategy_checks import own_doc
 from femubench.core.effect.attachments import total_mass
-from femubench.core.effect.frame_effect import EffectParameter
+from femubench.core.effect.reading import Reading
 from femubench.core.effect.sizes import Site, Size
-from femubench.core.effect.words import Reading, Wording
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.model import Model
 from femubench.core.look.modes import Seen
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.plugin.roles import Effect
+from femubench.core.roles import Effect, EffectParameter, Wording
 from femubench.core.schema.diagnosis import LookWarning
 from femubench.core.update.strategy import UpdateResult
 
@@ -122,7 +121,14 @@ def _values(parameters: tuple[EffectParameter, ...], x: float) -> list[float]:
 
 
 def _extended(effect: Effect, model: Model, place: str, x: float = 1.0) -> Model:
-    return effect.extend(model, place, _values(tuple(effect.parameters(model, place)), x))
+    return _with(effect, model, place, _values(tuple(effect.parameters(model, place)), x))
+
+
+def _with(effect: Effect, model: Model, place: str, values: list[float]) -> Model:
+    found = effect.extend(model, place, values)
+    if not isinstance(found, Model):
+        raise TypeError(f"extend gave {type(found).__name__}, expected femubench.Model")
+    return found
 
 
 def _sendable(effect: Effect) -> Verdict:
@@ -178,7 +184,7 @@ def _neutral(effect: Effect) -> Verdict:
         count += 1
         values = [item.neutral for item in effect.parameters(model, place)]
         try:
-            extended = effect.extend(model, place, values)
+            extended = _with(effect, model, place, values)
         except NotApplicable:
             continue
         gap = _distance(model, extended)

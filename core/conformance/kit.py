@@ -13,10 +13,10 @@ from typing import Any, Literal
 from femubench.core.conformance import SECONDS
 from femubench.core.conformance.problems import PLAIN, Problem, problem
 from femubench.core.conformance.trial import Observation, Trial, observation_of, run_trial
-from femubench.core.run.jobs import one_line
+from femubench.core.roles import Strategy
+from femubench.core.run.jobs import one_line, sent
 from femubench.core.run.limits import MIB, Limits
 from femubench.core.run.workers import Ending, Workers
-from femubench.core.update.strategy import Strategy
 
 Status = Literal["pass", "fail", "warn", "not-applicable"]
 Role = Literal["strategy", "effect", "reader", "scenario"]
@@ -143,7 +143,7 @@ class Bench:
     def code(self) -> bytes | str:
         """Return the pickled subject, or in one line why it cannot be pickled."""
         try:
-            data = pickle.dumps(self.subject)
+            data = sent(self.subject)
         except Exception as error:
             return one_line(error)
         return data
@@ -179,7 +179,7 @@ class Bench:
         return Verdict(*json.loads(ending.answer))
 
     def _trial(self, want: Want) -> Trial:
-        code = pickle.dumps(self.reference) if want.reference else self.code
+        code = sent(self.reference) if want.reference else self.code
         assert isinstance(code, bytes)
         given = self.cases.get(want.problem) or problem(want.problem)
         return Trial(code, given, want.seed, want.scramble, want.traced)

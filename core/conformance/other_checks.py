@@ -12,7 +12,7 @@ from femubench.core.case.case import Case
 from femubench.core.case.reader import read_case
 from femubench.core.conformance.kit import Bench, Verdict, check, failed, not_applicable, passed
 from femubench.core.errors import FemubenchError, InputError
-from femubench.core.plugin.roles import Reader, Scenario
+from femubench.core.roles import Reader, Scenario
 from femubench.core.run.jobs import one_line
 from femubench.core.score.scoring import reference_of
 

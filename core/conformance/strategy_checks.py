@@ -23,8 +23,8 @@ from femubench.core.conformance.problems import PLAIN
 from femubench.core.conformance.result_checks import FREE, of_results, with_results
 from femubench.core.conformance.results import PROMISES
 from femubench.core.plugin.variants import Variant
+from femubench.core.roles import CAPABILITIES, Strategy, declared
 from femubench.core.run.limits import spoken_bytes
-from femubench.core.update.strategy import CAPABILITIES, Strategy
 
 _MUCH = 100.0  # times what the reference takes
 _LEAST_SECONDS, _LEAST_BYTES = 1e-3, 1e4  # below which a ratio says nothing
@@ -46,7 +46,7 @@ def described(bench: Bench) -> Verdict:
     strategy = _inner(bench)
     if not str(strategy.citation).strip():
         return failed("citation is empty, expected author, year, title, equation")
-    promises: object = strategy.promises
+    promises: object = declared(strategy, "promises")
     if not isinstance(promises, frozenset):
         return failed(f"promises is {promises!r}, expected a frozenset")
     unknown = sorted(str(name) for name in promises if name not in PROMISES)
@@ -173,7 +173,7 @@ def capabilities(bench: Bench) -> Verdict:
 
 def _withheld(bench: Bench) -> list[tuple[str, Want]]:
     """Return what it does not declare, and a problem that does not have it."""
-    needs = frozenset(bench.subject.needs)
+    needs = frozenset(declared(bench.subject, "needs"))
     frame = needs & {"elements", "geometry", "joints"}
     lacking = {"shapes": "no shapes at all", "elements": "matrices alone", "joints": "one member"}
     return [

@@ -10,7 +10,7 @@ import tracemalloc
 import warnings
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 
@@ -19,10 +19,12 @@ from femubench.core.conformance.problems import Problem
 from femubench.core.conformance.results import Given, faults_of
 from femubench.core.errors import NotApplicable, StrategyFailure
 from femubench.core.fem.model import Model
-from femubench.core.plugin.variants import Variant
+from femubench.core.roles import Result, Strategy, declared
 from femubench.core.run.jobs import missing_capability, one_line
 from femubench.core.run.workers import Ending
-from femubench.core.update.strategy import Strategy, UpdateResult
+
+if TYPE_CHECKING:
+    from femubench.core.update.strategy import UpdateResult
 
 Kind = Literal["result", "lacking", "not-applicable", "failed", "error", "stopped"]
 
@@ -99,7 +101,8 @@ def observation_of(problem: str, ending: Ending) -> Observation:
 def _observe(trial: Trial) -> Observation:
     strategy: Strategy = pickle.loads(trial.strategy)
     problem = trial.problem
-    reason = missing_capability(frozenset(strategy.needs), problem.model, problem.measurement)
+    needs = frozenset(declared(strategy, "needs"))
+    reason = missing_capability(needs, problem.model, problem.measurement)
     if reason is not None:
         return Observation(problem.name, "lacking", reason)
     # What is handed over may be spoilt; the problem itself is needed to judge the result.
@@ -147,13 +150,13 @@ def _called(
     wrong = _wrong_type(result)
     if wrong:
         return Observation(name, "error", wrong, seconds), None
-    return Observation(name, "result", "", seconds, peak), result
+    # Its model is the data class, as was just seen, and the rest is read by name alone.
+    return Observation(name, "result", "", seconds, peak), cast("UpdateResult", result)
 
 
 def promises_of(strategy: Strategy) -> frozenset[str]:
     """Return what a strategy says that it keeps, with or without options."""
-    inner = strategy.base if isinstance(strategy, Variant) else strategy
-    promises: object = inner.promises
+    promises: object = declared(strategy, "promises")
     return promises if isinstance(promises, frozenset) else frozenset()
 
 
@@ -165,7 +168,7 @@ def _refusal(name: str, kind: Kind, error: Exception) -> Observation:
 
 
 def _wrong_type(result: object) -> str | None:
-    if not isinstance(result, UpdateResult):
+    if not isinstance(result, Result):
         return f"update returned {type(result).__name__} instead of UpdateResult"
     model: object = result.model
     if not isinstance(model, Model):

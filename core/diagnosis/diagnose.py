@@ -37,7 +37,7 @@ from femubench.core.inference.static_response import LargeProblem
 from femubench.core.look.localisation import locate
 from femubench.core.look.look import look
 from femubench.core.plugin.loader import registered_effects
-from femubench.core.plugin.roles import Effect
+from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning
 from femubench.core.score.scoring import score_model
 from femubench.core.ties import alike, in_order
@@ -148,6 +148,7 @@ def _written(
         extended=model if named else case.model,
         notes=_notes(examination, proof, best),
         seconds=time.perf_counter() - begin,
+        subject=case,
     )
 
 

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
+from femubench.core.case.case import Case
+from femubench.core.display import Shown
 from femubench.core.fem.model import Model
 from femubench.core.schema.diagnosis import (
     Advice,
@@ -23,8 +25,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True)
-class Diagnosis:
+@dataclass(frozen=True, repr=False)
+class Diagnosis(Shown):
     """What is missing in a model, where, how sure, and what it gains.
 
     Arguments:
@@ -49,6 +51,7 @@ class Diagnosis:
         extended: the model with the causes in it; the nominal one where none was named.
         notes: further remarks, one sentence each.
         seconds: spent.
+        subject: the case itself, for drawings of its structure.
     """
 
     case: str
@@ -71,6 +74,23 @@ class Diagnosis:
     extended: Model = field(repr=False)
     notes: tuple[str, ...] = ()
     seconds: float = 0.0
+    subject: Case | None = field(default=None, repr=False)
+
+    def rows(self) -> Sequence[tuple[str, str]]:
+        """Return verdict, causes, rivals and gain."""
+        found = [
+            (self.case, self.verdict),
+            ("", self.sentence),
+            *(("cause", f"{c.effect} at {c.place}, p = {c.probability:.2f}") for c in self.causes),
+            *(
+                ("rival", f"{r.effect} at {r.place}, p = {r.probability:.2f}")
+                for r in self.rivals[: max(0, 3 - len(self.causes))]
+            ),
+        ]
+        for name, pair in asdict(self.gain).items():
+            if isinstance(pair, tuple) and None not in pair:
+                found.append((name.replace("_percent", ""), f"{pair[0]:.2f} % -> {pair[1]:.2f} %"))
+        return [*found, ("adequacy", f"p = {self.adequacy_p:.2g}")]
 
     def frame(self, table: str) -> pd.DataFrame:
         """Return one of the tables as a data frame.

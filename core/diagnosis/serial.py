@@ -11,14 +11,14 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-import femubench
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.drawing.places import PlacedWireframe, placed_wireframe
-from femubench.core.effect.words import Wording
 from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
+from femubench.core.roles import Wording
 from femubench.core.schema.diagnosis import Verdict
+from femubench.core.version import __version__
 
 
 def diagnosis_to_json(
@@ -31,7 +31,7 @@ def diagnosis_to_json(
         written: folder of the extended case, if it was written.
         case: what was diagnosed, for the drawing of its structure; a model has no sensors.
     """
-    names = [f.name for f in fields(diagnosis) if f.name != "extended"]
+    names = [f.name for f in fields(diagnosis) if f.name not in ("extended", "subject")]
     tables = {name: _plain(getattr(diagnosis, name)) for name in names}
     for look in tables["looks"]:
         look["changes"] = [{"mode": mode, "percent": change} for mode, change in look["changes"]]
@@ -39,7 +39,7 @@ def diagnosis_to_json(
         **tables,
         "structure": None if case is None else _plain(placed_wireframe(case, _words(diagnosis))),
         "written": None if written is None else str(written),
-        "version": femubench.__version__,
+        "version": __version__,
     }
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from femubench.core.diagnosis.verdict import angle_between
-from femubench.core.effect.frame_effect import EffectParameter
 from femubench.core.inference.examine import Examination
 from femubench.core.inference.fit import State
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.search import Found
+from femubench.core.roles import EffectParameter
 from femubench.core.schema.diagnosis import (
     Cause,
     CauseParameter,

@@ -5,18 +5,16 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
+from femubench.core.effect.reading import Reading
 from femubench.core.effect.sizes import Size
-from femubench.core.effect.words import Reading, Wording
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
-from femubench.core.plugin.roles import Effect
-
-Scaling = Literal["linear", "exponential", "compliance"]
+from femubench.core.roles import Effect, Scaling, Wording
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from femubench.core import roles
 from femubench.core.effect.change import (
     Change,
     Term,
@@ -17,10 +18,9 @@ from femubench.core.effect.change import (
     proportional,
     sparse_term,
 )
-from femubench.core.effect.frame_effect import EffectParameter
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model, common_dofs
-from femubench.core.plugin.roles import Effect
+from femubench.core.roles import Effect, EffectParameter
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 _NODES = {1: 9, 2: 4}
@@ -94,7 +94,7 @@ def _within(parameter: EffectParameter) -> tuple[float, float]:
     return (max(low, 1e-6), high) if parameter.scaling == "compliance" else (low, high)
 
 
-def _difference(model: Model, extended: Model) -> tuple[SparseArray, SparseArray]:
+def _difference(model: Model, extended: roles.Model) -> tuple[SparseArray, SparseArray]:
     """Return what the extended model adds to mass and stiffness on the nominal dofs."""
     mass, stiffness = extended.mass, extended.stiffness
     old, new = model.structure, extended.structure

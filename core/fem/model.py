@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 import scipy.sparse as sp
 
+from femubench.core.display import Shown, counted
 from femubench.core.errors import ModelError, NotApplicable
 from femubench.core.fem.frame import Frame, GroundSpring, PointMass
 from femubench.core.fem.sensors import Sensors
@@ -73,8 +74,8 @@ class Geometry(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class Model:
+@dataclass(frozen=True, repr=False)
+class Model(Shown):
     """A structural model; strategies return another one made by `dataclasses.replace`.
 
     Arguments:
@@ -109,6 +110,20 @@ class Model:
         xyz = structure.mesh.xyz[kinematics.node]
         dofs = Dofs(kinematics.node, kinematics.direction, xyz, kinematics.axes)
         return cls(mass, stiffness, dofs, structure, structure)
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Return what it is a model of, its mass and what of it is not in the matrices."""
+        size, what = f"{self.size} degrees of freedom", "matrices from files"
+        if self.structure is not None:
+            frame = self.structure.frame
+            members, joints = counted(len(frame.members), "member"), len(frame.joints)
+            what = f"{frame.plane}, {members}, {counted(joints, 'joint')}"
+        found = [("", f"{size}, {what}")]
+        for name in ("mass", "stiffness"):
+            matrix, change = getattr(self, name), getattr(self, f"{name}_change")
+            rank = "" if change is None else f", and a change of rank {change.core.shape[0]}"
+            found.append((name, f"{matrix.nnz} entries, largest {abs(matrix).max():.4g}{rank}"))
+        return found + ([("groups", ", ".join(self.groups))] if self.groups else [])
 
     @property
     def size(self) -> int:

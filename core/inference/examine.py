@@ -24,7 +24,7 @@ from femubench.core.inference.search import Found, Search, adequacy
 from femubench.core.inference.static_response import Basis, placed
 from femubench.core.modal.eigen import Modes
 from femubench.core.modal.measurement import Measurement
-from femubench.core.plugin.roles import Effect
+from femubench.core.roles import Effect
 from femubench.core.typing import FloatArray
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from femubench.core.errors import FemubenchError
+from femubench.core.errors import FemubenchError, ModelError
 from femubench.core.fem.model import Model
 from femubench.core.inference.fit import Fit, Problem, fit, signed_hz
 from femubench.core.inference.projection import Projection
@@ -20,13 +20,21 @@ _AGREES = 0.3  # deviations in all, below which a fit and its model are the same
 
 
 def extended(model: Model, parts: Sequence[Projection], x: FloatArray) -> Model:
-    """Return the model with effects in it, at their coordinates."""
+    """Return the model with effects in it, at their coordinates.
+
+    Raises:
+        ModelError: when an effect gives something else.
+    """
     start = 0
     for part in parts:
         h = part.hypothesis
         values = h.values(x[None, start : start + len(h.parameters)])[0]
         start += len(h.parameters)
-        model = h.effect.extend(model, h.place, [float(v) for v in values])
+        found = h.effect.extend(model, h.place, [float(v) for v in values])
+        if not isinstance(found, Model):
+            what = f"effect {h.effect.name!r} gave {type(found).__name__}"
+            raise ModelError(f"{what}, expected femubench.Model")
+        model = found
     return model
 
 

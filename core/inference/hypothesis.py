@@ -10,10 +10,9 @@ from itertools import product
 import numpy as np
 
 from femubench.core.effect.change import Change
-from femubench.core.effect.frame_effect import EffectParameter
 from femubench.core.effect.tabulated_change import tabulated_change
 from femubench.core.fem.model import Model
-from femubench.core.plugin.roles import Effect
+from femubench.core.roles import Effect, EffectParameter
 from femubench.core.typing import FloatArray
 
 _SLOPE_STEP = 1e-5

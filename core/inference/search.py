@@ -17,7 +17,7 @@ from femubench.core.inference.prior import Base, selection_cost, textbook_bases
 from femubench.core.inference.projection import Projection
 from femubench.core.inference.screening import beside, screened, with_shortlist
 from femubench.core.inference.static_response import Basis, LargeProblem, enriched, placed
-from femubench.core.plugin.roles import Effect
+from femubench.core.roles import Effect
 from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray
 

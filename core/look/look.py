@@ -11,7 +11,7 @@ from femubench.core.look.modes import Seen
 from femubench.core.look.readings import look_at_band, look_at_deviations, look_at_sensors
 from femubench.core.look.theory import look_at_materials, look_at_slenderness
 from femubench.core.modal.measurement import Measurement
-from femubench.core.plugin.roles import Effect
+from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import LookWarning
 
 

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from femubench.core.display import Shown, counted
 from femubench.core.fem.sensors import Sensors
 from femubench.core.typing import FloatArray
 
 
-@dataclass(frozen=True)
-class Measurement:
+@dataclass(frozen=True, repr=False)
+class Measurement(Shown):
     """Measured modes of one structure.
 
     Arguments:
@@ -37,6 +38,18 @@ class Measurement:
 
     def __len__(self) -> int:
         return len(self.numbers)
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Return the sensors, and frequency, deviation and damping of every mode."""
+        found = [("", f"{counted(len(self), 'mode')} at {counted(len(self.sensors), 'sensor')}")]
+        for row in zip(
+            self.numbers, self.frequencies, self.frequency_std, self.damping, strict=True
+        ):
+            damping = f", damping {row[3]:.3g}" if np.isfinite(row[3]) else ""
+            found.append((f"mode {row[0]}", f"{row[1]:.6g} Hz, std {row[2]:.2g} Hz{damping}"))
+        if self.total_mass is not None:
+            found.insert(1, ("mass", "{:.6g} kg, std {:.2g} kg".format(*self.total_mass)))
+        return found
 
     @property
     def eigenvalues(self) -> FloatArray:

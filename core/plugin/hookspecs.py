@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 from femubench.core.plugin.markers import hookspec
 
 if TYPE_CHECKING:
-    from femubench.core.plugin.roles import Effect, Reader, Reporter, Scenario
-    from femubench.core.update.strategy import Strategy
+    from femubench.core.roles import Effect, Reader, Reporter, Scenario, Strategy
 
 # Hook specifications have no body: pluggy reads their signature alone.
 # mypy: disable-error-code="empty-body"

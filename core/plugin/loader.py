@@ -18,13 +18,12 @@ from typing import Any, TypeVar
 
 import pluggy
 
-import femubench
 from femubench.core.errors import PluginError
 from femubench.core.plugin import hookspecs
 from femubench.core.plugin.markers import PROJECT
-from femubench.core.plugin.roles import Effect, Reader, Reporter, Scenario
 from femubench.core.plugin.validation import CHECKS, did_you_mean
-from femubench.core.update.strategy import Strategy
+from femubench.core.roles import Effect, Reader, Reporter, Scenario, Strategy
+from femubench.core.version import __version__
 
 PREFIX = f"{PROJECT}_"
 HOOKS = tuple(PREFIX + kind for kind in CHECKS)
@@ -212,12 +211,12 @@ def _package(point: EntryPoint) -> str:
 
 def _of_clone() -> Iterator[_Source]:
     """Return the built-ins as the clone's pyproject.toml lists them."""
-    file = Path(femubench.__file__).parents[1] / "pyproject.toml"
+    file = Path(__file__).parents[3] / "pyproject.toml"
     if file.is_file():
         listed = tomllib.loads(file.read_text(encoding="utf-8"))["project"]["entry-points"][PROJECT]
         for name, module in sorted(listed.items()):
             point = EntryPoint(name, module, PROJECT)
-            yield _Source(name, f"{PROJECT} {femubench.__version__}, not installed", point)
+            yield _Source(name, f"{PROJECT} {__version__}, not installed", point)
 
 
 def _register(source: _Source) -> pluggy.PluginManager:

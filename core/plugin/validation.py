@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from femubench.core.errors import PluginError
-from femubench.core.plugin.roles import Effect, Reader, Reporter, Scenario
-from femubench.core.update.strategy import CAPABILITIES, Strategy
+from femubench.core.errors import PluginError, UnknownNameError
+from femubench.core.roles import (
+    CAPABILITIES,
+    Effect,
+    Reader,
+    Reporter,
+    Scenario,
+    Strategy,
+    declared,
+)
 
 # Names become words on the command line and parts of file names.
 _WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
@@ -21,15 +28,14 @@ def check_strategy(offered: object) -> Strategy:
     """Return an instance of a strategy class or the instance itself.
 
     Raises:
-        PluginError: when it is no Strategy, has no name or citation, or needs the unknown.
+        PluginError: when it has no update(), name or citation, or needs the unknown.
     """
     strategy = _instance(offered)
-    if not isinstance(strategy, Strategy):
-        raise PluginError(f"{_label(offered)} is not a subclass of femubench.Strategy")
+    _check_members(strategy, offered, "Strategy", ("update",))
     _check_name(strategy, offered)
     if not _is_text(getattr(strategy, "citation", None)):
         raise PluginError(f"{_label(offered)}: citation is missing (author, year, title, equation)")
-    needs: object = strategy.needs
+    needs: object = declared(strategy, "needs")
     if not isinstance(needs, frozenset | set | tuple | list):
         raise PluginError(f"{_label(offered)}: needs is {needs!r}, not a set of capabilities")
     for need in needs:
@@ -38,6 +44,7 @@ def check_strategy(offered: object) -> Strategy:
                 f"{_label(offered)}: needs {need!r}, which is none of "
                 f"{', '.join(CAPABILITIES)}{did_you_mean(str(need), CAPABILITIES)}"
             )
+    assert isinstance(strategy, Strategy)
     return strategy
 
 
@@ -130,6 +137,27 @@ def did_you_mean(word: str, known: Any) -> str:  # noqa: ANN401 - any iterable o
     """Return ``; did you mean 'x'?`` for a near match, else nothing."""
     near = get_close_matches(word, list(known), n=3, cutoff=0.6)
     return f"; did you mean {' or '.join(repr(name) for name in near)}?" if near else ""
+
+
+def unknown(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
+    """Return an error on an unknown name with the near matches, or with all names."""
+    known = tuple(dict.fromkeys(known))
+    near = did_you_mean(name, known) or f"; there are {', '.join(known) or 'none'}"
+    return UnknownNameError(f"no {kind} {name!r}{near}")
+
+
+def chosen(kind: str, names: Iterable[str], known: Iterable[str]) -> tuple[str, ...]:
+    """Return the names without repetition.
+
+    Raises:
+        UnknownNameError: for a name that is not known.
+    """
+    known = tuple(known)
+    unique = tuple(dict.fromkeys(names))
+    for name in unique:
+        if name not in known:
+            raise unknown(kind, name, known)
+    return unique
 
 
 def _instance(offered: object) -> object:

@@ -1,31 +1,30 @@
 """Strategies with other options than their default ones: ``NAME:OPTION=VALUE``.
 
-Options of options have a dotted name: ``NAME:options.damping=0.01``, ``NAME:stiffness.ry=3e6``.
+Options of options have a dotted name: ``NAME:options.damping=0.01``, ``NAME:stiffness.ry=3e6``;
+where only one option ends in a name, that name will do: ``NAME:damping=0.01``.
 """
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from femubench.core.errors import InputError
 from femubench.core.plugin.validation import did_you_mean
-from femubench.core.update.strategy import Strategy, UpdateResult
+from femubench.core.roles import Result, Strategy, declared
 
 if TYPE_CHECKING:
     import numpy as np
-
-    from femubench.core.fem.model import Model
-    from femubench.core.modal.measurement import Measurement
 
 _SIMPLE = (bool, int, float, str, type(None))
 _UNKNOWN = object()
 
 
 @dataclass(frozen=True)
-class Variant(Strategy):
+class Variant:
     """A strategy under a name that tells its options.
 
     Arguments:
@@ -34,23 +33,37 @@ class Variant(Strategy):
     """
 
     base: Strategy
-    name: str  # type: ignore[misc]
+    name: str
 
     @property
-    def citation(self) -> str:  # type: ignore[override]
+    def citation(self) -> str:
         """Return that of the strategy."""
         return self.base.citation
 
     @property
-    def needs(self) -> frozenset[str]:  # type: ignore[override]
+    def needs(self) -> frozenset[str]:
         """Return those of the strategy."""
-        return self.base.needs
+        return declared(self.base, "needs")
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
+    @property
+    def promises(self) -> frozenset[str]:
+        """Return those of the strategy."""
+        return declared(self.base, "promises")
+
+    def update(self, model: Any, measurement: Any, rng: np.random.Generator) -> Result:  # noqa: ANN401
         """Return what the strategy returns."""
         return self.base.update(model, measurement, rng)
+
+    def __call__(self, **options: object) -> Variant:
+        """Return the strategy with other options, under a name that tells them.
+
+        Arguments:
+            options: by name; dotted names as ``**{"options.damping": 0.01}``.
+
+        Raises:
+            InputError: for an option that it does not have, or a value of another type.
+        """
+        return labelled(_changed(self.base, options), self.base)
 
 
 def strategy_of(words: str, strategies: Mapping[str, Strategy]) -> Strategy:
@@ -67,19 +80,88 @@ def strategy_of(words: str, strategies: Mapping[str, Strategy]) -> Strategy:
     base = strategies[name]
     if not listed:
         return base
-    known = options_of(base)
-    changed: Any = base
-    for pair in listed.split(","):
-        key, found, text = (part.strip() for part in pair.partition("="))
-        present = known.get(key, _entry(base, key))
-        if not found or present is _UNKNOWN:
-            near = did_you_mean(key, known) or f"; there are {', '.join(known) or 'none'}"
-            raise InputError(f"strategy {name!r} has no option {key!r}{near}")
+    pairs = [pair.partition("=") for pair in listed.split(",")]
+    for key, found, _ in pairs:
+        if not found:
+            raise _no_option(name, key.strip(), options_of(base))
+    return Variant(_changed(base, {key.strip(): _Typed(text) for key, _, text in pairs}), words)
+
+
+def labelled(strategy: Strategy, default: Strategy | None = None) -> Variant:
+    """Return a strategy under its name and the options that are not the default ones.
+
+    Arguments:
+        default: the same with default options; None for what its class makes without arguments.
+    """
+    if default is None:
         try:
-            changed = _with(changed, key, _value(name, key, text, present))
+            default = type(strategy)()
+        except TypeError:  # it has none
+            default = strategy
+    usual, present = _settings(default), _settings(strategy)
+    told = {key: value for key, value in present.items() if usual.get(key, _UNKNOWN) != value}
+    words = [f"{_shortest(key, usual)}={_text(value)}" for key, value in told.items()]
+    return Variant(strategy, strategy.name + (f":{','.join(words)}" if words else ""))
+
+
+def _settings(strategy: Strategy) -> dict[str, Any]:
+    """Return options, or where they are none of a dataclass the attributes of an instance."""
+    own = getattr(strategy, "__dict__", {}) if not is_dataclass(strategy) else {}
+    return options_of(strategy) or {
+        key: value
+        for key, value in own.items()
+        if isinstance(value, _SIMPLE) and key[:1] != "_" and key not in ("name", "citation")
+    }
+
+
+class _Typed(str):
+    """An option as it was typed, not yet a value."""
+
+
+def _changed(base: Strategy, options: Mapping[str, object]) -> Strategy:
+    """Return a strategy with options set by name.
+
+    Raises:
+        InputError: for an option that it does not have, or a value of another type.
+    """
+    known, changed = options_of(base), base
+    for name, given in options.items():
+        key = _full(base.name, name, known)
+        present = known.get(key, _entry(base, key))
+        if present is _UNKNOWN:
+            raise _no_option(base.name, name, known)
+        try:
+            changed = _with(changed, key, _value(base.name, key, given, present))
         except (TypeError, ValueError) as error:
-            raise InputError(f"strategy {words!r}: {error}") from error
-    return Variant(changed, words)
+            raise InputError(f"strategy {base.name!r}: option {name}: {error}") from error
+    return changed
+
+
+def _no_option(strategy: str, key: str, known: Mapping[str, object]) -> InputError:
+    words = dict.fromkeys([*known, *(name.rpartition(".")[2] for name in known)])
+    near = did_you_mean(key, words) or f"; there are {', '.join(known) or 'none'}"
+    return InputError(f"strategy {strategy!r} has no option {key!r}{near}")
+
+
+def _full(strategy: str, name: str, known: Iterable[str]) -> str:
+    """Return the dotted name of an option whose last part will do where no other ends in it."""
+    ends = [key for key in known if key.endswith(f".{name}")]
+    if name in known or not ends:
+        return name
+    if len(ends) > 1:
+        raise InputError(f"strategy {strategy!r}: option {name!r} is {' or '.join(ends)}")
+    return ends[0]
+
+
+def _shortest(key: str, known: Iterable[str]) -> str:
+    """Return the last part of a dotted name where it stands for no other option."""
+    last = key.rpartition(".")[2]
+    found = [other for other in known if other == last or other.endswith(f".{last}")]
+    return last if found == [key] else key
+
+
+def _text(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _with(holder: Any, key: str, value: object) -> Any:  # noqa: ANN401 - a strategy, or options of one
@@ -104,18 +186,21 @@ def options_of(strategy: object) -> dict[str, Any]:
     present = {field.name: getattr(strategy, field.name) for field in fields(strategy)}
     simple = {name: value for name, value in present.items() if isinstance(value, _SIMPLE)}
     for name, value in present.items():
-        simple |= {f"{name}.{inner}": found for inner, found in options_of(value).items()}
+        inner = value if isinstance(value, Mapping) else options_of(value)
+        simple |= {f"{name}.{k}": v for k, v in inner.items() if isinstance(v, _SIMPLE)}
     return simple
 
 
-def _value(strategy: str, key: str, text: str, present: object) -> object:
-    try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        value = text
+def _value(strategy: str, key: str, given: object, present: object) -> object:
+    """Return a value of the type of the present one, from a text where it was typed."""
+    value = given
+    if isinstance(given, _Typed):
+        value = text = given.strip()
+        with suppress(tomllib.TOMLDecodeError):
+            value = tomllib.loads(f"value = {text}")["value"]
     numeric = isinstance(present, float) and type(value) is int
     if present is None or type(value) is type(present) or numeric:
-        return float(value) if numeric else value
+        return float(cast("int", value)) if numeric else value
     raise InputError(
-        f"strategy {strategy!r}: option {key} is {text!r}", expected=type(present).__name__
+        f"strategy {strategy!r}: option {key} is {str(given)!r}", expected=type(present).__name__
     )

@@ -9,7 +9,8 @@ import numpy as np
 
 from femubench.core.case.case import Case
 from femubench.core.plugin.variants import strategy_of
-from femubench.core.update.strategy import Strategy, UpdateResult
+from femubench.core.roles import Strategy
+from femubench.core.update.strategy import UpdateResult
 
 
 @dataclass(frozen=True)
@@ -41,5 +42,7 @@ class Workbench:
             found = self.cases[case]
             strategy = strategy_of(words, self.strategies)
             rng = np.random.default_rng(0)
-            self._done[key] = strategy.update(found.model, found.used_measurement(0), rng)
+            result = strategy.update(found.model, found.used_measurement(0), rng)
+            assert isinstance(result, UpdateResult), type(result)
+            self._done[key] = result
         return self._done[key]

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from femubench.core.schema.records import run_from_json, run_to_json
 from femubench.core.schema.results import BLOCKS, Run
 from femubench.core.score.scoring import frequency_error
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 __all__ = ["modes_frame", "results_frame", "run_from_json", "run_to_json"]
 
@@ -19,6 +22,8 @@ def results_frame(run: Run) -> pd.DataFrame:
     rigid_body_modes_expected negative_eigenvalues unphysical parameter_count evaluations score
     rank.
     """
+    import pandas as pd
+
     rows = []
     for result in run.results:
         row: dict[str, object] = {
@@ -44,6 +49,8 @@ def modes_frame(run: Run) -> pd.DataFrame:
     mac. The error is signed, (f_p / f_m - 1), and nan for a mode without partner or with an
     imaginary one; `counted_percent` is what the score takes, 100 for such a mode.
     """
+    import pandas as pd
+
     rows = [
         {
             "case": result.case,

@@ -8,7 +8,7 @@ import time
 import traceback
 import warnings
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,8 +17,8 @@ from femubench.core.errors import Diverged, NotApplicable, StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import counted_evaluations
 from femubench.core.modal.measurement import Measurement
+from femubench.core.roles import CAPABILITIES, Result, Strategy, declared
 from femubench.core.schema.results import Status
-from femubench.core.update.strategy import CAPABILITIES, Strategy, UpdateResult
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,24 @@ class JobOutcome:
     diagnostics: Mapping[str, float] = field(default_factory=dict)
 
 
+def sent(thing: object) -> bytes:
+    """Return a strategy as bytes for a worker.
+
+    A class that lives in a script, a notebook or a function has no name by which a worker could
+    import it: its code goes along, and the worker never sees the rest of the script.
+    """
+    try:
+        plain = pickle.dumps(thing, protocol=pickle.HIGHEST_PROTOCOL)
+    except Exception:
+        plain = b""
+    if plain and b"__main__" not in plain:
+        return plain
+    import cloudpickle
+
+    code: bytes = cloudpickle.dumps(thing)
+    return code
+
+
 def seed_words(case: str, strategy: str, seed: int) -> tuple[int, ...]:
     """Return the seed of a job's random generator: the same on every machine and in any order.
 
@@ -96,7 +114,7 @@ def execute(job: Job) -> JobOutcome:
         strategy, model, measurement = (
             pickle.loads(part) for part in (job.strategy, job.model, job.measurement)
         )
-        reason = missing_capability(strategy.needs, model, measurement)
+        reason = missing_capability(frozenset(declared(strategy, "needs")), model, measurement)
     except Exception as error:
         return JobOutcome("failed", one_line(error), traceback.format_exc())
     if reason is not None:
@@ -148,9 +166,9 @@ def _text(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 
-def _plain(result: UpdateResult) -> JobOutcome:
+def _plain(result: Result) -> JobOutcome:
     """Return a result as an outcome; figures that are none raise TypeError or ValueError."""
-    if not isinstance(result, UpdateResult):
+    if not isinstance(result, Result):
         raise TypeError(f"update returned {type(result).__name__}, expected UpdateResult")
     if not isinstance(result.model, Model):
         raise TypeError(f"the updated model is {type(result.model).__name__}, expected Model")
@@ -161,19 +179,19 @@ def _plain(result: UpdateResult) -> JobOutcome:
         status="ok",
         model=result.model,
         parameter_count=count,
-        parameters=tuple(_parameter(asdict(item)) for item in result.parameters),
+        parameters=tuple(_parameter(item) for item in result.parameters),
         history=tuple(_figures(item) for item in result.history),
         diagnostics=_figures(result.diagnostics),
     )
 
 
-def _parameter(item: Mapping[str, Any]) -> dict[str, Any]:
+def _parameter(item: Any) -> dict[str, Any]:  # noqa: ANN401 - a `ParameterEstimate`
     return {
-        "name": str(item["name"]),
-        "before": float(item["before"]),
-        "after": float(item["after"]),
-        "unit": str(item["unit"]),
-        "std": None if item["std"] is None else float(item["std"]),
+        "name": str(item.name),
+        "before": float(item.before),
+        "after": float(item.after),
+        "unit": str(item.unit),
+        "std": None if item.std is None else float(item.std),
     }
 
 

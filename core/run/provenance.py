@@ -16,11 +16,11 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import femubench
 from femubench.core.case.case import Case
 from femubench.core.plugin.variants import Variant
+from femubench.core.roles import Strategy
 from femubench.core.score.scoring import Reference
-from femubench.core.update.strategy import Strategy
+from femubench.core.version import __version__
 
 Stamp = tuple[Path, int, int]  # a file, when it was changed, its size
 
@@ -36,7 +36,7 @@ def job_key(case: Case, strategy: str, code: bytes, version: str, seed: int) -> 
         seed: of the noise.
     """
     parts = (
-        *(femubench.__version__, case.name, case.digest, strategy),
+        *(__version__, case.name, case.digest, strategy),
         *(hashlib.sha256(code).hexdigest(), version, str(seed)),
     )
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]

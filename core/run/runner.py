@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
+from femubench.core.roles import Strategy
 from femubench.core.run.limits import Limits, memory_share
 from femubench.core.run.provenance import plan_digest, run_meta
 from femubench.core.run.recording import Overwrite, Progress, Results, ended, recorded
@@ -18,7 +19,6 @@ from femubench.core.run.schedule import computed, slots_of
 from femubench.core.run.store import Store
 from femubench.core.schema.results import Run
 from femubench.core.score.scoring import rank_results, reference_of
-from femubench.core.update.strategy import Strategy
 
 
 def run_jobs(
@@ -39,8 +39,7 @@ def run_jobs(
 ) -> Run:
     """Run every strategy on every case with every seed, each job in a process of its own.
 
-    What a strategy returns is judged in another process. A script needs the usual
-    ``if __name__ == "__main__":`` around its call. On Ctrl-C what is done stays in the store.
+    What a strategy returns is judged in another process. On Ctrl-C what is done stays in the store.
 
     Arguments:
         seeds: 0 is the data as recorded, every other one a draw of measurement noise.
@@ -59,7 +58,7 @@ def run_jobs(
         InputError: for two of one name, no worker, or a run that another process works on.
         ModelError: when the nominal model of a case cannot be solved.
     """
-    workers = _worker_count(jobs)
+    workers = worker_count(jobs)
     _check_names("case", [case.name for case in cases])
     _check_names("strategy", [strategy.name for strategy in strategies])
     share = memory_share(workers) if memory is None else memory
@@ -81,7 +80,12 @@ def run_jobs(
     return Run({**meta, **ending}, rank_results(results.in_order(), meta["reference"]))
 
 
-def _worker_count(jobs: int | None) -> int:
+def worker_count(jobs: int | None) -> int:
+    """Return the number of worker processes: that of the processors where none is given.
+
+    Raises:
+        InputError: for less than one.
+    """
     if jobs is None:
         return len(os.sched_getaffinity(0))
     if jobs < 1:

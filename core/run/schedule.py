@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import json
 import pickle
+import sys
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
+from femubench.core.roles import Strategy
 from femubench.core.run.answers import AnswerError, head_of
-from femubench.core.run.jobs import Job, JobOutcome, one_line, seed_words
+from femubench.core.run.jobs import Job, JobOutcome, one_line, seed_words, sent
 from femubench.core.run.judging import Verdict, judged, run_judge, run_strategy
 from femubench.core.run.limits import Limits
 from femubench.core.run.provenance import job_key, provenance, strategy_version
@@ -22,7 +25,6 @@ from femubench.core.run.workers import Ending, How, Workers
 from femubench.core.schema.records import result_from_json
 from femubench.core.schema.results import JobResult, Status
 from femubench.core.score.scoring import Reference
-from femubench.core.update.strategy import Strategy
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ def slots_of(
     cases: Sequence[Case], strategies: Sequence[Strategy], seeds: Sequence[int]
 ) -> Iterator[Slot]:
     """Yield the jobs of a run, case by case and seed by seed."""
-    pickled: list[bytes | JobOutcome] = [_pickled(strategy) for strategy in strategies]
+    pickled = [_pickled(strategy, sent) for strategy in strategies]
     versions = [strategy_version(strategy) for strategy in strategies]
     for case in cases:
         model = _pickled(case.model)
@@ -73,15 +75,30 @@ def slots_of(
                 fault = next((part for part in parts if isinstance(part, JobOutcome)), None)
                 words = seed_words(case.name, strategy.name, seed)
                 job = None if fault else Job(*parts, words)  # type: ignore[arg-type]
-                known = code if isinstance(code, bytes) else repr(type(strategy)).encode()
+                known = _identity(strategy, code)
                 key = job_key(case, strategy.name, known, version, seed)
                 plain, now = {"strategy": version}, partial(strategy_version, strategy)
                 yield Slot(case, strategy.name, seed, key, plain, job, fault, now)
 
 
-def _pickled(thing: object) -> bytes | JobOutcome:
+def _identity(strategy: Strategy, code: bytes | JobOutcome) -> bytes:
+    """Return bytes that tell a strategy and its options from others, in this session and later.
+
+    What was typed into a notebook has no file whose digest would tell a later version apart:
+    there the code itself is what counts.
+    """
+    if getattr(sys.modules["__main__"], "__file__", None):
+        with suppress(Exception):
+            return _bytes(strategy)
+    return code if isinstance(code, bytes) else repr(type(strategy)).encode()
+
+
+_bytes = partial(pickle.dumps, protocol=pickle.HIGHEST_PROTOCOL)
+
+
+def _pickled(thing: object, turned: Callable[[object], bytes] = _bytes) -> bytes | JobOutcome:
     try:
-        return pickle.dumps(thing, protocol=pickle.HIGHEST_PROTOCOL)
+        return turned(thing)
     except Exception as error:
         reason = f"{type(thing).__name__} cannot be sent to a worker process: {one_line(error)}"
         return JobOutcome("failed", reason, traceback.format_exc())

@@ -20,6 +20,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing import connection, forkserver, get_context, resource_tracker
 from pathlib import Path
+from types import ModuleType
 from typing import Any, Generic, Literal, TypeVar
 
 import psutil
@@ -323,7 +324,8 @@ class Workers(Generic[Key]):
         process = context.Process(target=serve, args=arguments)
         try:
             _server_mark()  # a job may have ended the server
-            process.start()
+            with _no_script():
+                process.start()
         except (OSError, EOFError) as error:
             for end in (answer, output):
                 end.close()
@@ -406,6 +408,17 @@ def _server_awake() -> Iterator[None]:
     finally:
         done.set()
         watcher.join()
+
+
+@contextmanager
+def _no_script() -> Iterator[None]:
+    """Hide the script or notebook from a worker that starts, which would run it once more."""
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
 
 
 def _wake_server() -> None:

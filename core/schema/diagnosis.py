@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from femubench.core.effect.words import Wording
+from femubench.core.roles import Wording
 
 Verdict = Literal["named", "none", "unknown", "ambiguous", "not-confirmed"]
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
+
+from femubench.core.display import Shown, counted
 
 Status = Literal["ok", "failed", "timeout", "crashed", "diverged", "not-applicable"]
 STATUSES: tuple[Status, ...] = ("ok", "failed", "timeout", "crashed", "diverged", "not-applicable")
@@ -100,8 +103,8 @@ class JobResult:
         return self.status == "ok" and (lost or bool(self.negative_eigenvalues))
 
 
-@dataclass(frozen=True)
-class Run:
+@dataclass(frozen=True, repr=False)
+class Run(Shown):
     """All results of one `bench run`.
 
     Arguments:
@@ -111,3 +114,14 @@ class Run:
 
     meta: Mapping[str, Any]
     results: tuple[JobResult, ...]
+
+    def rows(self) -> Sequence[tuple[str, str]]:
+        """Return what was run and how it ended."""
+        count = Counter(result.status for result in self.results)
+        size = ", ".join(
+            counted(len({getattr(result, what) for result in self.results}), noun)
+            for what, noun in (("case", "case"), ("strategy", "strategy"), ("seed", "seed"))
+        )
+        ended = ", ".join(f"{number} {status}" for status, number in count.items())
+        title = f"{size}, {counted(len(self.results), 'result')} ({ended or 'none'})"
+        return [(str(self.meta.get("run", "")), title)]

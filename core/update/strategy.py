@@ -1,4 +1,4 @@
-"""The role of a strategy: one method that turns a model and a few measured modes into a model."""
+"""What a strategy hands back, and a base class for strategies: one method to override."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
+from femubench.core import roles
+from femubench.core.display import Shown, counted
+
 if TYPE_CHECKING:
     import numpy as np
 
     from femubench.core.fem.model import Model
     from femubench.core.modal.measurement import Measurement
-
-CAPABILITIES = ("shapes", "elements", "geometry", "joints")
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,8 @@ class ParameterEstimate:
     std: float | None = None
 
 
-@dataclass(frozen=True)
-class UpdateResult:
+@dataclass(frozen=True, repr=False)
+class UpdateResult(Shown):
     """What a strategy hands back.
 
     Arguments:
@@ -55,16 +56,30 @@ class UpdateResult:
     history: tuple[Mapping[str, float], ...] = ()
     diagnostics: Mapping[str, float] = field(default_factory=dict)
 
+    def rows(self) -> list[tuple[str, str]]:
+        """Return the model, and the parameters before and after."""
+        unknowns = counted(self.parameter_count, "unknown")
+        found = [
+            ("", f"{unknowns}, {counted(len(self.history), 'iteration')}"),
+            ("model", self.model.rows()[0][1]),
+        ]
+        for p in self.parameters:
+            std = "" if p.std is None else f", std {p.std:.2g}"
+            found.append((p.name, f"{p.before:.5g} -> {p.after:.5g} {p.unit}".rstrip() + std))
+        return found + [(name, f"{value:.5g}") for name, value in self.diagnostics.items()]
+
 
 class Strategy(ABC):
-    """Base class of every updating strategy: override `update`, set `name` and `citation`.
+    """Base class for updating strategies: override `update`, set `name` and `citation`.
+
+    Nobody has to inherit it: whatever plays `core.roles.Strategy` is ranked and checked alike.
 
     Attributes:
         name: the word after ``bench run -s``.
         citation: author, year, title, equation.
-        needs: capabilities (of `CAPABILITIES`) that model or measurement must have: ``shapes``
-            measured mode shapes, ``elements`` element matrices, ``geometry`` members that can be
-            rebuilt with other parameters, ``joints`` places where members meet.
+        needs: capabilities that model or measurement must have: ``shapes`` measured mode shapes,
+            ``elements`` element matrices, ``geometry`` members that can be rebuilt with other
+            parameters, ``joints`` places where members meet.
         promises: what every result keeps (of ``used-modes``, ``rigid-body-modes``,
             ``no-negative-eigenvalue``); `bench plugins check` measures it.
         baseline: whether it is the one that leaves the model as it is, to compare with.
@@ -93,3 +108,12 @@ class Strategy(ABC):
             StrategyFailure: when no model can be given, or a self-check fails.
             NotApplicable: when the case lacks something that `needs` cannot express.
         """
+
+
+if TYPE_CHECKING:
+
+    def _play(
+        model: Model, measurement: Measurement, result: UpdateResult, strategy: Strategy
+    ) -> tuple[roles.Model, roles.Measurement, roles.Result, roles.Strategy]:
+        """Let type checkers see that the data classes play the roles."""
+        return model, measurement, result, strategy

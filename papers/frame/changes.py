@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from femubench import Model, UpdateResult, wireframe_of
+from femubench import Model, UpdateResult
 from femubench.fem import FloatArray, Structure, stiffness_matrices
+from femubench.plot import wireframe_of
 from femubench.reproduction import Figure, MatrixImage, StructureMap, Workbench
 from femubench.results import element_norms, stiffness_difference
 from femubench.update import ElementFamily, generic_family

@@ -9,12 +9,14 @@ from typing import ClassVar
 import numpy as np
 import scipy.sparse as sp
 
-from femubench import Model, Site, Size
+from femubench import Model
 from femubench.effect import (
     Change,
     EffectParameter,
     FrameEffect,
     RowOperator,
+    Site,
+    Size,
     Term,
     directed_places,
     directed_point,

@@ -9,12 +9,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import Model, Site, Size
+from femubench import Model
 from femubench.effect import (
     Change,
     EffectParameter,
     FrameEffect,
     RowOperator,
+    Site,
+    Size,
     Term,
     elongation_row,
     member_length,

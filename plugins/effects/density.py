@@ -7,8 +7,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from femubench import LookWarning, Model, Seen, Size
-from femubench.effect import total_mass
+from femubench import Model
+from femubench.effect import LookWarning, Seen, Size, total_mass
 from femubench.fem import FloatArray
 from femubench.plugins.effects.material import MaterialEffect
 

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-from femubench import Model, Site, Size
+from femubench import Model
 from femubench.effect import (
     Change,
     EffectParameter,
     FrameEffect,
+    Site,
+    Size,
     joints_of,
     mass_term,
     proportional,

@@ -8,11 +8,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import Model, Site, Size
+from femubench import Model
 from femubench.effect import (
     Change,
     EffectParameter,
     FrameEffect,
+    Site,
+    Size,
     branch_places,
     end_arm,
     end_places,

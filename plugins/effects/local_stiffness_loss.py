@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-from femubench import Model, Size
+from femubench import Model
 from femubench.effect import (
     Change,
     EffectParameter,
     ElementOperator,
     FrameEffect,
+    Size,
     Term,
     element_labels,
     elements_of,

@@ -8,12 +8,14 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from femubench import Model, Site, Size
+from femubench import Model
 from femubench.effect import (
     Change,
     EffectParameter,
     ElementOperator,
     FrameEffect,
+    Site,
+    Size,
     Term,
     elements_of,
     once_for,

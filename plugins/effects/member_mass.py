@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar, Literal
 
-from femubench import Model, Size
-from femubench.effect import member_labels
+from femubench import Model
+from femubench.effect import Size, member_labels
 from femubench.plugins.effects.material import MaterialEffect
 
 

@@ -8,12 +8,15 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import LookWarning, Model, Seen, Size
+from femubench import Model
 from femubench.effect import (
     Change,
     EffectParameter,
     ElementOperator,
     FrameEffect,
+    LookWarning,
+    Seen,
+    Size,
     Term,
     elements_of,
     proportional,

@@ -8,12 +8,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import Model, Reading, Size
+from femubench import Model
 from femubench.effect import (
     Change,
     EffectParameter,
     ElementOperator,
     FrameEffect,
+    Reading,
+    Size,
     Term,
     proportional,
 )

@@ -9,12 +9,15 @@ from typing import ClassVar
 import numpy as np
 from scipy.optimize import brentq
 
-from femubench import LookWarning, Model, Seen, Size, bredt
+from femubench import Model
 from femubench.effect import (
     Change,
     EffectParameter,
     ElementOperator,
     FrameEffect,
+    LookWarning,
+    Seen,
+    Size,
     Term,
     elements_of,
     proportional,
@@ -22,6 +25,7 @@ from femubench.effect import (
 from femubench.fem import (
     Frame,
     Section,
+    bredt,
     rectangular_tube,
     round_tube,
     solid_rectangle,

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar, Literal
 
-from femubench import Model, Size
+from femubench import Model
+from femubench.effect import Size
 from femubench.plugins.effects.material import MaterialEffect
 
 

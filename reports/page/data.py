@@ -6,7 +6,6 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
-from femubench import TIE, Run, tell_apart
 from femubench.reports.cells import plain
 from femubench.reports.page.papers import papers_of
 from femubench.reports.page.rounding import clean, plain_data, rounded
@@ -19,7 +18,16 @@ from femubench.reports.summary import (
     seeds_of,
     strategies_of,
 )
-from femubench.results import OFFSET_PERCENT, SCORE_OF_FAILURE, JobResult, leaderboard, rank_results
+from femubench.results import (
+    OFFSET_PERCENT,
+    SCORE_OF_FAILURE,
+    TIE,
+    JobResult,
+    Run,
+    leaderboard,
+    rank_results,
+    tell_apart,
+)
 
 VERSION = 1
 BLOCKS = ("used", "higher", "modified")

@@ -7,8 +7,8 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from femubench import Run
 from femubench.reports.summary import cases_of, measured_modes
+from femubench.results import Run
 
 # Relative; the cases hold the printed frequencies, and what goes by the same name may be another.
 _SAME = 1e-6

@@ -13,9 +13,9 @@ import pytest
 from click.testing import CliRunner
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from femubench import Run
 from femubench.core.cli.main import bench
 from femubench.core.schema.records import read_run
+from femubench.results import Run
 
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 STRATEGIES = ("unchanged", "baruch", "generic-ls", "local", "nobari", "kabe")

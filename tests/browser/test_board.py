@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page
 
-from femubench import Run
-from femubench.results import leaderboard, rank_results
+from femubench.results import Run, leaderboard, rank_results
 
 BLOCKS = ("used", "higher", "modified")
 ROUNDED = {"seconds": 1e-3}  # figures that the page holds with fewer digits

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page
 
-from femubench import Run
 from femubench.core.run.store import Store
 from femubench.reports.htmls import HtmlReporter
+from femubench.results import Run
 
 VIEW, TOLD = ".case-structure canvas.case-view", ".case-structure .case-told"
 PIXELS = f"document.querySelector('{VIEW}').toDataURL()"

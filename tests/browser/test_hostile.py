@@ -13,12 +13,11 @@ from typing import Any
 
 import pytest
 
-from femubench import Run
 from femubench.core.schema.records import finite
 from femubench.reports.csvs import CsvReporter
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.markdown import MarkdownReporter
-from femubench.results import run_to_json
+from femubench.results import Run, run_to_json
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "toys"))
 from synthetic_run import synthetic_run

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pyuff
 
-from femubench import Run
-from femubench.results import Block, JobResult, PairedMode, Store, run_to_json
+from femubench.results import Block, JobResult, PairedMode, Run, Store, run_to_json
 
 ROOT = Path(__file__).parents[2]
 CASES = sorted(

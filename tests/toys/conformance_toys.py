@@ -15,20 +15,15 @@ import scipy.sparse as sp
 
 from femubench import (
     InputError,
-    LookWarning,
     Measurement,
     Model,
     NotApplicable,
-    Reading,
-    Seen,
-    Site,
-    Size,
     Strategy,
     StrategyFailure,
     UpdateResult,
     solve_modes,
 )
-from femubench.effect import EffectParameter, FrameEffect
+from femubench.effect import EffectParameter, FrameEffect, LookWarning, Reading, Seen, Site, Size
 from femubench.fem import Frame, GroundSpring, LowRank, Place, SparseArray
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from femubench import LookWarning, Model, Reading, Seen, Size, hookimpl
-from femubench.effect import EffectParameter, FrameEffect
+from femubench import Model, hookimpl
+from femubench.effect import EffectParameter, FrameEffect, LookWarning, Reading, Seen, Size
 from femubench.fem import Factor, Frame
 
 CAUTION = "A skin that peels off looks like a thinner one."

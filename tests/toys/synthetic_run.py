@@ -8,8 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from femubench import Run
-from femubench.results import Block, JobResult, PairedMode, rank_results
+from femubench.results import Block, JobResult, PairedMode, Run, rank_results
 
 BLOCKS = ("used", "higher", "modified")
 MODES = {"used": (1, 2, 3), "higher": (4, 5), "modified": (1, 2)}

@@ -50,7 +50,7 @@ _FURTHER = {
 _NAME = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)*")
 _EXPECTED = "a word of lower-case letters, digits and dashes that begins with a letter"
 _LONGEST = 40
-_IMPORTED = ("Any", "Iterable", "NoReturn", "Path", "Sequence")
+_TEMPLATES = Path(__file__).parent / "templates"
 
 
 def write_package(name: str, kind: str, output: Path, plugins: Plugins) -> tuple[Path, ...]:
@@ -157,7 +157,7 @@ def _files(name: str, kind: str, trial: str) -> Iterator[tuple[str, str]]:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     room = Environment(
-        loader=PackageLoader("femubench.core.plugin"),
+        loader=PackageLoader("femubench.core.library"),
         autoescape=False,
         undefined=StrictUndefined,
         trim_blocks=True,
@@ -185,10 +185,9 @@ def _files(name: str, kind: str, trial: str) -> Iterator[tuple[str, str]]:
 
 def _class_of(name: str, kind: str) -> str:
     """Return a name for the class that no import of the template and no built-in has."""
-    import femubench
-
     word = "".join(part.capitalize() for part in name.split("-"))
-    taken = (*dir(femubench), *dir(builtins), *_IMPORTED)
+    sources = (path.read_text(encoding="utf-8") for path in _TEMPLATES.glob("*.py.jinja"))
+    taken = {*dir(builtins), *(found for text in sources for found in re.findall(r"\w+", text))}
     return f"{word}{kind.capitalize()}" if word in taken or keyword.iskeyword(word) else word
 
 

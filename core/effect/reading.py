@@ -1,12 +1,8 @@
-"""How an effect speaks for itself: the wording of its sizes, and what can be read directly."""
+"""What can be read directly of an effect, without any vibration test."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
-
-# In its unit; a relative change, also in percent with a sign; a part of a whole, also in percent.
-Wording = Literal["value", "change", "share"]
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,205 @@
+"""Cases by name, by folder or as they are, and what plugins offer by name."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
+
+from femubench.core.display import clipped
+from femubench.core.errors import InputError
+from femubench.core.plugin.loader import Plugins, load_plugins
+from femubench.core.plugin.validation import chosen, unknown
+from femubench.core.plugin.variants import Variant
+from femubench.core.roles import Effect, Scenario
+
+if TYPE_CHECKING:
+    from femubench.core.case.case import Case
+
+CaseLike: TypeAlias = "str | PathLike[str] | Case"
+Thing = TypeVar("Thing")
+
+
+def usable_plugins() -> Plugins:
+    """Return what plugins offer; warn of those that are broken."""
+    plugins = load_plugins()
+    for fault in plugins.broken:
+        warnings.warn(str(fault), stacklevel=2)
+    return plugins
+
+
+class Catalogue(Mapping[str, Thing], Generic[Thing]):
+    """Everything of one kind that plugins offer, by name; nothing is loaded before it is asked for.
+
+    Arguments:
+        kind: for messages.
+        names: returns the names that there are.
+        make: returns what has a name.
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        names: Callable[[Plugins], Iterable[str]],
+        make: Callable[[Plugins, str], Thing],
+    ) -> None:
+        self._kind, self._names, self._make = kind, names, make
+
+    def __getitem__(self, name: str) -> Thing:
+        """Return what has a name.
+
+        Raises:
+            UnknownNameError: an InputError and a KeyError, with the near matches.
+        """
+        plugins = usable_plugins()
+        chosen(self._kind, [name], self._names(plugins))
+        return self._make(plugins, name)
+
+    def _known(self) -> tuple[str, ...]:
+        return tuple(self._names(usable_plugins()))
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._known())
+
+    def __len__(self) -> int:
+        return len(self._known())
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._known()
+
+    def __repr__(self) -> str:
+        return clipped(f"{self._kind}: {', '.join(self._known())}")
+
+
+def _parts(scenarios: Mapping[str, Scenario]) -> dict[str, Path]:
+    return {name: path for scenario in scenarios.values() for name, path in scenario.cases.items()}
+
+
+def _case(plugins: Plugins, name: str) -> Case:
+    from femubench.core.case.reader import read_case
+
+    readers = tuple(plugins.readers.values())
+    return read_case(_parts(plugins.scenarios)[name], name, readers, installed=True)
+
+
+def _strategy(plugins: Plugins, name: str) -> Variant:
+    return Variant(plugins.strategies[name], name)
+
+
+cases: Catalogue[Case] = Catalogue("case", lambda p: _parts(p.scenarios), _case)
+strategies: Catalogue[Variant] = Catalogue("strategy", lambda p: p.strategies, _strategy)
+effects: Catalogue[Effect] = Catalogue(
+    "effect", lambda p: p.effects, lambda p, name: p.effects[name]
+)
+
+
+def listed(given: Any) -> list[Any]:  # noqa: ANN401 - one of anything, or several
+    """Return one thing as a list of one, several as a list."""
+    if isinstance(given, Iterable) and not isinstance(given, (str, PathLike)):
+        return list(given)
+    return [given]
+
+
+def read_cases(given: CaseLike | Iterable[CaseLike], plugins: Plugins) -> list[Case]:
+    """Read and validate cases, each once.
+
+    Arguments:
+        given: names of scenarios, of one case of a scenario, folders, or cases; none for all
+            scenarios.
+        plugins: where scenarios and readers come from.
+
+    Raises:
+        InputError: for an unknown name or a faulty case, before anything is run.
+    """
+    wanted = case_folders(given, plugins.scenarios)
+    # Words are known to be right before what reads cases is loaded.
+    from femubench.core.case.reader import read_case
+
+    readers = tuple(plugins.readers.values())
+    # A name is that of a scenario, whose folder came with a plugin.
+    found = [
+        read_case(item[1], item[0], readers, installed=item[0] is not None)
+        if isinstance(item, tuple)
+        else item
+        for item in wanted
+    ]
+    _check_names(found)
+    return found
+
+
+def case_folders(
+    given: CaseLike | Iterable[CaseLike], scenarios: Mapping[str, Scenario]
+) -> list[tuple[str | None, Path] | Case]:
+    """Return name and folder of every case that words stand for, and cases as they are, each once.
+
+    Arguments:
+        given: as in `read_cases`.
+        scenarios: the known ones.
+
+    Raises:
+        InputError: for an unknown name.
+    """
+    # By resolved folder, so that each runs once; messages name it as it was typed.
+    wanted: dict[object, tuple[str | None, Path] | Case] = {}
+    for word in listed(given) or scenarios:
+        if not isinstance(word, (str, PathLike)):
+            wanted.setdefault(id(word), word)
+            continue
+        for name, folder in _folders(str(word), scenarios):
+            wanted.setdefault(folder.resolve(), (name, folder))
+    if not wanted:
+        raise InputError("there is no case to run", expected="a case folder or a scenario plugin")
+    return list(wanted.values())
+
+
+def one_case(given: CaseLike, plugins: Plugins) -> Case:
+    """Return the only case that a word stands for.
+
+    Raises:
+        InputError: when it stands for several.
+    """
+    found = read_cases(given, plugins)
+    if len(found) > 1:
+        names = ", ".join(case.name for case in found)
+        raise InputError(f"{given!r} stands for {len(found)} cases", expected=f"one of {names}")
+    return found[0]
+
+
+def case_words(words: Iterable[str], plugins: Plugins) -> tuple[str, ...]:
+    """Return words for cases that mean the same from any working directory."""
+    known = {*_parts(plugins.scenarios), *plugins.scenarios}
+    given = tuple(words) or tuple(plugins.scenarios)
+    return tuple(word if word in known else str(Path(word).absolute()) for word in given)
+
+
+def _folders(word: str, scenarios: Mapping[str, Scenario]) -> Iterable[tuple[str | None, Path]]:
+    """Return name and folder of every case that a word stands for."""
+    if word in scenarios:
+        return list(scenarios[word].cases.items())
+    parts = _parts(scenarios)
+    if word in parts:
+        return [(word, parts[word])]
+    path = Path(word)
+    if path.name == "case.toml" and path.is_file():
+        path = path.parent
+    if path.is_dir():
+        return [(None, path)]
+    if "/" in word and word.partition("/")[0] not in scenarios:
+        raise InputError("folder does not exist", file=path, expected="a folder with a case.toml")
+    raise unknown("case", word, [*scenarios, *parts])
+
+
+def _check_names(cases: Iterable[Case]) -> None:
+    """Refuse two folders under one name: their results could not be told apart."""
+    seen: dict[str, Path] = {}
+    for case in cases:
+        if case.name in seen:
+            raise InputError(
+                f"the name {case.name!r} is also that of {seen[case.name]}",
+                file=case.folder / "case.toml",
+                key="case.name",
+                expected="a name of its own",
+            )
+        seen[case.name] = case.folder

@@ -1,0 +1,112 @@
+"""What a model lacks: ``bench diagnose``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+
+from threadpoolctl import threadpool_limits
+
+from femubench.core.case.case import Case
+from femubench.core.case.writing import write_case
+from femubench.core.diagnosis.diagnose import diagnose as search
+from femubench.core.diagnosis.result import Diagnosis
+from femubench.core.diagnosis.serial import diagnosis_to_json
+from femubench.core.errors import InputError, NotApplicable
+from femubench.core.files import check_new, make_folder
+from femubench.core.library.cases import CaseLike, listed, one_case, usable_plugins
+from femubench.core.plugin.loader import Plugins
+from femubench.core.plugin.validation import check_effect, chosen
+from femubench.core.roles import Effect
+
+# Verdicts that leave no model to write.
+_NO_MODEL = ("none", "unknown")
+_LONGEST = 70  # of 80 characters that a name may have
+
+
+def diagnose(
+    case: CaseLike,
+    effects: str | Effect | Iterable[str | Effect] | None = None,
+    *,
+    pairs: bool = True,
+    tolerance: float | None = None,
+    output: str | PathLike[str] | None = None,
+) -> Diagnosis:
+    """Return what is missing in a case's model, where, how sure, and what it gains.
+
+    Held-out modes and modified structures never enter the naming; they confirm it or not.
+
+    Arguments:
+        case: a name, a folder or a `Case`.
+        effects: what may be missing, by name or as effects; all that are installed by default.
+        pairs: whether more than one cause is sought.
+        tolerance: standard deviation of every element's relative scatter; the case's by default.
+        output: new folder for the extended model as a case, where one was found.
+
+    Raises:
+        InputError: when the case or an effect is unknown, or the case lacks what it takes.
+        ModelError: when the model has no modes.
+    """
+    if output is not None:
+        check_new(Path(output))
+    found = diagnosis_of(case, effects, usable_plugins(), pairs=pairs, tolerance=tolerance)
+    if output is not None and has_model(found):
+        write_extended(found, Path(output))
+    return found
+
+
+def diagnosis_of(
+    case: CaseLike,
+    effects: str | Effect | Iterable[str | Effect] | None,
+    plugins: Plugins,
+    *,
+    pairs: bool = True,
+    tolerance: float | None = None,
+) -> Diagnosis:
+    """Return the diagnosis; see `diagnose`."""
+    wanted = _effects(effects, plugins)
+    read = one_case(case, plugins)
+    if tolerance is not None:
+        read = replace(read, tolerance=tolerance)
+    try:
+        # Many small matrices: threads would only wait for each other.
+        with threadpool_limits(1):
+            return search(read, effects=wanted, pairs=pairs)
+    except NotApplicable as fault:
+        raise InputError(f"cannot be diagnosed: {fault}", file=read.folder) from fault
+
+
+def _effects(given: object, plugins: Plugins) -> list[Effect]:
+    """Return the effects to try.
+
+    Raises:
+        InputError: for an unknown one.
+    """
+    wanted = [*plugins.effects] if given is None else listed(given)
+    chosen("effect", (item for item in wanted if isinstance(item, str)), plugins.effects)
+    unique = [item for i, item in enumerate(wanted) if item not in wanted[:i]]
+    return [plugins.effects[e] if isinstance(e, str) else check_effect(e) for e in unique]
+
+
+def has_model(found: Diagnosis) -> bool:
+    """Tell whether a diagnosis has an extended model."""
+    return found.verdict not in _NO_MODEL and bool(found.causes)
+
+
+def write_extended(found: Diagnosis, folder: Path) -> None:
+    """Write the extended model of a diagnosis as a case.
+
+    Raises:
+        FemubenchError: when it cannot be written as a case.
+    """
+    from femubench.reports.diagnosis import summary_lines
+
+    case = found.subject
+    assert isinstance(case, Case)
+    make_folder(folder.parent)
+    comment = summary_lines(diagnosis_to_json(found))
+    # A name of its own, so that both cases can be run together.
+    name = f"{case.name[:_LONGEST]}-extended"
+    write_case(folder, case, found.extended, comment=comment, name=name)

@@ -1,0 +1,348 @@
+"""Strategies ranked on cases: what ``bench run`` does."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import Field, TypeAdapter, ValidationError
+
+from femubench.core.case.case import Case
+from femubench.core.errors import InputError
+from femubench.core.files import make_folder
+from femubench.core.library.cases import CaseLike, case_words, listed, read_cases, usable_plugins
+from femubench.core.plugin.loader import Plugins
+from femubench.core.plugin.validation import check_strategy, chosen
+from femubench.core.plugin.variants import Variant, labelled, strategy_of
+from femubench.core.roles import Strategy
+from femubench.core.run.frames import modes_frame, results_frame
+from femubench.core.run.recording import Overwrite, Progress
+from femubench.core.run.runner import run_jobs
+from femubench.core.run.store import Store
+from femubench.core.schema import records as serial, results
+from femubench.core.score.leaderboard import leaderboard
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+StrategyLike = str | Strategy | type[Strategy]
+DEFAULT_STORE = "femubench-results"
+DEFAULT_TIMEOUT = 600.0  # s
+_Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+@dataclass(frozen=True)
+class Request:
+    """What decides on the results of a run, in words that can be kept with it and asked for again.
+
+    Arguments:
+        cases: names of scenarios or of their cases, and absolute folders.
+        strategies: names, with options.
+        seeds: number of draws of noise; None for the data as recorded.
+        seed: the first one.
+        timeout: seconds that a job may take.
+        timeouts: the same for single strategies.
+        memory: bytes that a job may take; None for an even share.
+    """
+
+    cases: tuple[str, ...]
+    strategies: tuple[str, ...]
+    seeds: Annotated[int, Field(ge=1)] | None = None
+    seed: Annotated[int, Field(ge=0)] = 0
+    timeout: _Seconds = DEFAULT_TIMEOUT
+    timeouts: Mapping[str, _Seconds] = field(default_factory=dict)
+    memory: Annotated[int, Field(ge=1)] | None = None
+
+    @property
+    def all_seeds(self) -> range:
+        """Return the seeds: 0 is the data as recorded, several are draws of noise and no other."""
+        first = self.seed if self.seeds is None else self.seed + 1
+        return range(first, first + (self.seeds or 1))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return plain data."""
+        return {
+            **asdict(self),
+            "cases": list(self.cases),
+            "strategies": list(self.strategies),
+            "timeouts": dict(self.timeouts),
+        }
+
+
+def request_of(run: results.Run) -> Request:
+    """Return what a stored run was asked for.
+
+    Raises:
+        InputError: when it was not kept, as by earlier versions and by calls from Python.
+    """
+    kept = run.meta.get("request")
+    if not isinstance(kept, Mapping) or not {"cases", "strategies"} <= kept.keys():
+        what = f"run {run.meta.get('run')} does not tell what it was asked for"
+        raise InputError(what, expected="a run of `bench run` of this version")
+    try:
+        found = TypeAdapter(Request).validate_python(dict(kept))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"]))
+        what = f"request of run {run.meta.get('run')}: {where}: {first['msg']}"
+        raise InputError(what, expected="what `bench run` keeps") from error
+    return replace(found, timeouts=dict(found.timeouts))
+
+
+class Run(results.Run):
+    """All results of one run, with the tables that one looks at."""
+
+    @classmethod
+    def of(cls, run: results.Run) -> Run:
+        """Return a run as one that has tables."""
+        return cls(run.meta, run.results)
+
+    @property
+    def table(self) -> pd.DataFrame:
+        """Return one row a job: status, errors by block, counts, score and rank."""
+        return results_frame(self)
+
+    @property
+    def modes(self) -> pd.DataFrame:
+        """Return one row a measured mode of every job that is ok."""
+        return modes_frame(self)
+
+    @property
+    def leaderboard(self) -> pd.DataFrame:
+        """Return one row a strategy, best first."""
+        return leaderboard(self)
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Return what was run, and who leads."""
+        board = self.leaderboard[["rank", "strategy", "skill"]].itertuples(index=False)
+        return [
+            *super().rows(),
+            *((f"{r}. {name}", f"skill {skill:.3f}") for r, name, skill in board),
+        ]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run is asked for, with all that it stands for.
+
+    Arguments:
+        request: in words.
+        cases, strategies: that they stand for.
+        repeatable: whether the words say it all.
+    """
+
+    request: Request
+    cases: Sequence[Case]
+    strategies: Sequence[Strategy]
+    repeatable: bool = True
+
+    def run(
+        self,
+        jobs: int | None = None,
+        store: Store | None = None,
+        *,
+        overwrite: Overwrite | None = None,
+        resume: bool = False,
+        progress: Progress | None = None,
+    ) -> Run:
+        """Run every strategy on every case with every seed; see `rank`."""
+        if store is not None:
+            make_folder(store.folder)
+        asked = self.request
+        return Run.of(
+            run_jobs(
+                self.cases,
+                self.strategies,
+                seeds=tuple(asked.all_seeds),
+                jobs=jobs,
+                timeout=asked.timeout,
+                timeouts=asked.timeouts,
+                memory=asked.memory,
+                store=store,
+                overwrite=overwrite,
+                resume=resume,
+                progress=progress,
+                run_seed=asked.seed,
+                request=asked.to_json() if self.repeatable else None,
+            )
+        )
+
+
+def rank(
+    cases: CaseLike | Iterable[CaseLike] = (),
+    strategies: StrategyLike | Iterable[StrategyLike] = (),
+    *,
+    seeds: int | None = None,
+    seed: int | None = None,
+    jobs: int | None = None,
+    timeout: float | None = None,
+    timeouts: Mapping[str, float] | None = None,
+    memory: int | None = None,
+    store: Store | str | PathLike[str] | None = None,
+    overwrite: Overwrite | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+) -> Run:
+    """Run strategies on cases, each job in a process of its own, and rank them.
+
+    Arguments:
+        cases: names, folders or `Case`s; all built-in ones where there is none.
+        strategies: names (``"generic-ls:plain=full"`` with options), ``strategies["local"](...)``,
+            classes or instances, also of a notebook; all that are installed where there is none.
+        seeds: number of draws of measurement noise; None for the data as recorded.
+        seed: the first seed; 0 by default.
+        jobs: number of worker processes; None for one a processor.
+        timeout: seconds that a job may take; 600 by default.
+        timeouts: the same for single strategies, by name.
+        memory: bytes that a job may take; None for an even share of the machine's.
+        store: folder that keeps the results, so that a run can be continued; None for none.
+        overwrite: which stored results of the same jobs are computed anew: ``always`` all,
+            ``missing`` none, ``failed`` the failures. Default: all, of a resumed run the failures.
+        resume: go on with the last run of these jobs in the store; where neither cases nor
+            strategies are given, with the last run.
+        progress: called with (result, jobs done, jobs in all).
+
+    Raises:
+        InputError: for an unknown name, an option that does not exist, or a faulty case.
+    """
+    kept = None if store is None else store_in(store)
+    plan = plan_of(
+        cases,
+        strategies,
+        usable_plugins(),
+        seeds=seeds,
+        seed=seed,
+        timeout=timeout,
+        timeouts=timeouts,
+        memory=memory,
+        resumed=kept if resume else None,
+    )
+    return plan.run(jobs, kept, overwrite=overwrite, resume=resume, progress=progress)
+
+
+def plan_of(
+    cases: CaseLike | Iterable[CaseLike],
+    strategies: StrategyLike | Iterable[StrategyLike],
+    plugins: Plugins,
+    *,
+    seeds: int | None = None,
+    seed: int | None = None,
+    timeout: float | None = None,
+    timeouts: Mapping[str, float] | None = None,
+    memory: int | None = None,
+    resumed: Store | None = None,
+) -> Plan:
+    """Return what is to be run; nothing has been run when something is wrong with it.
+
+    Arguments:
+        plugins: where cases and strategies come from.
+        resumed: the store whose last run is meant where neither cases nor strategies are given.
+    """
+    words, wanted = listed(cases), listed(strategies)
+    if resumed is not None and not words and not wanted and resumed.runs():
+        for name, value in (("seeds", seeds), ("seed", seed)):
+            if value is not None:
+                what = f"--resume alone goes on as before; {name} needs CASE or -s beside it"
+                raise InputError(what)
+        request = request_of(resumed.load())
+        if timeout is not None or timeouts:
+            request = replace(request, timeout=timeout or DEFAULT_TIMEOUT, timeouts=timeouts or {})
+        request = request if memory is None else replace(request, memory=memory)
+        return repeated(request, plugins)
+    found = _strategies(wanted, plugins)
+    read = read_cases(cases, plugins)
+    plain = all(isinstance(item, (str, PathLike)) for item in words)
+    return Plan(
+        Request(
+            cases=case_words(map(str, words), plugins) if plain else tuple(c.name for c in read),
+            strategies=tuple(strategy.name for strategy in found),
+            seeds=seeds,
+            seed=seed or 0,
+            timeout=DEFAULT_TIMEOUT if timeout is None else timeout,
+            timeouts=_known(timeouts or {}, found),
+            memory=memory,
+        ),
+        read,
+        found,
+        repeatable=plain and all(isinstance(item, str) for item in wanted),
+    )
+
+
+def repeated(request: Request, plugins: Plugins) -> Plan:
+    """Return the plan of what was asked for before."""
+    found = _strategies(request.strategies, plugins)
+    _known(request.timeouts, found)
+    return Plan(request, read_cases(request.cases, plugins), found)
+
+
+def _strategies(given: Sequence[object], plugins: Plugins) -> list[Strategy]:
+    """Return the strategies that are asked for, each once, all where none is given.
+
+    Raises:
+        InputError: for an unknown one, or where there is none at all.
+        PluginError: for an object that is no strategy.
+    """
+    wanted = [item for i, item in enumerate(given) if item not in given[:i]]
+    words = [word for word in wanted if isinstance(word, str)]
+    chosen("strategy", (word.partition(":")[0] for word in words), plugins.strategies)
+    found = [
+        strategy_of(item, plugins.strategies) if isinstance(item, str) else _named(item, plugins)
+        for item in wanted or plugins.strategies
+    ]
+    if not found:
+        raise InputError("there is no strategy to run", expected="a plugin that brings one")
+    return found
+
+
+def _named(given: object, plugins: Plugins) -> Strategy:
+    """Return a strategy under a name that tells its options where they are not the usual ones."""
+    strategy = check_strategy(given.base if isinstance(given, Variant) else given)
+    usual = plugins.strategies.get(strategy.name)
+    variant = given if isinstance(given, Variant) else None
+    if variant is None:
+        variant = labelled(strategy, usual if type(usual) is type(strategy) else None)
+    return strategy if variant.name == strategy.name else variant
+
+
+def _known(timeouts: Mapping[str, float], strategies: Iterable[Strategy]) -> dict[str, float]:
+    """Make sure that every time limit is for a strategy that runs.
+
+    Raises:
+        InputError: for another name.
+    """
+    chosen("strategy to limit", timeouts, [strategy.name for strategy in strategies])
+    return dict(timeouts)
+
+
+def store_in(folder: Store | str | PathLike[str] | None = None) -> Store:
+    """Return a store: given, in a folder, in FEMUBENCH_STORE, or in the default folder here."""
+    if isinstance(folder, Store):
+        return folder
+    return Store(Path(folder or os.environ.get("FEMUBENCH_STORE") or DEFAULT_STORE))
+
+
+def read_run(
+    run: results.Run | str | PathLike[str] | None = None,
+    store: Store | str | PathLike[str] | None = None,
+    *,
+    lenient: bool = False,
+) -> Run:
+    """Return a run.
+
+    Arguments:
+        run: a file that ``run --json`` wrote, a run id or its first letters; None for the last.
+        store: where runs are kept.
+        lenient: whether lines of the store that cannot be read are left out.
+
+    Raises:
+        InputError: when there is no such run, or it cannot be read.
+    """
+    if isinstance(run, results.Run):
+        return Run.of(run)
+    if run is not None and os.path.exists(run) and not os.path.isdir(run):
+        return Run.of(serial.read_run(Path(run)))
+    return Run.of(store_in(store).load(None if run is None else str(run), lenient=lenient))

@@ -1,0 +1,85 @@
+"""The tables of the papers recomputed: ``bench reproduce``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+from threadpoolctl import threadpool_limits
+
+from femubench.core.files import check_can_make, make_folder, write_atomically
+from femubench.core.library.cases import listed, read_cases, usable_plugins
+from femubench.core.library.report import drawings, rendering
+from femubench.core.plugin.loader import Plugins
+from femubench.core.plugin.validation import chosen
+from femubench.core.reproduction.study import Study
+from femubench.core.reproduction.workbench import Workbench
+
+_STEM = "reproduce"
+
+
+def reproduce(
+    papers: str | Sequence[str] | None = None, *, output: str | PathLike[str] | None = None
+) -> tuple[Study, ...]:
+    """Return the tables of papers recomputed, cell by cell, each with a verdict.
+
+    Arguments:
+        papers: ``frame``, ``hframe``; both by default.
+        output: folder for reproduce.md, .html, .json and the figures.
+
+    Raises:
+        InputError: for an unknown paper, or a folder that cannot be written.
+    """
+    if output is not None:
+        check_can_make(Path(output))
+    found = studies_of(known_papers(papers), usable_plugins())
+    if output is not None:
+        write_studies(found, Path(output))
+    return found
+
+
+def known_papers(papers: str | Sequence[str] | None = None) -> tuple[str, ...]:
+    """Return the names of papers, all where None is given.
+
+    Raises:
+        InputError: for an unknown one.
+    """
+    from femubench.papers import PAPERS
+
+    return chosen("paper", PAPERS if papers is None else listed(papers), PAPERS)
+
+
+def studies_of(papers: Sequence[str], plugins: Plugins) -> tuple[Study, ...]:
+    """Return the studies of papers; see `reproduce`."""
+    from femubench.papers import PAPERS, study
+
+    found = []
+    for paper in papers:
+        cases = {case.name: case for case in read_cases(PAPERS[paper], plugins)}
+        # Many small matrices: threads would only wait for each other.
+        with threadpool_limits(1):
+            found.append(study(paper, Workbench(plugins.strategies, cases)))
+    return tuple(found)
+
+
+def write_studies(studies: Sequence[Study], folder: Path) -> tuple[list[str], int]:
+    """Write the reports and the figures; return the names of the reports, and how many figures."""
+    from femubench.reports.reproduction import (
+        FIGURES,
+        reproduction_html,
+        reproduction_markdown,
+    )
+
+    make_folder(folder / FIGURES)
+    drawn = dict(drawings(studies))
+    for name, svg in drawn.items():
+        write_atomically(folder / FIGURES / f"{name}.svg", svg)
+    texts = {
+        ".md": reproduction_markdown(studies, figures=True),
+        ".html": reproduction_html(studies, drawn),
+        ".json": rendering(studies, "json"),
+    }
+    for suffix, text in texts.items():
+        write_atomically(folder / f"{_STEM}{suffix}", text)
+    return [f"{_STEM}{suffix}" for suffix in texts], len(drawn)

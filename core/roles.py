@@ -1,0 +1,338 @@
+"""The roles that are played here, as protocols: whoever has the members plays the role.
+
+Nothing has to be inherited. Parameters of methods are contravariant: a method that wants the data
+class `femubench.Model` would not do where one is asked for that takes any object with a model's
+members. What is handed to a strategy, an effect or a reporter is therefore `Any` here (it is always
+the data class); what they hand back is typed by its protocol.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from femubench.core.typing import FloatArray, SparseArray
+
+Scaling = Literal["linear", "exponential", "compliance"]
+# Of a size: in its unit; a relative change, also in percent with a sign; a part of a whole.
+Wording = Literal["value", "change", "share"]
+CAPABILITIES = ("shapes", "elements", "geometry", "joints")
+
+
+@runtime_checkable
+class Model(Protocol):
+    """A structural model: sparse mass and stiffness in labelled degrees of freedom."""
+
+    @property
+    def mass(self) -> SparseArray:
+        """Return the sparse symmetric mass matrix, (n, n), in kg, kg m, kg m2."""
+        ...
+
+    @property
+    def stiffness(self) -> SparseArray:
+        """Return the sparse symmetric stiffness matrix, (n, n), in N/m, N, N m."""
+        ...
+
+    @property
+    def dofs(self) -> Any:  # noqa: ANN401 - labels of the rows: node, direction, xyz
+        """Return what the rows are."""
+        ...
+
+    @property
+    def structure(self) -> Any:  # noqa: ANN401 - the meshed frame
+        """Return the meshed frame, None where the model came as matrices."""
+        ...
+
+    @property
+    def size(self) -> int:
+        """Return the number of degrees of freedom n."""
+        ...
+
+    def observe(self, sensors: Any) -> SparseArray:  # noqa: ANN401 - see the module
+        """Return sensor readings from dofs, sparse (n_sensors, n)."""
+        ...
+
+    def attach(self, masses: Sequence[Any], springs: Sequence[Any]) -> Model:
+        """Return the model with further masses and springs to ground."""
+        ...
+
+    def mass_times(self, vectors: FloatArray) -> FloatArray:
+        """Return M @ vectors, (n, m), with changes of low rank that `mass` does not hold."""
+        ...
+
+    def stiffness_times(self, vectors: FloatArray) -> FloatArray:
+        """Return K @ vectors, (n, m), with changes of low rank that `stiffness` does not hold."""
+        ...
+
+
+@runtime_checkable
+class Measurement(Protocol):
+    """Measured modes of one structure."""
+
+    @property
+    def sensors(self) -> Any:  # noqa: ANN401 - labels, positions, directions
+        """Return where the shapes were measured."""
+        ...
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Return the label of every mode, (m,)."""
+        ...
+
+    @property
+    def frequencies(self) -> FloatArray:
+        """Return natural frequencies in Hz, (m,)."""
+        ...
+
+    @property
+    def frequency_std(self) -> FloatArray:
+        """Return their standard deviations in Hz, (m,)."""
+        ...
+
+    @property
+    def damping(self) -> FloatArray:
+        """Return damping ratios, (m,); nan where none was measured."""
+        ...
+
+    @property
+    def shapes(self) -> FloatArray:
+        """Return real mode shapes, (n_sensors, m); nan where missing."""
+        ...
+
+    @property
+    def shape_std(self) -> FloatArray:
+        """Return standard deviations of the shapes, (n_sensors, m)."""
+        ...
+
+    @property
+    def total_mass(self) -> tuple[float, float] | None:
+        """Return the weighed mass and its standard deviation in kg; None where not weighed."""
+        ...
+
+
+@runtime_checkable
+class Result(Protocol):
+    """What a strategy hands back; `femubench.UpdateResult` is one."""
+
+    @property
+    def model(self) -> Model:
+        """Return the updated model."""
+        ...
+
+    @property
+    def parameter_count(self) -> int:
+        """Return the number of unknowns that were free to change."""
+        ...
+
+    @property
+    def parameters(self) -> Sequence[Any]:
+        """Return the parameters that have a name: name, before, after, unit, std."""
+        ...
+
+    @property
+    def history(self) -> Sequence[Mapping[str, float]]:
+        """Return one mapping an iteration."""
+        ...
+
+    @property
+    def diagnostics(self) -> Mapping[str, float]:
+        """Return any further figures."""
+        ...
+
+
+@runtime_checkable
+class Strategy(Protocol):
+    """A method of updating; `femubench.Strategy` is a base class for who wants one.
+
+    A strategy may say more than is asked here; `declared` reads it:
+
+    - ``needs``: capabilities (of `CAPABILITIES`) that model or measurement must have.
+    - ``promises``: what every result keeps; `bench plugins check` measures it.
+    """
+
+    @property
+    def name(self) -> str:
+        """Return the word after ``bench run -s``; a plain attribute will do."""
+        ...
+
+    @property
+    def citation(self) -> str:
+        """Return author, year, title, equation."""
+        ...
+
+    def update(
+        self,
+        model: Any,  # noqa: ANN401 - see the module
+        measurement: Any,  # noqa: ANN401
+        rng: np.random.Generator,
+    ) -> Result:
+        """Return an updated model; raises StrategyFailure or NotApplicable where there is none."""
+        ...
+
+
+def declared(strategy: object, what: Literal["needs", "promises"]) -> frozenset[str]:
+    """Return what a strategy says that it needs or promises; nothing where it says nothing."""
+    found: frozenset[str] = getattr(strategy, what, frozenset())
+    return found
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A named set of case folders that are run together.
+
+    Arguments:
+        name: the word after ``bench run``.
+        title: one line for lists.
+        cases: from the case's name (the scenario's own, or ``scenario/part``) to its folder.
+    """
+
+    name: str
+    title: str
+    cases: Mapping[str, Path]
+
+
+@runtime_checkable
+class Reader(Protocol):
+    """Reads a file format that the case format does not know by itself.
+
+    Attributes:
+        name: for messages, e.g. ``"universal file"``.
+        suffixes: lower-case file suffixes with the dot.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+
+    def read_matrix(self, path: Path) -> SparseArray:
+        """Return a square sparse matrix; raises InputError where the file holds none."""
+        ...
+
+    def read_modes(self, path: Path) -> Measurement:
+        """Return sensors and modes; raises InputError where the file holds none."""
+        ...
+
+
+@runtime_checkable
+class Reporter(Protocol):
+    """Turns stored results into a text.
+
+    A reporter may offer more than is asked here:
+
+    - ``render_with(run, exhibits) -> str``: used instead of `render` where there is a store;
+      `exhibits` is None, or has ``case(digest)`` of a case and ``of(key of the job)``, plain
+      data to draw or None.
+    - ``render_bytes(run) -> bytes``: used instead of `render`, for a format that is no text.
+
+    Attributes:
+        name: the word after ``bench report --format``.
+        suffix: of the file that is written, with the dot.
+    """
+
+    name: str
+    suffix: str
+
+    def render(self, run: Any) -> str:  # noqa: ANN401 - see the module
+        """Return the report; must not run anything."""
+        ...
+
+
+class EffectParameter(Protocol):
+    """One number of an effect, with its prior; `effect.EffectParameter` explains the members."""
+
+    @property
+    def name(self) -> str:
+        """Return a word for tables."""
+        ...
+
+    @property
+    def unit(self) -> str:
+        """Return the unit of the value; empty for a ratio."""
+        ...
+
+    @property
+    def scale(self) -> float:
+        """Return the scale of the value at a coordinate of 1."""
+        ...
+
+    @property
+    def neutral(self) -> float:
+        """Return the value that leaves the model as it is."""
+        ...
+
+    @property
+    def lower(self) -> float:
+        """Return the least value."""
+        ...
+
+    @property
+    def upper(self) -> float:
+        """Return the largest value."""
+        ...
+
+    @property
+    def scaling(self) -> Scaling:
+        """Return how a coordinate becomes a value."""
+        ...
+
+    @property
+    def one_sided(self) -> bool:
+        """Tell whether coordinates are positive."""
+        ...
+
+    @property
+    def textbook(self) -> float | None:
+        """Return a value that physics gives without any fit, None where there is none."""
+        ...
+
+    @property
+    def wording(self) -> Wording:
+        """Return how a size is worded: in its unit, as a relative change, or as a share."""
+        ...
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """Return the smallest and the largest coordinate that the bounds allow."""
+        ...
+
+    def value(self, x: Any) -> Any:  # noqa: ANN401 - numbers and arrays alike
+        """Return the value at a coordinate that is standard normal a priori."""
+        ...
+
+    def coordinate(self, value: float) -> float:
+        """Return the coordinate of a value."""
+        ...
+
+
+@runtime_checkable
+class Effect(Protocol):
+    """A physical cause that a model can lack; `effect.FrameEffect` is a base class for frames.
+
+    An effect may offer more than is asked here:
+
+    - ``summary``, ``caution``: what the model lacks, as a clause (``"a bolt is loose"``), and a
+      sentence for whoever finds the effect named.
+    - ``change(model, place) -> Change``: what it does to mass and stiffness as fixed matrices with
+      varying factors. Without it the diagnosis reads the change off `extend` at a few values.
+    """
+
+    @property
+    def name(self) -> str:
+        """Return a slug such as ``"loose-bolt"``; a plain attribute will do."""
+        ...
+
+    def places(self, model: Any) -> Sequence[str]:  # noqa: ANN401 - see the module
+        """Return where the effect may sit in this model; nothing where it does not apply."""
+        ...
+
+    def parameters(self, model: Any, place: str) -> Sequence[EffectParameter]:  # noqa: ANN401
+        """Return its parameters there, with unit, prior and bounds."""
+        ...
+
+    def extend(self, model: Any, place: str, values: Sequence[float]) -> Model:  # noqa: ANN401
+        """Return the model with the effect in it."""
+        ...

@@ -1,0 +1,85 @@
+"""Finite elements: frames and their parts, sections, beam matrices, what a model is made of."""
+
+from femubench.core.case.case import Modification
+from femubench.core.errors import ModelError
+from femubench.core.fem.beam import (
+    BeamProperties,
+    coupling_matrices,
+    eccentric_mass_parts,
+    mass_matrices,
+    stiffness_matrices,
+)
+from femubench.core.fem.frame import (
+    ACTIVE,
+    Brace,
+    Coupling,
+    Eccentricity,
+    Factor,
+    Frame,
+    GroundSpring,
+    Joint,
+    JointSpring,
+    Material,
+    Member,
+    Oscillator,
+    Place,
+    PointMass,
+    Preload,
+    RigidEnd,
+    Support,
+)
+from femubench.core.fem.model import LowRank
+from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.preload import preload_stiffness, preload_stiffnesses, redundant_members
+from femubench.core.fem.sections import (
+    Section,
+    bredt,
+    constant_kappa,
+    rectangular_tube,
+    round_tube,
+    solid_rectangle,
+)
+from femubench.core.fem.structure import Structure
+from femubench.core.typing import FloatArray, IntArray, SparseArray
+
+__all__ = [
+    "ACTIVE",
+    "BeamProperties",
+    "Brace",
+    "Coupling",
+    "Eccentricity",
+    "Factor",
+    "FloatArray",
+    "Frame",
+    "GroundSpring",
+    "IntArray",
+    "Joint",
+    "JointSpring",
+    "LowRank",
+    "Material",
+    "Member",
+    "ModelError",
+    "Modification",
+    "Oscillator",
+    "Parameter",
+    "Place",
+    "PointMass",
+    "Preload",
+    "RigidEnd",
+    "Section",
+    "SparseArray",
+    "Structure",
+    "Support",
+    "bredt",
+    "constant_kappa",
+    "coupling_matrices",
+    "eccentric_mass_parts",
+    "mass_matrices",
+    "preload_stiffness",
+    "preload_stiffnesses",
+    "rectangular_tube",
+    "redundant_members",
+    "round_tube",
+    "solid_rectangle",
+    "stiffness_matrices",
+]

@@ -1,0 +1,31 @@
+"""Modal analysis: pairing and correlation of modes, expansion, sensitivities, receptances."""
+
+from femubench.core.modal.complex_modes import real_modes
+from femubench.core.modal.correlation import auto_mac, mac, modal_scale_factor
+from femubench.core.modal.expansion import expand_by_dynamics, expand_by_rotation, expand_by_serep
+from femubench.core.modal.frf import receptance
+from femubench.core.modal.pairing import Pairing, pair_modes
+from femubench.core.modal.rigid import rigid_body_vectors, rigid_modes_of
+from femubench.core.modal.sensitivity import (
+    eigenvalue_sensitivities,
+    frequency_sensitivities,
+    shape_sensitivities,
+)
+
+__all__ = [
+    "Pairing",
+    "auto_mac",
+    "eigenvalue_sensitivities",
+    "expand_by_dynamics",
+    "expand_by_rotation",
+    "expand_by_serep",
+    "frequency_sensitivities",
+    "mac",
+    "modal_scale_factor",
+    "pair_modes",
+    "real_modes",
+    "receptance",
+    "rigid_body_vectors",
+    "rigid_modes_of",
+    "shape_sensitivities",
+]

@@ -1,0 +1,21 @@
+"""What the study of a paper is made of: cells, pages, figures, verdicts."""
+
+from femubench.core.plot.figure import Bars, Curve, Curves, Figure, MatrixImage, StructureMap
+from femubench.core.reproduction.cell import Cell, Page
+from femubench.core.reproduction.study import Extra, Study, verdict_counts
+from femubench.core.reproduction.workbench import Workbench
+
+__all__ = [
+    "Bars",
+    "Cell",
+    "Curve",
+    "Curves",
+    "Extra",
+    "Figure",
+    "MatrixImage",
+    "Page",
+    "StructureMap",
+    "Study",
+    "Workbench",
+    "verdict_counts",
+]

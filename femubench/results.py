@@ -1,0 +1,39 @@
+"""Runs and their results: jobs, scores, ranking, data frames, the store, reports on them."""
+
+from femubench.core.drawing.element_change import element_norms, stiffness_difference
+from femubench.core.roles import Reporter
+from femubench.core.run.frames import modes_frame, results_frame, run_from_json, run_to_json
+from femubench.core.run.runner import run_jobs
+from femubench.core.run.store import Store
+from femubench.core.schema.results import Block, JobResult, PairedMode, Run
+from femubench.core.score.leaderboard import leaderboard
+from femubench.core.score.ranking import OFFSET_PERCENT, SCORE_OF_FAILURE, TIE, rank_results, ranked
+from femubench.core.score.scoring import frequency_error, predict_block, score_model
+from femubench.core.score.statistics import METHOD, tell_apart
+
+__all__ = [
+    "Block",
+    "JobResult",
+    "METHOD",
+    "OFFSET_PERCENT",
+    "PairedMode",
+    "Reporter",
+    "Run",
+    "SCORE_OF_FAILURE",
+    "Store",
+    "TIE",
+    "element_norms",
+    "frequency_error",
+    "leaderboard",
+    "modes_frame",
+    "predict_block",
+    "rank_results",
+    "ranked",
+    "results_frame",
+    "run_from_json",
+    "run_jobs",
+    "run_to_json",
+    "score_model",
+    "stiffness_difference",
+    "tell_apart",
+]

@@ -1,0 +1,73 @@
+"""Steps that updating strategies share: unknowns, element families, joints, expansion, promises."""
+
+from femubench.core.errors import SelfCheckFailed
+from femubench.core.fem.joints import (
+    JointGroup,
+    all_elements,
+    available_length,
+    flexible_ends,
+    groups_within,
+    half_depth,
+    joint_groups,
+    spring_estimates,
+    with_joint_springs,
+    with_rigid_ends,
+)
+from femubench.core.update.dynamic import expand_measured_shapes
+from femubench.core.update.element_families import (
+    ElementFamily,
+    Symmetry,
+    generic_family,
+    nobari_family,
+    physical_family,
+)
+from femubench.core.update.element_strategy import ElementStrategy
+from femubench.core.update.entries import update_entries
+from femubench.core.update.equation_error import update_by_equation_error
+from femubench.core.update.low_rank import total_change, with_measured_frequencies
+from femubench.core.update.promise import check_used_modes, force_scale
+from femubench.core.update.quasi import ITERATIONS, QuasiModes, quasi_measured_modes
+from femubench.core.update.sensitivity_update import sensitivity_update
+from femubench.core.update.unknowns import (
+    Unknown,
+    UpdateOptions,
+    carried_by,
+    global_stiffness,
+    joint_stiffness,
+)
+
+__all__ = [
+    "ElementFamily",
+    "ElementStrategy",
+    "ITERATIONS",
+    "JointGroup",
+    "QuasiModes",
+    "SelfCheckFailed",
+    "Symmetry",
+    "Unknown",
+    "UpdateOptions",
+    "all_elements",
+    "available_length",
+    "carried_by",
+    "check_used_modes",
+    "expand_measured_shapes",
+    "flexible_ends",
+    "force_scale",
+    "generic_family",
+    "global_stiffness",
+    "groups_within",
+    "half_depth",
+    "joint_groups",
+    "joint_stiffness",
+    "nobari_family",
+    "physical_family",
+    "quasi_measured_modes",
+    "sensitivity_update",
+    "spring_estimates",
+    "total_change",
+    "update_by_equation_error",
+    "update_entries",
+    "with_joint_springs",
+    "with_measured_frequencies",
+    "with_rigid_ends",
+]

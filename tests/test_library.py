@@ -1,0 +1,373 @@
+"""All that the command line does, from Python: same results, same files, and short to look at."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import textwrap
+import threading
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+import femubench
+import femubench.papers
+from femubench.core.cli.main import bench
+from femubench.core.display import LINES, WIDTH
+from femubench.core.plugin.variants import labelled
+from femubench.core.score.repeatability import result_differences
+from tests.test_cli import put_case
+from tests.toys import reproduction_toys
+from tests.toys.duck import Duck
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+TWO = ["unchanged", "generic-ls"]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in a folder with one small case."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("FEMUBENCH_STORE", raising=False)
+    put_case(tmp_path / "rod")
+    return tmp_path
+
+
+def call(*words: object) -> Result:
+    """Call `bench`, which must find nothing wrong."""
+    done = CliRunner().invoke(bench, [str(word) for word in words])
+    assert done.exit_code == 0, done.output
+    return done
+
+
+def data(file: str) -> Any:
+    return json.loads(Path(file).read_text(encoding="utf-8"))
+
+
+def without_times(found: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in found.items() if key not in ("seconds", "written")}
+
+
+class TestEveryCommandOfTheReadme:
+    """One test a verb; the last one makes sure that none is missing."""
+
+    @pytest.mark.parametrize(
+        "words", [["baruch", "generic-ls"], ["generic-ls:plain=full"], ["unchanged"]]
+    )
+    def test_run(self, words: list[str]) -> None:
+        given = [part for word in words for part in ("-s", word)]
+        call("run", "frame", *given, "-q", "-j", 2, "--json", "results.json")
+        run = femubench.rank("frame", words, jobs=2)
+        assert result_differences(femubench.read_run("results.json"), run) == []
+        assert femubench.report(run, "ours.json") == Path("ours.json")
+        ours, theirs = data("ours.json"), data("results.json")
+        assert ours.keys() == theirs.keys()
+        assert [r["score"] for r in ours["results"]] == [r["score"] for r in theirs["results"]]
+        assert ours["meta"]["request"] == theirs["meta"]["request"]
+
+    def test_run_with_noise_and_run_resume(self) -> None:
+        call("run", "rod", "-s", "unchanged", "--seeds", 3, "-q", "-j", 2, "--store", "a")
+        run = femubench.rank("rod", "unchanged", seeds=3, jobs=2, store="b")
+        assert run.table["seed"].tolist() == [1, 2, 3]
+        assert result_differences(femubench.read_run(store="a"), run) == []
+        again = femubench.rank(resume=True, store="b")
+        assert again.meta["run"] == run.meta["run"]
+        assert again.results == run.results
+        with pytest.raises(femubench.InputError, match="resume alone goes on as before; seeds"):
+            femubench.rank(resume=True, seeds=4, store="b")
+
+    def test_report(self) -> None:
+        femubench.rank("rod", TWO, jobs=2, store="s")
+        call("report", "--store", "s", "-f", "html,md,csv", "-o", "out")
+        for theirs in Path("out").iterdir():
+            ours = femubench.report(None, f"ours{theirs.suffix}", store="s")
+            assert Path(ours).read_bytes() == theirs.read_bytes()
+        assert str(femubench.report(store="s")) in call("report", "--store", "s").output
+
+    def test_compare(self) -> None:
+        a = femubench.rank("rod", TWO, jobs=2, store="s")
+        b = femubench.rank("rod", TWO, jobs=2, store="s")
+        words = ("compare", a.meta["run"], b.meta["run"], "--store", "s", "--fail", "skill>1.2")
+        call(*words, "-f", "json", "-o", "theirs.json")
+        found = femubench.compare(a, b.meta["run"], fail="skill>1.2", store="s")
+        assert not found.worse
+        femubench.report(found, "ours.json")
+        assert data("ours.json") == data("theirs.json")
+        with pytest.raises(femubench.InputError, match="'skil>1' is no threshold"):
+            femubench.compare(a, b, fail="skil>1")
+
+    def test_publish(self) -> None:
+        run = femubench.rank("rod", TWO, jobs=2)
+        file = femubench.report(run, "results.json")
+        call("publish", "theirs", file, "-q")
+        femubench.publish("ours", run)
+        femubench.publish("files", ["results.json"])
+        pages = [sorted(p.name for p in Path(f).rglob("*")) for f in ("theirs", "ours", "files")]
+        assert pages[0] == pages[1] == pages[2]
+
+    def test_init_and_diagnose(self) -> None:
+        call("init", "theirs")
+        ours = femubench.init_case("ours")
+        assert sorted(path.name for path in ours) == sorted(os.listdir("theirs"))
+        effects = ["torsion-constant", "shear-deformation"]
+        found = femubench.diagnose("frame", effects, pairs=False, output="ours-extended")
+        call(
+            *("diagnose", "frame", "--effects", ",".join(effects), "--no-pairs", "-q"),
+            *("--json", "theirs.json", "-o", "theirs-extended"),
+        )
+        femubench.report(found, "ours.json")
+        assert without_times(data("ours.json")) == without_times(data("theirs.json"))
+        texts = [Path(f"{who}-extended", "case.toml").read_text() for who in ("ours", "theirs")]
+        assert texts[0] == texts[1]
+        assert found.causes[0].effect == "torsion-constant"
+        assert found.sentence in " ".join(str(femubench.report(found)).split())
+
+    def test_reproduce(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(
+            femubench.papers, "study", lambda paper, _: reproduction_toys.study(paper)
+        )
+        monkeypatch.setattr("femubench.reports.drawing.drawn", reproduction_toys.drawn)
+        call("reproduce", "hframe", "-q", "-o", "theirs")
+        studies = femubench.reproduce("hframe", output="ours")
+        names = [p.relative_to("theirs") for p in Path("theirs").rglob("*") if p.is_file()]
+        assert len(names) > 3
+        for name in names:
+            assert Path("ours", name).read_bytes() == Path("theirs", name).read_bytes()
+        femubench.report(studies, "studies.json")
+        assert data("studies.json") == data("ours/reproduce.json")
+
+    def test_scenarios(self) -> None:
+        shown = call("scenarios", "show", "frame-solid").output
+        case = femubench.cases["frame-solid"]
+        assert case.title.split()[0] in shown
+        assert {"source", "sensors", "used"} <= {key for key, _ in case.rows()}
+
+    def test_plugins(self) -> None:
+        listed = call("plugins", "list").output.replace("\n", " ")
+        for catalogue in (femubench.strategies, femubench.effects):
+            assert len(catalogue) > 5
+            assert all(name in listed for name in catalogue)
+        Path("a").mkdir()
+        Path("b").mkdir()
+        call("plugins", "new", "my-method", "-o", "a")
+        ours = femubench.new_plugin("my-method", output="b")
+        theirs = [path.relative_to("a") for path in Path("a").rglob("*") if path.is_file()]
+        assert sorted(path.relative_to("b") for path in ours) == sorted(theirs)
+        assert all(Path("a", p.relative_to("b")).read_bytes() == p.read_bytes() for p in ours)
+        call("plugins", "check", "unchanged", "--json", "checked.json")
+        (theirs_found,) = data("checked.json")["checked"]
+        found = femubench.check("unchanged")
+        assert [(f.check.name, f.verdict.status) for f in found] == [
+            (item["check"], item["status"]) for item in theirs_found["checks"]
+        ]
+
+    def test_challenge(self) -> None:
+        call("challenge", "new", "theirs", "--seed", 3, "--hidden", "none")
+        blind = femubench.challenge("ours", 3, hidden="none")
+        assert (blind.folder / "case.toml").read_bytes() == Path("theirs/case.toml").read_bytes()
+        answer = {"verdict": "none", "causes": []}
+        Path("answer.json").write_text(json.dumps(answer))
+        call("challenge", "score", "theirs", "answer.json", "--json", "scored.json")
+        assert (
+            blind.score("answer.json").judgement.right is data("scored.json")["judgement"]["right"]
+        )
+
+    def test_no_command_is_missing(self) -> None:
+        blocks = re.findall(r"```console\n(.*?)```", README, re.DOTALL)
+        words = re.findall(r"\bbench ([a-z]+)(?: (new|check|list|show))?", " ".join(blocks))
+        tests = " ".join(vars(type(self)))
+        assert {verb for verb, _ in words} >= {"run", "report", "plugins", "diagnose"}
+        for verb, _ in words:
+            assert f"_{verb}" in tests, verb
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """Scale the stiffness.
+
+    Arguments:
+        factor: on all of it.
+        held: something that need not be sent.
+    """
+
+    factor: float = 1.1
+    held: Any = field(default=None, repr=False)
+
+    name = "scaled"
+    citation = "Nobody (2026), equation (1)"
+
+    def update(self, model: Any, measurement: Any, rng: Any) -> femubench.UpdateResult:
+        changed = replace(model, stiffness=self.factor * model.stiffness)
+        return femubench.UpdateResult(changed, 1)
+
+
+class TestCatalogues:
+    def test_cases_and_their_scenarios(self) -> None:
+        assert femubench.cases["frame"].name == "frame"
+        assert "design-change/hframe-solid" in femubench.cases
+        assert "nothing" not in femubench.cases
+        assert femubench.cases.get("nothing") is None
+
+    @pytest.mark.parametrize("kind", [KeyError, femubench.InputError])
+    def test_unknown_names_are_told_with_near_ones(self, kind: type[Exception]) -> None:
+        with pytest.raises(kind, match=r"^no case 'fram'; did you mean 'frame' or 'hframe'\?$"):
+            femubench.cases["fram"]
+        with pytest.raises(kind, match="no strategy 'loca'; did you mean 'local'"):
+            femubench.strategies["loca"]
+
+    def test_options_by_name(self) -> None:
+        local = femubench.strategies["local"]
+        assert local(damping=1e-3).name == "local:damping=0.001"
+        assert local(**{"options.damping": 1e-3}) == local(damping=1e-3)
+        assert local(damping=1e-5).name == local().name == "local"
+        softer = femubench.strategies["spring"](**{"stiffness.ry": 3e6}, damping=0.1)
+        assert softer.name == "spring:stiffness.ry=3000000.0,damping=0.1"
+        words = femubench.strategies["generic-ls"](orthogonality=False, plain="full")
+        assert words.name == "generic-ls:orthogonality=false,plain=full"
+
+    @pytest.mark.parametrize(
+        ("options", "says"),
+        [
+            ({"dampin": 1.0}, "'local' has no option 'dampin'; did you mean 'damping'"),
+            ({"damping": "much"}, r"option options.damping is 'much' \(expected float\)"),
+            ({"weighting": "heavy"}, "weighting 'heavy' is neither"),
+        ],
+    )
+    def test_wrong_options_are_told(self, options: dict[str, Any], says: str) -> None:
+        with pytest.raises(femubench.InputError, match=says):
+            femubench.strategies["local"](**options)
+
+    def test_a_catalogue_entry_is_a_strategy_as_it_stands(self) -> None:
+        case = femubench.cases["frame"]
+        result = femubench.strategies["unchanged"].update(case.model, case.used_measurement(), None)  # type: ignore[arg-type]
+        assert result.model is case.model
+
+
+class TestRank:
+    def test_two_instances_of_one_class_have_names_of_their_own(self) -> None:
+        given = [Scaled(), Scaled(0.9), Scaled(1.3), Duck, femubench.strategies["unchanged"]]
+        run = femubench.rank(femubench.read_case("rod"), given, jobs=2)
+        names = ["scaled", "scaled:factor=0.9", "scaled:factor=1.3", "duck", "unchanged"]
+        assert run.table["strategy"].tolist() == names
+        assert set(run.table["status"]) == {"ok"}
+        assert run.leaderboard["strategy"].tolist()[0] in names
+        assert run.modes["strategy"].nunique() == 5
+
+    def test_options_make_a_difference_in_a_name_that_can_be_typed(self) -> None:
+        local = femubench.strategies["generic-ls"](orthogonality=False)
+        ours = femubench.rank("frame", local, jobs=1)
+        theirs = femubench.rank("frame", local.name, jobs=1)
+        assert result_differences(ours, theirs) == []
+        assert ours.results[0].key == theirs.results[0].key
+
+    def test_what_cannot_be_told_apart_is_refused(self) -> None:
+        with pytest.raises(femubench.InputError, match="strategy 'scaled' occurs twice"):
+            femubench.rank("rod", [Scaled(held=[1]), Scaled(held=[2])])
+
+    def test_what_cannot_be_sent_to_a_worker_is_told(self) -> None:
+        run = femubench.rank("rod", [Scaled(held=threading.Lock())], jobs=1)
+        (reason,) = run.table["reason"]
+        assert reason.startswith("Scaled cannot be sent to a worker process: TypeError")
+
+    def test_wrong_words(self) -> None:
+        with pytest.raises(
+            femubench.InputError, match="no strategy 'barch'; did you mean 'baruch'"
+        ):
+            femubench.rank("rod", "barch")
+        with pytest.raises(femubench.PluginError, match=r"is not a femubench\.Strategy: update"):
+            femubench.rank("rod", int)  # type: ignore[arg-type]
+
+    def test_labels_of_what_has_no_defaults_and_of_plain_objects(self) -> None:
+        class Plain(Duck):
+            def __init__(self, size: float = 1.0) -> None:
+                self.size = size
+
+        assert labelled(Plain(2.0)).name == "duck:size=2.0"
+        assert labelled(Plain()).name == "duck"
+
+    @pytest.mark.parametrize("how", ["script", "stdin"])
+    def test_a_class_of_a_script_or_notebook_needs_no_guard(self, folder: Path, how: str) -> None:
+        """It is sent with its code, and the script itself does not run again in a worker."""
+        script = textwrap.dedent(
+            """
+            from dataclasses import replace
+            import femubench
+            print("once")
+            FACTOR = 1.2
+            class Mine:
+                name = "mine"
+                citation = "me"
+                def update(self, model, measurement, rng):
+                    changed = replace(model, stiffness=FACTOR * model.stiffness)
+                    return femubench.UpdateResult(changed, 1)
+            run = femubench.rank("rod", Mine, jobs=1)
+            print(run.results[0].status, run.results[0].reason)
+            """
+        )
+        (folder / "script.py").write_text(script)
+        words = ["script.py"] if how == "script" else ["-"]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+        done = subprocess.run(
+            [sys.executable, *words],
+            input=script,
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert done.stdout.split() == ["once", "ok"]
+
+
+class TestLooks:
+    def test_reprs_are_short(self) -> None:
+        case = femubench.cases["frame"]
+        run = femubench.rank(["frame", "rod"], ["unchanged", "local"], jobs=2, seeds=2)
+        result = femubench.strategies["local"].update(case.model, case.used_measurement(), None)  # type: ignore[arg-type]
+        found = femubench.diagnose("frame", "torsion-constant", pairs=False)
+        for shown in (case, case.model, case.measurement, result, run, found):
+            lines = repr(shown).splitlines()
+            assert len(lines) <= LINES == 10
+            assert max(map(len, lines)) <= WIDTH == 100
+            assert lines[0].startswith(type(shown).__name__)
+            page = shown._repr_html_()  # type: ignore[attr-defined]
+            assert page.startswith("<table>")
+            assert page.count("<tr>") == page.count("</tr>") > 0
+        assert "skill" in repr(run)
+        assert found.verdict in repr(found)
+
+    def test_tables_are_escaped(self) -> None:
+        case = replace(femubench.cases["frame"], title="<script>alert(1)</script>")
+        assert "<script>" not in case._repr_html_()
+        assert "&lt;script&gt;" in case._repr_html_()
+
+    def test_an_empty_run_shows_itself(self) -> None:
+        assert (
+            repr(femubench.Run({}, ())) == "Run: 0 cases, 0 strategies, 0 seeds, 0 results (none)"
+        )
+
+
+def test_the_page_of_the_docs_runs() -> None:
+    """All its snippets are one script, as a reader types them."""
+    text = (ROOT / "docs" / "library.md").read_text(encoding="utf-8")
+    script = "\n".join(re.findall(r"```python\n(.*?)```", text, re.DOTALL))
+    Path("page.py").write_text(script)
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+    done = subprocess.run(
+        [sys.executable, "page.py"], env=environment, capture_output=True, text=True, check=True
+    )
+    assert "local:damping=0.001" in done.stdout
+    assert "softer:share=0.2" in done.stdout
+    assert "torsion-constant" in done.stdout
+    missing = [
+        name
+        for name, what in ((name, getattr(femubench, name)) for name in femubench.__all__)
+        if callable(what) and not isinstance(what, type) and f"{name}(" not in text
+    ]
+    assert set(missing) <= {"hookimpl", "read_case", "solve_modes"}

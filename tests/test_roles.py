@@ -1,0 +1,105 @@
+"""The protocols of `core.roles`: the data classes play them, and so does who inherits nothing."""
+
+from __future__ import annotations
+
+import ast
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from mypy import api
+
+from femubench import Strategy, UpdateResult
+from femubench.core import roles
+from femubench.core.case.reader import read_case
+from femubench.core.cli.main import bench
+from femubench.core.inference.hypothesis import hypotheses_of
+from femubench.core.plugin.loader import load_plugins
+from femubench.core.plugin.validation import check_effect, check_strategy
+from tests.test_cli import put_case, put_distribution
+from tests.toys.duck import Duck, Softer
+
+ROOT = Path(__file__).parents[1]
+DUCK = ROOT / "tests" / "toys" / "duck.py"
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Give a folder with a case and an installed strategy that inherits nothing."""
+    put_distribution(tmp_path, "duckling", DUCK.read_text(encoding="utf-8"))
+    put_case(tmp_path / "rod")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    yield tmp_path
+    sys.modules.pop("duckling", None)
+
+
+def test_roles_import_nothing_of_ours_but_the_roots() -> None:
+    tree = ast.parse((ROOT / "core" / "roles.py").read_text(encoding="utf-8"))
+    modules = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    ours = {name for name in modules if name and name.startswith("femubench")}
+    assert ours <= {"femubench.core.errors", "femubench.core.typing"}
+
+
+def test_data_classes_play_their_roles(tmp_path: Path) -> None:
+    case = read_case(put_case(tmp_path / "rod"))
+    assert isinstance(case.model, roles.Model)
+    assert isinstance(case.used_measurement(), roles.Measurement)
+    assert isinstance(UpdateResult(case.model), roles.Result)
+    assert not isinstance(case, roles.Model | roles.Measurement | roles.Result)
+
+
+def test_a_strategy_that_inherits_nothing_is_one() -> None:
+    assert Duck.__mro__ == (Duck, object)
+    found = check_strategy(Duck)
+    assert isinstance(found, roles.Strategy)
+    assert roles.declared(found, "needs") == roles.declared(found, "promises") == frozenset()
+    assert not isinstance(object(), roles.Strategy)
+    assert not issubclass(Duck, Strategy)
+
+
+def test_it_is_ranked_and_passes_the_checks(here: Path) -> None:
+    words = ["run", "rod", "-s", "duck", "-s", "unchanged", "-q", "--json", "run.json", "-j", "1"]
+    assert CliRunner().invoke(bench, words).exit_code == 0
+    results = {r["strategy"]: r for r in json.loads((here / "run.json").read_text())["results"]}
+    assert results["duck"]["status"] == "ok"
+    assert results["duck"]["score"] < results["unchanged"]["score"]
+    done = CliRunner().invoke(bench, ["plugins", "check", "duck"])
+    assert done.exit_code == 0, done.output
+    assert ", 0 failed, 0 warnings" in done.output
+    shown = CliRunner().invoke(bench, ["plugins", "show", "duck"]).output
+    assert "nothing but frequencies" in shown
+
+
+def test_what_is_no_strategy_is_told_what_it_lacks() -> None:
+    (fault,) = load_plugins([], {"toy": _Offers(int)}).broken
+    assert fault.message == "class int is not a femubench.Strategy: update() is missing"
+
+
+class _Offers:
+    def __init__(self, *given: object) -> None:
+        self._given = given
+
+    from femubench import hookimpl
+
+    @hookimpl
+    def femubench_strategies(self) -> list[object]:
+        return list(self._given)
+
+
+def test_an_effect_that_inherits_nothing_is_tabulated(tmp_path: Path) -> None:
+    model = read_case(put_case(tmp_path / "rod")).model
+    (found,) = hypotheses_of(model, [check_effect(Softer)])
+    changed = found.factors(np.array([[0.5]]))
+    assert np.isfinite(changed).all()
+    assert found.parameters[0].name == "softer"
+
+
+def test_type_checkers_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    report, errors, code = api.run(["--strict", str(DUCK)])
+    assert (code, errors) == (0, ""), report
