@@ -14,7 +14,7 @@ $(error femubench/core is no link to the folder core: clone once more with \
   `git clone -c core.symlinks=true` (on Windows, in developer mode))
 endif
 
-.PHONY: run test kernels bench sweep fuzz format clean
+.PHONY: run test docs kernels bench sweep fuzz format clean
 .DELETE_ON_ERROR:
 
 run: $(VENV)/.installed
@@ -27,6 +27,10 @@ test: $(VENV)/.installed-test
 	$(BIN)/mypy -p femubench
 	$(BIN)/pyright --pythonpath $(BIN)/python
 	$(BIN)/pytest $(ARGS)
+
+docs: $(VENV)/.installed-test
+	$(BIN)/sphinx-build -q -E -W --keep-going -c docs -b html . build/site $(ARGS)
+	@echo "build/site/index.html"
 
 # Tests whose figures go through linear algebra; KERNELS are those of OpenBLAS, of which a processor
 # without AVX-512 runs all but SkylakeX, and every x86-64 runs Nehalem.
@@ -55,7 +59,7 @@ format: $(VENV)/.installed-test
 	$(BIN)/ruff format .
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .benchmarks .coverage .hypothesis
+	rm -rf $(VENV) build dist docs/api *.egg-info .mypy_cache .ruff_cache .pytest_cache .benchmarks .coverage .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:

@@ -245,23 +245,23 @@ def page(records: Sequence[Record]) -> str:
     return f"""\
 # How often the diagnosis is right
 
-{len(records)} blind cases, drawn and judged as [challenge](challenge.md) says; `python
-benchmarks/diagnosis_sweep.py run` and `tables` make this page again.
+{len(records)} blind cases, drawn and scored as described under [blind cases](challenge.md); `python
+benchmarks/diagnosis_sweep.py run` and `tables` generate this page.
 
-## What it must reach
+## Targets
 
 {_markdown(bars_table(records))}
 
 A name counts as right when the diagnosis gives it, alone or as a member of one group of at most
 six names. Where the hidden effect lowers chi-square by less than 12, `none` is right and a wrong
-name still wrong. Intervals are Wilson's.
+name is still wrong. Intervals are Wilson's.
 
 ## By kind of case
 
 {groups}
 
 `too small`: cases whose effect lowers chi-square by less than 12. `groups`: verdicts that name
-several effects which the data cannot tell apart, and how many on average.
+several effects which the data cannot distinguish, and how many on average.
 
 ## By hidden effect
 

@@ -72,7 +72,7 @@ def _verdict(data: Data) -> Iterator[Section]:
 def _looks(data: Data) -> Iterator[Section]:
     if data["looks"]:
         entries = [(look["where"], _look(look)) for look in data["looks"]]
-        yield Section("A plain look at the model, before any fit", [Items(entries)])
+        yield Section("Plausibility checks of the model, before any fit", [Items(entries)])
 
 
 def _look(look: Data) -> str:
@@ -84,8 +84,8 @@ def _look(look: Data) -> str:
     more = len(known) - len(changes)
     by = f" ({look['effect']})" if look["effect"] else ""
     tail = f" and {more} more" if more else ""
-    mended = f" Mended{by}: {', '.join(changes)}{tail}." if changes else by
-    return f"{look['what']}{mended}"
+    corrected = f" If corrected{by}: {', '.join(changes)}{tail}." if changes else by
+    return f"{look['what']}{corrected}"
 
 
 def _residuals(data: Data) -> Iterator[Section]:

@@ -140,7 +140,7 @@ def odds(separation: float | None) -> str:
 
 
 def look_changes(look: Data) -> str:
-    """Return how the frequencies change, were it mended."""
+    """Return how the frequencies change if the model is corrected."""
     known = [c for c in look["changes"] if c["percent"] is not None]
     text = ", ".join(f"mode {c['mode']} {signed(c['percent'])} %" for c in known[:_MOST_CHANGES])
     more = len(known) - _MOST_CHANGES

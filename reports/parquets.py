@@ -23,7 +23,7 @@ class ParquetReporter:
         Raises:
             InputError: always.
         """
-        raise InputError("format parquet is no text", expected="a file")
+        raise InputError("format parquet is not a text format", expected="a file")
 
     def render_bytes(self, run: Run) -> bytes:
         """Return the results; run and notes are in the file's metadata under ``femubench``.

@@ -35,9 +35,9 @@ _WORDS = {
 _MEANING = {
     "agrees": "ours rounds to the printed figure, or lies within the tolerance of the row's kind",
     "agrees-under": "agrees under a convention that the text does not state, or states otherwise: "
-    "the note below the table tells which",
+    "the note below the table says which",
     "does-not-follow": "does not follow from the text: a misprint, data that are not in print, or "
-    "a step that is missing; the note tells which",
+    "a step that is missing; the note says which",
 }
 _DEVIATION = (
     "Deviation: (ours - printed) / |printed| in percent; of figures that are percentages "

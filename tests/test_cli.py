@@ -189,6 +189,36 @@ class TestHelp:
         assert not {module for module, _ in VERBS.values()} & set(loaded)
         assert len(loaded) < len(numpy)
 
+    @pytest.mark.parametrize(
+        ("words", "offered", "imported"),
+        [
+            ("bench ", set(VERBS), set()),
+            ("bench re", {"report", "reproduce"}, set()),
+            ("bench init --h", {"--help"}, {VERBS["init"][0]}),
+        ],
+    )
+    def test_completion_imports_no_other_verb(
+        self,
+        words: str,
+        offered: set[str],
+        imported: set[str],
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        monkeypatch.setenv("_BENCH_COMPLETE", "bash_complete")
+        monkeypatch.setenv("COMP_WORDS", words)
+        monkeypatch.setenv("COMP_CWORD", str(words.count(" ")))
+        *answers, loaded = python(
+            """
+            import contextlib, sys
+            from femubench.core.cli.main import bench
+            with contextlib.suppress(SystemExit):
+                bench(prog_name="bench")
+            print(" ".join(sys.modules))
+            """
+        ).splitlines()
+        assert {answer.removeprefix("plain,") for answer in answers} == offered
+        assert {module for module, _ in VERBS.values()} & set(loaded.split()) == imported
+
     def test_one_line_a_verb(self, invoke: Invoke) -> None:
         result = invoke("--help")
         assert result.exit_code == 0

@@ -172,7 +172,7 @@ class TestTerminal:
             "toy: named; that nothing is missing has probability < 0.1 %; "
             "taken at the textbook value: shear-deformation, rotary-inertia.",
             "tube: J equals Jp and tube is no circle.",
-            "Mended (torsion-constant): mode 1 -3.25 %.",
+            "If corrected (torsion-constant): mode 1 -3.25 %.",
             "4 226.8 +12.3 -0.2 3 3.54 1",
             "7 275.2 – +0.5 0 – –",
             "mass 2.125 kg: +0.3 before, +0.3 after",
@@ -226,7 +226,7 @@ class TestTerminal:
             ("rivals", "advice", "smallest_visible", "residuals", "looks", "locations", "notes"), ()
         )
         text = words(toys.made("none", **empty))
-        for heading in ("Rivals", "next", "smallest", "plain look", "Where", "Notes"):
+        for heading in ("Rivals", "next", "smallest", "Plausibility checks", "Where", "Notes"):
             assert heading not in text
         assert "Chi-square" in text
 

@@ -23,7 +23,7 @@ from femubench.fem import Frame
 from femubench.plugins.effects import femubench_effects
 
 TEXT = (Path(__file__).parents[1] / "docs" / "effects.md").read_text(encoding="utf-8")
-THERE, WRITES = "## What there is", "### What each writes and what it is confused with"
+THERE, WRITES = "## The catalogue", "### Keys written, and possible confusions"
 EFFECTS: dict[str, Any] = {name: load_plugins().effects[name] for name in femubench_effects()}
 RATIOS = ("ratio", "multiple")
 

@@ -257,9 +257,9 @@ def test_workers_that_cannot_start_end_the_run(
 
 def test_wrong_input_is_told() -> None:
     case = toys.tiny_case()
-    with pytest.raises(InputError, match="case 'corner' is there twice"):
+    with pytest.raises(InputError, match="case 'corner' occurs twice"):
         run_jobs([case, case], [toys.Unchanged()])
-    with pytest.raises(InputError, match="strategy 'unchanged' is there twice"):
+    with pytest.raises(InputError, match="strategy 'unchanged' occurs twice"):
         run_jobs([case], [toys.Unchanged(), toys.Unchanged()])
     with pytest.raises(InputError, match="0 worker processes"):
         run_jobs([case], [toys.Unchanged()], jobs=0)

@@ -268,7 +268,7 @@ class TestRank:
         assert ours.results[0].key == theirs.results[0].key
 
     def test_what_cannot_be_told_apart_is_refused(self) -> None:
-        with pytest.raises(femubench.InputError, match="strategy 'scaled' is there twice"):
+        with pytest.raises(femubench.InputError, match="strategy 'scaled' occurs twice"):
             femubench.rank("rod", [Scaled(held=[1]), Scaled(held=[2])])
 
     def test_what_cannot_be_sent_to_a_worker_is_told(self) -> None:
@@ -281,7 +281,7 @@ class TestRank:
             femubench.InputError, match="no strategy 'barch'; did you mean 'baruch'"
         ):
             femubench.rank("rod", "barch")
-        with pytest.raises(femubench.PluginError, match=r"is no femubench\.Strategy: update"):
+        with pytest.raises(femubench.PluginError, match=r"is not a femubench\.Strategy: update"):
             femubench.rank("rod", int)  # type: ignore[arg-type]
 
     def test_labels_of_what_has_no_defaults_and_of_plain_objects(self) -> None:

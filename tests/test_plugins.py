@@ -135,7 +135,7 @@ def test_third_party_cannot_take_a_builtin_name(site: Path) -> None:
         ("raise RuntimeError('no licence')", "RuntimeError: no licence"),
         ("raise SystemExit", "SystemExit"),
         ("yield Nothing\n        raise OSError('half way')", "OSError: half way"),
-        ("return [object()]", "a object is no femubench.Strategy: update() is missing"),
+        ("return [object()]", "a object is not a femubench.Strategy: update() is missing"),
         ("return [Strategy]", "class Strategy does not override update()"),
     ],
 )
@@ -155,7 +155,7 @@ def test_one_bad_entry_leaves_the_others(site: Path) -> None:
     plugins = from_site(site)
     assert list(plugins.strategies) == ["fine"]
     assert [fault.message for fault in plugins.broken] == [
-        "class int is no femubench.Strategy: update() is missing",
+        "class int is not a femubench.Strategy: update() is missing",
         "the name 'fine' is taken by another of the strategies",
     ]
 
@@ -320,9 +320,9 @@ def test_other_roles_are_checked(tmp_path: Path) -> None:
         check_scenario(Scenario("s", "t", {"other": tmp_path}))
     with pytest.raises(PluginError, match="not a mapping"):
         check_scenario(Scenario("s", "t", {}))
-    with pytest.raises(PluginError, match=r"no pathlib\.Path"):
+    with pytest.raises(PluginError, match=r"not a pathlib\.Path"):
         check_scenario(Scenario("s", "t", {"s": str(tmp_path)}))  # type: ignore[dict-item]
-    with pytest.raises(PluginError, match=r"no femubench\.Scenario"):
+    with pytest.raises(PluginError, match=r"not a femubench\.Scenario"):
         check_scenario({"name": "s"})
     with pytest.raises(PluginError, match=r"suffix '\.UNV'"):
         check_reader(variant(Unit, suffixes=(".UNV",)))

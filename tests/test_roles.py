@@ -77,7 +77,7 @@ def test_it_is_ranked_and_passes_the_checks(here: Path) -> None:
 
 def test_what_is_no_strategy_is_told_what_it_lacks() -> None:
     (fault,) = load_plugins([], {"toy": _Offers(int)}).broken
-    assert fault.message == "class int is no femubench.Strategy: update() is missing"
+    assert fault.message == "class int is not a femubench.Strategy: update() is missing"
 
 
 class _Offers:

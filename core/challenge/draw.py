@@ -370,7 +370,7 @@ def _case(candidates: Candidates, drawn: Candidate, seen: Seen, rng: np.random.G
     return Case(
         name=name,
         title=specimen.title,
-        source="Computed from a truth that is not told, with random noise; not measured",
+        source="Computed from a hidden truth, with random noise; not measured",
         folder=Path(name),
         model=specimen.model,
         measurement=measurement,

@@ -16,7 +16,7 @@ _HIDDEN = ("one", "none", "pair", "outside", "any")
 
 @click.group()
 def challenge() -> None:
-    """Write blind cases with a hidden fault, and judge answers."""
+    """Write blind cases with a hidden fault, and score answers."""
 
 
 @challenge.command()
@@ -81,7 +81,7 @@ def new(
 )
 @click.option("--json", "json_file", type=click.Path(path_type=Path), help="Write the judgement.")
 def score(folder: Path, answer: Path, sealed: Path | None, json_file: Path | None) -> None:
-    """Judge ANSWER, a file as `bench diagnose --json` writes it, to the blind case in FOLDER."""
+    """Score ANSWER, a file written by `bench diagnose --json`, for the blind case in FOLDER."""
     from femubench.core.files import check_writable, write_atomically
     from femubench.core.library.challenge import score_challenge
 

@@ -53,7 +53,7 @@ def thresholds_of(
     multiple=True,
     metavar="METRIC>X",
     callback=thresholds_of,
-    help="Exit with 1 where a ratio B/A exceeds X: skill, used, higher, modified, seconds; or the "
+    help="Exit with 1 if a ratio B/A exceeds X: skill, used, higher, modified, seconds; or the "
     "number of lost results: failures. May be repeated. Default: skill>1.01 and failures>0.",
 )
 @click.option(
@@ -93,7 +93,7 @@ def compare(
     store: Path | None,
     quiet: bool,
 ) -> None:
-    """Set run B beside run A; exit with 1 where B is worse.
+    """Compare run B with run A; exit with 1 if B is worse.
 
     A and B are run ids in the store, their first letters, or files that run --json wrote. With
     --of X --with Y strategy Y of B is set beside strategy X of A, or both are taken from A.

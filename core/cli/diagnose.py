@@ -54,7 +54,7 @@ def _share(ctx: click.Context, param: click.Parameter, value: float | None) -> f
     type=float,
     callback=_share,
     metavar="X",
-    help="Relative scatter of every element that is ordinary; 0 for none. Default: the case's.",
+    help="Ordinary relative scatter of every element; 0 for none. Default: the case's.",
 )
 @click.option("--no-pairs", is_flag=True, help="Look for single effects only, which is quicker.")
 @click.option(

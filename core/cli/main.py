@@ -15,6 +15,7 @@ from importlib import import_module
 from typing import Any, NoReturn
 
 import click
+from click.shell_completion import CompletionItem
 
 from femubench.core.errors import FemubenchError, InputError, PluginError
 from femubench.core.version import __version__
@@ -28,7 +29,7 @@ VERBS = {
     "report": ("femubench.core.cli.report", "Write a report on a stored run."),
     "compare": (
         "femubench.core.cli.compare",
-        "Set run B beside run A; exit with 1 where B is worse.",
+        "Compare run B with run A; exit with 1 if B is worse.",
     ),
     "publish": ("femubench.core.cli.publish", "Merge result files into a static site in DIR."),
     "diagnose": ("femubench.core.cli.diagnose", "Find what a model lacks, and extend it."),
@@ -42,7 +43,7 @@ VERBS = {
     ),
     "challenge": (
         "femubench.core.cli.challenge",
-        "Write blind cases with a hidden fault, and judge answers.",
+        "Write blind cases with a hidden fault, and score answers.",
     ),
     "scenarios": ("femubench.core.cli.scenarios", "List the built-in scenarios, or show one."),
     "plugins": ("femubench.core.cli.plugins", "List, show and check plugins, or write a new one."),
@@ -73,6 +74,15 @@ class Bench(click.Group):
             hint = f" Did you mean {' or '.join(near)}?" if near else ""
             ctx.fail(f"No such command {args[0]!r}.{hint}")
         return super().resolve_command(ctx, args)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Complete a verb without importing any."""
+        verbs = [
+            CompletionItem(verb, help=line)
+            for verb, (_, line) in VERBS.items()
+            if verb.startswith(incomplete)
+        ]
+        return verbs + click.Command.shell_complete(self, ctx, incomplete)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of verbs without importing them."""

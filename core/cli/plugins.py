@@ -60,7 +60,7 @@ def list_(ctx: click.Context, traceback: bool) -> None:
     wanted = traceback or bool(ctx.find_root().params.get("traceback"))
     warn(found.broken, with_traceback=wanted)
     if found.broken and not wanted:
-        click.echo("bench plugins list --traceback tells where these come from", err=True)
+        click.echo("bench plugins list --traceback shows where these come from", err=True)
 
 
 @plugins.command("show")
@@ -88,7 +88,7 @@ def show(ctx: click.Context, name: str) -> None:
     type=click.Choice(_KINDS),
     default="strategy",
     show_default=True,
-    help="What the package brings.",
+    help="What the package contains.",
 )
 @click.option(
     "-o",
@@ -102,7 +102,7 @@ def show(ctx: click.Context, name: str) -> None:
 def new(ctx: click.Context, name: str, kind: str, output: Path) -> None:
     """Write a pip-installable package with a working plugin in the new folder NAME.
 
-    NAME, of lower-case letters, digits and dashes, is also the name of what the plugin brings.
+    NAME, of lower-case letters, digits and dashes, is also the name of the plugin.
     """
     from femubench.core.library.new_package import trial_of, write_package
 

@@ -49,7 +49,7 @@ def check(
     timeout: float,
     json_file: Path | None,
 ) -> int:
-    """Check that the plugin NAME keeps what a plugin must keep.
+    """Check that the plugin NAME follows the rules for plugins.
 
     NAME is a strategy, with options after a colon if need be, an effect, a reader or a scenario.
     Every trial runs in a process of its own. Exit: 0 nothing failed, 1 something did.

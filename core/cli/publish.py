@@ -18,9 +18,8 @@ from femubench.core.display import counted
 def publish(folder: Path, files: tuple[Path, ...], quiet: bool) -> None:
     """Merge result files into a static site in DIR.
 
-    A FILE is what run --json wrote, here or on another machine. DIR is new, empty, or made by
-    publish before: then the files are added to it. One file that is not sound, and nothing is
-    written.
+    A FILE is written by run --json, here or on another machine. DIR is new, empty, or written by
+    an earlier publish, and then the files are added. If one file is invalid, nothing is written.
     """
     from femubench.core.library.publish import publish as merge
 

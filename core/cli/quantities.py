@@ -26,8 +26,8 @@ def timeouts_of(
         # Options of a strategy may hold equal signs of their own.
         name, _, text = value.rpartition("=")
         if name in found:
-            whom = f"for {name!r} " if name else ""
-            raise click.BadParameter(f"{value!r}: there is another one {whom}already")
+            whom = f" for {name!r}" if name else ""
+            raise click.BadParameter(f"{value!r}: given twice{whom}")
         found[name] = _seconds(text, value)
     return found
 

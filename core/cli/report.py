@@ -36,7 +36,7 @@ class _Formats(click.Option):
         """Return the option and its help."""
         short = {name: f"{name} ({word})" for word, name in _SHORT.items()}
         names = ", ".join(short.get(name, name) for name in load_plugins().reporters)
-        self.help = f"{names}; several with commas. Default: terminal."
+        self.help = f"{names}; several separated by commas. Default: terminal."
         return super().get_help_record(ctx)
 
 
@@ -77,7 +77,7 @@ def report(
 
     RUN is a run id in the store, its first letters, or a file that run --json or diagnose --json
     wrote. Without it, the last run of the store. Lines of a store that cannot be read are left
-    out, and told.
+    out and reported.
     """
     plugins = plugins_for(ctx)
     words = list(dict.fromkeys([*_words(formats), *([_PAGE] if opened else [])])) or ["terminal"]

@@ -45,7 +45,7 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
     "--jobs",
     type=click.IntRange(1),
     metavar="N",
-    help="Number of worker processes. Default: one a core.",
+    help="Number of worker processes. Default: one per core.",
 )
 @click.option(
     "--seeds",
@@ -79,25 +79,23 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
 @click.option(
     "--resume",
     is_flag=True,
-    help="Go on with the last run of these jobs: do what is missing, and failures again. Without "
-    "CASE and -s, with the last run of the store.",
+    help="Continue the last run of these jobs: run what is missing, and failed jobs again. Without "
+    "CASE and -s, continue the last run in the store.",
 )
 @click.option(
     "--overwrite",
     type=click.Choice(["always", "missing", "failed"]),
-    help="Which stored results of the very same jobs are computed anew: all, none, or the "
+    help="Which stored results of the same jobs are computed again: all, none, or the "
     "failures. Default: always; with --resume: failed.",
 )
 @click.option(
     "--locked",
     metavar="RUN",
-    help="Repeat a stored run and say what differs; exit 1 where a result does.",
+    help="Repeat a stored run and report differences; exit 1 if a result differs.",
 )
-@click.option(
-    "--strict-plugins", is_flag=True, help="Stop with exit code 2 where a plugin is broken."
-)
+@click.option("--strict-plugins", is_flag=True, help="Stop with exit code 2 if a plugin is broken.")
 @click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the results as JSON.")
-@click.option("--csv", "csv_file", type=FILE, metavar="FILE", help="Write one line a job as CSV.")
+@click.option("--csv", "csv_file", type=FILE, metavar="FILE", help="Write one line per job as CSV.")
 @click.option(
     "--store",
     type=FOLDER,
@@ -109,7 +107,7 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
     "report_file",
     type=FILE,
     metavar="FILE",
-    help="Write the report there; its suffix tells the format. Default: RUN.html and "
+    help="Write the report there; its suffix decides the format. Default: RUN.html and "
     "RUN.md in the store.",
 )
 @click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")

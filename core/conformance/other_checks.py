@@ -45,7 +45,7 @@ def random_file(bench: Bench) -> Verdict:
     )  # fmt: skip
 
 
-@check("reader", "text-file", "A text that is none of its format is refused by InputError.")
+@check("reader", "text-file", "A text that is not in its format is refused by InputError.")
 def text_file(bench: Bench) -> Verdict:
     """Read a text as a matrix and as modes."""
     text = b"Dear reader,\nnothing of this is a measurement.\n-1\n 55\n1,2,x\n"
@@ -80,7 +80,7 @@ def reads(bench: Bench) -> Verdict:
     return bench.apart(_reads, (bench.subject, bench.helpers or ()))
 
 
-@check("scenario", "held-out", "Every case holds something back that a model can be judged by.")
+@check("scenario", "held-out", "Every case holds out data by which a model can be judged.")
 def held_out(bench: Bench) -> Verdict:
     """Look for held-out modes and modifications."""
     return bench.apart(_held_out, (bench.subject, bench.helpers or ()))

@@ -123,7 +123,7 @@ def parameter_count(bench: Bench) -> Verdict:
 @check(
     "strategy",
     "promises",
-    "What the class attribute `promises` lists is kept by every result.",
+    "Every result keeps what the class attribute `promises` lists.",
     wants=with_results,
 )
 def promises(bench: Bench) -> Verdict:

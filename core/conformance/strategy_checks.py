@@ -139,7 +139,7 @@ def inputs(bench: Bench) -> Verdict:
 @check(
     "strategy",
     "global-state",
-    "What all code in a process shares is left as it was.",
+    "Global state of the process is left as it was.",
     wants=with_results,
 )
 def global_state(bench: Bench) -> Verdict:
@@ -153,7 +153,7 @@ def global_state(bench: Bench) -> Verdict:
 @check(
     "strategy",
     "capabilities",
-    "What `needs` does not list is not needed.",
+    "Nothing is needed that `needs` does not list.",
     wants=lambda bench: [want for _, want in _withheld(bench)],
 )
 def capabilities(bench: Bench) -> Verdict:

@@ -115,7 +115,7 @@ def check_name(name: str, kind: str, plugins: Plugins) -> None:
             raise InputError("the name is too long", expected=f"{_LONGEST} characters at most")
         better = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
         hint = f", e.g. {better}" if _NAME.fullmatch(better) else ""
-        raise InputError(f"{name!r} is no name of a package", expected=f"{_EXPECTED}{hint}")
+        raise InputError(f"{name!r} is not a package name", expected=f"{_EXPECTED}{hint}")
     if fault := _fault_of(name, kind, plugins):
         raise InputError(f"the name {name!r} cannot be used: {fault}", expected="another name")
 
@@ -135,7 +135,7 @@ def _fault_of(name: str, kind: str, plugins: Plugins) -> str:
         return f"there is a {kind} of that name (bench plugins show {name})"
     try:
         # Installing a second distribution of that name would remove the first.
-        return f"{distribution(name).name} is installed, which is another package"
+        return f"{distribution(name).name} is installed, which is a different package"
     except PackageNotFoundError:
         pass
     found = find_spec(module)

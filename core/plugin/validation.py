@@ -55,7 +55,7 @@ def check_scenario(offered: object) -> Scenario:
         PluginError: when it is no Scenario or its cases are misnamed.
     """
     if not isinstance(offered, Scenario):
-        raise PluginError(f"{_label(offered)} is no femubench.Scenario")
+        raise PluginError(f"{_label(offered)} is not a femubench.Scenario")
     _check_name(offered, offered)
     if not isinstance(offered.cases, Mapping) or not offered.cases:
         raise PluginError(f"scenario {offered.name!r}: cases is not a mapping of names to folders")
@@ -67,7 +67,9 @@ def check_scenario(offered: object) -> Scenario:
                 f"'{offered.name}' nor '{offered.name}/PART'"
             )
         if not isinstance(folder, Path):
-            raise PluginError(f"scenario {offered.name!r}: folder of {name!r} is no pathlib.Path")
+            raise PluginError(
+                f"scenario {offered.name!r}: folder of {name!r} is not a pathlib.Path"
+            )
     return offered
 
 
@@ -182,7 +184,7 @@ def _check_name(filled: object, offered: object) -> None:
 def _check_members(filled: object, offered: object, role: str, methods: tuple[str, ...]) -> None:
     for method in methods:
         if not callable(getattr(filled, method, None)):
-            raise PluginError(f"{_label(offered)} is no femubench.{role}: {method}() is missing")
+            raise PluginError(f"{_label(offered)} is not a femubench.{role}: {method}() is missing")
 
 
 def _is_text(value: object) -> bool:

@@ -181,7 +181,7 @@ def _check(result: JobResult, meta: Mapping[str, Any], file: Path, key: str) -> 
         if not isinstance(text, str) or not 0 < len(text) <= 200:
             where = f"{key}.provenance.{name}"
             expected = "a digest" if name == "case" else "a version"
-            raise InputError("missing or no text", file=file, key=where, expected=expected)
+            raise InputError("missing or not a text", file=file, key=where, expected=expected)
     case = meta["cases"].get(result.case)
     if case is None or case["digest"] != result.provenance["case"]:
         where = f"{key}.provenance.case"

@@ -56,7 +56,7 @@ def _check_indices(name: str, matrix: Any) -> None:  # noqa: ANN401
         elif matrix.format != "dia":
             raise ValueError(f"format {matrix.format}, expected csc, csr, coo, bsr or dia")
     except (ValueError, TypeError, AttributeError, IndexError) as error:
-        raise StrategyFailure(f"{name} is no valid sparse array: {error}") from error
+        raise StrategyFailure(f"{name} is not a valid sparse array: {error}") from error
 
 
 def _check_low_rank(name: str, change: Any, size: int) -> None:  # noqa: ANN401

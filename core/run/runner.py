@@ -96,4 +96,4 @@ def worker_count(jobs: int | None) -> int:
 def _check_names(kind: str, names: Sequence[str]) -> None:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise InputError(f"{kind} {twice[0]!r} is there twice", expected="every name once")
+        raise InputError(f"{kind} {twice[0]!r} occurs twice", expected="every name once")

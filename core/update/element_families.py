@@ -89,7 +89,7 @@ def strain_mode_signs(operation: FloatArray, active: BoolArray) -> FloatArray:
     turned = operation_on_dofs(operation) @ modes
     signs = np.sign(np.einsum("iq,iq->q", modes, turned))
     if not np.allclose(turned, modes * signs):
-        raise ModelError("the operation is no symmetry of a prismatic beam")
+        raise ModelError("the operation is not a symmetry of a prismatic beam")
     return np.asarray(signs)
 
 

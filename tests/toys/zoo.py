@@ -323,7 +323,7 @@ class WildIndices(Animal):
     """Returns a sparse matrix whose indices point far outside: reading it may end a process."""
 
     name = "wild-indices"
-    ends = ("failed", "stiffness is no valid sparse array")
+    ends = ("failed", "stiffness is not a valid sparse array")
 
     def harm(self, model: Model) -> Model:
         stiffness = model.stiffness.copy()
