@@ -137,7 +137,7 @@ def run(
     with a case.toml. Without any, all built-in scenarios run.
     """
     plugins = _checked(ctx, cases, strategies)
-    from femubench.core.library.rank import store_in
+    from femubench.core.library.rank import repeated, request_of, store_in
     from femubench.core.library.report import reporter, run_name
     from femubench.core.run.runner import worker_count
     from femubench.core.schema.results import DONE
@@ -145,7 +145,7 @@ def run(
     outputs = _outputs(plugins, json_file, csv_file, report_file)
     kept = store_in(store)
     old = None if locked is None else kept.load(locked)
-    plan = _plan(ctx, plugins, kept) if old is None else _repeated(ctx, plugins, old)
+    plan = _plan(ctx, plugins, kept) if old is None else repeated(request_of(old), plugins)
     if not quiet:
         click.echo(wrapped(_header(plan, worker_count(jobs)), hanging=2))
     with progress_bar(quiet=quiet) as progress:
@@ -167,6 +167,8 @@ def _checked(ctx: click.Context, cases: Iterable[str], strategies: Iterable[str]
         raise PluginError(f"{counted(len(plugins.broken), 'fault')} in plugins, see above")
     chosen("strategy", (word.partition(":")[0] for word in strategies), plugins.strategies)
     case_folders(cases, plugins.scenarios)
+    if ctx.params["locked"] is not None:
+        _check_locked(ctx)
     return plugins
 
 
@@ -195,20 +197,17 @@ def _plan(ctx: click.Context, plugins: Plugins, store: Store) -> Plan:
     )
 
 
-def _repeated(ctx: click.Context, plugins: Plugins, old: Run) -> Plan:
-    """Return what a stored run was asked for.
+def _check_locked(ctx: click.Context) -> None:
+    """Refuse words that would make it another run.
 
     Raises:
-        InputError: for words that would make it another run, naming the first of them.
+        InputError: naming the first of them.
     """
-    from femubench.core.library.rank import repeated, request_of
-
     default = click.core.ParameterSource.DEFAULT
     words = ("cases", "strategies", "seeds", "seed", "timeouts", "memory", "resume", "overwrite")
     for name in words:
         if ctx.get_parameter_source(name) is not default:
             raise InputError(f"--locked repeats a run as it was; {name} cannot be given beside it")
-    return repeated(request_of(old), plugins)
 
 
 def _compare(old: Run, new: Run) -> int:

@@ -39,6 +39,7 @@ class Size:
     scaling: roles.Scaling = "linear"
     one_sided: bool = False
     textbook: float | None = None
+    wording: roles.Wording = "change"
     range: tuple[float, float] = (-6.0, 6.0)
 
     def value(self, x: float) -> float:
