@@ -15,7 +15,7 @@ SUFFIXES = (".py", ".js", ".html", ".jinja")
 ALLOWED = {
     "frame": r"kind\b|'frame' or 'matrices'|`parameters` and `frame`",  # kind of model, a method
     "density": r"rhoA|\"E\"",  # a quantity of elements, beside the others
-    "spring": r"quantity|properties|lookup|weights|name|property|rigid|: \(\)|counted",  # likewise
+    "spring": r"quantity|properties|lookup|weights|name|property|rigid|: \(\)|counted|marker|stiffness",  # likewise
     "offset": r"`offset` \(global",  # where a point mass sits
     "hframe": r"\"hframe\": _hframe",  # a structure of the challenge; in its seeds
     "physical": r"\"unphysical\"",  # a label beside its contrary
@@ -42,7 +42,10 @@ def found_in(text: str, names: set[str]) -> Iterator[tuple[int, str]]:
 def test_core_and_reports_know_no_plugin_by_name() -> None:
     names = names_of(load_plugins())
     assert len(names) > 40
+    # What `bench plugins new` writes is a stranger's, who may name what to compare with.
+    written = ROOT / "core" / "library" / "templates"
     files = [p for room in ("core", "reports") for p in (ROOT / room).rglob("*")]
+    files = [path for path in files if path.parent != written]
     texts = {p: p.read_text(encoding="utf-8") for p in files if p.suffix in SUFFIXES}
     assert len(texts) > 150
     met = [

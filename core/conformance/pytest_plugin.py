@@ -108,7 +108,7 @@ class _Speed:
         benchmark: Any,  # noqa: ANN401 - pytest-benchmark is untyped
         pytestconfig: pytest.Config,
     ) -> Callable[[str, str], UpdateResult]:
-        """Time `update` with pytest-benchmark: ``strategy_speed("my-method", "frame")``.
+        """Time `update` with pytest-benchmark: ``strategy_speed("my-method", CASE)``.
 
         The arguments are those of ``bench run``: a strategy, with options where wanted, and a case
         by its name or folder. Times on one case share a group, so that one table compares them;

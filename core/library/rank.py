@@ -191,7 +191,7 @@ def rank(
 
     Arguments:
         cases: names, folders or `Case`s; all built-in ones where there is none.
-        strategies: names (``"generic-ls:plain=full"`` with options), ``strategies["local"](...)``,
+        strategies: names (``"NAME:OPTION=VALUE"`` with options), ``strategies[NAME](...)``,
             classes or instances, also of a notebook; all that are installed where there is none.
         seeds: number of draws of measurement noise; None for the data as recorded.
         seed: the first seed; 0 by default.

@@ -25,7 +25,7 @@ def reproduce(
     """Return the tables of papers recomputed, cell by cell, each with a verdict.
 
     Arguments:
-        papers: ``frame``, ``hframe``; both by default.
+        papers: their names; all by default.
         output: folder for reproduce.md, .html, .json and the figures.
 
     Raises:
