@@ -43,7 +43,8 @@ NUMERICAL := $(addprefix tests/test_,advice*.py assembly.py asymmetric_frame.py 
 kernels: $(VENV)/.installed-test
 	for kernel in $(KERNELS); do \
 		echo "OPENBLAS_CORETYPE=$$kernel"; \
-		OPENBLAS_CORETYPE=$$kernel $(BIN)/pytest $(or $(ARGS),$(NUMERICAL)) || exit 1; done
+		OPENBLAS_CORETYPE=$$kernel OPENBLAS_NUM_THREADS=1 \
+			$(BIN)/pytest -n 2 -p no:benchmark $(or $(ARGS),$(NUMERICAL)) || exit 1; done
 
 bench: $(VENV)/.installed-test
 	$(BIN)/pytest benchmarks -o addopts="--import-mode=importlib -ra" --benchmark-only $(ARGS)
