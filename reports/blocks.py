@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
+from typing import Literal
 from urllib.parse import quote
 
 from femubench.reports.cells import plain, shortened
@@ -32,6 +33,11 @@ class Column:
     width: int
     left: bool = False
     wrap: bool = False
+
+    @property
+    def side(self) -> Literal["left", "right"]:
+        """Return where the cells stand."""
+        return "left" if self.left else "right"
 
 
 @dataclass(frozen=True)
@@ -136,8 +142,8 @@ def _entry(label: str, text: str, *, whole: bool = False) -> str:
 
 def _screen_table(block: Table) -> str:
     rows = [line for row in block.rows for line in _lines(row, block.columns)]
-    sides = tuple("left" if column.left else "right" for column in block.columns)
-    return aligned_table(rows, tuple(column.title for column in block.columns), sides)
+    titles, sides = zip(*((column.title, column.side) for column in block.columns), strict=True)
+    return aligned_table(rows, titles, sides)
 
 
 def _lines(row: Sequence[str], columns: Sequence[Column]) -> list[list[str]]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from femubench.reports.cells import NOTHING, fixed, plain, shortened
 from femubench.reports.markdown import escape, table
-from femubench.reports.site import environment
+from femubench.reports.templating import site_page
 from femubench.reports.terminal import WIDTH, aligned_table
 from femubench.results import METHOD
 
@@ -76,23 +76,19 @@ def comparison_markdown(data: Mapping[str, Any]) -> str:
 
 def comparison_html(data: Mapping[str, Any]) -> str:
     """Return a comparison as one document that needs no script and no network."""
-    found = environment().get_template("compare.html")
     before, after = _sides(data)
-    return found.render(
+    return site_page("compare.html").render(
         headline=headline(data),
         before=before,
         after=after,
         worse=data["worse"],
-        excesses=[plain(_excess(item)) for item in data["excesses"]],
-        changes=[
-            (_SAYS[item["kind"]], _job(item), item["before"], item["after"], plain(item["reason"]))
-            for item in data["changes"]
-        ],
+        excesses=[_excess(item) for item in data["excesses"]],
+        changes=[(_SAYS[item["kind"]], _job(item), item) for item in data["changes"]],
         heads=_HEADS,
         rows=[(row["scenario"] is None, _cells(row), _tones(row)) for row in data["rows"]],
-        proofs=[_proof(item) for item in data["evidence"]],
+        proofs=map(_proof, data["evidence"]),
         forest=forest(data["evidence"]),
-        lists=[(title, [plain(line) for line in lines]) for title, lines in _lists(data) if lines],
+        lists=[(title, lines) for title, lines in _lists(data) if lines],
         legend=_LEGEND,
         evidence=_EVIDENCE,
     )
