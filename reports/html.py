@@ -18,6 +18,4 @@ def to_html(sections: Iterable[Section], *, title: str, heading: str) -> str:
         heading: at the top, the line that matters most.
     """
     page = templates("templates").get_template("report.html")
-    return page.render(
-        title=title, heading=heading, sections=list(sections), embedded=embedded
-    )
+    return page.render(title=title, heading=heading, sections=list(sections), embedded=embedded)
