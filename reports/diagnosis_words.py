@@ -87,12 +87,17 @@ def place_at(place: str) -> str:
     return "everywhere" if place == "all" else place
 
 
-def pair_at(rival: Data) -> str:
+def pairs_of(rival: Data) -> list[tuple[str, str]]:
     """Return effects and places of a combination, each effect beside its place."""
     effects, places = rival["effect"].split(" + "), rival["place"].split(" + ")
     if len(effects) != len(places):
-        effects, places = [rival["effect"]], [rival["place"]]
-    return " + ".join(map(_at, effects, places))
+        return [(rival["effect"], rival["place"])]
+    return list(zip(effects, places, strict=True))
+
+
+def pair_at(rival: Data) -> str:
+    """Return the effects of a combination, each with its place."""
+    return " + ".join(_at(*pair) for pair in pairs_of(rival))
 
 
 def _at(effect: str, place: str) -> str:

@@ -95,8 +95,7 @@ def frame_axes(
     ax.set_aspect("equal")
     ax.spines[["top", "right"]].set_visible(False)
     if view.names is not None and scales:
-        ax.set_xlabel(f"{view.names[0]}, m")
-        ax.set_ylabel(f"{view.names[1]}, m")
+        ax.set(xlabel=f"{view.names[0]}, m", ylabel=f"{view.names[1]}, m")
         return
     ax.set_axis_off()
     if not directions:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -132,6 +133,20 @@ def curve_style(role: str, rank: int, points: int) -> dict[str, Any]:
         style["marker"], style["markersize"] = _MARKERS[rank % len(_MARKERS)], 4.5
         style["markevery"] = max(1, points // 12)
     return style
+
+
+def draw_curves(ax: Axes, curves: Iterable[tuple[str, str, Any, Any]]) -> None:
+    """Draw curves over a grid.
+
+    Arguments:
+        curves: label, role, x and y of each.
+    """
+    ranks: Counter[str] = Counter()
+    for label, role, x, y in curves:
+        ax.plot(x, y, label=label, **curve_style(role, ranks[role], len(x)))
+        ranks[role] += 1
+    ax.margins(x=0.01)
+    ax.grid(color="0.88", linewidth=0.6)
 
 
 def name_of(text: str, most: int = 40) -> str:
