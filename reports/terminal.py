@@ -53,17 +53,13 @@ def ranking(board: pd.DataFrame) -> str:
 
 def intervals(board: pd.DataFrame) -> str:
     """Return median and 95 % interval of the skill over the seeds."""
+    found = board[["strategy", "skill", "skill_low", "skill_high"]].itertuples(index=False)
     rows = [
-        [
-            shortened(plain(row["strategy"]), _NAME_WIDTH),
-            fixed(row["skill"], 3),
-            interval(row["skill_low"], row["skill_high"]),
-        ]
-        for row in board.to_dict("records")
+        [shortened(plain(name), _NAME_WIDTH), fixed(skill, 3), interval(low, high)]
+        for name, skill, low, high in found
     ]
-    return aligned_table(
-        rows, ("strategy", "median skill", "95 % interval"), ("left", "right", "left")
-    )
+    heads = ("strategy", "median skill", "95 % interval")
+    return aligned_table(rows, heads, ("left", "right", "left"))
 
 
 def failures(failed: list[Trouble]) -> str:
