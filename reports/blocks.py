@@ -125,25 +125,17 @@ def _screen(section: Section) -> Iterator[str]:
         else:
             if block.caption:
                 yield textwrap.fill(plain(block.caption), WIDTH, break_on_hyphens=False)
-            yield textwrap.indent(_screen_table(block), "  ")
+            rows = [line for row in block.rows for line in _lines(row, block.columns)]
+            heads = [(column.title, column.side) for column in block.columns]
+            yield textwrap.indent(aligned_table(rows, *zip(*heads, strict=True)), "  ")
 
 
 def _entry(label: str, text: str, *, whole: bool = False) -> str:
-    words = plain(f"{label}: {text}" if label else text)
     return textwrap.fill(
-        words,
-        WIDTH,
-        initial_indent="  ",
-        subsequent_indent="      ",
-        break_on_hyphens=False,
-        break_long_words=not whole,
-    )
-
-
-def _screen_table(block: Table) -> str:
-    rows = [line for row in block.rows for line in _lines(row, block.columns)]
-    titles, sides = zip(*((column.title, column.side) for column in block.columns), strict=True)
-    return aligned_table(rows, titles, sides)
+        plain(f"{label}: {text}" if label else text),
+        WIDTH, initial_indent="  ", subsequent_indent="      ",
+        break_on_hyphens=False, break_long_words=not whole,
+    )  # fmt: skip
 
 
 def _lines(row: Sequence[str], columns: Sequence[Column]) -> list[list[str]]:
@@ -173,10 +165,8 @@ def _document(section: Section) -> Iterator[str]:
             if block.caption:
                 yield _line(escape(block.caption))
             heads = [escape(column.title) for column in block.columns]
-            rows = [[escape(cell) for cell in row] for row in block.rows]
-            yield table(
-                heads, rows, "".join("l" if column.left else "r" for column in block.columns)
-            )
+            rows = (map(escape, row) for row in block.rows)
+            yield table(heads, rows, "".join(column.side[0] for column in block.columns))
 
 
 def _labelled(label: str, text: str) -> str:

@@ -38,10 +38,8 @@ def diagnosis_html(data: Data) -> str:
     room.filters.update(chance=chance, figure=figure, signed=signed)
     indicators = dict.fromkeys(row["indicator"] for row in data["locations"])
     pairs = {key: data["gain"][key] for key in words.GAINS if data["gain"][key] is not None}
-    panels = (
-        _panel(data, "frequency", "Frequencies"),
-        _panel(data, "shape", "Mode shapes, rms over the sensors"),
-    )
+    titles = {"frequency": "Frequencies", "shape": "Mode shapes, rms over the sensors"}
+    panels = [_panel(data, kind, title) for kind, title in titles.items()]
     return room.get_template("diagnosis.html").render(
         data=data,
         words=words,

@@ -106,5 +106,4 @@ def chart(versions: Sequence[Data]) -> dict[str, Any] | None:
     inside = [value for value in nice if low < math.log(value) < high and value != 1.0]
     shown = inside if len(inside) < 6 else [v for v in inside if f"{v:e}".startswith("1.")]
     ticks = [(height(math.log(value)), f"{value:g}") for value in [1.0, *shown]]
-    ends = {"first": dots[0], "last": dots[-1]}
-    return {"dots": dots, "line": solid, "every": every, "ticks": ticks, **ends}
+    return {"dots": dots, "line": solid, "every": every, "ticks": ticks}

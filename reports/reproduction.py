@@ -167,10 +167,8 @@ def _extra(extra: Extra) -> Iterator[Block]:
     made = _columns(extra.columns, extra.rows, sides)
     squeezed = [
         place
-        for place, column in enumerate(made)
-        if place
-        and column.width < _SQUEEZED
-        and max(map(len, columns[place]), default=0) >= _SENTENCE
+        for place, (column, cells) in enumerate(zip(made, columns, strict=True))
+        if place and column.width < _SQUEEZED and max(map(len, cells), default=0) >= _SENTENCE
     ]
     kept = [place for place in range(len(made)) if place not in squeezed]
     rows = [[row[place] for place in kept] for row in extra.rows]

@@ -6,12 +6,12 @@ import base64
 import hashlib
 from functools import cache
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from femubench.reports.cells import fixed, plain, shortened
 
 if TYPE_CHECKING:
-    from jinja2 import Environment
+    from jinja2 import Environment, Template
 
 
 @cache
@@ -32,7 +32,7 @@ def templates(folder: str = "page/assets") -> Environment:
 
 
 @cache
-def site_page(name: str) -> Any:  # noqa: ANN401 - jinja2's template
+def site_page(name: str) -> Template:
     """Return a template of `bench compare` or `bench publish`, with its style, script, policy."""
     from markupsafe import Markup
 

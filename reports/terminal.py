@@ -66,15 +66,10 @@ def failures(failed: list[Trouble]) -> str:
     """Return a table of the failures with their reasons, the first ones where there are many."""
     from tabulate import tabulate
 
-    rows = [
-        (
-            plain(item.case),
-            plain(item.strategy),
-            item.status + (f" x{len(item.seeds)}" if len(item.seeds) > 1 else ""),
-            item.reason,
-        )
-        for item in failed[:_MOST_FAILURES]
-    ]
+    rows = []
+    for item in failed[:_MOST_FAILURES]:
+        often = f" x{len(item.seeds)}" if len(item.seeds) > 1 else ""
+        rows.append((plain(item.case), plain(item.strategy), item.status + often, item.reason))
     headers = ("case", "strategy", "status", "reason")
     # tabulate pads a header by two; columns are two apart.
     columns = zip(*([f"{header}  " for header in headers], *rows), strict=True)
