@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
+from typing import Literal
 from urllib.parse import quote
 
 from femubench.reports.cells import plain, shortened
@@ -32,6 +33,11 @@ class Column:
     width: int
     left: bool = False
     wrap: bool = False
+
+    @property
+    def side(self) -> Literal["left", "right"]:
+        """Return where the cells stand."""
+        return "left" if self.left else "right"
 
 
 @dataclass(frozen=True)
@@ -119,25 +125,17 @@ def _screen(section: Section) -> Iterator[str]:
         else:
             if block.caption:
                 yield textwrap.fill(plain(block.caption), WIDTH, break_on_hyphens=False)
-            yield textwrap.indent(_screen_table(block), "  ")
+            rows = [line for row in block.rows for line in _lines(row, block.columns)]
+            heads = [(column.title, column.side) for column in block.columns]
+            yield textwrap.indent(aligned_table(rows, *zip(*heads, strict=True)), "  ")
 
 
 def _entry(label: str, text: str, *, whole: bool = False) -> str:
-    words = plain(f"{label}: {text}" if label else text)
     return textwrap.fill(
-        words,
-        WIDTH,
-        initial_indent="  ",
-        subsequent_indent="      ",
-        break_on_hyphens=False,
-        break_long_words=not whole,
-    )
-
-
-def _screen_table(block: Table) -> str:
-    rows = [line for row in block.rows for line in _lines(row, block.columns)]
-    sides = tuple("left" if column.left else "right" for column in block.columns)
-    return aligned_table(rows, tuple(column.title for column in block.columns), sides)
+        plain(f"{label}: {text}" if label else text),
+        WIDTH, initial_indent="  ", subsequent_indent="      ",
+        break_on_hyphens=False, break_long_words=not whole,
+    )  # fmt: skip
 
 
 def _lines(row: Sequence[str], columns: Sequence[Column]) -> list[list[str]]:
@@ -167,10 +165,8 @@ def _document(section: Section) -> Iterator[str]:
             if block.caption:
                 yield _line(escape(block.caption))
             heads = [escape(column.title) for column in block.columns]
-            rows = [[escape(cell) for cell in row] for row in block.rows]
-            yield table(
-                heads, rows, "".join("l" if column.left else "r" for column in block.columns)
-            )
+            rows = (map(escape, row) for row in block.rows)
+            yield table(heads, rows, "".join(column.side[0] for column in block.columns))
 
 
 def _labelled(label: str, text: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 from femubench.reports.cells import NOTHING, fixed, plain, shortened
 from femubench.reports.markdown import escape, table
-from femubench.reports.site import environment
+from femubench.reports.templating import site_page
 from femubench.reports.terminal import WIDTH, aligned_table
 from femubench.results import METHOD
 
@@ -76,23 +76,19 @@ def comparison_markdown(data: Mapping[str, Any]) -> str:
 
 def comparison_html(data: Mapping[str, Any]) -> str:
     """Return a comparison as one document that needs no script and no network."""
-    found = environment().get_template("compare.html")
     before, after = _sides(data)
-    return found.render(
+    return site_page("compare.html").render(
         headline=headline(data),
         before=before,
         after=after,
         worse=data["worse"],
-        excesses=[plain(_excess(item)) for item in data["excesses"]],
-        changes=[
-            (_SAYS[item["kind"]], _job(item), item["before"], item["after"], plain(item["reason"]))
-            for item in data["changes"]
-        ],
+        excesses=[_excess(item) for item in data["excesses"]],
+        changes=[(_SAYS[item["kind"]], _job(item), item) for item in data["changes"]],
         heads=_HEADS,
         rows=[(row["scenario"] is None, _cells(row), _tones(row)) for row in data["rows"]],
-        proofs=[_proof(item) for item in data["evidence"]],
+        proofs=map(_proof, data["evidence"]),
         forest=forest(data["evidence"]),
-        lists=[(title, [plain(line) for line in lines]) for title, lines in _lists(data) if lines],
+        lists=[(title, lines) for title, lines in _lists(data) if lines],
         legend=_LEGEND,
         evidence=_EVIDENCE,
     )
@@ -122,13 +118,8 @@ def headline(data: Mapping[str, Any]) -> str:
 def forest(evidence: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return where ratio and interval of every strategy stand on a logarithmic axis."""
     listed = [item for item in evidence if item["ratio"] is not None]
-    ends = [
-        abs(math.log(item[name]))
-        for item in listed
-        for name in ("ratio", "low", "high")
-        if item[name]
-    ]
-    reach = min(max([*ends, math.log(1.1)]) * 1.05, math.log(1e6))
+    ends = [item[name] for item in listed for name in ("ratio", "low", "high") if item[name]]
+    reach = min(max(abs(math.log(end)) for end in [*ends, 1.1]) * 1.05, math.log(1e6))
     left, right = _FOREST
 
     def place(ratio: float) -> float:
@@ -138,8 +129,7 @@ def forest(evidence: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     bars = [
         {
             "name": plain(item["strategy"]),
-            "verdict": item["verdict"].replace(" ", "-"),
-            "ratio": fixed(item["ratio"], 3, 6),
+            "verdict": item["verdict"],
             "at": place(item["ratio"]),
             "low": None if item["low"] is None else place(item["low"]),
             "high": None if item["high"] is None else place(item["high"]),
@@ -223,10 +213,8 @@ def _lists(data: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:
     yield "Only in A", _jobs(data["only_before"])
     yield "Only in B", _jobs(data["only_after"])
     yield "Not compared: other case files", _jobs(data["other_cases"])
-    yield (
-        "Environment",
-        [shortened(plain(line), 300) for line in data["environment"]] or ["nothing differs"],
-    )
+    differing = [shortened(plain(line), 300) for line in data["environment"]]
+    yield "Environment", differing or ["nothing differs"]
     if data["untested"]:
         yield "Thresholds that nothing was held against", list(data["untested"])
 
@@ -255,6 +243,4 @@ def _bullets(title: str, lines: Sequence[str]) -> list[str]:
 
 
 def _wrapped(text: str, indent: str = "") -> str:
-    return textwrap.fill(
-        text, WIDTH, initial_indent=indent, subsequent_indent=indent + ("  " if indent else "")
-    )
+    return textwrap.fill(text, WIDTH, initial_indent=indent, subsequent_indent=2 * indent)

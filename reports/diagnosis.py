@@ -6,11 +6,12 @@ through `diagnosis_from_json`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from femubench.reports.blocks import Column, Items, Section, Table, to_markdown, to_terminal
+from femubench.reports.blocks import Block, Column, Items, Section, Table, to_markdown, to_terminal
 from femubench.reports.cells import NOTHING, fixed, plain
+from femubench.reports.diagnosis_words import CAUSES, GAINS, pairs_of
 from femubench.reports.figures import chance, estimate, figure, rms, signed
 from femubench.reports.markdown import escape
 
@@ -18,18 +19,7 @@ Data = Mapping[str, Any]
 
 _MOST_RIVALS, _MOST_PLACES, _MOST_CHANGES, _MOST_ADVICE = 8, 5, 8, 5
 _LEAST = 0.005  # what two decimals show
-_CAUSES = {
-    "named": "What is missing",
-    "ambiguous": "Candidates, among which these data cannot decide",
-    "unknown": "Best guess, which does not explain the data",
-    "not-confirmed": "Best guess, which data held back do not confirm",
-}
-_GAINS = {
-    "used_percent": "used modes",
-    "held_out_percent": "held-out modes",
-    "modified_percent": "modified structure",
-    "cross_validated_percent": "each used mode left out in turn",
-}
+_GAINS = {**GAINS, "cross_validated_percent": "each used mode left out in turn"}
 
 
 def diagnosis_text(data: Data) -> str:
@@ -51,28 +41,54 @@ def summary_lines(data: Data) -> list[str]:
 
 def diagnosis_sections(data: Data) -> list[Section]:
     """Return what a diagnosis says, the verdict first, for a report of any form."""
-    parts = (
-        *(_verdict, _looks, _residuals, _causes, _rivals, _advice, _visible, _gain),
-        *(_locations, _notes, _written),
-    )
-    return [section for part in parts for section in part(data)]
+    found: dict[str, list[Data]] = {}
+    for row in data["locations"]:
+        found.setdefault(row["indicator"], []).append(row)
+    written = data.get("written")
+    parts: list[tuple[str, list[Block]]] = [
+        ("", [data["sentence"]] if data["sentence"] else []),
+        ("", [_verdict(data)]),
+        (
+            "A plain look at the model, before any fit",
+            _items((look["where"], _look(look)) for look in data["looks"]),
+        ),
+        ("Residuals in standard deviations, measured minus predicted", _residuals(data)),
+        (
+            CAUSES.get(data["verdict"], "Causes"),
+            [
+                *_items((_at(cause), _cause(cause)) for cause in data["causes"]),
+                *([data["reason"]] if data["reason"] else []),
+            ],
+        ),
+        ("Rivals", _items(((_pair_at(r), _rival(r)) for r in data["rivals"]), _MOST_RIVALS)),
+        (
+            "What to measure next",
+            _items((("", _advice(item)) for item in data["advice"]), _MOST_ADVICE),
+        ),
+        ("The smallest that these data would have shown", _visible(data)),
+        ("Gain: median frequency error before and after", _gain(data)),
+        ("Where the error sits, 1 at the largest", _items((k, _top(v)) for k, v in found.items())),
+        ("Notes", _items(("", note) for note in data["notes"])),
+        ("", [f"The extended case is in {written}"] if written else []),
+    ]
+    return [Section(title, blocks) for title, blocks in parts if blocks]
 
 
-def _verdict(data: Data) -> Iterator[Section]:
+def _items(entries: Iterable[tuple[str, str]], most: int | None = None) -> list[Block]:
+    """Return a list of remarks and how many more there are; nothing where there is none."""
+    listed = list(entries)
+    hidden = len(listed[most:]) if most else 0
+    more = [f"... and {hidden} more in the JSON"] if hidden else []
+    return [Items(listed[:most]), *more] if listed else []
+
+
+def _verdict(data: Data) -> str:
     said = [f"{data['case']}: {data['verdict']}"]
     if data["nothing"] is not None:
         said.append(f"that nothing is missing has probability {chance(data['nothing'])}")
     if data["base"]:
         said.append(f"taken at the textbook value: {', '.join(data['base'])}")
-    if data["sentence"]:
-        yield Section("", [data["sentence"]])
-    yield Section("", ["; ".join(said) + "."])
-
-
-def _looks(data: Data) -> Iterator[Section]:
-    if data["looks"]:
-        entries = [(look["where"], _look(look)) for look in data["looks"]]
-        yield Section("Plausibility checks of the model, before any fit", [Items(entries)])
+    return "; ".join(said) + "."
 
 
 def _look(look: Data) -> str:
@@ -88,7 +104,7 @@ def _look(look: Data) -> str:
     return f"{look['what']}{corrected}"
 
 
-def _residuals(data: Data) -> Iterator[Section]:
+def _residuals(data: Data) -> list[Block]:
     """Return the residuals, a mode a row, and how likely their sum is."""
     rows = data["residuals"]
     shapes = any(row["kind"] == "shape" for row in rows)
@@ -112,9 +128,7 @@ def _residuals(data: Data) -> Iterator[Section]:
         for row in rows
         if row["kind"] == "mass"
     ]
-    blocks = [Table(columns, lines)] if lines else []
-    title = "Residuals in standard deviations, measured minus predicted"
-    yield Section(title, [*blocks, *text, _chi_square(data)])
+    return [*([Table(columns, lines)] if lines else []), *text, _chi_square(data)]
 
 
 def _mode_row(mode: int, rows: Iterable[Data], shapes: bool) -> list[str]:
@@ -143,16 +157,6 @@ def _chi_square(data: Data) -> str:
     return f"{text}. Noise alone leaves as much with probability {data['adequacy_p']:.2g}."
 
 
-def _causes(data: Data) -> Iterator[Section]:
-    blocks: list[Items | str] = []
-    if data["causes"]:
-        blocks.append(Items([(_at(cause), _cause(cause)) for cause in data["causes"]]))
-    if data["reason"]:
-        blocks.append(data["reason"])
-    if blocks:
-        yield Section(_CAUSES.get(data["verdict"], "Causes"), blocks)
-
-
 def _cause(cause: Data) -> str:
     parts = [f"probability {chance(cause['probability'])}"]
     if cause["summary"]:
@@ -172,19 +176,9 @@ def _at(item: Data) -> str:
     return f"{item['effect']} at {item['place']}" if item["place"] else str(item["effect"])
 
 
-def _rivals(data: Data) -> Iterator[Section]:
-    entries = [(_pair_at(rival), _rival(rival)) for rival in data["rivals"][:_MOST_RIVALS]]
-    if entries:
-        yield Section("Rivals", [Items(entries), *_more(data["rivals"], entries)])
-
-
 def _pair_at(rival: Data) -> str:
     """Return effects and places of a combination, each effect beside its place."""
-    effects, places = rival["effect"].split(" + "), rival["place"].split(" + ")
-    if len(effects) != len(places):
-        return _at(rival)
-    parts = [{"effect": e, "place": p} for e, p in zip(effects, places, strict=True)]
-    return " + ".join(map(_at, parts))
+    return " + ".join(_at({"effect": effect, "place": place}) for effect, place in pairs_of(rival))
 
 
 def _rival(rival: Data) -> str:
@@ -195,16 +189,11 @@ def _rival(rival: Data) -> str:
     return text if rival["angle"] is None else f"{text}, {rival['angle']:.1f} degrees away"
 
 
-def _advice(data: Data) -> Iterator[Section]:
-    entries = [
-        ("", f"{item['measurement']} (separates by {figure(item['separation'], 3)} sigma squared)")
-        for item in data["advice"][:_MOST_ADVICE]
-    ]
-    if entries:
-        yield Section("What to measure next", [Items(entries), *_more(data["advice"], entries)])
+def _advice(item: Data) -> str:
+    return f"{item['measurement']} (separates by {figure(item['separation'], 3)} sigma squared)"
 
 
-def _visible(data: Data) -> Iterator[Section]:
+def _visible(data: Data) -> list[Block]:
     columns = [
         *(Column("effect", 32, left=True), Column("at its best place", 22, left=True)),
         *(Column("size", 10), Column("unit", 8, left=True)),
@@ -213,44 +202,18 @@ def _visible(data: Data) -> Iterator[Section]:
         [item["effect"], item["place"], figure(item["size"], 3), item["unit"]]
         for item in data["smallest_visible"]
     ]
-    if rows:
-        yield Section("The smallest that these data would have shown", [Table(columns, rows)])
+    return [Table(columns, rows)] if rows else []
 
 
-def _gain(data: Data) -> Iterator[Section]:
-    gain = data["gain"]
-    found = [(title, gain[key]) for key, title in _GAINS.items() if gain[key] is not None]
+def _gain(data: Data) -> list[Block]:
+    found = [(title, data["gain"][key]) for key, title in _GAINS.items()]
     columns = [Column("", 32, left=True), Column("before %", 9), Column("after %", 9)]
-    rows = [[title, *(fixed(value, 3, 7) for value in pair)] for title, pair in found]
-    title = "Gain: median frequency error before and after"
-    yield Section(title, [Table(columns, rows)])
-
-
-def _locations(data: Data) -> Iterator[Section]:
-    found: dict[str, list[Data]] = {}
-    for row in data["locations"]:
-        found.setdefault(row["indicator"], []).append(row)
-    entries = [(indicator, _top(rows)) for indicator, rows in found.items()]
-    if entries:
-        yield Section("Where the error sits, 1 at the largest", [Items(entries)])
+    return [
+        Table(columns, [[title, *(fixed(v, 3, 7) for v in pair)] for title, pair in found if pair])
+    ]
 
 
 def _top(rows: Sequence[Data]) -> str:
     known = [row for row in rows if (row["value"] or 0.0) >= _LEAST]
     best = sorted(known, key=lambda row: -row["value"])[:_MOST_PLACES]
     return ", ".join(f"{row['place']} {row['value']:.2f}" for row in best) or NOTHING
-
-
-def _notes(data: Data) -> Iterator[Section]:
-    if data["notes"]:
-        yield Section("Notes", [Items([("", note) for note in data["notes"]])])
-
-
-def _written(data: Data) -> Iterator[Section]:
-    if data.get("written"):
-        yield Section("", [f"The extended case is in {data['written']}"])
-
-
-def _more(all_: Sequence[Any], shown: Sequence[Any]) -> list[str]:
-    hidden = len(all_) - len(shown)
-    return [f"... and {hidden} more in the JSON"] if hidden else []

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from importlib.resources import files
 from typing import Any
 
 from markupsafe import Markup
@@ -22,46 +21,40 @@ from femubench.plot import (
     strongest_places,
     svg,
 )
+from femubench.reports import diagnosis_words as words
 from femubench.reports.cells import NOTHING, plain
-from femubench.reports.diagnosis_words import (
-    CAUSES,
-    GAINS,
-    INDICATORS,
-    MARKS,
-    MEANINGS,
-    adequacy,
-    change,
-    look_changes,
-    odds,
-    pair_at,
-    parameter_rows,
-    percent,
-    place_at,
-    sentence,
-    times,
-)
 from femubench.reports.figures import chance, figure, signed
-from femubench.reports.templating import templates
+from femubench.reports.templating import asset, templates
 
 Data = Mapping[str, Any]
 
-_MOST_DATA, _MOST_ADVICE, _MOST_TOP, _MOST_TOLD = 2000, 8, 5, 12
+_MOST_TOP, _MOST_TOLD = 5, 12
 _MAP, _SMALL = (4.8, 3.7), (3.4, 2.4)  # inch
 
 
 def diagnosis_html(data: Data) -> str:
     """Return a diagnosis as a document that needs nothing but itself; it reads without scripts."""
-
-    room = templates("page/assets", finalize=_shown)
-    page = room.get_template("diagnosis.html")
-    return page.render(
-        style=_asset("diagnosis.css"),
-        script=_asset("diagnosis.js"),
-        **_head(data),
-        **_fit(data),
+    room = templates().overlay(finalize=_shown)
+    room.filters.update(chance=chance, figure=figure, signed=signed)
+    indicators = dict.fromkeys(row["indicator"] for row in data["locations"])
+    pairs = {key: data["gain"][key] for key in words.GAINS if data["gain"][key] is not None}
+    titles = {"frequency": "Frequencies", "shape": "Mode shapes, rms over the sensors"}
+    panels = [_panel(data, kind, title) for kind, title in titles.items()]
+    return room.get_template("diagnosis.html").render(
+        data=data,
+        words=words,
+        style=Markup(asset("diagnosis.css")),
+        script=Markup(asset("diagnosis.js")),
+        tiles=_tiles(data),
+        gains=pairs,
+        largest=max([v for pair in pairs.values() for v in pair if v is not None], default=0.0),
+        panels=[panel for panel in panels if panel],
         **_where(data),
-        **_explanations(data),
-        **_rest(data),
+        indicators=[
+            _indicator(data, name, number)
+            for number, name in enumerate(indicators)
+            if name != "evidence"
+        ],
     )
 
 
@@ -73,66 +66,20 @@ def _shown(value: object) -> object:
     return text.replace("> ", ">\N{NO-BREAK SPACE}").replace("< ", "<\N{NO-BREAK SPACE}")
 
 
-def _asset(name: str) -> Markup:
-    """Return one of our own files as it is."""
-    return Markup(files("femubench.reports").joinpath("page/assets", name).read_text("utf-8"))
-
-
-def _head(data: Data) -> dict[str, Any]:
-    nothing = data["nothing"]
-    missing = None if nothing is None else 1.0 - nothing
-    found, sure = (
-        ("Nothing is missing", nothing)
-        if data["verdict"] == "none"
-        else ("Something is missing", missing)
-    )
+def _tiles(data: Data) -> list[tuple[str, str, str]]:
+    """Return the figures that matter most, each with a title and what it is."""
+    nothing, none = data["nothing"], data["verdict"] == "none"
+    sure = nothing if none or nothing is None else 1.0 - nothing
+    found = "Nothing is missing" if none else "Something is missing"
     tiles = [(found, chance(sure), "probability, before any name is given")]
     for key in ("held_out_percent", "modified_percent", "cross_validated_percent", "used_percent"):
         pair = data["gain"][key]
-        if pair is not None and data["verdict"] != "none":
-            text = f"{percent(pair[0])} → {percent(pair[1])}"
-            tiles.append((f"Error on {GAINS[key]}", text, "median frequency error, before → after"))
+        if pair is not None and not none:
+            text = f"{words.percent(pair[0])} → {words.percent(pair[1])}"
+            title = f"Error on {words.GAINS[key]}"
+            tiles.append((title, text, "median frequency error, before → after"))
             break
-    left, said = adequacy(data)
-    return {
-        "case": data["case"],
-        "verdict": data["verdict"],
-        "mark": MARKS[data["verdict"]],
-        "meaning": MEANINGS[data["verdict"]],
-        "sentence": data["sentence"] or f"The verdict is {data['verdict']}.",
-        "tiles": [*tiles, ("What is left", left, said)],
-        "base": ", ".join(data["base"]),
-    }
-
-
-def _fit(data: Data) -> dict[str, Any]:
-    """Return gains and residuals."""
-    pairs = [(GAINS[key], data["gain"][key]) for key in GAINS if data["gain"][key] is not None]
-    most = max([v for _, pair in pairs for v in pair if v is not None], default=0.0) or 1.0
-    gains = [
-        {
-            "title": title,
-            "bars": [
-                {"kind": kind, "text": percent(value), "width": _width(value, most)}
-                for kind, value in zip(("before", "after"), pair, strict=True)
-            ],
-            "times": times(*pair),
-        }
-        for title, pair in pairs
-    ]
-    panels = [
-        _panel(data, "frequency", "Frequencies"),
-        _panel(data, "shape", "Mode shapes, rms over the sensors"),
-    ]
-    rows = data["residuals"]
-    return {
-        "gains": gains,
-        "panels": [panel for panel in panels if panel],
-        "residuals": [_residual(row) for row in rows[:_MOST_DATA]],
-        "hidden_residuals": max(0, len(rows) - _MOST_DATA),
-        "chi2": [figure(value) for value in data["chi2"]],
-        "data_count": data["data_count"],
-    }
+    return [*tiles, ("What is left", *words.adequacy(data))]
 
 
 def _panel(data: Data, kind: Any, title: str) -> dict[str, Any] | None:  # noqa: ANN401
@@ -147,42 +94,12 @@ def _panel(data: Data, kind: Any, title: str) -> dict[str, Any] | None:  # noqa:
     return {"title": title, "svg": Markup(found), "hidden": max(0, len(dots) - MOST_ROWS)}
 
 
-def _width(value: float | None, most: float) -> str:
-    return "0" if value is None else f"{min(100.0, 100.0 * abs(value) / most):.1f}"
-
-
-def _residual(row: Data) -> list[tuple[str, float | None]]:
-    """Return the cells of a datum: text and what to sort by."""
-    mode = NOTHING if row["mode"] is None else str(row["mode"])
-    return [
-        (mode, row["mode"]),
-        (row["kind"], None),
-        (row["sensor"], None),
-        (figure(row["measured"], 6), row["measured"]),
-        (signed(row["before"]), row["before"]),
-        (signed(row["after"]), row["after"]),
-    ]
-
-
 def _where(data: Data) -> dict[str, Any]:
-    """Return the map of the evidence and the other indicators."""
+    """Return the map of the evidence with its places."""
     spots = strongest_places(data)
     listed = ", ".join(f"{spot.place} {spot.value:.2f}" for spot in spots[:_MOST_TOP])
     says = f"Evidence by place: {listed}." if listed else "No place stands out."
-    indicators = dict.fromkeys(row["indicator"] for row in data["locations"])
-    return {
-        "map": _map(data, "evidence", "map", "Evidence on the structure", says),
-        "spots": [
-            {"place": s.place, "value": f"{s.value:.2f}", "width": _width(s.value, 1.0)}
-            | {"causes": s.causes, "level": s.level}
-            for s in spots
-        ],
-        "indicators": [
-            _indicator(data, name, number)
-            for number, name in enumerate(indicators)
-            if name != "evidence"
-        ],
-    }
+    return {"map": _map(data, "evidence", "map", "Evidence on the structure", says), "spots": spots}
 
 
 def _map(data: Data, indicator: str, name: str, title: str, says: str) -> Markup | None:
@@ -205,66 +122,4 @@ def _indicator(data: Data, name: str, number: int) -> dict[str, Any]:
     rows.sort(key=lambda row: -row[1])
     top = ", ".join(f"{place} {value:.2f}" for place, value in rows[:_MOST_TOP]) or NOTHING
     drawn = _map(data, name, f"where-{number}", f"Indicator {name}", f"Highest: {top}.")
-    return {"name": name, "means": INDICATORS.get(name, ""), "top": top, "svg": drawn}
-
-
-def _explanations(data: Data) -> dict[str, Any]:
-    """Return causes, the group, what would split it, and the rivals."""
-    causes = [
-        {
-            "effect": cause["effect"].replace("-", " "),
-            "slug": cause["effect"],
-            "place": place_at(cause["place"]),
-            "summary": sentence(cause["summary"]),
-            "chance": chance(cause["probability"]),
-            "width": _width(cause["probability"], 1.0),
-            "parameters": parameter_rows(cause),
-        }
-        for cause in data["causes"]
-    ]
-    advice = [
-        {"text": item["measurement"], "size": figure(item["separation"], 3)}
-        | {"odds": odds(item["separation"])}
-        for item in data["advice"][:_MOST_ADVICE]
-    ]
-    rivals = [
-        [
-            (pair_at(rival), None),
-            (chance(rival["probability"]), rival["probability"]),
-            (figure(rival["delta_chi2"]), rival["delta_chi2"]),
-            (NOTHING if rival["angle"] is None else f"{rival['angle']:.1f}", rival["angle"]),
-        ]
-        for rival in data["rivals"]
-    ]
-    return {
-        "causes_title": CAUSES.get(data["verdict"], "Causes"),
-        "causes": causes,
-        "reason": sentence(data["reason"]),
-        "advice": advice,
-        "hidden_advice": max(0, len(data["advice"]) - _MOST_ADVICE),
-        "rivals": rivals,
-    }
-
-
-def _rest(data: Data) -> dict[str, Any]:
-    visible = [
-        [
-            (item["effect"].replace("-", " "), None),
-            (place_at(item["place"]), None),
-            (f"{figure(item['size'], 3)} {item['unit']}".strip() + change(item), item["size"]),
-        ]
-        for item in data["smallest_visible"]
-    ]
-    looks = [
-        {"what": look["what"], "where": place_at(look["where"]), "effect": look["effect"]}
-        | {"changes": look_changes(look)}
-        for look in data["looks"]
-    ]
-    return {
-        "visible": visible,
-        "looks": looks,
-        "notes": data["notes"],
-        "written": data.get("written") or "",
-        "version": data.get("version") or "",
-        "seconds": figure(data["seconds"], 2),
-    }
+    return {"name": name, "top": top, "svg": drawn}

@@ -87,12 +87,17 @@ def place_at(place: str) -> str:
     return "everywhere" if place == "all" else place
 
 
-def pair_at(rival: Data) -> str:
+def pairs_of(rival: Data) -> list[tuple[str, str]]:
     """Return effects and places of a combination, each effect beside its place."""
     effects, places = rival["effect"].split(" + "), rival["place"].split(" + ")
     if len(effects) != len(places):
-        effects, places = [rival["effect"]], [rival["place"]]
-    return " + ".join(map(_at, effects, places))
+        return [(rival["effect"], rival["place"])]
+    return list(zip(effects, places, strict=True))
+
+
+def pair_at(rival: Data) -> str:
+    """Return the effects of a combination, each with its place."""
+    return " + ".join(_at(*pair) for pair in pairs_of(rival))
 
 
 def _at(effect: str, place: str) -> str:
@@ -102,17 +107,10 @@ def _at(effect: str, place: str) -> str:
     return f"{words} at {place}" if place else words
 
 
-def parameter_rows(cause: Data) -> list[dict[str, str]]:
-    """Return name, value with its deviation, and where the value comes from."""
-    rows = []
-    for item in cause["parameters"]:
-        value = estimate(item["value"], item["std"])
-        unit = f" {item['unit']}" if item["unit"] else ""
-        source = "textbook value, not fitted" if item["textbook"] else ""
-        rows.append(
-            {"name": item["name"], "value": f"{value}{unit}{_share(item)}", "source": source}
-        )
-    return rows
+def parameter(item: Data) -> str:
+    """Return the value of a parameter with its deviation."""
+    unit = f" {item['unit']}" if item["unit"] else ""
+    return f"{estimate(item['value'], item['std'])}{unit}{_share(item)}"
 
 
 def _share(item: Data) -> str:
@@ -124,11 +122,16 @@ def _share(item: Data) -> str:
     return f" ({signed(100.0 * value)}{spread} %)"
 
 
-def change(item: Data) -> str:
-    """Return an effect's size in percent where it is a share of something."""
-    if item["wording"] == "value" or item["size"] is None:
-        return ""
-    return f" ({figure(100.0 * item['size'], 2)} %)"
+def size(item: Data) -> str:
+    """Return an effect's size, in percent too where it is a share of something."""
+    text = f"{figure(item['size'], 3)} {item['unit']}".strip()
+    share = item["wording"] != "value" and item["size"] is not None
+    return text + (f" ({figure(100.0 * item['size'], 2)} %)" if share else "")
+
+
+def width(value: float | None, most: float) -> str:
+    """Return the length of a bar in percent of the longest one."""
+    return "0" if value is None else f"{min(100.0, 100.0 * abs(value) / (most or 1.0)):.1f}"
 
 
 def odds(separation: float | None) -> str:

@@ -7,7 +7,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
-from typing import Any
 
 from femubench.reports.cells import NOTHING, fixed, hertz, interval, plain, whole
 from femubench.reports.page.papers import papers_of
@@ -53,10 +52,11 @@ class MarkdownReporter:
     def render(self, run: Run) -> str:
         """Return the report."""
         printed = papers_of(run)
+        notes = [f"- **Note**: {escape(note)}" for note in notes_of(run)]
         sections = [
             f"# Updating strategies compared: run {escape(run.meta.get('run', ''))}",
             table(["", ""], ([title, escape(text)] for title, text in header(run)), "ll"),
-            *_notes(run),
+            *(["\n".join(notes)] if notes else []),
             "## Leaderboard",
             *_leaderboard(run),
             *_FOOTNOTES,
@@ -74,18 +74,11 @@ def escape(text: object) -> str:
     return _SPECIAL.sub(r"\\\1", safe)
 
 
-def table(headers: Sequence[str], rows: Iterable[Sequence[str]], align: str) -> str:
+def table(headers: Sequence[str], rows: Iterable[Iterable[str]], align: str) -> str:
     """Return a table of cells that are escaped already; `align` has an l or r a column."""
     rules = {"l": ":---", "r": "---:"}
     lines = [headers, [rules[side] for side in align], *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
-
-
-def _notes(run: Run) -> Iterator[str]:
-    """Return what was left out and what is missing."""
-    notes = notes_of(run)
-    if notes:
-        yield "\n".join(f"- **Note**: {escape(note)}" for note in notes)
 
 
 def _leaderboard(run: Run) -> Iterator[str]:
@@ -111,7 +104,7 @@ def _leaderboard(run: Run) -> Iterator[str]:
             *(whole(row[key]) for key in ("rigid_modes_lost", "negative_eigenvalues")),
             *(whole(row[key]) for key in ("parameters", "evaluations")),
             fixed(row["seconds"], 3, 7),
-            _share_of_jobs(row),
+            f"{whole(row['ok'])} of {whole(row['total'] - row['not_applicable'])}",
             letters.get(row["strategy"], NOTHING),
         ]
         if several:
@@ -119,11 +112,6 @@ def _leaderboard(run: Run) -> Iterator[str]:
         rows.append(cells)
     yield table(headers, rows, "rl" + "r" * (len(headers) - 3) + "l")
     yield f"**group**: {escape(tested.note)}"
-
-
-def _share_of_jobs(row: Mapping[Any, Any]) -> str:
-    """Return how many jobs gave a model, of those that the strategy applies to."""
-    return f"{whole(row['ok'])} of {whole(row['total'] - row['not_applicable'])}"
 
 
 def _coverage(run: Run) -> Iterator[str]:
@@ -149,14 +137,8 @@ def _coverage(run: Run) -> Iterator[str]:
 
 def _troubles(items: Iterable[Trouble]) -> str:
     rows = (
-        [
-            escape(item.case),
-            escape(item.strategy),
-            " ".join(map(str, item.seeds)),
-            item.status,
-            escape(item.reason),
-        ]
-        for item in items
+        map(escape, (i.case, i.strategy, " ".join(map(str, i.seeds)), i.status, i.reason))
+        for i in items
     )
     return table(["case", "strategy", "seeds", "status", "reason"], rows, "lllll")
 
@@ -201,10 +183,10 @@ def _printed(
     strategy: str, hertz_of: Mapping[int, float], columns: Mapping[tuple[str, int], PairedMode]
 ) -> list[str]:
     """Return the row of a paper, to stand under ours."""
-    modes = (
-        replace(mode, predicted_hz=hertz_of.get(number)) for (_, number), mode in columns.items()
+    cells = (
+        _predicted(replace(mode, predicted_hz=hertz_of[number])) if number in hertz_of else NOTHING
+        for (_, number), mode in columns.items()
     )
-    cells = (NOTHING if mode.predicted_hz is None else _predicted(mode) for mode in modes)
     return [f"*{escape(strategy)}, as the paper prints it*", *cells, NOTHING, NOTHING]
 
 

@@ -88,14 +88,10 @@ def _counts(cells: Sequence[Cell]) -> str:
 
 def _summary(cells: Sequence[Cell]) -> str:
     """Return the counts of a table without those that are zero."""
-    counts = verdict_counts(cells)
-    told = {
-        "agree": counts["agrees"],
-        "agree under a convention": counts["agrees-under"],
-        "do not follow": counts["does-not-follow"],
-    }
+    told = ("agree", "agree under a convention", "do not follow")
     noun = "cell" if len(cells) == 1 else "cells"
-    parts = ", ".join(f"{number} {what}" for what, number in told.items() if number)
+    counts = zip(told, verdict_counts(cells).values(), strict=True)
+    parts = ", ".join(f"{number} {what}" for what, number in counts if number)
     return f"{len(cells)} {noun}: {parts}"
 
 
@@ -142,23 +138,22 @@ def _page(cells: Sequence[Cell], words: Mapping[str, str]) -> Iterator[Block]:
     digits = {
         unit: Digits.of(cell.printed for cell in cells if cell.unit == unit) for unit in units
     }
-    rows = []
-    for cell in cells:
-        own = digits[cell.unit]
-        row = [
+    several = len(units) > 1  # then they have a column
+    rows = [
+        [
             cell.row,
             cell.column,
-            own.printed(cell.printed, cell.unit),
-            own.ours(cell.ours, cell.unit, beside=cell.printed),
+            *([cell.unit] if several else []),
+            digits[cell.unit].printed(cell.printed, cell.unit),
+            digits[cell.unit].ours(cell.ours, cell.unit, beside=cell.printed),
             off(cell.deviation_percent, cell.unit),
             f"{words[cell.verdict]} {marks.get(cell.note, '')}".rstrip(),
         ]
-        rows.append([*row[:2], cell.unit, *row[2:]] if len(units) > 1 else row)
-    titles = ["row", "column", "unit", "printed", "ours", "dev. %", "verdict"]
-    sides = "lllrrrl"
-    if len(units) == 1:
-        titles, sides = [title for title in titles if title != "unit"], "llrrrl"
-    caption = f"{_summary(cells)}{f'; in {units[0]}' if units[0] and len(units) == 1 else ''}."
+        for cell in cells
+    ]
+    titles = ["row", "column", *(["unit"] * several), "printed", "ours", "dev. %", "verdict"]
+    sides = "ll" + "l" * several + "rrrl"
+    caption = f"{_summary(cells)}{f'; in {units[0]}' if units[0] and not several else ''}."
     yield Table(_columns(titles, rows, sides), rows, caption, [cell.verdict for cell in cells])
     if notes:
         yield Items([(marks[note], note) for note in notes], whole=True)
@@ -167,14 +162,13 @@ def _page(cells: Sequence[Cell], words: Mapping[str, str]) -> Iterator[Block]:
 def _extra(extra: Extra) -> Iterator[Block]:
     """Return a table; a column of sentences that the screen has no room for stands below it."""
     columns = list(zip(*extra.rows, strict=True)) or [()] * len(extra.columns)
-    sides = "l" + "".join("r" if _figures(cells) else "l" for cells in columns[1:])
+    figures = (all(not cell or cell[0] in _NUMERIC for cell in cells) for cells in columns[1:])
+    sides = "l" + "".join("r" if numeric else "l" for numeric in figures)
     made = _columns(extra.columns, extra.rows, sides)
     squeezed = [
         place
-        for place, column in enumerate(made)
-        if place
-        and column.width < _SQUEEZED
-        and max(map(len, columns[place]), default=0) >= _SENTENCE
+        for place, (column, cells) in enumerate(zip(made, columns, strict=True))
+        if place and column.width < _SQUEEZED and max(map(len, cells), default=0) >= _SENTENCE
     ]
     kept = [place for place in range(len(made)) if place not in squeezed]
     rows = [[row[place] for place in kept] for row in extra.rows]
@@ -183,10 +177,6 @@ def _extra(extra: Extra) -> Iterator[Block]:
     notes = [(row[0], row[place]) for place in squeezed for row in extra.rows]
     if notes or extra.note:
         yield Items([*notes, *([("Note", extra.note)] if extra.note else [])], whole=True)
-
-
-def _figures(cells: Iterable[str]) -> bool:
-    return all(not cell or cell[0] in _NUMERIC for cell in cells)
 
 
 def _columns(titles: Sequence[str], rows: Sequence[Sequence[str]], sides: str) -> list[Column]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +12,11 @@ from femubench.reports.cells import plain
 from femubench.results import JobResult, PairedMode, Run, frequency_error
 
 FINE = ("ok", "not-applicable")
+_HEADER = (
+    *("run", "started", "seed", "seeds", "jobs", "timeout"),
+    *("versions", "machine", "git_commit"),
+)
+_TITLES = {"jobs": "workers", "timeout": "timeout in s", "git_commit": "git commit"}
 
 
 @dataclass(frozen=True)
@@ -52,11 +58,11 @@ def spared(results: Iterable[JobResult]) -> dict[str, list[str]]:
 
 def unconverged(results: Iterable[JobResult]) -> dict[str, int]:
     """Return how many jobs of a strategy ended with its iteration still moving."""
-    counts: dict[str, int] = {}
-    for result in results:
-        if result.status == "ok" and result.diagnostics.get("converged") == 0.0:
-            counts[result.strategy] = counts.get(result.strategy, 0) + 1
-    return counts
+    return Counter(
+        result.strategy
+        for result in results
+        if result.status == "ok" and result.diagnostics.get("converged") == 0.0
+    )
 
 
 def first_seed(run: Run) -> int:
@@ -109,20 +115,9 @@ def _modified(result: JobResult) -> dict[str, list[PairedMode]]:
 def header(run: Run) -> Iterator[tuple[str, str]]:
     """Return what a reader needs to repeat a run: seeds, versions, machine."""
     meta = run.meta
-    titles = {
-        "run": "run",
-        "started": "started",
-        "seed": "seed",
-        "seeds": "seeds",
-        "jobs": "workers",
-        "timeout": "timeout in s",
-        "versions": "versions",
-        "machine": "machine",
-        "git_commit": "git commit",
-    }
-    for key, title in titles.items():
+    for key in _HEADER:
         if meta.get(key) not in (None, "", []):
-            yield title, _spoken(meta[key])
+            yield _TITLES.get(key, key), _spoken(meta[key])
 
 
 def _spoken(value: Any) -> str:  # noqa: ANN401 - plain data of any kind

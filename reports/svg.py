@@ -45,23 +45,15 @@ def _clean(element: ElementTree.Element, prefix: str) -> None:
             element.remove(child)
         else:
             _clean(child, prefix)
-    kept = {
-        name: value
-        for name, value in element.attrib.items()
-        if not _local(name).startswith("on") and _stays(name, value)
-    }
+    kept = _prefixed(element.attrib, prefix)
     element.attrib.clear()
-    element.attrib.update(_prefixed(kept, prefix))
+    element.attrib.update(kept)
     if element.text and _local(element.tag) == "style":
         element.text = _REFERENCE.sub("none", element.text).replace("@import", "")
 
 
-def _stays(name: str, value: str) -> bool:
-    return _local(name) != "href" or value.startswith(("#", _PICTURE))
-
-
 def _prefixed(attributes: Mapping[str, str], prefix: str) -> dict[str, str]:
-    """Return attributes whose ids, and whose references to ids, are those of this drawing."""
+    """Return what runs and fetches nothing, with ids, and references to ids, of this drawing."""
 
     def renamed(match: re.Match[str]) -> str:
         target = match[1]
@@ -69,11 +61,14 @@ def _prefixed(attributes: Mapping[str, str], prefix: str) -> dict[str, str]:
 
     found = {}
     for name, value in attributes.items():
+        local = _local(name)
+        if local.startswith("on") or (local == "href" and not value.startswith(("#", _PICTURE))):
+            continue
         if name == "id":
             found[name] = f"{prefix}-{value}"
         elif name in _ID_LISTS:
             found[name] = " ".join(f"{prefix}-{word}" for word in value.split())
-        elif _local(name) == "href" and value.startswith("#"):
+        elif local == "href" and value.startswith("#"):
             found[name] = f"#{prefix}-{value[1:]}"
         else:
             found[name] = _REFERENCE.sub(renamed, value)

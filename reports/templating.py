@@ -1,27 +1,59 @@
-"""The room in which templates of pages become text; whatever comes from data is escaped."""
+"""How templates become pages: what comes from data is one line and escaped, our files stay."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import base64
+import hashlib
+from functools import cache
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+from femubench.reports.cells import fixed, plain, shortened
 
 if TYPE_CHECKING:
-    from jinja2 import Environment
+    from jinja2 import Environment, Template
 
 
-def templates(folder: str, **options: Any) -> Environment:  # noqa: ANN401 - jinja2's own
-    """Return the templates of a folder of this package.
-
-    Arguments:
-        folder: below `femubench.reports`.
-        options: further ones of `jinja2.Environment`.
-    """
+@cache
+def templates(folder: str = "page/assets") -> Environment:
+    """Return the templates of a folder below `femubench.reports`."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
-    return Environment(
+    room = Environment(
         loader=PackageLoader("femubench.reports", folder),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
-        **options,
+        finalize=_one_line,
     )
+    room.filters.update(fixed=fixed, plain=plain, shortened=shortened)
+    return room
+
+
+@cache
+def site_page(name: str) -> Template:
+    """Return a template of `bench compare` or `bench publish`, with its style, script, policy."""
+    from markupsafe import Markup
+
+    style, script = asset("site.css"), asset("site.js")
+    # Nothing but this very style and this very script may take effect, whatever a name smuggles in.
+    policy = f"default-src 'none'; base-uri 'none'; form-action 'none'; style-src {_hash(style)}"
+    shared = {"style": style, "script": script, "policy": policy}
+    shared["script_policy"] = f"{policy}; script-src {_hash(script)}"
+    return templates().get_template(name, globals={k: Markup(v) for k, v in shared.items()})
+
+
+def asset(name: str) -> str:
+    """Return the text of a file beside the templates of pages."""
+    path = files("femubench.reports").joinpath("page", "assets", name)
+    return path.read_text(encoding="utf-8")
+
+
+def _one_line(value: object) -> object:
+    return value if hasattr(value, "__html__") else plain(value)
+
+
+def _hash(text: str) -> str:
+    digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+    return f"'sha256-{digest}'"

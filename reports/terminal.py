@@ -53,32 +53,23 @@ def ranking(board: pd.DataFrame) -> str:
 
 def intervals(board: pd.DataFrame) -> str:
     """Return median and 95 % interval of the skill over the seeds."""
+    found = board[["strategy", "skill", "skill_low", "skill_high"]].itertuples(index=False)
     rows = [
-        [
-            shortened(plain(row["strategy"]), _NAME_WIDTH),
-            fixed(row["skill"], 3),
-            interval(row["skill_low"], row["skill_high"]),
-        ]
-        for row in board.to_dict("records")
+        [shortened(plain(name), _NAME_WIDTH), fixed(skill, 3), interval(low, high)]
+        for name, skill, low, high in found
     ]
-    return aligned_table(
-        rows, ("strategy", "median skill", "95 % interval"), ("left", "right", "left")
-    )
+    heads = ("strategy", "median skill", "95 % interval")
+    return aligned_table(rows, heads, ("left", "right", "left"))
 
 
 def failures(failed: list[Trouble]) -> str:
     """Return a table of the failures with their reasons, the first ones where there are many."""
     from tabulate import tabulate
 
-    rows = [
-        (
-            plain(item.case),
-            plain(item.strategy),
-            item.status + (f" x{len(item.seeds)}" if len(item.seeds) > 1 else ""),
-            item.reason,
-        )
-        for item in failed[:_MOST_FAILURES]
-    ]
+    rows = []
+    for item in failed[:_MOST_FAILURES]:
+        often = f" x{len(item.seeds)}" if len(item.seeds) > 1 else ""
+        rows.append((plain(item.case), plain(item.strategy), item.status + often, item.reason))
     headers = ("case", "strategy", "status", "reason")
     # tabulate pads a header by two; columns are two apart.
     columns = zip(*([f"{header}  " for header in headers], *rows), strict=True)

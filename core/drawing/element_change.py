@@ -61,9 +61,7 @@ def relative_changes(
     if np.nanmax(found, initial=0.0) > _NOTHING * size.max() or _as_assembled(updated):
         return _ratios(found, size, rows)
     change = _from_family(structure, parameters)
-    if change is None:
-        return None
-    return _ratios(element_norms(structure, change), size, rows)
+    return None if change is None else _ratios(element_norms(structure, change), size, rows)
 
 
 def _ratios(change: FloatArray, size: FloatArray, rows: Sequence[int | None]) -> list[float | None]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -102,12 +103,13 @@ def _place(wireframe: Wireframe, frame: Frame | None, word: str) -> DrawnPlace:
         return DrawnPlace(word, "joint", points=_points(frame, joints))
     if frame is None or plain.kind in ("all", "member", "element"):
         return plain
-    readers: tuple[Callable[[Frame, str, str], DrawnPlace], ...] = (_ends, _at, _pair)
-    for reader in readers:
-        try:
-            return reader(frame, word, head)
-        except ModelError:
-            continue
+    with suppress(ModelError):
+        return DrawnPlace(word, "end", _ends(frame, head))
+    with suppress(ModelError):
+        at = to_point(place_xyz(frame, point_of(frame, head)))
+        return DrawnPlace(word, "point", points=(at,))
+    with suppress(ModelError):
+        return DrawnPlace(word, "pair", points=_points(frame, pair_of(frame, head)))
     return plain
 
 
@@ -115,19 +117,11 @@ def _points(frame: Frame, joints: Iterable[str]) -> tuple[Point, ...]:
     return tuple(to_point(place_xyz(frame, Place(joint=name))) for name in joints)
 
 
-def _ends(frame: Frame, word: str, head: str) -> DrawnPlace:
+def _ends(frame: Frame, head: str) -> tuple[Span, ...]:
     spans = []
     for end in ends_of(frame, head):
         name, _, joint = end.rpartition("@")
         member = frame.member_index[name]
         first = frame.members[member].ends[0] == joint
         spans.append(Span(member, *((0.0, _END) if first else (1.0 - _END, 1.0))))
-    return DrawnPlace(word, "end", tuple(spans))
-
-
-def _at(frame: Frame, word: str, head: str) -> DrawnPlace:
-    return DrawnPlace(word, "point", points=(to_point(place_xyz(frame, point_of(frame, head))),))
-
-
-def _pair(frame: Frame, word: str, head: str) -> DrawnPlace:
-    return DrawnPlace(word, "pair", points=_points(frame, pair_of(frame, head)))
+    return tuple(spans)

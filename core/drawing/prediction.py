@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -162,20 +161,16 @@ def receptances(case: Case, model: Model, sensor: str | None = None) -> dict[str
     drive = _drive(case, sensor)
     if drive is None:
         return {}
-    return {
-        name: _decibels(case, changed, modes_of(changed), drive)
-        for name, changed, _ in _structures(case, model)
-    }
+    hz, damping = frequency_axis(case), damping_of(case)
+    found = {}
+    for name, changed, _ in _structures(case, model):
+        row = changed.observe(drive)
+        found[name] = _decibels(receptance(modes_of(changed), row, row, hz, damping))
+    return found
 
 
-def _decibels(case: Case, model: Model, modes: Modes, drive: Sensors) -> list[float]:
-    row = model.observe(drive)
-    values = receptance(modes, row, row, frequency_axis(case), damping_of(case))[:, 0, 0]
-    return _level(values)
-
-
-def _level(values: FloatArray) -> list[float]:
-    levels = 20.0 * np.log10(np.maximum(np.abs(values), 1e-300))
+def _decibels(values: FloatArray) -> list[float]:
+    levels = 20.0 * np.log10(np.maximum(np.abs(values[:, 0, 0]), 1e-300))
     return [round(float(level), 1) for level in levels]
 
 
@@ -188,11 +183,12 @@ def measured_receptances(case: Case, sensor: str | None = None) -> dict[str, Any
     drive = _drive(case, sensor)
     if drive is None:
         return {}
-    measured: dict[str, list[float] | None] = {}
+    measured: dict[str, list[float]] = {}
     alone: list[str] = []
     for name, changed, data in _structures(case, case.model):
         _, at_sensors, pairing = paired_with(changed, data)
-        measured[name] = _stand_in(case, changed, data, drive, pairing, at_sensors)
+        if drive.labels[0] in data.sensors.labels and (pairing.index >= 0).any():
+            measured[name] = _stand_in(case, changed, data, drive, pairing, at_sensors)
         if not name:
             pairs = zip(data.numbers, pairing.index, strict=True)
             alone = [str(number) for number, k in pairs if k < 0]
@@ -205,7 +201,7 @@ def measured_receptances(case: Case, sensor: str | None = None) -> dict[str, Any
     return {
         "hz": rounded(frequency_axis(case)),
         "damping": damping_of(case),
-        "measured": {name: level for name, level in measured.items() if level is not None},
+        "measured": measured,
         "note": note,
     }
 
@@ -217,15 +213,12 @@ def _stand_in(
     drive: Sensors,
     pairing: Pairing,
     at_sensors: FloatArray,
-) -> list[float] | None:
+) -> list[float]:
     modes = modes_of(nominal)
     elastic = np.flatnonzero(~modes.rigid)
     readings = np.asarray(nominal.observe(drive) @ modes.shapes)[0]
     eigenvalues = modes.eigenvalues.copy()
-    known = data.sensors.labels
-    row = known.index(drive.labels[0]) if drive.labels[0] in known else -1
-    if row < 0 or not (pairing.index >= 0).any():
-        return None
+    row = data.sensors.labels.index(drive.labels[0])
     for k, partner in enumerate(pairing.index):
         shape = data.shapes[:, k]
         if partner < 0 or not np.isfinite(shape[row]):
@@ -236,8 +229,7 @@ def _stand_in(
         readings[own] = float(np.real(scale).item()) * shape[row]
         eigenvalues[own] = data.eigenvalues[k]
     seen = readings[None]
-    values = modal_sum(eigenvalues, seen, seen, frequency_axis(case), damping_of(case))
-    return _level(values[:, 0, 0])
+    return _decibels(modal_sum(eigenvalues, seen, seen, frequency_axis(case), damping_of(case)))
 
 
 def rounded(values: Any) -> Any:  # noqa: ANN401 - arrays of any shape
@@ -322,7 +314,7 @@ def _unit(shape: FloatArray) -> FloatArray:
 
 def highest_measured(case: Case) -> float:
     """Return the highest measured frequency in Hz, of the structure as tested and modified."""
-    found = chain.from_iterable(data.frequencies for _, _, data in measured_blocks(case))
+    found = (hz for *_, data in measured_blocks(case) for hz in data.frequencies)
     return float(max(found, default=0.0))
 
 

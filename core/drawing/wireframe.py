@@ -198,14 +198,13 @@ def to_point(xyz: Iterable[float]) -> Point:
 
 
 def _sensors(sensors: Sensors) -> tuple[DrawnSensor, ...]:
-    rows = zip(sensors.labels, sensors.xyz, sensors.axes, sensors.directions, strict=True)
-    return tuple(
-        DrawnSensor(
-            label, to_point(xyz), direction, to_point(axes[3:] if turn else axes[:3]), rotation=turn
-        )
-        for label, xyz, axes, direction in rows
-        for turn in ("r" in direction,)
-    )
+    rows = zip(sensors.labels, sensors.xyz, sensors.directions, sensors.axes, strict=True)
+    drawn = []
+    for label, xyz, direction, axes in rows:
+        turns = "r" in direction
+        axis = to_point(axes[3:] if turns else axes[:3])
+        drawn.append(DrawnSensor(label, to_point(xyz), direction, axis, turns))
+    return tuple(drawn)
 
 
 def _of_frame(
@@ -242,7 +241,7 @@ def _of_frame(
             for spring in frame.springs
         ),
         nodes=tuple(nodes),
-        elements=tuple((int(kept[mesh.ends[k, 0]]), int(kept[mesh.ends[k, 1]])) for k in rows),
-        element_labels=tuple(structure.labels[k] for k in rows),
-        member_of=tuple(int(mesh.member[k]) for k in rows),
+        elements=tuple((int(kept[i]), int(kept[j])) for i, j in mesh.ends[: len(rows)]),
+        element_labels=tuple(structure.labels[: len(rows)]),
+        member_of=tuple(mesh.member[: len(rows)].tolist()),
     )

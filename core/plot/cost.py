@@ -55,11 +55,9 @@ def error_against_cost(run: Run, *, error: str = "skill", ax: Axes | None = None
             markerfacecolor="none" if flag else BLUE, markeredgecolor=BEFORE if flag else BLUE,
             markeredgewidth=1.5, label="unphysical" if flag else "physical",
         )  # fmt: skip
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    ax.margins(0.16)
+    ax.set(xscale="log", yscale="log", ylabel=_LABELS[error])
     ax.set_xlabel("wall time of the strategy, s (median over cases)")
-    ax.set_ylabel(_LABELS[error])
+    ax.margins(0.16)
     ax.grid(color="0.88", linewidth=0.6)
     ax.set_axisbelow(True)
     place_names(ax, kept[["seconds", error]].to_numpy(float), list(kept["strategy"]), color=INK)

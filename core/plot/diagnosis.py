@@ -227,10 +227,11 @@ def strongest_places(diagnosis: Diagnosis | Data, indicator: str = "evidence") -
         indicator: ``evidence``, or one of the classical indicators.
     """
     data = _data(diagnosis)
-    values: dict[str, float] = {}
-    for row in data["locations"]:
-        if row["indicator"] == indicator:
-            values[row["place"]] = min(1.0, max(0.0, row["value"] or 0.0))
+    values = {
+        row["place"]: min(1.0, max(0.0, row["value"] or 0.0))
+        for row in data["locations"]
+        if row["indicator"] == indicator
+    }
     ranked = sorted(values, key=lambda place: -values[place])
     if indicator != "evidence":
         known = [Spot(place, values[place]) for place in ranked if values[place] >= _LEAST]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import partial
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from femubench.core.plot.style import (
     PURPLE,
     SKY,
     SOFT,
-    curve_style,
+    draw_curves,
     figure_of,
 )
 from femubench.core.plot.svg import svg
@@ -58,28 +58,51 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Curves:
-    """Lines over one pair of axes.
+class Figure(ABC):
+    """What every figure has.
 
     Arguments:
         name: slug, the stem of the file.
         title, caption: a line, and what it shows and where it comes from.
-        x_label, y_label: with units.
-        curves: the lines.
-        log_y: whether the y axis is logarithmic.
     """
 
     name: str
     title: str
     caption: str
+
+    @abstractmethod
+    def draw(self, ax: Axes) -> None:
+        """Draw on axes and size their figure."""
+
+
+@dataclass(frozen=True)
+class Curves(Figure):
+    """Lines over one pair of axes.
+
+    Arguments:
+        x_label, y_label: with units.
+        curves: the lines.
+        log_y: whether the y axis is logarithmic.
+    """
+
     x_label: str
     y_label: str
     curves: tuple[Curve, ...]
     log_y: bool = False
 
+    def draw(self, ax: Axes) -> None:
+        """Draw on axes and size their figure."""
+        figure_of(ax).set_size_inches(WIDTH, 4.4)
+        draw_curves(ax, ((curve.label, curve.role, curve.x, curve.y) for curve in self.curves))
+        if self.log_y:
+            ax.set_yscale("log")
+        ax.set(xlabel=self.x_label, ylabel=self.y_label)
+        columns = min(len(self.curves), 3)
+        figure_of(ax).legend(loc="outside lower center", ncols=columns, handlelength=3.6)
+
 
 @dataclass(frozen=True)
-class MatrixImage:
+class MatrixImage(Figure):
     """Size of the entries of a matrix.
 
     Arguments:
@@ -88,18 +111,39 @@ class MatrixImage:
         separators: indices before which a thin line is drawn, e.g. where a member ends.
     """
 
-    name: str
-    title: str
-    caption: str
     matrix: FloatArray
     row_label: str
     column_label: str
     value_label: str
     separators: tuple[int, ...] = ()
 
+    def draw(self, ax: Axes) -> None:
+        """Draw on axes and size their figure."""
+        from matplotlib.colors import LogNorm
+        from matplotlib.ticker import FuncFormatter
+
+        rows, columns = self.matrix.shape
+        figure_of(ax).set_size_inches(WIDTH, min(9.0, 1.1 + 5.3 * rows / columns))
+        size = np.abs(self.matrix)
+        top = float(size.max()) or 1.0
+        image = ax.imshow(
+            np.ma.masked_less_equal(size, 0.0),
+            norm=LogNorm(top / 10.0**_DECADES, top),
+            cmap="Blues",
+            interpolation="nearest",
+            extent=(0.5, columns + 0.5, rows + 0.5, 0.5),
+        )
+        for index in self.separators:
+            ax.axhline(index + 0.5, color="black", linewidth=0.5)
+            ax.axvline(index + 0.5, color="black", linewidth=0.5)
+        ax.set(xlabel=self.column_label, ylabel=self.row_label)
+        beside = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
+        bar = figure_of(ax).colorbar(image, cax=beside, extend="min", format=FuncFormatter(_power))
+        bar.set_label(self.value_label)
+
 
 @dataclass(frozen=True)
-class StructureMap:
+class StructureMap(Figure):
     """A value for every element, drawn on the structure.
 
     Arguments:
@@ -108,16 +152,19 @@ class StructureMap:
         value_label: with unit.
     """
 
-    name: str
-    title: str
-    caption: str
     structure: Wireframe
     values: FloatArray
     value_label: str
 
+    def draw(self, ax: Axes) -> None:
+        """Draw on axes and size their figure."""
+        draw_element_values(ax, self.structure, self.values, self.value_label)
+        wide, tall = np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())
+        figure_of(ax).set_size_inches(WIDTH, min(8.0, max(3.2, 1.7 + 6.0 * tall / wide)))
+
 
 @dataclass(frozen=True)
-class Bars:
+class Bars(Figure):
     """Groups of bars.
 
     Arguments:
@@ -127,17 +174,46 @@ class Bars:
         lines: horizontal marks, label and value.
     """
 
-    name: str
-    title: str
-    caption: str
     groups: tuple[str, ...]
     series: tuple[tuple[str, tuple[float, ...]], ...]
     group_label: str
     value_label: str
     lines: tuple[tuple[str, float], ...] = ()
 
+    def draw(self, ax: Axes) -> None:
+        """Draw on axes and size their figure."""
+        figure_of(ax).set_size_inches(WIDTH, 4.6)
+        count = len(self.series)
+        width = 0.86 / count
+        where: FloatArray = np.arange(len(self.groups), dtype=float)
+        for rank, (label, values) in enumerate(self.series):
+            colour, hatch = _FILLS[rank % len(_FILLS)]
+            place = where + (rank - 0.5 * (count - 1)) * width
+            bars = ax.bar(
+                place, values, 0.92 * width,
+                label=label, color=colour, hatch=hatch, edgecolor="black", linewidth=0.8,
+            )  # fmt: skip
+            texts = [f"{value:.1f}".replace("-", "−") for value in values]
+            if count * len(self.groups) <= _MOST_LABELLED:
+                ax.bar_label(bars, texts, padding=2.0, fontsize=9.0)
+        for rank, (label, value) in enumerate(self.lines):
+            style = ("--", ":", "-.")[rank % 3]
+            ax.axhline(value, color=SOFT, linewidth=1.2, linestyle=style, label=label, zorder=0)
+        ax.axhline(0.0, color="black", linewidth=0.8)
+        ax.set_xticks(where, list(self.groups))
+        ax.set(xlabel=self.group_label, ylabel=self.value_label)
+        ax.margins(x=0.01, y=0.1)
+        handles, labels = ax.get_legend_handles_labels()
+        order = [*range(len(self.lines), len(labels)), *range(len(self.lines))]
+        figure_of(ax).legend(
+            [handles[i] for i in order], [labels[i] for i in order],
+            loc="outside lower center", ncols=2,
+        )  # fmt: skip
 
-Figure = Curves | MatrixImage | StructureMap | Bars
+
+def _power(value: float, position: int | None) -> str:
+    exponent = round(np.log10(value))
+    return "10" + str(exponent).translate(_RAISED)
 
 
 def drawn(figure: Figure) -> str:
@@ -156,99 +232,6 @@ def draw_figure(figure: Figure, ax: Axes) -> None:
     Arguments:
         figure: what it shows.
     """
-    painters: dict[type, Callable[[Any, Axes], None]] = {
-        Curves: _curves,
-        MatrixImage: _matrix,
-        StructureMap: _structure,
-        Bars: _bars,
-    }
     title = fill(figure.title, _TITLE)
     figure_of(ax).suptitle(title, x=0.01, ha="left", fontsize=11.0, parse_math=False)
-    painters[type(figure)](figure, ax)
-
-
-def _curves(figure: Curves, ax: Axes) -> None:
-    figure_of(ax).set_size_inches(WIDTH, 4.4)
-    seen: dict[str, int] = {}
-    for curve in figure.curves:
-        rank = seen.setdefault(curve.role, 0)
-        seen[curve.role] += 1
-        style = curve_style(curve.role, rank, len(curve.x))
-        ax.plot(curve.x, curve.y, label=curve.label, **style)
-    if figure.log_y:
-        ax.set_yscale("log")
-    ax.set_xlabel(figure.x_label)
-    ax.set_ylabel(figure.y_label)
-    ax.margins(x=0.01)
-    ax.grid(color="0.88", linewidth=0.6)
-    columns = min(len(figure.curves), 3)
-    figure_of(ax).legend(loc="outside lower center", ncols=columns, handlelength=3.6)
-
-
-def _structure(figure: StructureMap, ax: Axes) -> None:
-    draw_element_values(ax, figure.structure, figure.values, figure.value_label)
-    wide, tall = np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())
-    figure_of(ax).set_size_inches(WIDTH, min(8.0, max(3.2, 1.7 + 6.0 * tall / wide)))
-
-
-def _matrix(figure: MatrixImage, ax: Axes) -> None:
-    from matplotlib.colors import LogNorm
-    from matplotlib.ticker import FuncFormatter
-
-    rows, columns = figure.matrix.shape
-    figure_of(ax).set_size_inches(WIDTH, min(9.0, 1.1 + 5.3 * rows / columns))
-    size = np.abs(figure.matrix)
-    top = float(size.max()) or 1.0
-    image = ax.imshow(
-        np.ma.masked_less_equal(size, 0.0),
-        norm=LogNorm(top / 10.0**_DECADES, top),
-        cmap="Blues",
-        interpolation="nearest",
-        extent=(0.5, columns + 0.5, rows + 0.5, 0.5),
-    )
-    for index in figure.separators:
-        ax.axhline(index + 0.5, color="black", linewidth=0.5)
-        ax.axvline(index + 0.5, color="black", linewidth=0.5)
-    ax.set_xlabel(figure.column_label)
-    ax.set_ylabel(figure.row_label)
-    beside = ax.inset_axes((1.03, 0.0, 0.035, 1.0))
-    bar = figure_of(ax).colorbar(image, cax=beside, extend="min", format=FuncFormatter(_power))
-    bar.set_label(figure.value_label)
-
-
-def _power(value: float, position: int | None) -> str:
-    exponent = round(np.log10(value))
-    return "10" + str(exponent).translate(_RAISED)
-
-
-def _bars(figure: Bars, ax: Axes) -> None:
-    figure_of(ax).set_size_inches(WIDTH, 4.6)
-    count = len(figure.series)
-    width = 0.86 / count
-    where: FloatArray = np.arange(len(figure.groups), dtype=float)
-    for rank, (label, values) in enumerate(figure.series):
-        colour, hatch = _FILLS[rank % len(_FILLS)]
-        place = where + (rank - 0.5 * (count - 1)) * width
-        bars = ax.bar(
-            place, values, 0.92 * width,
-            label=label, color=colour, hatch=hatch, edgecolor="black", linewidth=0.8,
-        )  # fmt: skip
-        texts = [f"{value:.1f}".replace("-", "−") for value in values]
-        if count * len(figure.groups) <= _MOST_LABELLED:
-            ax.bar_label(bars, texts, padding=2.0, fontsize=9.0)
-    for rank, (label, value) in enumerate(figure.lines):
-        style = ("--", ":", "-.")[rank % 3]
-        ax.axhline(value, color=SOFT, linewidth=1.2, linestyle=style, label=label, zorder=0)
-    ax.axhline(0.0, color="black", linewidth=0.8)
-    ax.set_xticks(where, list(figure.groups))
-    ax.set_xlabel(figure.group_label)
-    ax.set_ylabel(figure.value_label)
-    ax.margins(x=0.01, y=0.1)
-    handles, labels = ax.get_legend_handles_labels()
-    order = [*range(len(figure.lines), len(labels)), *range(len(figure.lines))]
-    figure_of(ax).legend(
-        [handles[i] for i in order],
-        [labels[i] for i in order],
-        loc="outside lower center",
-        ncols=2,
-    )
+    figure.draw(ax)

@@ -75,8 +75,7 @@ def mac(
     ax.imshow(values, vmin=0.0, vmax=1.0, cmap="Blues", aspect="auto", interpolation="nearest")
     ax.set_xticks(range(len(names)), names, rotation=90 if max(map(len, names)) > 4 else 0)
     ax.set_yticks(range(len(row_names)), row_names)
-    ax.set_xlabel(label)
-    ax.set_ylabel(row_label)
+    ax.set(xlabel=label, ylabel=row_label)
     ax.set_title("MAC", fontsize=10.0)
     if values.size <= _MOST_NUMBERED:
         for (i, j), value in np.ndenumerate(values):

@@ -14,7 +14,7 @@ from femubench.core.drawing.prediction import (
 )
 from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
-from femubench.core.plot.style import check_kind, curve_style, name_of, own_axes
+from femubench.core.plot.style import check_kind, draw_curves, name_of, own_axes
 from femubench.core.update.strategy import UpdateResult
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def receptance(
     """
     check_kind(case, (Case,), "receptance")
     label = _sensor(case, sensor)
-    known = {change.name: change.name for change in case.modifications}
+    known = [change.name for change in case.modifications]
     if modification is not None and modification not in known:
         expected = ", ".join(known) or "none: the case has no modifications"
         raise InputError(f"there is no modification {modification!r}", expected=expected)
@@ -60,27 +60,19 @@ def receptance(
     for name, item in named.items():
         check_kind(item, (Model, UpdateResult), "receptance")
         model = item.model if isinstance(item, UpdateResult) else item
-        curves.append((name, "predicted", receptances(case, model, label)[change]))
+        curves.append((name_of(name), "predicted", receptances(case, model, label)[change]))
     ax = own_axes(ax, (7.0, 4.0))
     hz = frequency_axis(case)
-    for k, (name, role, levels) in enumerate(curves):
-        rank = sum(other == role for _, other, _ in curves[:k])
-        ax.plot(hz, levels, label=name_of(name), **curve_style(role, rank, len(hz)))
-    ax.set_xlabel("frequency, Hz")
-    ax.set_ylabel(f"receptance at {name_of(label)}, dB re 1 m/N")
-    ax.margins(x=0.01)
-    ax.grid(color="0.88", linewidth=0.6)
+    draw_curves(ax, ((name, role, hz, levels) for name, role, levels in curves))
+    ax.set(xlabel="frequency, Hz", ylabel=f"receptance at {name_of(label)}, dB re 1 m/N")
     ax.legend(fontsize=8.5, handlelength=3.6)
     return ax
 
 
 def _sensor(case: Case, sensor: str | None) -> str:
     sensors = case.measurement.sensors
-    moving = [
-        label
-        for label, name in zip(sensors.labels, sensors.directions, strict=True)
-        if "r" not in name
-    ]
+    pairs = zip(sensors.labels, sensors.directions, strict=True)
+    moving = [label for label, direction in pairs if "r" not in direction]
     if sensor is not None and sensor not in moving:
         expected = f"one of {', '.join(moving)}"
         raise InputError(f"there is no displacement sensor {sensor!r}", expected=expected)

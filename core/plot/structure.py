@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 _TURN, _TILT = math.radians(-52.0), math.radians(24.0)
 _MOST_NAMES, _MOST_SENSORS = 30, 400
+_TRIANGLE: Any = [(0, 0), (-0.6, -1), (0.6, -1), (0, 0)]
+_ZIGZAG: Any = [(0, 0), (0, -0.3), (0.4, -0.5), (-0.4, -0.7), (0, -0.9), (0, -1.2)]
 _PLANES = {"in-plane": (0, 2), "out-of-plane": (0, 1)}
 
 
@@ -95,8 +97,7 @@ def frame_axes(
     ax.set_aspect("equal")
     ax.spines[["top", "right"]].set_visible(False)
     if view.names is not None and scales:
-        ax.set_xlabel(f"{view.names[0]}, m")
-        ax.set_ylabel(f"{view.names[1]}, m")
+        ax.set(xlabel=f"{view.names[0]}, m", ylabel=f"{view.names[1]}, m")
         return
     ax.set_axis_off()
     if not directions:
@@ -153,32 +154,23 @@ def draw_structure(
     dot: dict[str, Any] = {"linestyle": "none", "markeredgecolor": PAGE, "markeredgewidth": 0.6}
     size = 4.5 if wireframe.members else 6.0
     ax.plot(*joints.T, marker="o", markersize=size, markerfacecolor=MEMBER, **dot)
-    shown: list[tuple[str, Any, str]] = [
-        (f"held: {', '.join(support.fixed)}", support.xyz, "support")
-        for support in wireframe.supports
-    ]
+    shown = [(f"held: {', '.join(s.fixed)}", s.xyz, _TRIANGLE) for s in wireframe.supports]
     if attached:
-        shown += [(f"mass {mass.kg:.3g} kg", mass.xyz, "mass") for mass in wireframe.masses]
-        shown += [(f"spring {s.stiffness:.3g}", s.xyz, "spring") for s in wireframe.springs]
-    marks: dict[str, dict[str, Any]] = {
-        "support": {"marker": [(0, 0), (-0.6, -1), (0.6, -1), (0, 0)], "markersize": 12},
-        "mass": {"marker": "s", "markersize": 6, "markerfacecolor": INK},
-        "spring": {"marker": [(0, 0), (0, -0.3), (0.4, -0.5), (-0.4, -0.7), (0, -0.9), (0, -1.2)]},
-    }
-    for k, (said, xyz, kind) in enumerate(shown):
-        mark = {"markerfacecolor": "none", "markersize": 12, **marks[kind]}
+        shown += [(f"mass {mass.kg:.3g} kg", mass.xyz, "s") for mass in wireframe.masses]
+        shown += [(f"spring {s.stiffness:.3g}", s.xyz, _ZIGZAG) for s in wireframe.springs]
+    for k, (said, xyz, mark) in enumerate(shown):
         x, y = view.flat(xyz)
+        small, face = (6, INK) if mark == "s" else (12, "none")
         ax.plot(
-            [x], [y], linestyle="none", markeredgecolor=SOFT, markeredgewidth=1.1,
-            label=f"_{said}", gid=f"attached-{k}", **mark,
+            [x], [y], linestyle="none", marker=mark, markersize=small, markerfacecolor=face,
+            markeredgecolor=SOFT, markeredgewidth=1.1, label=f"_{said}", gid=f"attached-{k}",
         )  # fmt: skip
 
 
 def draw_sensors(ax: Axes, wireframe: Wireframe, view: View) -> None:
     """Draw a triangle at every sensor, where there are few enough to tell them apart."""
-    for k, sensor in enumerate(wireframe.sensors[: _MOST_SENSORS + 1]):
-        if len(wireframe.sensors) > _MOST_SENSORS:
-            return
+    few = len(wireframe.sensors) <= _MOST_SENSORS
+    for k, sensor in enumerate(wireframe.sensors if few else ()):
         x, y = view.flat(sensor.xyz)
         ax.plot(
             [x], [y], linestyle="none", marker="^", markersize=5.5, markerfacecolor=SOFT,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -37,20 +38,13 @@ STYLES: dict[str, dict[str, Any]] = {
 _COLOURS = (VERMILLION, GREEN, PURPLE, ORANGE, SKY, BLUE)
 _MARKERS = ("", "o", "s", "^", "D", "v")
 _SETTINGS: dict[str, Any] = {
-    "font.size": 10.0,
-    "axes.labelsize": 10.0,
-    "xtick.labelsize": 9.5,
-    "ytick.labelsize": 9.5,
-    "legend.fontsize": 9.5,
+    **dict.fromkeys(("font.size", "axes.labelsize"), 10.0),
+    **dict.fromkeys(("xtick.labelsize", "ytick.labelsize", "legend.fontsize"), 9.5),
+    **dict.fromkeys(("text.color", "axes.labelcolor"), INK),
+    **dict.fromkeys(("xtick.labelcolor", "ytick.labelcolor"), INK),
+    **dict.fromkeys(("axes.edgecolor", "xtick.color", "ytick.color"), SOFT),
     "font.family": ["DejaVu Sans"],
     "text.parse_math": False,
-    "text.color": INK,
-    "axes.labelcolor": INK,
-    "axes.edgecolor": SOFT,
-    "xtick.color": SOFT,
-    "ytick.color": SOFT,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
     "axes.unicode_minus": True,
     "svg.fonttype": "none",
     "hatch.linewidth": 0.7,
@@ -132,6 +126,20 @@ def curve_style(role: str, rank: int, points: int) -> dict[str, Any]:
         style["marker"], style["markersize"] = _MARKERS[rank % len(_MARKERS)], 4.5
         style["markevery"] = max(1, points // 12)
     return style
+
+
+def draw_curves(ax: Axes, curves: Iterable[tuple[str, str, Any, Any]]) -> None:
+    """Draw curves over a grid.
+
+    Arguments:
+        curves: label, role, x and y of each.
+    """
+    ranks: Counter[str] = Counter()
+    for label, role, x, y in curves:
+        ax.plot(x, y, label=label, **curve_style(role, ranks[role], len(x)))
+        ranks[role] += 1
+    ax.margins(x=0.01)
+    ax.grid(color="0.88", linewidth=0.6)
 
 
 def name_of(text: str, most: int = 40) -> str:

@@ -69,8 +69,8 @@ def convergence(
     if lowest > 0.0:
         ax.set_yscale("log")
     ax.locator_params(axis="x", integer=True)
-    ax.set_xlabel("iteration")
-    ax.set_ylabel(name_of(keys[0]) if len(keys) == 1 else "measured at every iteration")
+    label = name_of(keys[0]) if len(keys) == 1 else "measured at every iteration"
+    ax.set(xlabel="iteration", ylabel=label)
     ax.grid(color="0.88", linewidth=0.6)
     ax.legend(fontsize=8.5, handlelength=3.0)
     return ax

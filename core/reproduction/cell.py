@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 Verdict = Literal["agrees", "agrees-under", "does-not-follow"]
@@ -44,23 +44,17 @@ class Cell:
         None where there is no value of ours, the printed one is zero and ours is not, or one of
         two frequencies is imaginary; two imaginary ones are compared by size.
         """
-        return deviation(self.printed, self.ours, self.unit)
-
-
-def deviation(printed: float, ours: float | None, unit: str = "") -> float | None:
-    """Return the deviation of a cell in percent, see `Cell.deviation_percent`."""
-    if ours is None or not math.isfinite(ours):
-        return None
-    if unit == "%":
-        return ours - printed
-    if printed == 0.0:
-        return 0.0 if ours == 0.0 else None
-    if unit == "Hz" and printed < 0.0:
-        # Imaginary frequencies are compared by size, and with nothing else.
-        return None if ours >= 0.0 else 100.0 * (ours / printed - 1.0)
-    if unit == "Hz" and ours < 0.0:
-        return None
-    return 100.0 * (ours - printed) / abs(printed)
+        printed, ours = self.printed, self.ours
+        if ours is None or not math.isfinite(ours):
+            return None
+        if self.unit == "%":
+            return ours - printed
+        if printed == 0.0:
+            return 0.0 if ours == 0.0 else None
+        if self.unit == "Hz" and (printed < 0.0 or ours < 0.0):
+            # Imaginary frequencies are compared by size, and with nothing else.
+            return 100.0 * (ours / printed - 1.0) if max(printed, ours) < 0.0 else None
+        return 100.0 * (ours - printed) / abs(printed)
 
 
 @dataclass(frozen=True)
@@ -87,13 +81,14 @@ class Page:
 
     def cell(self, row: str, column: str, printed: float, ours: float | None) -> Cell:
         """Return the cell with its verdict, which follows from the figures alone."""
-        off = deviation(printed, ours, self.unit)
+        cell = Cell(self.paper, self.table, row, column, printed, ours, "agrees", "", self.unit)
+        off = cell.deviation_percent
         same = ours is not None and round(ours - printed, 12) == 0.0
         digits = math.inf if self.decimals is None else self.decimals
         rounds = ours is not None and abs(ours - printed) <= 0.5000001 * 10.0**-digits
         meets = same or rounds or (off is not None and abs(off) <= self.tolerance)
-        verdict: Verdict = "does-not-follow"
-        if meets:
-            verdict = "agrees-under" if self.convention else "agrees"
-        note = self.convention if meets else self.reason
-        return Cell(self.paper, self.table, row, column, printed, ours, verdict, note, self.unit)
+        if not meets:
+            return replace(cell, verdict="does-not-follow", note=self.reason)
+        if self.convention:
+            return replace(cell, verdict="agrees-under", note=self.convention)
+        return cell

@@ -10,6 +10,11 @@ from typing import Any
 from femubench.core.plot.figure import Figure
 from femubench.core.reproduction.cell import VERDICTS, Cell, Verdict
 
+_TOLD = (
+    *("paper", "table", "row", "column"),
+    *("printed", "ours", "deviation_percent", "verdict", "note"),
+)
+
 
 @dataclass(frozen=True)
 class Extra:
@@ -60,17 +65,8 @@ def verdict_counts(cells: Sequence[Cell]) -> dict[Verdict, int]:
 def cells_to_json(studies: Sequence[Study]) -> list[dict[str, Any]]:
     """Return all cells as plain data; None for what is missing."""
     return [
-        {
-            "paper": cell.paper,
-            "table": cell.table,
-            "row": cell.row,
-            "column": cell.column,
-            "printed": cell.printed,
-            "ours": cell.ours if math.isfinite(cell.ours or 0.0) else None,
-            "deviation_percent": cell.deviation_percent,
-            "verdict": cell.verdict,
-            "note": cell.note,
-        }
+        {name: getattr(cell, name) for name in _TOLD}
+        | ({} if math.isfinite(cell.ours or 0.0) else {"ours": None})
         for study in studies
         for cell in study.cells
     ]

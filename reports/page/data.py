@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
-from femubench.reports.cells import plain
+from femubench.reports.cells import plain, shortened
 from femubench.reports.page.papers import papers_of
 from femubench.reports.page.rounding import clean, plain_data, rounded
 from femubench.reports.summary import (
@@ -60,6 +60,7 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
     run = Run(run.meta, rank_results(run.results, reference, baseline))
     cases, strategies = cases_of(run), strategies_of(run)
     board = leaderboard(run)
+    ranking = board.to_dict("records")
     listed = [_case(run, case, exhibits) for case in cases]
     stages = {case["name"]: case["stage"] for case in listed}
     details, left_out = _details(run, strategies, stages, exhibits)
@@ -76,16 +77,13 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
         "seeds": seeds_of(run),
         "scenarios": list(dict.fromkeys(_scenario(case) for case in cases)),
         "baseline": baseline,
-        "strategies": _strategies(run, board.to_dict("records")),
+        "strategies": _strategies(run, ranking),
         "cases": listed,
         "results": [
             _result(found, cases.index(found.case), strategies.index(found.strategy))
             for found in run.results
         ],
-        "board": [
-            {str(key): clean(value) for key, value in row.items()}
-            for row in board.to_dict("records")
-        ],
+        "board": [{str(key): clean(value) for key, value in row.items()} for row in ranking],
         "statistics": _statistics(run, list(board["strategy"])),
         "details": details,
         "papers": papers_of(run),
@@ -155,7 +153,7 @@ def _result(result: JobResult, case: int, strategy: int) -> dict[str, Any]:
         "s": strategy,
         "seed": result.seed,
         "status": result.status,
-        "reason": _short(plain(result.reason)),
+        "reason": shortened(plain(result.reason), _LONGEST_REASON),
         "score": clean(result.score),
         "rms": [None if block is None else clean(block.rms_percent) for block in blocks],
         "seconds": rounded(result.seconds, 4),
@@ -166,10 +164,6 @@ def _result(result: JobResult, case: int, strategy: int) -> dict[str, Any]:
         "unphysical": result.unphysical,
         "mac": [None if block is None else rounded(block.mean_mac, 5) for block in blocks],
     }
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= _LONGEST_REASON else f"{text[: _LONGEST_REASON - 1]}…"
 
 
 def _statistics(run: Run, order: list[str]) -> dict[str, Any]:
@@ -249,18 +243,17 @@ def _detail(result: JobResult) -> dict[str, Any]:
             for mode in block.modes
         ],
         "history": [_numbers(step) for step in result.history],
-        "parameters": [_parameter(item) for item in result.parameters],
+        "parameters": [
+            {
+                "name": plain(item.get("name", "")),
+                **{name: rounded(item.get(name), 6) for name in ("before", "after", "std")},
+                "unit": plain(item.get("unit") or ""),
+            }
+            for item in result.parameters
+        ],
         "diagnostics": _numbers(result.diagnostics),
     }
 
 
 def _numbers(named: Mapping[str, float]) -> dict[str, Any]:
     return {name: rounded(value, 5) for name, value in named.items()}
-
-
-def _parameter(item: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        "name": plain(item.get("name", "")),
-        **{name: rounded(item.get(name), 6) for name in ("before", "after", "std")},
-        "unit": plain(item.get("unit") or ""),
-    }
