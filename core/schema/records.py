@@ -7,13 +7,14 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, NoReturn, TypeVar
+from typing import Annotated, Any, NoReturn
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from femubench.core.errors import InputError
 from femubench.core.files import MIB, read_text
 from femubench.core.schema.results import BLOCKS, Block, JobResult, PairedMode, Run, Status
+from femubench.core.schema.validation import validated
 
 LARGEST_RUN = 256 * MIB  # bytes of a file of `bench run --json`
 LARGEST_STORE = 1024 * MIB  # bytes of a store, which holds many runs
@@ -223,7 +224,7 @@ def result_from_json(
     Raises:
         InputError: naming the first field that is wrong.
     """
-    data = _validated(ResultRecord, record, file, line, key)
+    data = validated(ResultRecord, record, file, line, key)
     found = {name: getattr(data, name) for name in BLOCKS}
     plain = data.model_dump(exclude=set(BLOCKS))
     plain["parameters"] = tuple(
@@ -249,7 +250,7 @@ def run_from_json(data: object, *, file: Path | str | None = None) -> Run:
     Raises:
         InputError: naming the first field that is wrong.
     """
-    record = _validated(RunRecord, data, file, None, "")
+    record = validated(RunRecord, data, file, None, "")
     meta = meta_from_json(record.meta, file=file)
     results = tuple(
         result_from_json(item, file=file, key=f"results[{i}]")
@@ -274,7 +275,7 @@ def meta_from_json(
     if not isinstance(data, dict):
         raise InputError("no meta data", file=file, line=line, key=key, expected="a table")
     check_depth(data, "meta data", file=file, line=line, key=key)
-    _validated(MetaRecord, data, file, line, key)
+    validated(MetaRecord, data, file, line, key)
     return data
 
 
@@ -330,22 +331,3 @@ def _block(block: Block) -> dict[str, Any]:
             for mode in block.modes
         ],
     }
-
-
-_R = TypeVar("_R", bound=BaseModel)
-
-
-def _validated(
-    kind: type[_R], record: object, file: Path | str | None, line: int | None, key: str
-) -> _R:
-    try:
-        return kind.model_validate(record)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        path = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in first["loc"])
-        raise InputError(
-            first["msg"],
-            file=file,
-            line=line,
-            key=(key + path).lstrip(".") or None,
-        ) from error
