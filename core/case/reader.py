@@ -23,7 +23,7 @@ from femubench.core.case.faults import (
     line_of,
 )
 from femubench.core.case.files import LARGEST_CASE, CaseFiles, read_text
-from femubench.core.case.frames import FrameSite, Site, frame_of, ground_springs, point_masses
+from femubench.core.case.frames import FrameSite, Site, attachments, frame_of
 from femubench.core.case.matrices import matrix_model, reader_of, reading_with
 from femubench.core.case.modes import (
     NO_SENSORS,
@@ -252,8 +252,8 @@ class _Building:
         self, i: int, spec: ModificationSpec, model: Model, site: Site, sensors: Sensors
     ) -> Modification:
         with at_key("modification", i):
-            masses = point_masses(spec.masses, site)
-            springs = ground_springs(spec.springs, site)
+            masses = attachments("masses", spec.masses, site)
+            springs = attachments("springs", spec.springs, site)
             if not masses and not springs:
                 raise Fault((), "nothing is changed", "masses or springs")
             try:
@@ -265,10 +265,7 @@ class _Building:
 
 
 def _key_of(item: object, frame: Frame) -> tuple[KeyPath, str]:
-    """Return the key, below `model`, of a part of the frame, and what would have been right.
-
-    The tables of `[model]` are named as the frame's own lists, one entry for one.
-    """
+    """Return the key, below `model`, of a part of the frame, and what would have been right."""
     for key, parts in vars(frame).items():
         for i, part in enumerate(parts if isinstance(parts, tuple) else ()):
             if part is item:

@@ -137,19 +137,13 @@ class Table:
         """Check that the required columns are there and no others but the known ones."""
         for column in required:
             if column not in self.columns:
-                found = f"it among {', '.join(self.columns)}"[:200]
-                raise InputError(
-                    "missing column", file=self.file, line=1, key=column, expected=found
-                )
+                what, found = "missing column", f"it among {', '.join(self.columns)}"[:200]
+                raise InputError(what, file=self.file, line=1, key=column, expected=found)
         for column in self.columns:
             if column not in required and column not in known:
-                raise InputError(
-                    "unknown column",
-                    file=self.file,
-                    line=1,
-                    key=column[:60],
-                    expected=", ".join([*required, *sorted(set(known).difference(required))])[:200],
-                )
+                listed = ", ".join([*required, *sorted(set(known).difference(required))])[:200]
+                what, key = "unknown column", column[:60]
+                raise InputError(what, file=self.file, line=1, key=key, expected=listed)
 
 
 def read_table(file: Path) -> Table:
@@ -198,10 +192,8 @@ def _header(file: Path, line: int, cells: list[str]) -> tuple[str, ...]:
             what = f"column {i + 1} has no name"
             raise InputError(what, file=file, line=line, expected="a name for every column")
         if cell in seen:
-            what = f"column {_shown(cell)} is listed twice"
-            raise InputError(
-                what, file=file, line=line, key=cell[:60], expected="every column once"
-            )
+            what, expected = f"column {_shown(cell)} is listed twice", "every column once"
+            raise InputError(what, file=file, line=line, key=cell[:60], expected=expected)
         seen.add(cell)
     return tuple(cells)
 

@@ -99,7 +99,7 @@ class _Change(BaseModel):
 
 
 def _json_type(kind: Any) -> Any:  # noqa: ANN401 - any type of a field
-    """Return the type of what `_plain` makes of a type: any number may be None, tuples are lists."""
+    """Return the type of what `_plain` makes of it: any number may be None, tuples are lists."""
     inside = tuple(_json_type(part) for part in get_args(kind) if part is not Ellipsis)
     size = len(inside)
     if get_origin(kind) is tuple:
@@ -107,7 +107,7 @@ def _json_type(kind: Any) -> Any:  # noqa: ANN401 - any type of a field
         several = Ellipsis in get_args(kind)
         return entries if several else Annotated[entries, Field(min_length=size, max_length=size)]
     if get_origin(kind) in (Union, UnionType):
-        return Union[inside]
+        return Union[inside]  # noqa: UP007 - as many as there are
     if is_dataclass(kind) and kind in _OPTIONAL:
         return _record(cast(type, kind))
     return float | None if kind is float else kind
@@ -132,13 +132,13 @@ def _record(kind: type, **more: tuple[Any, Any]) -> type[BaseModel]:
 _UNTOLD = ("extended", "subject")
 # What older versions did not write, by the data class; a type goes with what is no field of it.
 _OPTIONAL: dict[Any, dict[str, Any]] = {
-    **dict.fromkeys((Advice, Cause, CauseParameter, Gain, LocationRow, ResidualRow, Rival), {}),
+    **{k: {} for k in (Advice, Cause, CauseParameter, Gain, LocationRow, ResidualRow, Rival)},
     SmallestVisible: {"place": ""},
     LookWarning: {"changes": (list[_Change], [])},
     Diagnosis: {
         **dict.fromkeys(("case", "sentence", "reason"), ""),
         **{"chi2": [None, None], "data_count": 0, "nothing": None, "seconds": None},
-        **dict.fromkeys(("looks", "locations", "base"), []),
+        **{name: [] for name in ("looks", "locations", "base")},
     },
 }
 _DiagnosisRecord = _record(

@@ -21,7 +21,7 @@ from femubench.core.run.jobs import Job, JobOutcome, one_line, seed_words, sent
 from femubench.core.run.judging import Verdict, judged, run_judge, run_strategy
 from femubench.core.run.limits import Limits
 from femubench.core.run.provenance import job_key, provenance, strategy_version
-from femubench.core.run.workers import Ending, How, Workers
+from femubench.core.run.workers import Ending, Workers
 from femubench.core.schema.records import result_from_json
 from femubench.core.schema.results import JobResult, Status
 from femubench.core.score.scoring import Reference
@@ -104,15 +104,6 @@ def _pickled(thing: object, turned: Callable[[object], bytes] = _bytes) -> bytes
         return JobOutcome("failed", reason, traceback.format_exc())
 
 
-_STATUS: Mapping[How, Status] = {
-    "timeout": "timeout",
-    "memory": "crashed",
-    "output": "crashed",
-    "answer-size": "crashed",
-    "died": "crashed",
-    "no-start": "crashed",
-    "orphaned": "crashed",
-}
 Show = Callable[[Slot, Mapping[str, Any]], None]
 _LEAST_JUDGING = 300.0  # s
 _ATTEMPTS = 3  # to start a process
@@ -187,20 +178,17 @@ class _Bench:
     ) -> tuple[int, JobOutcome] | None:
         """Start judging an answer or running a job; return a job that cannot be started."""
         if self.answers or not waiting:
-            index, answer = (self.answers or self.lonely).popleft()
+            task = (self.answers or self.lonely).popleft()
         else:
-            index, answer = waiting.popleft(), b""
+            task = waiting.popleft(), b""
+        index, answer = task
         slot = self._slots[index]
         if answer:
             shown = self._show is not None and slot.seed == self._shown
             verdict = Verdict(self._case(slot.case), answer, slot.strategy, slot.seed, shown)
-            ending = workers.start(
-                (index, answer), run_judge, verdict, self._judging(slot.strategy)
-            )
+            ending = workers.start(task, run_judge, verdict, self._judging(slot.strategy))
         else:
-            ending = workers.start(
-                (index, b""), run_strategy, slot.job, self._limits[slot.strategy]
-            )
+            ending = workers.start(task, run_strategy, slot.job, self._limits[slot.strategy])
         if ending is None or self._again(index, answer, waiting):
             return None
         return index, JobOutcome("crashed", ending.reason)
@@ -237,7 +225,8 @@ class _Bench:
                 return outcome
             self.answers.append((index, ending.answer))
             return None
-        return JobOutcome(_STATUS[ending.how], ending.reason, seconds=ending.seconds)
+        status: Status = "timeout" if ending.how == "timeout" else "crashed"
+        return JobOutcome(status, ending.reason, seconds=ending.seconds)
 
     def _judgement(self, slot: Slot, ending: Ending) -> JobResult | JobOutcome:
         if ending.how != "answer":
