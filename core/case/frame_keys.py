@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from femubench.core.case.faults import Fault
-from femubench.core.case.files import read_text
+from femubench.core.case.files import LARGEST_TEXT
 from femubench.core.case.frames import CONSTANTS, section_of
 from femubench.core.case.schema import FrameSpec, MaterialSpec, MemberSpec, SectionSpec, parse_spec
 from femubench.core.errors import InputError
@@ -28,6 +28,7 @@ from femubench.core.fem.sections import (
     round_tube,
 )
 from femubench.core.fem.structure import Structure
+from femubench.core.files import read_text
 
 Keys: TypeAlias = dict[str, Any]
 _LONGEST = 80
@@ -50,7 +51,7 @@ class Known:
 def known_from(file: Path) -> Known:
     """Return what a `case.toml` says; nothing where it is not there or not a case."""
     try:
-        spec = parse_spec(tomllib.loads(read_text(file)))
+        spec = parse_spec(tomllib.loads(read_text(file, LARGEST_TEXT)))
     except (InputError, ValueError, RecursionError):  # not TOML, or not the keys of a case
         return Known()
     share = spec.measurement.shape_std

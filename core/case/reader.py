@@ -22,7 +22,7 @@ from femubench.core.case.faults import (
     key_lines,
     line_of,
 )
-from femubench.core.case.files import LARGEST_CASE, CaseFiles, read_text
+from femubench.core.case.files import LARGEST_CASE, CaseFiles
 from femubench.core.case.frames import FrameSite, Site, attachments, frame_of
 from femubench.core.case.matrices import matrix_model, reader_of, reading_with
 from femubench.core.case.modes import (
@@ -39,6 +39,7 @@ from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
+from femubench.core.files import read_text
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Reader
 
@@ -207,14 +208,12 @@ class _Building:
     def sensors(self, site: Site) -> tuple[Sensors, bool]:
         """Return the sensors, and whether a reader plugin gave them."""
         spec = self.spec.measurement
-        if spec.sensors is None:
-            path, read = self.reading(("measurement", "modes"), spec.modes)
-            if read is None or not len(read.sensors):
-                return NO_SENSORS, False
-        else:
-            path, read = self.reading(("measurement", "sensors"), spec.sensors)
-            if read is None:
-                return read_sensors(path, site), False
+        key, name = ("modes", spec.modes) if spec.sensors is None else ("sensors", spec.sensors)
+        path, read = self.reading(("measurement", key), name)
+        if spec.sensors is None and (read is None or not len(read.sensors)):
+            return NO_SENSORS, False
+        if read is None:
+            return read_sensors(path, site), False
         return fitted_sensors(read, path, site), True
 
     def modes(self, key: KeyPath, name: str, sensors: Sensors) -> Measurement:

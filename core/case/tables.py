@@ -14,12 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from femubench.core.case.faults import Misfit, WrongDirection
-from femubench.core.case.files import read_text
+from femubench.core.case.files import LARGEST_TEXT
 from femubench.core.case.frames import Site
 from femubench.core.case.schema import LARGEST
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Place, Vector
 from femubench.core.fem.sensors import DIRECTIONS, Sensors
+from femubench.core.files import read_text
 
 _MOST_ROWS, _MOST_COLUMNS, _MOST_CELLS = 1_000_000, 50_000, 10_000_000
 _MOST_SENSORS = 50_000
@@ -152,7 +153,7 @@ def read_table(file: Path) -> Table:
     Raises:
         InputError: for a ragged row, a column without name or named twice, a broken quotation.
     """
-    reader = csv.reader(StringIO(read_text(file)), skipinitialspace=True)
+    reader = csv.reader(StringIO(read_text(file, LARGEST_TEXT)), skipinitialspace=True)
     rows: list[Row] = []
     columns: tuple[str, ...] = ()
     try:

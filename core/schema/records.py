@@ -184,30 +184,10 @@ def _not_json(word: str) -> NoReturn:
 
 def result_to_json(result: JobResult) -> dict[str, Any]:
     """Return one result in the JSON contract of ``bench run``; no NaN, no infinity in it."""
-    blocks = {name: result.blocks.get(name) for name in BLOCKS}
-    record: dict[str, Any] = {
-        "case": result.case,
-        "strategy": result.strategy,
-        "seed": result.seed,
-        "status": result.status,
-        "reason": result.reason[:LONGEST_TEXT],
-        "seconds": result.seconds,
-        **{name: None if block is None else _block(block) for name, block in blocks.items()},
-        "rigid_body_modes": result.rigid_body_modes,
-        "rigid_body_modes_expected": result.rigid_body_modes_expected,
-        "negative_eigenvalues": result.negative_eigenvalues,
-        "unphysical": result.unphysical,
-        "parameter_count": result.parameter_count,
-        "evaluations": result.evaluations,
-        "score": result.score,
-        "rank": result.rank,
-        "parameters": [dict(item) for item in result.parameters],
-        "history": [dict(item) for item in result.history],
-        "diagnostics": dict(result.diagnostics),
-        "traceback": result.traceback[-LONGEST_TEXT:],
-        "key": result.key,
-        "provenance": dict(result.provenance),
-    }
+    record = {name: getattr(result, name, None) for name in ResultRecord.model_fields}
+    record |= {name: _block(block) for name, block in result.blocks.items()}
+    record |= {"reason": result.reason[:LONGEST_TEXT], "unphysical": result.unphysical}
+    record["traceback"] = result.traceback[-LONGEST_TEXT:]
     clean: dict[str, Any] = _encodable(finite(record))
     return clean
 
@@ -317,17 +297,6 @@ def _numbers(item: Mapping[str, Any], names: Iterable[str]) -> dict[str, Any]:
 
 
 def _block(block: Block) -> dict[str, Any]:
-    return {
-        "rms_percent": block.rms_percent,
-        "mean_mac": block.mean_mac,
-        "modes": [
-            {
-                "mode": mode.number,
-                "measured_hz": mode.measured_hz,
-                "predicted_hz": mode.predicted_hz,
-                "mac": mode.mac,
-                "modification": mode.modification,
-            }
-            for mode in block.modes
-        ],
-    }
+    plain = ({"mode": mode.number, **vars(mode)} for mode in block.modes)
+    modes = [{name: mode[name] for name in _ModeRecord.model_fields} for mode in plain]
+    return {**vars(block), "modes": modes}
