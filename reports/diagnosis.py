@@ -49,7 +49,7 @@ def diagnosis_sections(data: Data) -> list[Section]:
         ("", [data["sentence"]] if data["sentence"] else []),
         ("", [_verdict(data)]),
         (
-            "A plain look at the model, before any fit",
+            "Plausibility checks of the model, before any fit",
             _items((look["where"], _look(look)) for look in data["looks"]),
         ),
         ("Residuals in standard deviations, measured minus predicted", _residuals(data)),

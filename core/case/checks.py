@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
@@ -13,22 +13,9 @@ from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.nominal import MAY_VANISH
 from femubench.core.typing import FloatArray
 
-# A planar frame moves its masses in its own directions, so that one offset does nothing there.
-_IDLE_OFFSET = {"in-plane": "y", "out-of-plane": "z"}
-
-
-def check_extensions(model: FrameSpec) -> None:
-    """Check places and planes; raises Fault with a path below `model`."""
-    members = {member.name: member.elements for member in model.members}
-    for key in ("preloads", "eccentricities", "couplings"):
-        for i, item in enumerate(getattr(model, key)):
-            if item.member not in members:
-                what = f"there is no member {item.member!r}"
-                raise Fault((key, i, "member"), what, "the name of a member")
-    _check_factors(model, members)
-    _check_eccentricities(model)
-    _check_couplings(model)
-    _check_braces(model)
+_MOST_ELEMENTS = 100_000
+# A planar frame moves its masses in its own directions, so that an offset along it does nothing.
+_NORMAL: dict[Plane, str] = {"in-plane": "y", "out-of-plane": "z"}
 
 
 def _check_factors(model: FrameSpec, members: dict[str, int]) -> None:
@@ -54,7 +41,7 @@ def _check_element(place: str, members: dict[str, int], i: int) -> None:
 
 
 def _check_eccentricities(model: FrameSpec) -> None:
-    idle = _IDLE_OFFSET.get(model.plane)
+    idle = _NORMAL.get(model.plane)
     for i, item in enumerate(model.eccentricities):
         if idle is not None and getattr(item, idle) != 0.0:
             what = f"an offset along {idle} does nothing in plane {model.plane!r}"
@@ -80,15 +67,9 @@ def _check_braces(model: FrameSpec) -> None:
             what = "a brace does nothing in plane 'out-of-plane'"
             raise Fault(("braces", i), what, "plane 'in-plane' or '3d'")
         for j, end in enumerate(item.ends):
-            if end not in joints:
-                what = f"there is no joint {end!r}"
-                raise Fault(("braces", i, "ends", j), what, "the name of a joint")
+            _check_known("joint", end, joints, ("braces", i, "ends", j))
         if item.ends[0] == item.ends[1]:
             raise Fault(("braces", i, "ends"), "the brace has length zero", "two different joints")
-
-
-_MOST_ELEMENTS = 100_000
-_NORMAL: dict[Plane, str] = {"in-plane": "y", "out-of-plane": "z"}
 
 
 def check_frame(model: FrameSpec) -> None:
@@ -103,7 +84,21 @@ def check_frame(model: FrameSpec) -> None:
     _check_joint_springs(model)
     for i, support in enumerate(model.supports):
         _check_directions(support.fixed, model.plane, ("supports", i, "fixed"))
-    check_extensions(model)
+    members = {member.name: member.elements for member in model.members}
+    for key in ("preloads", "eccentricities", "couplings"):
+        for i, item in enumerate(getattr(model, key)):
+            _check_known("member", item.member, members, (key, i, "member"))
+    _check_factors(model, members)
+    _check_eccentricities(model)
+    _check_couplings(model)
+    _check_braces(model)
+
+
+def _check_known(
+    kind: str, name: str, known: Collection[str], path: KeyPath, expected: str | None = None
+) -> None:
+    if name not in known:
+        raise Fault(path, f"there is no {kind} {name!r}", expected or f"the name of a {kind}")
 
 
 def check_unique(names: Iterable[tuple[KeyPath, str]]) -> None:
@@ -135,22 +130,13 @@ def _check_joints(model: FrameSpec) -> None:
             i = int(off[0])
             what = f"joint {model.joints[i].name!r} lies off the plane, {normal} = {column[i]:g}"
             raise Fault(("joints", i, "xyz"), what, f"{normal} = {column[0]:g} as at the first")
-    pair = _nearest_pair(xyz)
-    if pair is not None:
-        first, second = (model.joints[k].name for k in pair)
-        what = f"joint {second!r} lies at the same point as {first!r}"
-        raise Fault(("joints", pair[1], "xyz"), what, "a point of its own")
-
-
-def _nearest_pair(xyz: FloatArray) -> tuple[int, int] | None:
-    """Return two joints that share a point."""
-    cells: dict[tuple[int, ...], int] = {}
-    for i, point in enumerate(xyz):
-        cell = tuple(int(v) for v in np.round(point / ON_MEMBER))
+    cells: dict[tuple[int, ...], str] = {}
+    for i, joint in enumerate(model.joints):
+        cell = tuple(int(v) for v in np.round(xyz[i] / ON_MEMBER))
         if cell in cells:
-            return cells[cell], i
-        cells[cell] = i
-    return None
+            what = f"joint {joint.name!r} lies at the same point as {cells[cell]!r}"
+            raise Fault(("joints", i, "xyz"), what, "a point of its own")
+        cells[cell] = joint.name
 
 
 def _check_members(model: FrameSpec) -> None:
@@ -165,18 +151,14 @@ def _check_members(model: FrameSpec) -> None:
             what = f"member {member.name!r} has length zero"
             raise Fault(("members", i, "ends"), what, "two different joints")
         for key, table in (("section", model.sections), ("material", model.materials)):
-            name = getattr(member, key)
-            if name not in table:
-                known = ", ".join(table) or f"a table [model.{key}s.NAME]"
-                raise Fault(("members", i, key), f"there is no {key} {name!r}", known)
+            expected = ", ".join(table) or f"a table [model.{key}s.NAME]"
+            _check_known(key, getattr(member, key), table, ("members", i, key), expected)
         if member.up is not None:
             _check_up(model, i, places[member.ends[1]] - places[member.ends[0]])
         elements += member.elements
         if elements > _MOST_ELEMENTS:
-            what = f"more than {_MOST_ELEMENTS} elements"
-            raise Fault(
-                ("members", i, "elements"), what, f"fewer elements, {_MOST_ELEMENTS} in all at most"
-            )
+            what, path = f"more than {_MOST_ELEMENTS} elements", ("members", i, "elements")
+            raise Fault(path, what, f"fewer elements, {_MOST_ELEMENTS} in all at most")
 
 
 def _check_up(model: FrameSpec, i: int, along: FloatArray) -> None:
@@ -211,8 +193,7 @@ def _check_ends(
     ends = {member.name: member.ends for member in model.members}
     seen = set()
     for i, item in enumerate(items):
-        if item.member not in ends:
-            raise Fault((key, i, "member"), f"there is no member {item.member!r}", "a member")
+        _check_known("member", item.member, ends, (key, i, "member"), "a member")
         if item.joint not in ends[item.member]:
             what = f"member {item.member!r} does not end at {item.joint!r}"
             raise Fault((key, i, "joint"), what, f"one of {', '.join(ends[item.member])}")

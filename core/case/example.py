@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 import tomllib
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
 
 from femubench.core.case.files import CASE_FILE
-from femubench.core.case.frames import FrameSite, frame_of, ground_springs, point_masses
-from femubench.core.case.schema import CaseSpec, FrameSpec, parse_spec
-from femubench.core.case.tables import read_sensors
+from femubench.core.case.frames import FrameSite, attachments, frame_of
+from femubench.core.case.schema import FrameSpec, parse_spec
+from femubench.core.case.table_text import csv_bytes
+from femubench.core.case.tables import RESERVED, read_sensors
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Frame, JointSpring
 from femubench.core.fem.model import Model
@@ -148,23 +147,19 @@ def write_example(folder: Path) -> tuple[Path, ...]:
 
 def _measured(sensor_file: Path) -> dict[str, str]:
     """Return the tables of modes that the better model gives."""
-    spec = _example_spec()
+    spec = parse_spec(tomllib.loads(CASE_TOML))
     assert isinstance(spec.model, FrameSpec)
     better = _better(frame_of(spec.model))
     site = FrameSite(better)
     sensors = read_sensors(sensor_file, site)
     change = spec.modification[0]
     heavier = better.with_attachments(
-        point_masses(change.masses, site), ground_springs(change.springs, site)
+        attachments("masses", change.masses, site), attachments("springs", change.springs, site)
     )
     return {
         spec.measurement.modes: _modes_csv(better, sensors),
         change.modes: _modes_csv(heavier, sensors),
     }
-
-
-def _example_spec() -> CaseSpec:
-    return parse_spec(tomllib.loads(CASE_TOML))
 
 
 def _better(frame: Frame) -> Frame:
@@ -187,11 +182,9 @@ def _modes_csv(frame: Frame, sensors: Sensors) -> str:
     model = Model.of(frame)
     modes = solve_modes(model, _MODES)
     shapes = model.observe(sensors) @ modes.shapes
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["mode", "frequency", "frequency_std", "damping", *sensors.labels])
+    rows = []
     for i, frequency in enumerate(modes.natural_frequencies):
         shape = shapes[:, i] / max(shapes[:, i], key=abs)
         cells = [f"{frequency:.3f}", f"{0.001 * frequency:.3f}", ""]
-        writer.writerow([i + 1, *cells, *(f"{value:.5f}" for value in shape)])
-    return text.getvalue()
+        rows.append([i + 1, *cells, *(f"{value:.5f}" for value in shape)])
+    return csv_bytes([*RESERVED, *sensors.labels], rows).decode()

@@ -96,15 +96,6 @@ class CaseFiles:
         return total.hexdigest()
 
 
-def read_text(path: Path, largest: int = LARGEST_TEXT) -> str:
-    """Return the text of a file, without a byte order mark, with any kind of line ends.
-
-    Raises:
-        InputError: when it cannot be read, is too large, or is not UTF-8.
-    """
-    return reading.read_text(path, largest)
-
-
 def _is_folder(path: Path) -> bool:
     try:
         return path.is_dir()

@@ -12,8 +12,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from femubench.core.case.faults import Fault
-from femubench.core.case.files import read_text
-from femubench.core.case.frames import section_of
+from femubench.core.case.files import LARGEST_TEXT
+from femubench.core.case.frames import CONSTANTS, section_of
 from femubench.core.case.schema import FrameSpec, MaterialSpec, MemberSpec, SectionSpec, parse_spec
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Factor, Frame, Member, Place, Plane, RigidEnd
@@ -28,6 +28,7 @@ from femubench.core.fem.sections import (
     round_tube,
 )
 from femubench.core.fem.structure import Structure
+from femubench.core.files import read_text
 
 Keys: TypeAlias = dict[str, Any]
 _LONGEST = 80
@@ -39,26 +40,24 @@ class Known:
 
     sections: Mapping[str, SectionSpec] = field(default_factory=dict)
     materials: Mapping[str, MaterialSpec] = field(default_factory=dict)
-    members: Mapping[str, MemberSpec] = field(default_factory=dict)
+    members: tuple[MemberSpec, ...] = ()
     shape_std: float | None = None
 
-    def name_of(self, kind: str, member: str) -> str | None:
-        """Return the name of a member's ``section`` or ``material``."""
-        spec = self.members.get(member)
-        return None if spec is None else str(getattr(spec, kind))
+    def names(self, kind: str) -> dict[str, str]:
+        """Return the name of every member's ``section`` or ``material``."""
+        return {member.name: getattr(member, kind) for member in self.members}
 
 
 def known_from(file: Path) -> Known:
     """Return what a `case.toml` says; nothing where it is not there or not a case."""
     try:
-        spec = parse_spec(tomllib.loads(read_text(file)))
+        spec = parse_spec(tomllib.loads(read_text(file, LARGEST_TEXT)))
     except (InputError, ValueError, RecursionError):  # not TOML, or not the keys of a case
         return Known()
     share = spec.measurement.shape_std
     if not isinstance(spec.model, FrameSpec):
         return Known(shape_std=share)
-    members = {member.name: member for member in spec.model.members}
-    return Known(spec.model.sections, spec.model.materials, members, share)
+    return Known(spec.model.sections, spec.model.materials, spec.model.members, share)
 
 
 def named_tables(
@@ -193,8 +192,6 @@ def _shortened(structure: Structure, places: Sequence[str]) -> tuple[str, ...]:
     return ("all",) if short == list(structure.member_labels) else tuple(short)
 
 
-_CONSTANTS = ("A", "Iy", "Iz", "J", "Jp")
-_SIZES = ("width", "height", "diameter", "wall")
 _SAME_KAPPA = 1e-13
 _ANY_NU = 0.3  # a section of case.toml has the kappa of its shape or one number for every nu
 
@@ -250,11 +247,7 @@ def _plain(value: object) -> Any:  # noqa: ANN401 - what TOML can hold
     if value is None or isinstance(value, str):
         return value
     if isinstance(value, Place):
-        return (
-            value.joint
-            if value.joint is not None
-            else {"member": value.member, "s": _plain(value.s)}
-        )
+        return value.joint or {"member": value.member, "s": _plain(value.s)}
     if isinstance(value, Mapping):
         return {str(key): _plain(entry) for key, entry in value.items()}
     if isinstance(value, (tuple, list, np.ndarray)):
@@ -266,13 +259,12 @@ def _plain(value: object) -> Any:  # noqa: ANN401 - what TOML can hold
 
 def _materials(frame: Frame, known: Known) -> tuple[list[str], dict[str, Keys]]:
     contents = [(member.name, keys_of(member.material)) for member in frame.members]
-    contents = [(name, {k: float(v) for k, v in keys.items()}) for name, keys in contents]
-    tables = {name: {k: float(v) for k, v in spec} for name, spec in known.materials.items()}
-    return named_tables(contents, _own(frame, known, "material"), tables, "material")
+    tables = {name: spec.model_dump() for name, spec in known.materials.items()}
+    return named_tables(contents, known.names("material"), tables, "material")
 
 
 def _sections(frame: Frame, known: Known) -> tuple[list[str], dict[str, Keys]]:
-    own = _own(frame, known, "section")
+    own = known.names("section")
     contents, seen = [], dict[tuple[int, float, str], Keys]()
     for member in frame.members:
         name = own.get(member.name, "")
@@ -288,12 +280,6 @@ def _sections(frame: Frame, known: Known) -> tuple[list[str], dict[str, Keys]]:
             continue
         tables[name] = section_keys(section, _ANY_NU, frame.plane, spec)
     return named_tables(contents, own, tables, "section")
-
-
-def _own(frame: Frame, known: Known, kind: str) -> dict[str, str]:
-    """Return the name that every member's section or material had."""
-    names = ((member.name, known.name_of(kind, member.name)) for member in frame.members)
-    return {member: name for member, name in names if name is not None}
 
 
 def _section_keys(member: Member, plane: Plane, hint: SectionSpec | None) -> Keys:
@@ -321,7 +307,7 @@ def section_keys(section: Section, nu: float, plane: Plane, hint: SectionSpec | 
         made = SHAPES[shape][0](**sizes)
         if (made.shape, made.width, made.height) != (section.shape, section.width, section.height):
             continue
-        differ = {key: _number(section, key) for key in _CONSTANTS}
+        differ = {key: _number(section, key) for key in CONSTANTS}
         differ = {key: value for key, value in differ.items() if value != _number(made, key)}
         gap = _kappa_gap(made.kappa, section.kappa)
         if section.kappa is not None and gap > _SAME_KAPPA:
@@ -334,7 +320,7 @@ def section_keys(section: Section, nu: float, plane: Plane, hint: SectionSpec | 
             break
     if best is not None:
         return best
-    numbers: Keys = {key: _number(section, key) for key in _CONSTANTS}
+    numbers: Keys = {key: _number(section, key) for key in CONSTANTS}
     if section.kappa is not None:
         numbers["kappa"] = _kappa(section.kappa, nu, plane)
     return {key: value for key, value in numbers.items() if value != 0.0}

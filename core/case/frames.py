@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Protocol
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from typing import Any, Protocol
 
 import numpy as np
 
 from femubench.core.case.checks import check_frame
 from femubench.core.case.faults import Fault, Misfit, WrongDirection, at_key
-from femubench.core.case.schema import FrameSpec, MassSpec, OscillatorSpec, SectionSpec, SpringSpec
+from femubench.core.case.schema import FrameSpec, SectionSpec, Table
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import (
     ACTIVE,
@@ -38,11 +38,11 @@ from femubench.core.fem.mesh import locate
 from femubench.core.fem.sections import SHAPES, Section, constant_kappa
 
 _SIZES = ("width", "height", "diameter", "wall")
-_CONSTANTS = ("A", "Iy", "Iz", "J", "Jp")
+CONSTANTS = ("A", "Iy", "Iz", "J", "Jp")
 _NEEDED: dict[Plane, tuple[str, ...]] = {
     "in-plane": ("A", "Iy"),
     "out-of-plane": ("A", "Iy", "J", "Jp"),
-    "3d": ("A", "Iy", "Iz", "J", "Jp"),
+    "3d": CONSTANTS,
 }
 
 
@@ -78,25 +78,25 @@ def _from_shape(spec: SectionSpec, shape: str) -> Section:
     smallest = min(value for key, value in sizes.items() if key != "wall")
     if wall >= smallest / 2:
         raise Fault(("wall",), f"wall {wall:g}", f"a number < {smallest / 2:g}, half of the size")
-    given = {key: getattr(spec, key) for key in _CONSTANTS if getattr(spec, key) is not None}
-    return replace(make(**sizes), **given)
+    return replace(make(**sizes), **_constants(spec))
+
+
+def _constants(spec: SectionSpec) -> dict[str, Any]:
+    return {key: getattr(spec, key) for key in CONSTANTS if getattr(spec, key) is not None}
 
 
 def _from_numbers(spec: SectionSpec, plane: Plane) -> Section:
     for key in _SIZES:
         if getattr(spec, key) is not None:
             raise Fault((key,), "a size without a shape", f"shape = one of {', '.join(SHAPES)}")
-    given: dict[str, float] = {
-        key: getattr(spec, key) for key in _CONSTANTS if getattr(spec, key) is not None
-    }
+    given = _constants(spec)
     if "Iy" in given and "Iz" in given:
         given.setdefault("Jp", given["Iy"] + given["Iz"])
     for key in _NEEDED[plane]:
         if key not in given:
             expected = f"{', '.join(_NEEDED[plane])}, which plane {plane!r} needs"
             raise Fault((key,), "missing key", expected)
-    a, iy, iz, j, jp = (given.get(key, 0.0) for key in _CONSTANTS)
-    return Section(A=a, Iy=iy, Iz=iz, J=j, Jp=jp)
+    return Section(**dict.fromkeys(CONSTANTS, 0.0) | given)
 
 
 class Site(Protocol):
@@ -151,6 +151,25 @@ class FrameSite:
         self.check_direction(place, direction)
 
 
+# The tables of `[model]` bear the names of the frame's lists, their keys those of its fields.
+_PARTS: dict[str, type] = {
+    "joints": Joint,
+    "joint_springs": JointSpring,
+    "rigid_ends": RigidEnd,
+    "factors": Factor,
+    "preloads": Preload,
+    "eccentricities": Eccentricity,
+    "couplings": Coupling,
+    "braces": Brace,
+}
+_ATTACHED: dict[str, type] = {
+    "masses": PointMass,
+    "springs": GroundSpring,
+    "supports": Support,
+    "oscillators": Oscillator,
+}
+
+
 def frame_of(model: FrameSpec) -> Frame:
     """Return the frame that `[model]` describes; raises Fault with a path below `model`."""
     check_frame(model)
@@ -158,90 +177,44 @@ def frame_of(model: FrameSpec) -> Frame:
     for name, spec in model.sections.items():
         with at_key("sections", name):
             sections[name] = section_of(spec, model.plane, model.beam)
-    frame = Frame(
-        plane=model.plane,
-        beam=model.beam,
-        joints=tuple(Joint(joint.name, joint.xyz, joint.type) for joint in model.joints),
-        members=_members(model, sections),
-        joint_springs=tuple(
-            JointSpring(
-                spring.joint, spring.member, spring.stiffness, spring.arm, spring.arm_factor
-            )
-            for spring in model.joint_springs
-        ),
-        rigid_ends=tuple(
-            RigidEnd(end.joint, end.member, end.stiffness_length, end.mass_length)
-            for end in model.rigid_ends
-        ),
-        rotary_inertia=model.rotary_inertia,
-        bending_mass=model.bending_mass,
-        factors=tuple(Factor(item.quantity, item.at, item.factor) for item in model.factors),
-        preloads=tuple(Preload(item.member, item.force) for item in model.preloads),
-        eccentricities=tuple(
-            Eccentricity(item.member, item.y, item.z) for item in model.eccentricities
-        ),
-        couplings=tuple(Coupling(item.member, item.coefficient) for item in model.couplings),
-        braces=tuple(Brace(item.ends, item.stiffness) for item in model.braces),
-    )
-    return _with_attachments(frame, model)
-
-
-def _members(model: FrameSpec, sections: Mapping[str, Section]) -> tuple[Member, ...]:
-    materials = {name: Material(m.E, m.nu, m.rho) for name, m in model.materials.items()}
-    return tuple(
+    materials = {name: _made(Material, spec) for name, spec in model.materials.items()}
+    own = ("plane", "beam", "rotary_inertia", "bending_mass")
+    parts: dict[str, Any] = {key: getattr(model, key) for key in own}
+    for key, kind in _PARTS.items():
+        parts[key] = tuple(_made(kind, spec) for spec in getattr(model, key))
+    members = tuple(
         Member(m.name, m.ends, m.elements, sections[m.section], materials[m.material], m.up)
         for m in model.members
     )
+    site = FrameSite(Frame(**parts, members=members))
+    attached: dict[str, Any] = {
+        key: attachments(key, getattr(model, key), site) for key in _ATTACHED
+    }
+    return replace(site.frame, **attached)
 
 
-def _with_attachments(frame: Frame, model: FrameSpec) -> Frame:
-    site = FrameSite(frame)
-    masses = point_masses(model.masses, site)
-    springs = ground_springs(model.springs, site)
-    supports = []
-    for i, support in enumerate(model.supports):
-        with at_key("supports", i, "at"):
-            site.point(support.at)
-        supports.append(Support(support.at, support.fixed))
-    return replace(
-        frame,
-        masses=masses,
-        springs=springs,
-        supports=tuple(supports),
-        oscillators=_oscillators(model.oscillators, site),
-    )
+def _made(kind: Any, spec: Table) -> Any:  # noqa: ANN401 - a part of a frame
+    return kind(**{f.name: getattr(spec, f.name) for f in fields(kind)})
 
 
-def _oscillators(specs: Sequence[OscillatorSpec], site: FrameSite) -> tuple[Oscillator, ...]:
-    oscillators = []
-    for i, spec in enumerate(specs):
-        with at_key("oscillators", i, "at"):
-            site.point(spec.at)
-        with at_key("oscillators", i, "direction"):
-            site.check_direction(spec.at, spec.direction)
-            if "r" in spec.direction:
-                raise Misfit(f"{spec.direction!r} is a rotation", "a translation")
-        oscillators.append(Oscillator(spec.at, spec.direction, spec.mass, spec.frequency))
-    return tuple(oscillators)
+def attachments(key: str, specs: Sequence[Table], site: Site) -> tuple[Any, ...]:
+    """Return what is attached at places of a structure.
 
+    Arguments:
+        key: ``masses``, ``springs``, ``supports`` or ``oscillators``.
+        specs: the tables of that list.
+        site: the structure.
 
-def point_masses(specs: Sequence[MassSpec], site: Site) -> tuple[PointMass, ...]:
-    """Return the masses of a list; raises Fault with a path from ``masses`` on."""
-    masses = []
-    for i, spec in enumerate(specs):
-        with at_key("masses", i, "at"):
-            site.point(spec.at)
-        masses.append(PointMass(spec.at, spec.mass, spec.offset))
-    return tuple(masses)
-
-
-def ground_springs(specs: Sequence[SpringSpec], site: Site) -> tuple[GroundSpring, ...]:
-    """Return the springs of a list; raises Fault with a path from ``springs`` on."""
-    springs = []
-    for i, spec in enumerate(specs):
-        with at_key("springs", i, "at"):
-            site.point(spec.at)
-        with at_key("springs", i, "direction"):
-            site.check_direction(spec.at, spec.direction)
-        springs.append(GroundSpring(spec.at, spec.direction, spec.stiffness))
-    return tuple(springs)
+    Raises:
+        Fault: with a path from the key on.
+    """
+    parts = [_made(_ATTACHED[key], spec) for spec in specs]
+    for i, part in enumerate(parts):
+        with at_key(key, i, "at"):
+            site.point(part.at)
+        with at_key(key, i, "direction"):
+            if isinstance(part, GroundSpring | Oscillator):
+                site.check_direction(part.at, part.direction)
+            if isinstance(part, Oscillator) and "r" in part.direction:
+                raise Misfit(f"{part.direction!r} is a rotation", "a translation")
+    return tuple(parts)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bz2
 import gzip
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BufferedIOBase
 from pathlib import Path
@@ -210,24 +210,22 @@ def _group(
     inside = np.zeros(size)
     for i, entry in enumerate(spec.dofs or ()):
         with at_key("dofs", i):
-            inside[_rows(entry, geometry, geometry.rows)] = 1.0
+            inside[_rows(entry, geometry)] = 1.0
     pick = sp.diags_array(inside)
     part = sp.csc_array(pick @ stiffness @ pick)
     part.eliminate_zeros()
     return part
 
 
-def _rows(
-    entry: int | str, geometry: MatrixGeometry, rows: Mapping[tuple[str, str], int]
-) -> list[int]:
+def _rows(entry: int | str, geometry: MatrixGeometry) -> list[int]:
     if isinstance(entry, int):
         row = entry - geometry.first_row
         if not 0 <= row < len(geometry.dofs):
             raise Misfit("there is no such row", "a row number of the dofs file")
         return [row]
     node, _, direction = entry.rpartition(":")
-    if (node, direction) in rows:
-        return [rows[node, direction]]
+    if (node, direction) in geometry.rows:
+        return [geometry.rows[node, direction]]
     found = geometry.rows_of.get(entry)
     if not found:
         raise Misfit(f"there is no dof {entry[:60]!r}", 'a row number, "node" or "node:direction"')

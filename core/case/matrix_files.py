@@ -65,17 +65,17 @@ def frame_files(model: Model) -> Files:
     `dofs.csv` names directions; those of a flexible connection of a skew member lie along the
     member, and then `axes.csv` has the unit motion of every dof.
     """
-    geometry = frame_geometry(model)
-    files = {
-        "mass.mtx": matrix_market(model.mass),
-        "stiffness.mtx": matrix_market(model.stiffness),
-        "dofs.csv": dofs_csv(geometry),
-    }
+    files = _three(model.mass, model.stiffness, frame_geometry(model))
     axes = model.dofs.axes
     if axes is not None and has_skew_dofs(model):
         rows = [[i + 1, *(number(v) for v in row)] for i, row in enumerate(axes)]
         files["axes.csv"] = csv_bytes(["row", *DIRECTIONS], rows)
     return {f"matrices/{name}": content for name, content in files.items()}
+
+
+def _three(mass: SparseArray, stiffness: SparseArray, geometry: MatrixGeometry) -> Files:
+    matrices = {"mass.mtx": matrix_market(mass), "stiffness.mtx": matrix_market(stiffness)}
+    return {**matrices, "dofs.csv": dofs_csv(geometry)}
 
 
 def has_skew_dofs(model: Model) -> bool:
@@ -172,13 +172,8 @@ def matrix_keys(
         geometry: what their rows are.
         groups: named parts of the stiffness, sparse (n, n) each.
     """
-    files = {
-        "mass.mtx": matrix_market(mass),
-        "stiffness.mtx": matrix_market(stiffness),
-        "dofs.csv": dofs_csv(geometry),
-    }
-    keys: Keys = {"kind": "matrices", "mass": "mass.mtx", "stiffness": "stiffness.mtx"}
-    keys["dofs"] = "dofs.csv"
+    files = _three(mass, stiffness, geometry)
+    keys: Keys = {"kind": "matrices", **{file.partition(".")[0]: file for file in files}}
     tables = []
     for i, (name, part) in enumerate(groups.items(), start=1):
         file = f"group-{i}.mtx"

@@ -10,7 +10,7 @@ import numpy as np
 from femubench.core.case.faults import Misfit, WrongDirection
 from femubench.core.case.frames import Site
 from femubench.core.case.schema import SMALLEST
-from femubench.core.case.tables import RESERVED, Complex, Row, Table, read_table
+from femubench.core.case.tables import RESERVED, Complex, Table, read_table
 from femubench.core.errors import InputError
 from femubench.core.fem.sensors import DIRECTIONS, Sensors
 from femubench.core.modal.complex_modes import real_modes
@@ -69,7 +69,7 @@ def _frequencies(table: Table) -> tuple[FloatArray, FloatArray, FloatArray]:
         if frequency is None:
             raise row.error("frequency", "empty cell", "a number > 0 in Hz")
         std = row.number("frequency_std", "a number > 0 in Hz, or nothing", _positive)
-        damping = row.number("damping", "a ratio >= 0 and < 1, or nothing", _ratio)
+        damping = row.number("damping", "a ratio >= 0 and < 1, or nothing", lambda v: 0 <= v < 1)
         std = FREQUENCY_STD * frequency if std is None else std
         columns.append((frequency, std, np.nan if damping is None else damping))
     frequencies, stds, ratios = np.array(columns).T
@@ -78,10 +78,6 @@ def _frequencies(table: Table) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _positive(value: float) -> bool:
     return value >= SMALLEST
-
-
-def _ratio(value: float) -> bool:
-    return 0.0 <= value < 1.0
 
 
 def _shapes(table: Table, labels: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
@@ -100,15 +96,11 @@ def _shapes(table: Table, labels: tuple[str, ...]) -> tuple[FloatArray, FloatArr
             if f"{label}_std" not in labels:
                 deviation = row.number(f"{label}_std", "a number > 0, or nothing", _positive)
                 std[s, m] = np.nan if deviation is None else deviation
-        _check_shape(row, shapes[:, m])
+        measured = np.abs(shapes[np.isfinite(shapes[:, m]), m])
+        if len(measured) and measured.max() < SMALLEST:
+            raise row.error("mode", "the shape is zero at every sensor", "a shape, or empty cells")
     real = np.where(complex_modes, real_modes(shapes), shapes.real)
     return real, std
-
-
-def _check_shape(row: Row, shape: FloatArray) -> None:
-    measured = np.abs(shape[np.isfinite(shape)])
-    if len(measured) and measured.max() < SMALLEST:
-        raise row.error("mode", "the shape is zero at every sensor", "a shape, or empty cells")
 
 
 def with_default_std(shapes: FloatArray, std: FloatArray, share: float) -> FloatArray:
@@ -150,10 +142,7 @@ def fitted_sensors(read: Measurement, file: Path, site: Site) -> Sensors:
     if not keep:
         expected = "nodes with coordinates, in a direction that the model has"
         raise InputError("no sensor fits the structure", file=file, expected=expected)
-    labels, directions = sensors.labels, sensors.directions
-    return Sensors(
-        tuple(labels[i] for i in keep), sensors.xyz[keep], tuple(directions[i] for i in keep)
-    )
+    return _some(sensors, keep)
 
 
 def fitted_modes(read: Measurement, file: Path, sensors: Sensors, share: float) -> Measurement:
@@ -178,9 +167,11 @@ def fitted_modes(read: Measurement, file: Path, sensors: Sensors, share: float) 
 
 def measured_only(sensors: Sensors, shapes: FloatArray) -> Sensors:
     """Return the sensors at which some mode has a shape."""
-    keep = np.flatnonzero(np.isfinite(shapes).any(axis=1))
-    return Sensors(
-        tuple(sensors.labels[i] for i in keep),
-        sensors.xyz[keep],
-        tuple(sensors.directions[i] for i in keep),
+    return _some(sensors, [int(i) for i in np.flatnonzero(np.isfinite(shapes).any(axis=1))])
+
+
+def _some(sensors: Sensors, keep: list[int]) -> Sensors:
+    labels, directions = (
+        [names[i] for i in keep] for names in (sensors.labels, sensors.directions)
     )
+    return Sensors(tuple(labels), sensors.xyz[keep], tuple(directions))

@@ -22,8 +22,8 @@ from femubench.core.case.faults import (
     key_lines,
     line_of,
 )
-from femubench.core.case.files import LARGEST_CASE, CaseFiles, read_text
-from femubench.core.case.frames import FrameSite, Site, frame_of, ground_springs, point_masses
+from femubench.core.case.files import LARGEST_CASE, CaseFiles
+from femubench.core.case.frames import FrameSite, Site, attachments, frame_of
 from femubench.core.case.matrices import matrix_model, reader_of, reading_with
 from femubench.core.case.modes import (
     NO_SENSORS,
@@ -39,6 +39,7 @@ from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
+from femubench.core.files import read_text
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Reader
 
@@ -207,14 +208,12 @@ class _Building:
     def sensors(self, site: Site) -> tuple[Sensors, bool]:
         """Return the sensors, and whether a reader plugin gave them."""
         spec = self.spec.measurement
-        if spec.sensors is None:
-            path, read = self.reading(("measurement", "modes"), spec.modes)
-            if read is None or not len(read.sensors):
-                return NO_SENSORS, False
-        else:
-            path, read = self.reading(("measurement", "sensors"), spec.sensors)
-            if read is None:
-                return read_sensors(path, site), False
+        key, name = ("modes", spec.modes) if spec.sensors is None else ("sensors", spec.sensors)
+        path, read = self.reading(("measurement", key), name)
+        if spec.sensors is None and (read is None or not len(read.sensors)):
+            return NO_SENSORS, False
+        if read is None:
+            return read_sensors(path, site), False
         return fitted_sensors(read, path, site), True
 
     def modes(self, key: KeyPath, name: str, sensors: Sensors) -> Measurement:
@@ -252,8 +251,8 @@ class _Building:
         self, i: int, spec: ModificationSpec, model: Model, site: Site, sensors: Sensors
     ) -> Modification:
         with at_key("modification", i):
-            masses = point_masses(spec.masses, site)
-            springs = ground_springs(spec.springs, site)
+            masses = attachments("masses", spec.masses, site)
+            springs = attachments("springs", spec.springs, site)
             if not masses and not springs:
                 raise Fault((), "nothing is changed", "masses or springs")
             try:
@@ -265,10 +264,7 @@ class _Building:
 
 
 def _key_of(item: object, frame: Frame) -> tuple[KeyPath, str]:
-    """Return the key, below `model`, of a part of the frame, and what would have been right.
-
-    The tables of `[model]` are named as the frame's own lists, one entry for one.
-    """
+    """Return the key, below `model`, of a part of the frame, and what would have been right."""
     for key, parts in vars(frame).items():
         for i, part in enumerate(parts if isinstance(parts, tuple) else ()):
             if part is item:

@@ -6,7 +6,7 @@ Every description says what is expected there: it is the text of the error messa
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, InstanceOf, PlainValidator
 from pydantic_core import PydanticCustomError
@@ -74,6 +74,7 @@ Vector = tuple[Number, Number, Number]
 Many = tuple[T, ...]
 DIRECTIONS = "one of x, y, z, rx, ry, rz, with an optional sign"
 NAME = "a name without @, / and :, in quotes"
+BAND = "[low, high] in Hz with low < high"
 XYZ = "[x, y, z] in m, finite numbers"
 
 
@@ -110,9 +111,7 @@ Quantity = Literal["EA", "EI", "GJ", "E", "rhoA", "rhoJp", "density", "shear", "
 class FactorSpec(Table):
     """`[[model.factors]]`."""
 
-    quantity: Quantity = Field(
-        description="one of EA, EI, GJ, E, rhoA, rhoJp, density, shear, rotary"
-    )
+    quantity: Quantity = Field(description=f"one of {', '.join(get_args(Quantity))}")
     at: Annotated[tuple[str, ...], PlainValidator(_places)] = Field(description=_PLACES)
     factor: NotNegative = Field(description="a number > 0")
 
@@ -160,6 +159,10 @@ class OscillatorSpec(Table):
 _MOST = 20_000  # entries of a list whose work grows with its length
 
 
+def _tables(key: str, max_length: int | None = None) -> Any:  # noqa: ANN401 - as `Field` has it
+    return Field((), max_length=max_length, description=f"tables [[{key}]]")
+
+
 class CaseInfo(Table):
     """`[case]`."""
 
@@ -199,9 +202,7 @@ class JointSpec(Table):
 
     name: Name = Field(description=NAME)
     xyz: Vector = Field(description=XYZ)
-    type: Annotated[str, Field(strict=True, pattern=rf"^$|{ID}", max_length=80)] = Field(
-        "", description=NAME
-    )
+    type: str = Field("", strict=True, pattern=rf"^$|{ID}", max_length=80, description=NAME)
 
 
 class MemberSpec(Table):
@@ -235,9 +236,7 @@ class SupportSpec(Table):
     """`[[model.supports]]`."""
 
     at: At = Field(description=AT)
-    fixed: Annotated[Many[Direction], Field(min_length=1, max_length=6)] = Field(
-        description="a list of directions"
-    )
+    fixed: Many[Direction] = Field(min_length=1, max_length=6, description="a list of directions")
 
 
 class JointSpringSpec(Table):
@@ -267,9 +266,7 @@ class FrameSpec(Table):
     kind: Literal["frame"] = Field(description="'frame' or 'matrices'")
     plane: Plane = Field(description="'in-plane', 'out-of-plane' or '3d'")
     beam: BeamTheory = Field("euler-bernoulli", description="'euler-bernoulli' or 'timoshenko'")
-    rotary_inertia: Share | None = Field(
-        None, description="true, false or a multiple of rho I, a number >= 0"
-    )
+    rotary_inertia: Share | None = Field(None, description=_SHARE)
     bending_mass: BendingMass = Field("cubic", description="'cubic' or 'shear-consistent'")
     materials: dict[Name, MaterialSpec] = Field(description="tables [model.materials.NAME]")
     sections: dict[Name, SectionSpec] = Field(description="tables [model.sections.NAME]")
@@ -279,21 +276,17 @@ class FrameSpec(Table):
     members: Annotated[Many[MemberSpec], Field(min_length=1, max_length=20_000)] = Field(
         description="tables [[model.members]], one at least"
     )
-    masses: Many[MassSpec] = Field((), max_length=_MOST, description="tables [[model.masses]]")
-    springs: Many[SpringSpec] = Field((), max_length=_MOST, description="tables [[model.springs]]")
-    supports: Many[SupportSpec] = Field(
-        (), max_length=_MOST, description="tables [[model.supports]]"
-    )
-    joint_springs: Many[JointSpringSpec] = Field((), description="tables [[model.joint_springs]]")
-    rigid_ends: Many[RigidEndSpec] = Field((), description="tables [[model.rigid_ends]]")
-    factors: Many[FactorSpec] = Field((), description="tables [[model.factors]]")
-    preloads: Many[PreloadSpec] = Field((), description="tables [[model.preloads]]")
-    eccentricities: Many[EccentricitySpec] = Field(
-        (), description="tables [[model.eccentricities]]"
-    )
-    couplings: Many[CouplingSpec] = Field((), description="tables [[model.couplings]]")
-    braces: Many[BraceSpec] = Field((), description="tables [[model.braces]]")
-    oscillators: Many[OscillatorSpec] = Field((), description="tables [[model.oscillators]]")
+    masses: Many[MassSpec] = _tables("model.masses", max_length=_MOST)
+    springs: Many[SpringSpec] = _tables("model.springs", max_length=_MOST)
+    supports: Many[SupportSpec] = _tables("model.supports", max_length=_MOST)
+    joint_springs: Many[JointSpringSpec] = _tables("model.joint_springs")
+    rigid_ends: Many[RigidEndSpec] = _tables("model.rigid_ends")
+    factors: Many[FactorSpec] = _tables("model.factors")
+    preloads: Many[PreloadSpec] = _tables("model.preloads")
+    eccentricities: Many[EccentricitySpec] = _tables("model.eccentricities")
+    couplings: Many[CouplingSpec] = _tables("model.couplings")
+    braces: Many[BraceSpec] = _tables("model.braces")
+    oscillators: Many[OscillatorSpec] = _tables("model.oscillators")
 
 
 class GroupSpec(Table):
@@ -331,13 +324,9 @@ class MeasurementSpec(Table):
     sensors: FileName | None = Field(None, description="a file in the case folder")
     modes: FileName = Field(description="a file in the case folder")
     shape_std: Positive = Field(0.015, description="a number > 0, of the largest component")
-    used: Annotated[Many[Count], Field(min_length=1)] = Field(
-        description="a list of mode numbers, one at least"
-    )
+    used: Many[Count] = Field(min_length=1, description="a list of mode numbers, one at least")
     held_out: Many[Count] = Field((), description="a list of mode numbers")
-    band: tuple[NotNegative, Positive] | None = Field(
-        None, description="[low, high] in Hz with low < high"
-    )
+    band: tuple[NotNegative, Positive] | None = Field(None, description=BAND)
     mass: WeightSpec | None = Field(None, description="{value, std} in kg")
 
 

@@ -16,6 +16,7 @@ from tomlkit.items import Item, Table
 from femubench.core.case.frame_keys import Keys
 from femubench.core.case.modes import with_default_std
 from femubench.core.case.schema import LARGEST, SMALLEST
+from femubench.core.case.tables import RESERVED
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray
@@ -55,7 +56,7 @@ def modes_csv(measurement: Measurement, share: float) -> bytes:
     std = np.where(_is_share(m, share), np.nan, m.shape_std)
     own = [s for s in range(len(m.sensors)) if np.isfinite(std[s]).any()]
     labels = m.sensors.labels
-    header = ["mode", "frequency", "frequency_std", "damping", *labels]
+    header = [*RESERVED, *labels]
     header += [f"{labels[s]}_std" for s in own]
     scalars = zip(m.numbers, m.frequencies, m.frequency_std, m.damping, strict=True)
     rows = [

@@ -14,12 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from femubench.core.case.faults import Misfit, WrongDirection
-from femubench.core.case.files import read_text
+from femubench.core.case.files import LARGEST_TEXT
 from femubench.core.case.frames import Site
 from femubench.core.case.schema import LARGEST
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Place, Vector
 from femubench.core.fem.sensors import DIRECTIONS, Sensors
+from femubench.core.files import read_text
 
 _MOST_ROWS, _MOST_COLUMNS, _MOST_CELLS = 1_000_000, 50_000, 10_000_000
 _MOST_SENSORS = 50_000
@@ -137,19 +138,13 @@ class Table:
         """Check that the required columns are there and no others but the known ones."""
         for column in required:
             if column not in self.columns:
-                found = f"it among {', '.join(self.columns)}"[:200]
-                raise InputError(
-                    "missing column", file=self.file, line=1, key=column, expected=found
-                )
+                what, found = "missing column", f"it among {', '.join(self.columns)}"[:200]
+                raise InputError(what, file=self.file, line=1, key=column, expected=found)
         for column in self.columns:
             if column not in required and column not in known:
-                raise InputError(
-                    "unknown column",
-                    file=self.file,
-                    line=1,
-                    key=column[:60],
-                    expected=", ".join([*required, *sorted(set(known).difference(required))])[:200],
-                )
+                listed = ", ".join([*required, *sorted(set(known).difference(required))])[:200]
+                what, key = "unknown column", column[:60]
+                raise InputError(what, file=self.file, line=1, key=key, expected=listed)
 
 
 def read_table(file: Path) -> Table:
@@ -158,7 +153,7 @@ def read_table(file: Path) -> Table:
     Raises:
         InputError: for a ragged row, a column without name or named twice, a broken quotation.
     """
-    reader = csv.reader(StringIO(read_text(file)), skipinitialspace=True)
+    reader = csv.reader(StringIO(read_text(file, LARGEST_TEXT)), skipinitialspace=True)
     rows: list[Row] = []
     columns: tuple[str, ...] = ()
     try:
@@ -198,10 +193,8 @@ def _header(file: Path, line: int, cells: list[str]) -> tuple[str, ...]:
             what = f"column {i + 1} has no name"
             raise InputError(what, file=file, line=line, expected="a name for every column")
         if cell in seen:
-            what = f"column {_shown(cell)} is listed twice"
-            raise InputError(
-                what, file=file, line=line, key=cell[:60], expected="every column once"
-            )
+            what, expected = f"column {_shown(cell)} is listed twice", "every column once"
+            raise InputError(what, file=file, line=line, key=cell[:60], expected=expected)
         seen.add(cell)
     return tuple(cells)
 

@@ -88,24 +88,20 @@ def check_written(fresh: Path, folder: Path, wanted: Case) -> None:
     except InputError as error:
         what = error.what.replace(str(fresh), str(folder))
         raise refused(folder, what, error.key, error.expected) from None
-    model = wanted.model
-    mass, stiffness = matrices_of(model)
-    same_matrices = alike(mass, back.model.mass, _SAME_MATRIX) and alike(
-        stiffness, back.model.stiffness, _SAME_MATRIX
-    )
-    if not same_matrices:
+    mass, stiffness = matrices_of(wanted.model)
+    matrices = ((mass, back.model.mass), (stiffness, back.model.stiffness))
+    if not all(alike(one, other, _SAME_MATRIX) for one, other in matrices):
         what = "no keys of a frame give the matrices of this model"
         raise refused(folder, what, "model", "parameters that keys can say")
     for part in ("name", "title", "source", "used", "held_out", "band", "tolerance"):
         if getattr(back, part) != getattr(wanted, part):
             what = f"{getattr(wanted, part)!r} does not read back"
             raise refused(folder, what, part, f"not {getattr(back, part)!r}")
-    pairs = [(wanted.measurement, back.measurement)]
-    pairs += [
-        (one.measurement, other.measurement)
-        for one, other in zip(wanted.modifications, back.modifications, strict=True)
-    ]
-    for one, other in pairs:
+    first, second = (
+        [case.measurement, *(change.measurement for change in case.modifications)]
+        for case in (wanted, back)
+    )
+    for one, other in zip(first, second, strict=True):
         column = _differing(one, other)
         if column is not None:
             what = f"the {column.replace('_', ' ')} of a measurement does not read back"
@@ -116,13 +112,12 @@ def _differing(one: Measurement, other: Measurement) -> str | None:
     """Return a field in which two measurements differ."""
     for f in fields(Measurement):
         first, second = getattr(one, f.name), getattr(other, f.name)
+        if f.name == "shape_std":  # of what was not measured it means nothing
+            first = np.where(np.isnan(first) & np.isnan(one.shapes), second, first)
         if f.name == "sensors":
             same = first.labels == second.labels
             same = same and np.array_equal(first.xyz, second.xyz)
             same = same and np.array_equal(first.axes, second.axes)
-        elif f.name == "shape_std":  # of what was not measured it means nothing
-            first = np.where(np.isnan(first) & np.isnan(one.shapes), second, first)
-            same = np.array_equal(first, second, equal_nan=True)
         elif isinstance(first, np.ndarray):
             same = np.array_equal(first, second, equal_nan=True)
         else:
@@ -214,11 +209,8 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
     files["modes.csv"] = modes_csv(case.measurement, share)
     measurement |= _settings(case)
     info = {"name": case.name, "title": case.title, "source": case.source}
-    content: Keys = {
-        "case": {key: value for key, value in info.items() if value},
-        "model": keys,
-        "measurement": measurement,
-    }
+    info = {key: value for key, value in info.items() if value}
+    content: Keys = {"case": info, "model": keys, "measurement": measurement}
     tables = []
     for item in modifications:
         file = _file_name(item.name, files)
@@ -262,18 +254,17 @@ def _model_part(case: Case, known: Known) -> tuple[Keys, Files, tuple[Modificati
         frame = described_frame(model.structure)
         keys = frame_keys(frame, known)
         return keys, frame_files(_model_of(frame)), case.modifications
-    mass, stiffness = matrices_of(model)
+    matrices = matrices_of(model)
     if isinstance(model.geometry, MatrixGeometry):
-        keys, files = matrix_keys(mass, stiffness, model.geometry, model.groups)
-        return keys, files, case.modifications
+        return *matrix_keys(*matrices, model.geometry, model.groups), case.modifications
     if model.structure is None:
         what = "a model without elements and without nodes by name cannot be written"
         raise Fault(("model",), what, "a frame, or matrices from files")
     if has_skew_dofs(model):
         what = "the model has changed matrices and flexible connections of skew members"
         raise Fault(("model",), what, "degrees of freedom along x, y or z")
-    keys, files = matrix_keys(mass, stiffness, frame_geometry(model), model.groups)
-    return keys, files, tuple(_at_nodes(item, model) for item in case.modifications)
+    moved = tuple(_at_nodes(item, model) for item in case.modifications)
+    return *matrix_keys(*matrices, frame_geometry(model), model.groups), moved
 
 
 def _model_of(frame: Frame) -> Model:
@@ -287,11 +278,9 @@ def _model_of(frame: Frame) -> Model:
 def _at_nodes(item: Modification, model: Model) -> Modification:
     wanted = [mass.at for mass in item.masses] + [spring.at for spring in item.springs]
     places = frame_places(model, wanted)
-    return replace(
-        item,
-        masses=tuple(replace(mass, at=places[mass.at]) for mass in item.masses),
-        springs=tuple(replace(spring, at=places[spring.at]) for spring in item.springs),
-    )
+    masses = tuple(replace(mass, at=places[mass.at]) for mass in item.masses)
+    springs = tuple(replace(spring, at=places[spring.at]) for spring in item.springs)
+    return replace(item, masses=masses, springs=springs)
 
 
 def _matrices_changed(model: Model) -> bool:

@@ -4,20 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from types import UnionType
+from typing import Annotated, Any, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.drawing.places import PlacedWireframe, placed_wireframe
-from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
-from femubench.core.roles import Wording
-from femubench.core.schema.diagnosis import Verdict
+from femubench.core.schema.diagnosis import (
+    Advice,
+    Cause,
+    CauseParameter,
+    Gain,
+    LocationRow,
+    LookWarning,
+    ResidualRow,
+    Rival,
+    SmallestVisible,
+)
+from femubench.core.schema.validation import validated
 from femubench.core.version import __version__
 
 
@@ -53,12 +63,7 @@ def diagnosis_from_json(data: object, *, file: Path | str | None = None) -> dict
     Raises:
         InputError: naming the first field that is wrong.
     """
-    try:
-        return _DiagnosisRecord.model_validate(data).model_dump(mode="json")
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        path = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in first["loc"])
-        raise InputError(first["msg"], file=file, key=path.lstrip(".") or None) from error
+    return validated(_DiagnosisRecord, data, file).model_dump(mode="json")
 
 
 def _words(diagnosis: Diagnosis) -> Iterator[str]:
@@ -83,107 +88,62 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 - data of any form
     return [_plain(item) for item in value]
 
 
-class _Record(BaseModel):
-    model_config = ConfigDict(extra="ignore", allow_inf_nan=False, strict=True)
+_CONFIG = ConfigDict(extra="ignore", allow_inf_nan=False, strict=True)
 
 
-_Number = float | None
-# Before and after.
-_Pair = Annotated[list[float | None], Field(min_length=2, max_length=2)]
+class _Change(BaseModel):
+    model_config = _CONFIG
 
-
-class _ParameterRecord(_Record):
-    name: str
-    value: _Number
-    std: _Number
-    unit: str
-    textbook: bool = False
-    wording: Wording = "value"
-
-
-class _CauseRecord(_Record):
-    effect: str
-    place: str
-    parameters: list[_ParameterRecord]
-    probability: _Number
-    summary: str = ""
-
-
-class _RivalRecord(_Record):
-    effect: str
-    place: str
-    delta_chi2: _Number
-    probability: _Number
-    angle: _Number = None
-
-
-class _AdviceRecord(_Record):
-    measurement: str
-    separation: _Number
-
-
-class _VisibleRecord(_Record):
-    effect: str
-    place: str = ""
-    size: _Number
-    unit: str
-    wording: Wording = "value"
-
-
-class _ResidualRecord(_Record):
-    kind: str
-    mode: int | None
-    sensor: str
-    measured: _Number
-    before: _Number
-    after: _Number
-
-
-class _ChangeRecord(_Record):
     mode: int
-    percent: _Number
+    percent: float | None
 
 
-class _LookRecord(_Record):
-    what: str
-    where: str
-    effect: str
-    changes: list[_ChangeRecord] = []
+def _json_type(kind: Any) -> Any:  # noqa: ANN401 - any type of a field
+    """Return the type of what `_plain` makes of it: any number may be None, tuples are lists."""
+    inside = tuple(_json_type(part) for part in get_args(kind) if part is not Ellipsis)
+    size = len(inside)
+    if get_origin(kind) is tuple:
+        entries = list[inside[0]]  # type: ignore[valid-type]
+        several = Ellipsis in get_args(kind)
+        return entries if several else Annotated[entries, Field(min_length=size, max_length=size)]
+    if get_origin(kind) in (Union, UnionType):
+        return Union[inside]  # noqa: UP007 - as many as there are
+    if is_dataclass(kind) and kind in _OPTIONAL:
+        return _record(cast(type, kind))
+    return float | None if kind is float else kind
 
 
-class _LocationRecord(_Record):
-    indicator: str
-    place: str
-    value: _Number
+def _record(kind: type, **more: tuple[Any, Any]) -> type[BaseModel]:
+    """Return the contract of a data class, and more fields with their types and defaults."""
+    hints, given = get_type_hints(kind), _OPTIONAL[kind] | more
+    own = {
+        f.name: (_json_type(hints[f.name]), ... if f.default is MISSING else _plain(f.default))
+        for f in fields(kind)
+        if f.name not in _UNTOLD
+    }
+    changed = {
+        name: value if isinstance(value, tuple) else (own[name][0], value)
+        for name, value in given.items()
+    }
+    parts: dict[str, Any] = {**own, **changed}
+    return create_model(kind.__name__, __config__=_CONFIG, **parts)
 
 
-class _GainRecord(_Record):
-    used_percent: _Pair
-    held_out_percent: _Pair | None = None
-    modified_percent: _Pair | None = None
-    cross_validated_percent: _Pair | None = None
-
-
-class _DiagnosisRecord(_Record):
-    case: str = ""
-    verdict: Verdict
-    sentence: str = ""
-    causes: list[_CauseRecord]
-    rivals: list[_RivalRecord]
-    reason: str = ""
-    advice: list[_AdviceRecord]
-    smallest_visible: list[_VisibleRecord]
-    residuals: list[_ResidualRecord]
-    gain: _GainRecord
-    chi2: _Pair = [None, None]
-    data_count: int = 0
-    adequacy_p: _Number
-    nothing: _Number = None
-    looks: list[_LookRecord] = []
-    locations: list[_LocationRecord] = []
-    base: list[str] = []
-    notes: list[str] = []
-    seconds: _Number = None
-    structure: PlacedWireframe | None = None
-    written: str | None = None
-    version: str = ""
+_UNTOLD = ("extended", "subject")
+# What older versions did not write, by the data class; a type goes with what is no field of it.
+_OPTIONAL: dict[Any, dict[str, Any]] = {
+    **{k: {} for k in (Advice, Cause, CauseParameter, Gain, LocationRow, ResidualRow, Rival)},
+    SmallestVisible: {"place": ""},
+    LookWarning: {"changes": (list[_Change], [])},
+    Diagnosis: {
+        **dict.fromkeys(("case", "sentence", "reason"), ""),
+        **{"chi2": [None, None], "data_count": 0, "nothing": None, "seconds": None},
+        **{name: [] for name in ("looks", "locations", "base")},
+    },
+}
+_DiagnosisRecord = _record(
+    Diagnosis,
+    structure=(PlacedWireframe | None, None),
+    written=(str | None, None),
+    version=(str, ""),
+)

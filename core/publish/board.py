@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from femubench.core.publish.agreement import Finding, References, findings_of, machine_of
 from femubench.core.publish.submissions import SCHEMA, Submission, slug
-from femubench.core.schema.results import BLOCKS, DONE
+from femubench.core.schema.results import BLOCKS, DONE, JobResult
 from femubench.core.score.ranking import geometric_mean, ranked as in_order, score_of
 
 
@@ -158,16 +158,21 @@ def _on_case(findings: Sequence[Finding], reference: Mapping[str, float]) -> dic
         "seeds": sorted({item.result.seed for item in findings}),
         "status": failed[0] if failed else results[0].status,
         "score": statistics.median(scores),
-        **{
-            f"{name}_percent": _middle(
-                [r.blocks[name].rms_percent for r in results if name in r.blocks]
-            )
-            for name in BLOCKS
-        },
+        **_errors(results),
         "seconds": statistics.median(result.seconds for result in results),
         "unphysical": any(result.unphysical for result in results),
         "conflict": any(item.conflict for item in findings),
         "machines": min(item.machines for item in listed),
+    }
+
+
+def _errors(results: Sequence[JobResult]) -> dict[str, float | None]:
+    """Return the median error of every block."""
+    return {
+        f"{name}_percent": _middle(
+            [r.blocks[name].rms_percent for r in results if name in r.blocks]
+        )
+        for name in BLOCKS
     }
 
 
@@ -195,20 +200,17 @@ def _strategy_entries(
         tier = not row["complete"], row["unphysical"], -row["covered"]
         return tier, 0.0 if row["skill"] is None else row["skill"], name
 
-    entries = []
-    for rank, name in in_order(latest, order):
-        history = [described[version] for version in described if version.strategy == name]
-        entries.append(
-            {
-                "name": name,
-                "citation": citations.get(name, ""),
-                "page": f"strategies/{slug(name)}.html",
-                "rank": rank if described[latest[name]]["complete"] else None,
-                "cases": len(ranked),
-                "versions": history[::-1],
-            }
-        )
-    return entries
+    return [
+        {
+            "name": name,
+            "citation": citations.get(name, ""),
+            "page": f"strategies/{slug(name)}.html",
+            "rank": rank if described[latest[name]]["complete"] else None,
+            "cases": len(ranked),
+            "versions": [row for own, row in described.items() if own.strategy == name][::-1],
+        }
+        for rank, name in in_order(latest, order)
+    ]
 
 
 def _case_entries(
@@ -248,12 +250,7 @@ def _conflict(item: Finding) -> dict[str, Any]:
             {
                 "counted": number == 0,
                 "status": other.result.status,
-                **{
-                    f"{name}_percent": other.result.blocks[name].rms_percent
-                    if name in other.result.blocks
-                    else None
-                    for name in BLOCKS
-                },
+                **_errors([other.result]),
                 "runs": [run.name for run in other.runs],
                 "machines": [dict(run.run.meta["machine"]) for run in other.runs],
             }

@@ -81,14 +81,11 @@ def check_site(folder: Path) -> None:
     if MARKER not in inside:
         if inside <= _SPARE:
             return
-        raise InputError(
-            f"not made by bench publish: there is {sorted(inside - _SPARE)[0]!r}",
-            file=folder,
-            expected="a new or empty folder, or one that bench publish made",
-        )
+        what = f"not made by bench publish: there is {sorted(inside - _SPARE)[0]!r}"
+        expected = "a new or empty folder, or one that bench publish made"
+        raise InputError(what, file=folder, expected=expected)
     file = folder / MARKER
-    expected = "what bench publish writes"
-    data = parse_json(read_text(file, MIB), file=file, expected=expected)
+    data = parse_json(read_text(file, MIB), file=file, expected="what bench publish writes")
     if not isinstance(data, dict) or data.get("kind") != KIND:
         raise InputError("no site", file=file, key="kind", expected=repr(KIND))
     if data.get("schema") != SCHEMA:

@@ -8,15 +8,16 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NoReturn
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from femubench.core.errors import InputError
 from femubench.core.files import read_text
 from femubench.core.schema.records import (
     LARGEST_RUN,
     Name,
+    Record,
     parse_json,
     result_to_json,
     run_from_json,
@@ -31,11 +32,11 @@ _LONGEST = 1e9  # s
 _ROUNDING = 1e-6  # relative, of an rms that is computed again from its modes
 _Word = Annotated[str, Field(max_length=200)]
 _Moment = Annotated[str, Field(pattern=_MOMENT)]
-_Digest = Annotated[str, Field(min_length=1, max_length=200)]
+_Digest = Annotated[_Word, Field(min_length=1)]
 
 
 class _Record(BaseModel):
-    model_config = ConfigDict(extra="ignore", allow_inf_nan=False)
+    model_config = Record.model_config
 
 
 class _Machine(_Record):
@@ -170,29 +171,29 @@ def _check(result: JobResult, meta: Mapping[str, Any], file: Path, key: str) -> 
     Raises:
         InputError: for a job without key or digest, or an error that its modes do not give.
     """
+
+    def refuse(what: str, where: str, expected: str) -> NoReturn:
+        raise InputError(what, file=file, key=where, expected=expected)
+
     if not re.fullmatch(r"[0-9a-f]{8,128}", result.key):
-        what = f"{result.key!r} is no key" if result.key else "no key"
-        raise InputError(what, file=file, key=f"{key}.key", expected="a hash of the job")
+        refuse(
+            f"{result.key!r} is no key" if result.key else "no key",
+            f"{key}.key",
+            "a hash of the job",
+        )
     if result.seconds > _LONGEST:
-        what, where = f"{result.seconds:g} s", f"{key}.seconds"
-        raise InputError(what, file=file, key=where, expected=f"at most {_LONGEST:g}")
+        refuse(f"{result.seconds:g} s", f"{key}.seconds", f"at most {_LONGEST:g}")
     for name in ("case", "strategy", "femubench"):
         text = result.provenance.get(name)
         if not isinstance(text, str) or not 0 < len(text) <= 200:
-            where = f"{key}.provenance.{name}"
             expected = "a digest" if name == "case" else "a version"
-            raise InputError("missing or not a text", file=file, key=where, expected=expected)
+            refuse("missing or not a text", f"{key}.provenance.{name}", expected)
     case = meta["cases"].get(result.case)
     if case is None or case["digest"] != result.provenance["case"]:
-        where = f"{key}.provenance.case"
-        expected = "the digest that meta.cases has"
-        raise InputError("another case", file=file, key=where, expected=expected)
+        refuse("another case", f"{key}.provenance.case", "the digest that meta.cases has")
     reference = meta["reference"].get(result.case)
     if not reference:
-        where = f"meta.reference.{result.case}"
-        raise InputError(
-            "missing", file=file, key=where, expected="the errors of the nominal model"
-        )
+        refuse("missing", f"meta.reference.{result.case}", "the errors of the nominal model")
     for name, block in result.blocks.items():
         _check_block(block, reference, file, f"{key}.{name}")
 

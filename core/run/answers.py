@@ -27,24 +27,21 @@ _LONGEST_NAME = 500
 _LONGEST_REASON = 2_000
 _MOST_FIGURES = 200_000
 _NUMPY = ("numpy", "numpy._core", "numpy.core", "scipy.sparse")
-_NAMES = frozenset(
-    {
-        ("builtins", "complex"),
-        ("builtins", "frozenset"),
-        ("builtins", "set"),
-        ("builtins", "slice"),
-        ("collections", "OrderedDict"),
-        ("copyreg", "_reconstructor"),
-        ("builtins", "object"),
-        ("functools", "partial"),
-        ("types", "MappingProxyType"),
-        ("femubench.core.case.nodes", "MatrixGeometry"),
-    }
-)
+_NAMES = {
+    "builtins": {"complex", "frozenset", "object", "set", "slice"},
+    "collections": {"OrderedDict"},
+    "copyreg": {"_reconstructor"},
+    "functools": {"partial"},
+    "types": {"MappingProxyType"},
+    "femubench.core.case.nodes": {"MatrixGeometry"},
+}
 _NUMPY_NAMES = frozenset(
     {"_reconstruct", "_frombuffer", "scalar", "dtype", "ndarray"}
-    | {"csr_array", "csc_array", "coo_array", "dia_array", "bsr_array"}
-    | {"csr_matrix", "csc_matrix", "coo_matrix", "dia_matrix", "bsr_matrix"}
+    | {
+        f"{form}_{kind}"
+        for form in ("csr", "csc", "coo", "dia", "bsr")
+        for kind in ("array", "matrix")
+    }
 )
 # Where the classes of a model live; functions there (a section's kappa) compute and do no more.
 _OURS = ("femubench.core.fem.", "femubench.core.fem.model", "femubench.core.modal.measurement")
@@ -113,7 +110,7 @@ class _ModelReader(pickle.Unpickler):
         Raises:
             AnswerError: for any other.
         """
-        known = (module, name) in _NAMES
+        known = name in _NAMES.get(module, ())
         numeric = module.startswith(_NUMPY) and name in _NUMPY_NAMES
         ours = module.startswith(_OURS) and "." not in name
         if not (known or numeric or ours):

@@ -26,18 +26,11 @@ def results_frame(run: Run) -> pd.DataFrame:
 
     rows = []
     for result in run.results:
-        row: dict[str, object] = {
-            name: getattr(result, name)
-            for name in ("case", "strategy", "seed", "status", "reason", "seconds")
-        }
-        for name in BLOCKS:
-            block = result.blocks.get(name)
-            row[f"{name}_percent"] = None if block is None else block.rms_percent
-            row[f"{name}_mac"] = None if block is None else block.mean_mac
-        for name in _COUNTS:
-            row[name] = getattr(result, name)
+        row = {name: getattr(result, name) for name in (*_JOB, *_COUNTS)}
+        for name, block in result.blocks.items():
+            row |= {f"{name}_percent": block.rms_percent, f"{name}_mac": block.mean_mac}
         rows.append(row)
-    frame = pd.DataFrame(rows, columns=list(_RESULT_COLUMNS))
+    frame = pd.DataFrame(rows, columns=[*_JOB, *_ERRORS, *_COUNTS])
     whole = {name: "Int64" for name in _COUNTS if name not in ("unphysical", "score")}
     return frame.astype({**whole, **dict.fromkeys(_FLOATS, "float64")})
 
@@ -70,8 +63,8 @@ def modes_frame(run: Run) -> pd.DataFrame:
         for mode in block.modes
     ]
     floats = ("measured_hz", "predicted_hz", "error_percent", "counted_percent", "mac")
-    frame = pd.DataFrame(rows, columns=list(_MODE_COLUMNS))
-    return frame.astype(dict.fromkeys(floats, "float64"))
+    names = ("case", "strategy", "seed", "block", "modification", "mode", *floats)
+    return pd.DataFrame(rows, columns=list(names)).astype(dict.fromkeys(floats, "float64"))
 
 
 def _signed(measured: float, predicted: float | None) -> float | None:
@@ -80,18 +73,10 @@ def _signed(measured: float, predicted: float | None) -> float | None:
     return 100.0 * (predicted / measured - 1.0)
 
 
+_JOB = ("case", "strategy", "seed", "status", "reason", "seconds")
 _COUNTS = (
     *("rigid_body_modes", "rigid_body_modes_expected", "negative_eigenvalues", "unphysical"),
     *("parameter_count", "evaluations", "score", "rank"),
 )
 _ERRORS = tuple(f"{name}_{what}" for name in BLOCKS for what in ("percent", "mac"))
 _FLOATS = ("seconds", *_ERRORS, "score")
-_RESULT_COLUMNS = (
-    *("case", "strategy", "seed", "status", "reason", "seconds"),
-    *_ERRORS,
-    *_COUNTS,
-)
-_MODE_COLUMNS = (
-    *("case", "strategy", "seed", "block", "modification", "mode", "measured_hz"),
-    *("predicted_hz", "error_percent", "counted_percent", "mac"),
-)

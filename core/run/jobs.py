@@ -111,9 +111,8 @@ def missing_capability(needs: frozenset[str], model: Model, measurement: Measure
 def execute(job: Job) -> JobOutcome:
     """Run one job in this process and tell how it ended; no exception of a strategy gets out."""
     try:
-        strategy, model, measurement = (
-            pickle.loads(part) for part in (job.strategy, job.model, job.measurement)
-        )
+        parts = (job.strategy, job.model, job.measurement)
+        strategy, model, measurement = map(pickle.loads, parts)
         reason = missing_capability(frozenset(declared(strategy, "needs")), model, measurement)
     except Exception as error:
         return JobOutcome("failed", one_line(error), traceback.format_exc())
@@ -150,20 +149,16 @@ def _attempt(
 ) -> JobOutcome:
     try:
         return _plain(strategy.update(model, measurement, rng))
-    except NotApplicable as error:
-        return JobOutcome("not-applicable", _text(error), traceback.format_exc())
-    except Diverged as error:
-        return JobOutcome("diverged", _text(error), traceback.format_exc())
-    except StrategyFailure as error:
-        return JobOutcome("failed", _text(error), traceback.format_exc())
-    except MemoryError as error:
-        return JobOutcome("failed", f"out of memory: {one_line(error)}", traceback.format_exc())
     except BaseException as error:  # Ctrl-C does not reach a worker: this is the strategy's own
-        return JobOutcome("failed", one_line(error), traceback.format_exc())
-
-
-def _text(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
+        status: Status = "failed"
+        if isinstance(error, NotApplicable | Diverged):
+            status = "diverged" if isinstance(error, Diverged) else "not-applicable"
+        reason = one_line(error)
+        if isinstance(error, NotApplicable | StrategyFailure):
+            reason = " ".join(str(error).split()) or type(error).__name__
+        elif isinstance(error, MemoryError):
+            reason = f"out of memory: {reason}"
+        return JobOutcome(status, reason, traceback.format_exc())
 
 
 def _plain(result: Result) -> JobOutcome:

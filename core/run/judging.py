@@ -6,7 +6,7 @@ import json
 import pickle
 import traceback
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from femubench.core.case.case import Case
@@ -74,21 +74,9 @@ def judged(
     case: Case, reference: Reference, strategy: str, seed: int, outcome: JobOutcome
 ) -> JobResult:
     """Return the result of a job: its model checked and scored; a model that fails has failed."""
-    result = JobResult(
-        case=case.name,
-        strategy=strategy,
-        seed=seed,
-        status=outcome.status,
-        reason=outcome.reason,
-        seconds=outcome.seconds,
-        rigid_body_modes_expected=reference.rigid.shape[1],
-        parameter_count=outcome.parameter_count,
-        evaluations=outcome.evaluations,
-        parameters=outcome.parameters,
-        history=outcome.history,
-        diagnostics=outcome.diagnostics,
-        traceback=outcome.traceback,
-    )
+    own = {f.name: getattr(outcome, f.name) for f in fields(outcome) if f.name != "model"}
+    expected = reference.rigid.shape[1]
+    result = JobResult(case.name, strategy, seed, **own, rigid_body_modes_expected=expected)
     if outcome.model is not None:
         result = _scored(result, case, outcome, reference)
     return replace(result, score=score_of(result, reference.rms_percent))
@@ -105,9 +93,4 @@ def _scored(result: JobResult, case: Case, outcome: JobOutcome, reference: Refer
     except Exception as error:
         reason = str(error) if isinstance(error, FemubenchError) else one_line(error)
         return replace(result, status="failed", reason=reason, traceback=traceback.format_exc())
-    return replace(
-        result,
-        blocks=judgement.blocks,
-        rigid_body_modes=judgement.rigid_body_modes,
-        negative_eigenvalues=judgement.negative_eigenvalues,
-    )
+    return replace(result, **vars(judgement))

@@ -35,16 +35,17 @@ def job_key(case: Case, strategy: str, code: bytes, version: str, seed: int) -> 
         version: from `strategy_version`.
         seed: of the noise.
     """
-    parts = (
-        *(__version__, case.name, case.digest, strategy),
-        *(hashlib.sha256(code).hexdigest(), version, str(seed)),
-    )
-    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
+    own = hashlib.sha256(code).hexdigest()
+    return _hash(__version__, case.name, case.digest, strategy, own, version, str(seed))
 
 
 def plan_digest(keys: Iterable[str]) -> str:
     """Return one digest for the keys of all jobs of a run, in any order."""
-    return hashlib.sha256("\0".join(sorted(keys)).encode()).hexdigest()[:32]
+    return _hash(*sorted(keys))
+
+
+def _hash(*parts: str) -> str:
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
 
 def strategy_version(strategy: Strategy) -> str:
@@ -59,16 +60,14 @@ def strategy_version(strategy: Strategy) -> str:
 
 @cache
 def _number(top: str) -> str:
-    return str(getattr(sys.modules.get(top), "__version__", "") or _installed(top))
+    return str(getattr(sys.modules.get(top), "__version__", "") or _installed(top, "0"))
 
 
-def _installed(top: str) -> str:
-    from importlib import metadata
-
+def _installed(package: str, missing: str) -> str:
     try:
-        return metadata.version(top)
+        return metadata.version(package)
     except metadata.PackageNotFoundError:
-        return "0"
+        return missing
 
 
 def _stamps(top: str, module: str) -> Iterator[Stamp]:
@@ -196,25 +195,15 @@ def run_meta(
 
 def versions() -> dict[str, str]:
     """Return the versions of Python and of the packages that results depend on."""
-    found = {"python": platform.python_version()}
-    for package in _PACKAGES:
-        try:
-            found[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            found[package] = "not installed"
-    return found
+    installed = {package: _installed(package, "not installed") for package in _PACKAGES}
+    return {"python": platform.python_version(), **installed}
 
 
 def git_commit() -> str | None:
     """Return the commit of the repository around the working directory, None without one."""
     try:
-        answer = subprocess.run(
-            ["git", "rev-parse", "HEAD"],
-            capture_output=True,
-            text=True,
-            timeout=5.0,
-            check=True,
-        )
+        command = ["git", "rev-parse", "HEAD"]
+        answer = subprocess.run(command, capture_output=True, text=True, timeout=5.0, check=True)
     except (OSError, subprocess.SubprocessError):
         return None
     return answer.stdout.strip() or None

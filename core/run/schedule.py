@@ -6,7 +6,7 @@ import json
 import pickle
 import sys
 import traceback
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ from femubench.core.run.jobs import Job, JobOutcome, one_line, seed_words, sent
 from femubench.core.run.judging import Verdict, judged, run_judge, run_strategy
 from femubench.core.run.limits import Limits
 from femubench.core.run.provenance import job_key, provenance, strategy_version
-from femubench.core.run.workers import Ending, How, Workers
+from femubench.core.run.workers import Ending, Workers
 from femubench.core.schema.records import result_from_json
 from femubench.core.schema.results import JobResult, Status
 from femubench.core.score.scoring import Reference
@@ -104,15 +104,7 @@ def _pickled(thing: object, turned: Callable[[object], bytes] = _bytes) -> bytes
         return JobOutcome("failed", reason, traceback.format_exc())
 
 
-_STATUS: Mapping[How, Status] = {
-    "timeout": "timeout",
-    "memory": "crashed",
-    "output": "crashed",
-    "answer-size": "crashed",
-    "died": "crashed",
-    "no-start": "crashed",
-    "orphaned": "crashed",
-}
+_Task = tuple[int, bytes]  # place of a job, and its answer once it is there to be judged
 Show = Callable[[Slot, Mapping[str, Any]], None]
 _LEAST_JUDGING = 300.0  # s
 _ATTEMPTS = 3  # to start a process
@@ -132,31 +124,21 @@ def computed(
         show: takes the exhibit of a job of the first seed, before its result comes.
     """
 
-    def result_of(index: int, outcome: JobOutcome) -> tuple[int, JobResult]:
-        slot = slots[index]
-        reference = references[slot.case.name]
-        return index, judged(slot.case, reference, slot.strategy, slot.seed, outcome)
-
+    bench = _Bench(slots, references, limits, show)
     for index in wanted:
         fault = slots[index].fault
         if fault is not None:
-            yield result_of(index, fault)
-    waiting = deque(index for index in wanted if slots[index].job is not None)
-    if not waiting:
+            yield index, bench.unjudged(index, fault)
+        else:
+            bench.waiting.append((index, b""))
+    if not bench.waiting:
         return
-    bench = _Bench(slots, references, limits, show)
-    with Workers[tuple[int, bytes]](count).open() as workers:
-        while waiting or bench.answers or bench.lonely or workers.busy:
-            while workers.free and bench.has_work(workers, waiting):
-                lost = bench.start(workers, waiting)
-                if lost is not None:
-                    yield result_of(*lost)
-            for (index, answer), ending in workers.wait():
-                found = bench.taken(index, answer, ending, waiting)
-                if isinstance(found, JobResult):
-                    yield index, found
-                elif found is not None:
-                    yield result_of(index, found)
+    with Workers[_Task](count).open() as workers:
+        while bench.waiting or bench.answers or bench.lonely or workers.busy:
+            while workers.free and bench.has_work(workers):
+                yield from bench.start(workers)
+            for task, ending in workers.wait():
+                yield from bench.taken(task, ending)
 
 
 class _Bench:
@@ -170,74 +152,65 @@ class _Bench:
         show: Show | None,
     ) -> None:
         self._slots, self._references, self._limits = slots, references, limits
-        self._show, self._shown = show, min(slot.seed for slot in slots)
+        self._show, self._shown = show, min((slot.seed for slot in slots), default=0)
         self._cases: dict[str, bytes] = {}
-        self._attempts: dict[int, int] = {}
+        self._attempts = Counter[int]()
         self._alone: set[int] = set()
-        self.answers: deque[tuple[int, bytes]] = deque()
+        self.waiting: deque[_Task] = deque()
+        self.answers: deque[_Task] = deque()
         # Ended by another job, or they ended others: they run last, one at a time.
-        self.lonely: deque[tuple[int, bytes]] = deque()
+        self.lonely: deque[_Task] = deque()
 
-    def has_work(self, workers: Workers[tuple[int, bytes]], waiting: deque[int]) -> bool:
+    def has_work(self, workers: Workers[_Task]) -> bool:
         """Tell whether there is something to start now."""
-        return bool(waiting or self.answers or (self.lonely and not workers.busy))
+        return bool(self.waiting or self.answers or (self.lonely and not workers.busy))
 
-    def start(
-        self, workers: Workers[tuple[int, bytes]], waiting: deque[int]
-    ) -> tuple[int, JobOutcome] | None:
-        """Start judging an answer or running a job; return a job that cannot be started."""
-        if self.answers or not waiting:
-            index, answer = (self.answers or self.lonely).popleft()
-        else:
-            index, answer = waiting.popleft(), b""
+    def start(self, workers: Workers[_Task]) -> Iterator[tuple[int, JobResult]]:
+        """Start judging an answer or running a job; yield the result of one that cannot start."""
+        task = (self.answers or self.waiting or self.lonely).popleft()
+        index, answer = task
         slot = self._slots[index]
         if answer:
             shown = self._show is not None and slot.seed == self._shown
             verdict = Verdict(self._case(slot.case), answer, slot.strategy, slot.seed, shown)
-            ending = workers.start(
-                (index, answer), run_judge, verdict, self._judging(slot.strategy)
-            )
+            ending = workers.start(task, run_judge, verdict, self._judging(slot.strategy))
         else:
-            ending = workers.start(
-                (index, b""), run_strategy, slot.job, self._limits[slot.strategy]
-            )
-        if ending is None or self._again(index, answer, waiting):
-            return None
-        return index, JobOutcome("crashed", ending.reason)
+            ending = workers.start(task, run_strategy, slot.job, self._limits[slot.strategy])
+        if ending is not None and not self._again(task):
+            yield index, self.unjudged(index, JobOutcome("crashed", ending.reason))
 
-    def _again(self, index: int, answer: bytes, waiting: deque[int]) -> bool:
+    def _again(self, task: _Task) -> bool:
         """Try a task once more for which there was no process; tell whether it may be tried."""
-        self._attempts[index] = self._attempts.get(index, 0) + 1
+        index, answer = task
+        self._attempts[index] += 1
         if self._attempts[index] >= _ATTEMPTS:
             return False
-        if answer:
-            self.answers.append((index, answer))
-        else:
-            waiting.append(index)
+        (self.answers if answer else self.waiting).append(task)
         return True
 
-    def taken(
-        self, index: int, answer: bytes, ending: Ending, waiting: deque[int]
-    ) -> JobResult | JobOutcome | None:
-        """Return the result of a task that has ended, or its outcome; None while it goes on."""
+    def taken(self, task: _Task, ending: Ending) -> Iterator[tuple[int, JobResult]]:
+        """Yield the result of a task that has ended, unless its job goes on."""
+        index, answer = task
         if ending.how == "orphaned" and index not in self._alone:
             self._alone.add(index)
-            self.lonely.append((index, answer))
-            return None
-        if ending.how == "no-start" and self._again(index, answer, waiting):
-            return None
-        if answer:
-            return self._judgement(self._slots[index], ending)
-        if ending.how == "answer":
-            try:
-                outcome = head_of(ending.answer)
-            except AnswerError as error:
-                return JobOutcome("failed", str(error), seconds=ending.seconds)
-            if outcome.status != "ok":
-                return outcome
-            self.answers.append((index, ending.answer))
-            return None
-        return JobOutcome(_STATUS[ending.how], ending.reason, seconds=ending.seconds)
+            self.lonely.append(task)
+        elif ending.how == "no-start" and self._again(task):
+            return
+        elif answer:
+            found = self._judgement(self._slots[index], ending)
+            yield index, self.unjudged(index, found) if isinstance(found, JobOutcome) else found
+        else:
+            outcome = _outcome_of(ending)
+            if outcome.status == "ok":
+                self.answers.append((index, ending.answer))
+            else:
+                yield index, self.unjudged(index, outcome)
+
+    def unjudged(self, index: int, outcome: JobOutcome) -> JobResult:
+        """Return the result of a job that has no model to be judged."""
+        slot = self._slots[index]
+        reference = self._references[slot.case.name]
+        return judged(slot.case, reference, slot.strategy, slot.seed, outcome)
 
     def _judgement(self, slot: Slot, ending: Ending) -> JobResult | JobOutcome:
         if ending.how != "answer":
@@ -261,3 +234,14 @@ class _Bench:
         limits = self._limits[strategy]
         seconds = None if limits.seconds is None else max(_LEAST_JUDGING, limits.seconds)
         return replace(limits, seconds=seconds)
+
+
+def _outcome_of(ending: Ending) -> JobOutcome:
+    """Return how a strategy's process says that its job ended, or what ended the process."""
+    if ending.how != "answer":
+        status: Status = "timeout" if ending.how == "timeout" else "crashed"
+        return JobOutcome(status, ending.reason, seconds=ending.seconds)
+    try:
+        return head_of(ending.answer)
+    except AnswerError as error:
+        return JobOutcome("failed", str(error), seconds=ending.seconds)

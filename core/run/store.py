@@ -54,9 +54,7 @@ class Damage:
 
     def notes(self, file: Path) -> list[str]:
         """Return a line for each of the first ones and one for the others."""
-        shown = [
-            f"{' '.join(str(fault).split())}: left out" for fault in self._faults[:_MOST_NOTES]
-        ]
+        shown = [f"{' '.join(str(f).split())}: left out" for f in self._faults[:_MOST_NOTES]]
         more = len(self._faults) - len(shown)
         if more:
             lines = "line was" if more == 1 else "lines were"
@@ -147,10 +145,7 @@ class Store:
         Raises:
             InputError: for a line that is no record.
         """
-        if not self.path.exists():
-            return ()
-        lines, _ = self._lines()
-        return tuple(line.record["run"] for line in lines if line.record["record"] == "run")
+        return tuple(line.record["run"] for line in self._of("run"))
 
     def load(self, run_id: str | None = None, *, lenient: bool = False) -> Run:
         """Return a run with scores and ranks.
@@ -195,8 +190,9 @@ class Store:
         is not in the key.
         """
         found: dict[str, JobResult] = {}
-        for run, item in self._results():
-            if run_id not in (None, run):
+        for line in self._of("result"):
+            item = self._result(line)
+            if run_id not in (None, line.record["run"]):
                 continue
             known = found.get(item.key)
             if item.key and (known is None or item.status in DONE or known.status not in DONE):
@@ -205,7 +201,8 @@ class Store:
 
     def latest_of_plan(self, plan: str) -> dict[str, Any] | None:
         """Return the meta data with which the latest run of the same jobs began."""
-        found = [meta for meta in self._begun() if meta.get("plan") == plan]
+        begun = (self._meta(line) for line in self._of("run"))
+        found = [meta for meta in begun if meta.get("plan") == plan]
         return found[-1] if found else None
 
     @contextmanager
@@ -231,18 +228,10 @@ class Store:
             path.unlink(missing_ok=True)
             os.close(descriptor)
 
-    def _begun(self) -> list[dict[str, Any]]:
-        if not self.path.exists():
-            return []
-        lines, _ = self._lines()
-        return [self._meta(line) for line in lines if line.record["record"] == "run"]
-
-    def _results(self) -> Iterator[tuple[str, JobResult]]:
-        if not self.path.exists():
-            return
-        for line in self._lines()[0]:
-            if line.record["record"] == "result":
-                yield line.record["run"], self._result(line)
+    def _of(self, kind: str) -> list[_Line]:
+        """Return the records of a kind, none where nothing was stored."""
+        lines = self._lines()[0] if self.path.exists() else []
+        return [line for line in lines if line.record["record"] == kind]
 
     def _result(self, line: _Line) -> JobResult:
         record = line.record.get("result")
@@ -251,24 +240,21 @@ class Store:
     def _find(self, lines: list[_Line], run_id: str | None, damage: Damage) -> str:
         # Of a run whose first line is broken there may be results.
         kinds = _KINDS if damage.lenient else ("run",)
-        begun = (line.record["run"] for line in lines if line.record["record"] in kinds)
-        known = list(dict.fromkeys(begun))
+        runs = (line.record["run"] for line in lines if line.record["record"] in kinds)
+        known = list(dict.fromkeys(runs))
         if run_id in known:
             return str(run_id)
         matching = [name for name in known if run_id is None or name.startswith(run_id)]
         if not matching:
             what = "no run" if run_id is None else f"no run {run_id!r}"
             what = "; ".join([what, *damage.notes(self.path)])
-            latest = (
+            stored = (
                 f"one of the {len(known)} stored, e.g. {known[-1]}" if known else "a stored run"
             )
-            raise InputError(what, file=self.path, expected=latest)
-        if run_id is not None and len(set(matching)) > 1:
-            raise InputError(
-                f"{len(set(matching))} runs begin with {run_id!r}",
-                file=self.path,
-                expected=f"more letters, e.g. {matching[0]}",
-            )
+            raise InputError(what, file=self.path, expected=stored)
+        if run_id is not None and len(matching) > 1:
+            what = f"{len(matching)} runs begin with {run_id!r}"
+            raise InputError(what, file=self.path, expected=f"more letters, e.g. {matching[0]}")
         return str(matching[-1])
 
     def _meta(self, line: _Line) -> dict[str, Any]:
@@ -290,25 +276,18 @@ class Store:
 
     def _record(self, text: bytes, number: int) -> dict[str, Any]:
         record = parse_json(text, file=self.path, line=number, expected="one record a line")
-        if not isinstance(record, dict) or record.get("record") not in _KINDS:
-            raise InputError(
-                "not a record",
-                file=self.path,
-                line=number,
-                key="record",
-                expected=f"one of {', '.join(_KINDS)}",
-            )
-        if record.get("schema") != SCHEMA:
-            raise InputError(
-                f"schema {record.get('schema')!r}",
-                file=self.path,
-                line=number,
-                key="schema",
-                expected=f"{SCHEMA}, as this version writes",
-            )
-        if not isinstance(record.get("run"), str):
-            raise InputError("no run id", file=self.path, line=number, key="run", expected="a text")
-        return record
+        kind = record.get("record") if isinstance(record, dict) else None
+        if kind not in _KINDS:
+            wrong = "not a record", "record", f"one of {', '.join(_KINDS)}"
+        elif record.get("schema") != SCHEMA:
+            known = f"{SCHEMA}, as this version writes"
+            wrong = f"schema {record.get('schema')!r}", "schema", known
+        elif not isinstance(record.get("run"), str):
+            wrong = "no run id", "run", "a text"
+        else:
+            return dict(record)
+        what, key, expected = wrong
+        raise InputError(what, file=self.path, line=number, key=key, expected=expected)
 
     def _write(self, record: dict[str, Any]) -> None:
         text = json.dumps(finite({"schema": SCHEMA, **record}), allow_nan=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import resource
+import shutil
 import signal
 import sys
 import tempfile
@@ -31,6 +32,8 @@ _THREADS = (
     "NUMEXPR_NUM_THREADS",
 )
 _PR_SET_PDEATHSIG = 1
+# Where multiprocessing's server and tracker keep how to reach them.
+_KEPT = ("_forkserver_alive_fd", "_forkserver_address", "_forkserver_pid", "_fd", "_pid")
 
 
 @contextmanager
@@ -101,13 +104,7 @@ def _close_all_but(descriptor: int) -> None:
     """Close what multiprocessing left open: whoever writes there ends the server of all workers."""
     # So that a strategy that starts processes of its own gets its own server and tracker.
     for keeper in (forkserver._forkserver, resource_tracker._resource_tracker):
-        for name in (
-            "_forkserver_alive_fd",
-            "_forkserver_address",
-            "_forkserver_pid",
-            "_fd",
-            "_pid",
-        ):
+        for name in _KEPT:
             if hasattr(keeper, name):
                 setattr(keeper, name, None)
     os.closerange(3, descriptor)
@@ -147,11 +144,5 @@ def scratch_root() -> Path:
     for left in above.glob("femubench-*-*"):
         number = left.name.split("-")[1]
         if number.isdigit() and not psutil.pid_exists(int(number)):
-            _remove(left)
+            shutil.rmtree(left, ignore_errors=True)
     return Path(tempfile.mkdtemp(prefix=f"femubench-{os.getpid()}-", dir=above))
-
-
-def _remove(folder: Path) -> None:
-    import shutil
-
-    shutil.rmtree(folder, ignore_errors=True)

@@ -7,13 +7,14 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, NoReturn, TypeVar
+from typing import Annotated, Any, NoReturn
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from femubench.core.errors import InputError
 from femubench.core.files import MIB, read_text
 from femubench.core.schema.results import BLOCKS, Block, JobResult, PairedMode, Run, Status
+from femubench.core.schema.validation import validated
 
 LARGEST_RUN = 256 * MIB  # bytes of a file of `bench run --json`
 LARGEST_STORE = 1024 * MIB  # bytes of a store, which holds many runs
@@ -183,30 +184,10 @@ def _not_json(word: str) -> NoReturn:
 
 def result_to_json(result: JobResult) -> dict[str, Any]:
     """Return one result in the JSON contract of ``bench run``; no NaN, no infinity in it."""
-    blocks = {name: result.blocks.get(name) for name in BLOCKS}
-    record: dict[str, Any] = {
-        "case": result.case,
-        "strategy": result.strategy,
-        "seed": result.seed,
-        "status": result.status,
-        "reason": result.reason[:LONGEST_TEXT],
-        "seconds": result.seconds,
-        **{name: None if block is None else _block(block) for name, block in blocks.items()},
-        "rigid_body_modes": result.rigid_body_modes,
-        "rigid_body_modes_expected": result.rigid_body_modes_expected,
-        "negative_eigenvalues": result.negative_eigenvalues,
-        "unphysical": result.unphysical,
-        "parameter_count": result.parameter_count,
-        "evaluations": result.evaluations,
-        "score": result.score,
-        "rank": result.rank,
-        "parameters": [dict(item) for item in result.parameters],
-        "history": [dict(item) for item in result.history],
-        "diagnostics": dict(result.diagnostics),
-        "traceback": result.traceback[-LONGEST_TEXT:],
-        "key": result.key,
-        "provenance": dict(result.provenance),
-    }
+    record = {name: getattr(result, name, None) for name in ResultRecord.model_fields}
+    record |= {name: _block(block) for name, block in result.blocks.items()}
+    record |= {"reason": result.reason[:LONGEST_TEXT], "unphysical": result.unphysical}
+    record["traceback"] = result.traceback[-LONGEST_TEXT:]
     clean: dict[str, Any] = _encodable(finite(record))
     return clean
 
@@ -223,7 +204,7 @@ def result_from_json(
     Raises:
         InputError: naming the first field that is wrong.
     """
-    data = _validated(ResultRecord, record, file, line, key)
+    data = validated(ResultRecord, record, file, line, key)
     found = {name: getattr(data, name) for name in BLOCKS}
     plain = data.model_dump(exclude=set(BLOCKS))
     plain["parameters"] = tuple(
@@ -249,7 +230,7 @@ def run_from_json(data: object, *, file: Path | str | None = None) -> Run:
     Raises:
         InputError: naming the first field that is wrong.
     """
-    record = _validated(RunRecord, data, file, None, "")
+    record = validated(RunRecord, data, file, None, "")
     meta = meta_from_json(record.meta, file=file)
     results = tuple(
         result_from_json(item, file=file, key=f"results[{i}]")
@@ -274,7 +255,7 @@ def meta_from_json(
     if not isinstance(data, dict):
         raise InputError("no meta data", file=file, line=line, key=key, expected="a table")
     check_depth(data, "meta data", file=file, line=line, key=key)
-    _validated(MetaRecord, data, file, line, key)
+    validated(MetaRecord, data, file, line, key)
     return data
 
 
@@ -316,36 +297,6 @@ def _numbers(item: Mapping[str, Any], names: Iterable[str]) -> dict[str, Any]:
 
 
 def _block(block: Block) -> dict[str, Any]:
-    return {
-        "rms_percent": block.rms_percent,
-        "mean_mac": block.mean_mac,
-        "modes": [
-            {
-                "mode": mode.number,
-                "measured_hz": mode.measured_hz,
-                "predicted_hz": mode.predicted_hz,
-                "mac": mode.mac,
-                "modification": mode.modification,
-            }
-            for mode in block.modes
-        ],
-    }
-
-
-_R = TypeVar("_R", bound=BaseModel)
-
-
-def _validated(
-    kind: type[_R], record: object, file: Path | str | None, line: int | None, key: str
-) -> _R:
-    try:
-        return kind.model_validate(record)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        path = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in first["loc"])
-        raise InputError(
-            first["msg"],
-            file=file,
-            line=line,
-            key=(key + path).lstrip(".") or None,
-        ) from error
+    plain = ({"mode": mode.number, **vars(mode)} for mode in block.modes)
+    modes = [{name: mode[name] for name in _ModeRecord.model_fields} for mode in plain]
+    return {**vars(block), "modes": modes}

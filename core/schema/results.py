@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from femubench.core.display import Shown, counted
 
 Status = Literal["ok", "failed", "timeout", "crashed", "diverged", "not-applicable"]
-STATUSES: tuple[Status, ...] = ("ok", "failed", "timeout", "crashed", "diverged", "not-applicable")
+STATUSES: tuple[Status, ...] = get_args(Status)
 # A result, though there may be no model; everything else is a failure and no result.
 DONE: frozenset[Status] = frozenset({"ok", "not-applicable"})
 BLOCKS = ("used", "higher", "modified")
@@ -97,10 +97,14 @@ class JobResult:
     provenance: Mapping[str, Any] = field(default_factory=dict)
 
     @property
+    def rigid_modes_lost(self) -> int:
+        """Return how many rigid-body modes the model has less than the nominal one."""
+        return max((self.rigid_body_modes_expected or 0) - (self.rigid_body_modes or 0), 0)
+
+    @property
     def unphysical(self) -> bool:
         """Tell whether rigid-body modes were lost or eigenvalues are negative."""
-        lost = (self.rigid_body_modes or 0) < (self.rigid_body_modes_expected or 0)
-        return self.status == "ok" and (lost or bool(self.negative_eigenvalues))
+        return self.status == "ok" and bool(self.rigid_modes_lost or self.negative_eigenvalues)
 
 
 @dataclass(frozen=True, repr=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from femubench.core.errors import InputError
 from femubench.core.schema.results import BLOCKS, DONE, JobResult, Run
@@ -15,7 +15,8 @@ from femubench.core.score.statistics import Evidence, block_ratios, evidence_of,
 from femubench.core.typing import FloatArray
 
 Metric = Literal["skill", "used", "higher", "modified", "seconds", "failures"]
-METRICS: tuple[Metric, ...] = ("skill", "used", "higher", "modified", "seconds", "failures")
+METRICS: tuple[Metric, ...] = get_args(Metric)
+Kind = Literal["lost", "gained", "other"]
 SCHEMA = 1
 
 
@@ -45,7 +46,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Change:
+class Change(Job):
     """A job that ended otherwise in B.
 
     Arguments:
@@ -55,10 +56,7 @@ class Change:
         reason: of the one that is no sound result.
     """
 
-    strategy: str
-    case: str
-    seed: int
-    kind: Literal["lost", "gained", "other"]
+    kind: Kind
     before: str
     after: str
     reason: str
@@ -143,7 +141,6 @@ class Comparison:
 
 
 _ROUNDING = 1e-9  # relative; two machines may differ by it
-_Job = tuple[str, str, int]  # strategy, in B where A has another name for it, case, seed
 
 
 @dataclass(frozen=True)
@@ -212,12 +209,10 @@ def compare_runs(
     other = [job for job in shared if _moved(before, old[job], after, new[job])]
     shared = [job for job in shared if job not in set(other)]
     if not shared:
-        raise InputError(
-            "the two runs have no job in common",
-            expected="one (case, strategy, seed) with the same case files",
-        )
+        expected = "one (case, strategy, seed) with the same case files"
+        raise InputError("the two runs have no job in common", expected=expected)
     references = {**(after.meta.get("reference") or {}), **(before.meta.get("reference") or {})}
-    pairs = [_Pair(job[0], old[job], new[job], references.get(job[1]) or {}) for job in shared]
+    pairs = [_Pair(j.strategy, old[j], new[j], references.get(j.case) or {}) for j in shared]
     rows = tuple(_rows(pairs))
     return Comparison(
         before=str(before.meta.get("run") or "A"),
@@ -227,22 +222,22 @@ def compare_runs(
         changes=_changes(pairs),
         rows=rows,
         evidence=evidence_of(_ratios(pairs, references)),
-        only_before=tuple(Job(*job) for job in old if job not in new),
-        only_after=tuple(Job(*job) for job in new if job not in old),
-        other_cases=tuple(Job(*job) for job in other),
+        only_before=tuple(job for job in old if job not in new),
+        only_after=tuple(job for job in new if job not in old),
+        other_cases=tuple(other),
         environment=tuple(environment_differences(_safe(before.meta), _safe(after.meta))),
         thresholds=tuple(thresholds),
         excesses=tuple(_excesses(rows, thresholds)),
         untested=tuple(
-            item.metric
-            for item in thresholds
-            if all(row.values[item.metric] is None for row in rows)
+            t.metric for t in thresholds if all(row.values[t.metric] is None for row in rows)
         ),
     )
 
 
-def _by_job(run: Run, names: Mapping[str, str]) -> dict[_Job, JobResult]:
-    return {(names[r.strategy], r.case, r.seed): r for r in run.results if r.strategy in names}
+def _by_job(run: Run, names: Mapping[str, str]) -> dict[Job, JobResult]:
+    """Return the results by job, under the strategy's name in B where A has another."""
+    chosen = (r for r in run.results if r.strategy in names)
+    return {Job(names[r.strategy], r.case, r.seed): r for r in chosen}
 
 
 def _strategies(run: Run) -> list[str]:
@@ -297,26 +292,22 @@ def _state(result: JobResult) -> str:
 def _changes(pairs: Iterable[_Pair]) -> tuple[Change, ...]:
     found = []
     for pair in pairs:
-        states = _state(pair.before), _state(pair.after)
-        if states[0] == states[1]:
+        before, after = _state(pair.before), _state(pair.after)
+        if before == after:
             continue
-        sound = [state in DONE for state in states]
-        kind: Literal["lost", "gained", "other"] = "other"
-        if sound[0] != sound[1]:
-            kind = "lost" if sound[0] else "gained"
+        kind: Kind = "other"
+        if (before in DONE) != (after in DONE):
+            kind = "lost" if before in DONE else "gained"
         result = pair.before if kind == "gained" else pair.after
         reason = result.reason or ("" if not result.unphysical else _damage(result))
         job = pair.strategy, result.case, result.seed
-        found.append(Change(*job, kind, *states, reason))
-    places = {"lost": 0, "gained": 1, "other": 2}
-    return tuple(sorted(found, key=lambda change: places[change.kind]))
+        found.append(Change(*job, kind, before, after, reason))
+    return tuple(sorted(found, key=lambda change: get_args(Kind).index(change.kind)))
 
 
 def _damage(result: JobResult) -> str:
-    lost = (result.rigid_body_modes_expected or 0) - (result.rigid_body_modes or 0)
-    return (
-        f"{max(lost, 0)} rigid-body modes lost, {result.negative_eigenvalues or 0} eigenvalues < 0"
-    )
+    negative = result.negative_eigenvalues or 0
+    return f"{result.rigid_modes_lost} rigid-body modes lost, {negative} eigenvalues < 0"
 
 
 def _ratios(
@@ -358,10 +349,9 @@ def _values(pairs: Sequence[_Pair]) -> dict[str, float | None]:
     return values
 
 
-def _excesses(rows: Iterable[Row], thresholds: Iterable[Threshold]) -> Iterable[Excess]:
-    listed = list(rows)
+def _excesses(rows: Sequence[Row], thresholds: Iterable[Threshold]) -> Iterable[Excess]:
     for item in thresholds:
-        for row in listed:
+        for row in rows:
             value = row.values[item.metric]
             if value is not None and value > item.most + _ROUNDING * abs(item.most):
                 yield Excess(row.strategy, row.scenario, item.metric, value, item.most)

@@ -70,10 +70,10 @@ def leaderboard(run: Run) -> pd.DataFrame:
 
     grid = _Grid.of(run)
     seed = int(run.meta.get("seed", 0))
-    scored = rank_results(run.results, run.meta.get("reference") or None, run.meta.get("baseline"))
+    reference = run.meta.get("reference") or {}
+    scored = rank_results(run.results, reference or None, run.meta.get("baseline"))
     names = list(run.meta.get("strategies", ()))
     names += sorted({result.strategy for result in scored} - set(names))
-    reference = run.meta.get("reference") or {}
     rows = [_row(n, [r for r in scored if r.strategy == n], grid, seed, reference) for n in names]
     listed = [{**row, "rank": rank} for rank, row in ranked(rows, _order)]
     return pd.DataFrame(listed, columns=list(COLUMNS))
@@ -95,10 +95,6 @@ def _row(
     skills = _skills(results, grid)
     low, high = _interval(skills, strategy, seed)
     fine = [result for result in results if result.status == "ok"]
-
-    def lost(result: JobResult) -> int:
-        return max((result.rigid_body_modes_expected or 0) - (result.rigid_body_modes or 0), 0)
-
     return {
         "strategy": strategy,
         "skill": float(np.median(skills)),
@@ -106,7 +102,7 @@ def _row(
         "skill_high": high,
         "skill_unseen": _unseen(results, grid, reference),
         **{f"{block}_percent": _median(fine, _error_in(block)) for block in BLOCKS},
-        "rigid_modes_lost": sum(lost(result) for result in fine),
+        "rigid_modes_lost": sum(result.rigid_modes_lost for result in fine),
         "negative_eigenvalues": sum(result.negative_eigenvalues or 0 for result in fine),
         "parameters": _median(fine, lambda result: result.parameter_count),
         "evaluations": _median(fine, lambda result: result.evaluations),
@@ -151,14 +147,9 @@ def _interval(skills: Sequence[float], strategy: str, seed: int) -> tuple[float,
     from scipy.stats import bootstrap
 
     random = np.random.default_rng(np.random.SeedSequence([seed, *strategy.encode()]))
-    interval = bootstrap(
-        (np.array(skills),),
-        np.median,
-        method="percentile",
-        n_resamples=_RESAMPLES,
-        random_state=random,
-    ).confidence_interval
-    return float(interval.low), float(interval.high)
+    how: dict[str, Any] = {"method": "percentile", "n_resamples": _RESAMPLES}
+    found = bootstrap((np.array(skills),), np.median, **how, random_state=random)
+    return float(found.confidence_interval.low), float(found.confidence_interval.high)
 
 
 def _error_in(block: str) -> Callable[[JobResult], float | None]:

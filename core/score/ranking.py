@@ -60,19 +60,15 @@ def ranked(
         key: tier, score and name; the tier counts first, then the score, less being better. The
             name orders those that share a rank.
     """
-    keyed = sorted(((key(item), item) for item in items), key=lambda pair: pair[0])
-    groups: list[list[tuple[str, _Item]]] = []
-    last: tuple[tuple[float, ...], float] | None = None
-    for (tier, score, name), item in keyed:
-        if last is None or tier != last[0] or score - last[1] > TIE * abs(score):
-            groups.append([])
-        groups[-1].append((name, item))
-        last = tier, score
-    found: list[tuple[int, _Item]] = []
-    for group in groups:
-        rank = len(found) + 1
-        found += [(rank, item) for _, item in sorted(group, key=lambda pair: pair[0])]
-    return found
+    keyed = sorted(((*key(item), item) for item in items), key=lambda entry: entry[:3])
+    found: list[tuple[int, str, _Item]] = []
+    rank = 0
+    for place, (tier, score, name, item) in enumerate(keyed):
+        before = keyed[place - 1]
+        if not rank or tier != before[0] or score - before[1] > TIE * abs(score):
+            rank = place + 1
+        found.append((rank, name, item))
+    return [(rank, item) for rank, _, item in sorted(found, key=lambda entry: entry[:2])]
 
 
 def rank_results(
@@ -98,18 +94,16 @@ def rank_results(
         for item in listed
         if reference is None and item.strategy == baseline
     }
+    groups: dict[tuple[str, int], list[JobResult]] = {}
     scored = []
     for result in listed:
+        job, score = (result.case, result.seed), result.score
         if reference is not None:
             score = score_of(result, reference.get(result.case, {}))
-        elif result.score is not None:
-            score = result.score
-        else:
-            score = score_of(result, given.get((result.case, result.seed), {}))
+        elif score is None:
+            score = score_of(result, given.get(job, {}))
         scored.append(replace(result, score=score))
-    groups: dict[tuple[str, int], list[JobResult]] = {}
-    for result in scored:
-        groups.setdefault((result.case, result.seed), []).append(result)
+        groups.setdefault(job, []).append(scored[-1])
     ranks = {
         (*job, result.strategy): rank
         for job, group in groups.items()

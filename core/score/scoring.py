@@ -200,28 +200,20 @@ def _blocks(case: Case, model: Model, modes: Modes) -> dict[str, Block]:
     tested = case.measurement.select(chain(case.used, case.held_out))
     pairs = _predict(model, modes, tested, None)
     shaped = _with_shape(tested)
-    first = len(case.used)
+    first, changes = len(case.used), case.modifications
     parts = {
         "used": (pairs[:first], shaped[:first]),
         "higher": (pairs[first:], shaped[first:]),
-        "modified": _modified(case, model),
+        "modified": (  # every mode of every change counts alike
+            tuple(pair for change in changes for pair in modified_modes(model, change)),
+            [flag for change in changes for flag in _with_shape(change.measurement)],
+        ),
     }
     return {name: _block(*part) for name, part in parts.items() if part[0]}
 
 
-def _modified(case: Case, model: Model) -> tuple[tuple[PairedMode, ...], list[bool]]:
-    """Return the modes of all modifications in one list: every mode counts alike."""
-    pairs: list[PairedMode] = []
-    shaped: list[bool] = []
-    for change in case.modifications:
-        pairs += modified_modes(model, change)
-        shaped += _with_shape(change.measurement)
-    return tuple(pairs), shaped
-
-
 def _with_shape(measurement: Measurement) -> list[bool]:
-    present = np.isfinite(measurement.shapes).sum(axis=0) >= LEAST_SENSORS
-    return [bool(flag) for flag in present]
+    return list((np.isfinite(measurement.shapes).sum(axis=0) >= LEAST_SENSORS).tolist())
 
 
 def _block(pairs: tuple[PairedMode, ...], shaped: Sequence[bool]) -> Block:

@@ -1,0 +1,33 @@
+"""Data of strangers against a schema: the first field that is wrong comes out as one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from femubench.core.errors import InputError
+
+_R = TypeVar("_R", bound=BaseModel)
+
+
+def validated(
+    kind: type[_R],
+    record: object,
+    file: Path | str | None = None,
+    line: int | None = None,
+    key: str = "",
+) -> _R:
+    """Return plain data as a record.
+
+    Raises:
+        InputError: naming the first field that is wrong.
+    """
+    try:
+        return kind.model_validate(record)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        path = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in first["loc"])
+        place = (key + path).lstrip(".") or None
+        raise InputError(first["msg"], file=file, line=line, key=place) from error
