@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from femubench.core.cli import options
 from femubench.core.cli.registry import plugins_for, warn, wrapped
 from femubench.core.errors import InputError
 from femubench.core.plugin.loader import Plugins, load_plugins
@@ -84,20 +85,10 @@ def show(ctx: click.Context, name: str) -> None:
 @plugins.command("new")
 @click.argument("name")
 @click.option(
-    "--kind",
-    type=click.Choice(_KINDS),
-    default="strategy",
-    show_default=True,
+    "--kind", type=click.Choice(_KINDS), default="strategy", show_default=True,
     help="What the package brings.",
-)
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=".",
-    metavar="DIR",
-    help="Write the folder NAME there. Default: here.",
-)
+)  # fmt: skip
+@options.output_folder("Write the folder NAME there. Default: here.", default=".")
 @click.pass_context
 def new(ctx: click.Context, name: str, kind: str, output: Path) -> None:
     """Write a pip-installable package with a working plugin in the new folder NAME.

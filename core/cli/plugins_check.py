@@ -9,45 +9,34 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from femubench.core.cli import options
 from femubench.core.cli.registry import plugins_for
 from femubench.core.conformance import SECONDS
 from femubench.core.display import counted
-from femubench.core.files import check_writable, write_atomically
+from femubench.core.files import write_atomically
 from femubench.core.library.cases import read_cases
 from femubench.core.plugin.validation import chosen
 
 if TYPE_CHECKING:
     from femubench.core.conformance.checking import Finding
 
-FILE = click.Path(path_type=Path, dir_okay=False)
 _WORDS = {"pass": "pass", "fail": "FAIL", "warn": "warn", "not-applicable": "-"}
 
 
 @click.command("check")
 @click.argument("name")
 @click.option(
-    "--case",
-    "words",
-    multiple=True,
-    metavar="CASE",
+    "--case", "words", multiple=True, metavar="CASE",
     help="Try a strategy on this case too; may be repeated.",
-)
+)  # fmt: skip
 @click.option(
-    "--timeout",
-    type=click.FloatRange(0.0, min_open=True),
-    default=SECONDS,
-    metavar="SECONDS",
-    show_default=True,
-    help="Give up on one trial after this time.",
-)
-@click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the findings as JSON.")
+    "--timeout", type=click.FloatRange(0.0, min_open=True), default=SECONDS, metavar="SECONDS",
+    show_default=True, help="Give up on one trial after this time.",
+)  # fmt: skip
+@options.json_file("Write the findings as JSON.")
 @click.pass_context
 def check(
-    ctx: click.Context,
-    name: str,
-    words: tuple[str, ...],
-    timeout: float,
-    json_file: Path | None,
+    ctx: click.Context, name: str, words: tuple[str, ...], timeout: float, json_file: Path | None
 ) -> int:
     """Check that the plugin NAME keeps what a plugin must keep.
 
@@ -61,8 +50,6 @@ def check(
     from femubench.core.conformance.checking import counts, findings, subjects, to_json
     from femubench.core.conformance.problems import of_case
 
-    if json_file is not None:
-        check_writable(json_file)
     cases = [of_case(case) for case in read_cases(words, plugins)] if words else []
     records: list[dict[str, Any]] = []
     bad = 0

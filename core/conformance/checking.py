@@ -10,9 +10,7 @@ from femubench.core.conformance import (
     SECONDS,
     effect_checks,
     other_checks,
-    result_checks,
     strategy_checks,
-    survival_checks,
 )
 from femubench.core.conformance.kit import (
     CHECKS,
@@ -31,7 +29,7 @@ from femubench.core.plugin.validation import did_you_mean
 from femubench.core.plugin.variants import strategy_of
 
 # Importing them fills the list.
-_SOURCES = (strategy_checks, survival_checks, result_checks, effect_checks, other_checks)
+_SOURCES = (strategy_checks, effect_checks, other_checks)
 
 
 @dataclass(frozen=True)
