@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _HIDDEN = ("one", "none", "pair", "outside", "any")
 
 
-def _truth(what: str) -> options.Option[options.Verb]:
+def _truth(what: str) -> options.Option:
     return click.option("--truth", "sealed", type=options.PATH, help=what)
 
 
@@ -66,7 +66,7 @@ def new(
 @click.argument("folder", type=options.PATH)
 @click.argument("answer", type=options.PATH)
 @_truth("The sealed truth; FOLDER/truth.sealed by default.")
-@click.option("--json", "json_file", type=options.OUTPUT, help="Write the judgement.")
+@click.option("--json", "json_file", type=options.OUTPUT_PATH, help="Write the judgement.")
 def score(folder: Path, answer: Path, sealed: Path | None, json_file: Path | None) -> None:
     """Judge ANSWER, a file as `bench diagnose --json` writes it, to the blind case in FOLDER."""
     from femubench.core.files import write_atomically

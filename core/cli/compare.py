@@ -48,7 +48,7 @@ def thresholds_of(
 )  # fmt: skip
 @options.style(*SUFFIXES, dest="form", what="What is printed or written.")
 @click.option(
-    "-o", "--output", type=options.OUTPUT, metavar="FILE",
+    "-o", "--output", type=options.OUTPUT_PATH, metavar="FILE",
     help="Write there instead of the screen.",
 )  # fmt: skip
 @options.store("Where the runs are.")
