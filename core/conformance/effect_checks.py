@@ -8,18 +8,9 @@ from typing import get_args
 
 import numpy as np
 
+from femubench.core.conformance import kit
 from femubench.core.conformance.fingerprints import fingerprint, first_difference
-from femubench.core.conformance.kit import (
-    Bench,
-    Verdict,
-    check,
-    check_apart,
-    failed,
-    not_applicable,
-    passed,
-    picklable as sent_to_workers,
-    warned,
-)
+from femubench.core.conformance.kit import Bench, Verdict, check, failed, passed
 from femubench.core.conformance.place_words import known_place
 from femubench.core.conformance.problems import PLAIN, problem
 from femubench.core.conformance.results import (
@@ -72,7 +63,7 @@ def described(bench: Bench) -> Verdict:
 @check("effect", "picklable", "It can be sent to a worker, and an extended model back.")
 def picklable(bench: Bench) -> Verdict:
     """Pickle the effect and what it makes."""
-    sent = sent_to_workers(bench, "an effect")
+    sent = kit.picklable(bench, "an effect")
     return bench.apart(sent_back) if sent.status == "pass" else sent
 
 
@@ -120,7 +111,7 @@ def _given(model: Model, extended: Model) -> Given:
     return Given(type(plain)("", model, plain.measurement), UpdateResult(extended), frozenset())
 
 
-@check_apart("effect", "places", "Its places are in the model, each once, and have parameters.")
+@kit.check_apart("effect", "places", "Its places are in the model, each once, and have parameters.")
 def places(effect: Effect) -> Verdict:
     """Read every place of every model."""
     count = 0
@@ -136,7 +127,7 @@ def places(effect: Effect) -> Verdict:
             fault = _parameters(effect, model, place)
             if fault:
                 return failed(f"{where}: {fault}")
-    return passed() if count else not_applicable("it has no place in any of the models")
+    return passed() if count else kit.not_applicable("it has no place in any of the models")
 
 
 def _parameters(effect: Effect, model: Model, place: str) -> str | None:
@@ -153,7 +144,7 @@ def _parameters(effect: Effect, model: Model, place: str) -> str | None:
     return None
 
 
-@check_apart("effect", "neutral", "With neutral values the model stays what it was.")
+@kit.check_apart("effect", "neutral", "With neutral values the model stays what it was.")
 def neutral(effect: Effect) -> Verdict:
     """Extend models with neutral values."""
     spots = list(_spots(effect))
@@ -167,8 +158,8 @@ def neutral(effect: Effect) -> Verdict:
         if not gap <= _SAME:
             text = f"{where}: neutral values change frequencies by {gap:.2g}, expected {_SAME:g}"
             # A rigid spring may leave the arm behind which it sits.
-            return failed(text) if np.isfinite(values).all() else warned(text)
-    return passed() if spots else not_applicable("it has no place in any of the models")
+            return failed(text) if np.isfinite(values).all() else kit.warned(text)
+    return passed() if spots else kit.not_applicable("it has no place in any of the models")
 
 
 def _distance(model: Model, other: Model) -> float:
@@ -179,7 +170,7 @@ def _distance(model: Model, other: Model) -> float:
     return float(np.abs(np.sqrt(np.abs(two[: len(one)] / one)) - 1.0).max())
 
 
-@check_apart(
+@kit.check_apart(
     "effect", "finite", "The extended model and its rates of change are finite and symmetric."
 )
 def finite(effect: Effect) -> Verdict:
@@ -195,10 +186,10 @@ def finite(effect: Effect) -> Verdict:
         same = one.stiffness.shape == more.stiffness.shape
         if not same or not np.isfinite(_distance(one, more) / _STEP):
             return failed(f"{where}: no rate of change at one scale, expected a smooth change")
-    return passed() if count else not_applicable("it has no place in any of the models")
+    return passed() if count else kit.not_applicable("it has no place in any of the models")
 
 
-@check_apart("effect", "deterministic", "Two extensions are equal to the last bit.")
+@kit.check_apart("effect", "deterministic", "Two extensions are equal to the last bit.")
 def deterministic(effect: Effect) -> Verdict:
     """Extend models twice."""
     for where, extended in _tries(effect, 1.0, 1.0):
@@ -208,7 +199,7 @@ def deterministic(effect: Effect) -> Verdict:
     return passed()
 
 
-@check_apart("effect", "inputs", "The nominal model stays as it was given.")
+@kit.check_apart("effect", "inputs", "The nominal model stays as it was given.")
 def inputs(effect: Effect) -> Verdict:
     """Compare models before and after."""
     for where, model, place in _spots(effect):
@@ -221,7 +212,9 @@ def inputs(effect: Effect) -> Verdict:
     return passed()
 
 
-@check_apart("effect", "worded", "Sizes, hints, wording and looks are of use, where it brings any.")
+@kit.check_apart(
+    "effect", "worded", "Sizes, hints, wording and looks are of use, where it brings any."
+)
 def worded(effect: Effect) -> Verdict:
     """Read what is optional, and look at every model beside its measurement."""
     hints = _hints(effect)

@@ -11,16 +11,8 @@ import numpy as np
 
 from femubench.core.case.case import Case
 from femubench.core.case.reader import read_case
-from femubench.core.conformance.kit import (
-    Bench,
-    Verdict,
-    check,
-    check_apart,
-    failed,
-    not_applicable,
-    passed,
-    picklable,
-)
+from femubench.core.conformance import kit
+from femubench.core.conformance.kit import Bench, Verdict, check, failed, passed
 from femubench.core.errors import FemubenchError, InputError
 from femubench.core.roles import Reader, Scenario
 from femubench.core.run.jobs import one_line
@@ -44,7 +36,7 @@ _FILES = (
     ),
 )
 
-check("reader", "picklable", "It can be sent to a worker.")(partial(picklable, what="a reader"))
+check("reader", "picklable", "It can be sent to a worker.")(partial(kit.picklable, what="a reader"))
 
 
 def _refused(bench: Bench, what: str, content: bytes) -> Verdict:
@@ -76,7 +68,7 @@ def refuses(reader: Reader, what: str, content: bytes) -> Verdict:
     return passed()
 
 
-@check_apart("scenario", "reads", "Every case can be read.")
+@kit.check_apart("scenario", "reads", "Every case can be read.")
 def reads(scenario: Scenario, *readers: Reader) -> Verdict:
     """Read every case."""
     for name, folder in scenario.cases.items():
@@ -98,7 +90,7 @@ def _first_fault(scenario: Scenario, fault_of: Callable[[Case], str], *readers: 
         count += 1
         if fault := fault_of(case):
             return failed(f"{case.name}: {fault}")
-    return passed() if count else not_applicable("no case can be read")
+    return passed() if count else kit.not_applicable("no case can be read")
 
 
 def held_out_fault(case: Case) -> str:

@@ -9,18 +9,9 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
+from femubench.core.conformance import kit
 from femubench.core.conformance.fingerprints import first_difference
-from femubench.core.conformance.kit import (
-    UNSENT,
-    Bench,
-    Verdict,
-    check,
-    failed,
-    not_applicable,
-    passed,
-    picklable as sent_to_workers,
-    warned,
-)
+from femubench.core.conformance.kit import Bench, Verdict, check, failed, passed
 from femubench.core.conformance.problems import CROSSED, PLAIN, PROBLEMS
 from femubench.core.conformance.results import PROMISES
 from femubench.core.conformance.trial import Observation, Want, promises_of
@@ -103,12 +94,12 @@ def _survives(bench: Bench, names: Sequence[str]) -> Verdict:
     pairs = zip(names, found, simpler, strict=True)
     told = [item for name, item, base in pairs if name == PLAIN or base.survived]
     if not told:
-        return not_applicable(f"not looked at: {simpler[0].problem} fails already")
+        return kit.not_applicable(f"not looked at: {simpler[0].problem} fails already")
     lost = [item for item in told if not item.survived]
     if lost:
         return failed(f"{lost[0].problem}: {lost[0].text}, {_HONEST}{_more(lost)}")
     if all(item.kind == "lacking" for item in told):
-        return not_applicable(told[0].text)
+        return kit.not_applicable(told[0].text)
     refused = [item for item in told if item.kind in ("not-applicable", "failed")]
     return passed(f"refused {refused[0].problem}: {refused[0].text}" if refused else "")
 
@@ -116,10 +107,10 @@ def _survives(bench: Bench, names: Sequence[str]) -> Verdict:
 def _of_results(bench: Bench, name: str) -> Verdict:
     """Judge what the workers saw of every result."""
     if name == "promises" and not promises_of(bench.subject):
-        return not_applicable("nothing promised")
+        return kit.not_applicable("nothing promised")
     found = [item for item in bench.observe(_with_results(bench)) if item.kind == "result"]
     if not found:
-        return not_applicable("there is no result to look at")
+        return kit.not_applicable("there is no result to look at")
     wrong = [item for item in found if name in item.faults]
     if wrong:
         return failed(f"{wrong[0].problem}: {wrong[0].faults[name]}{_more(wrong)}")
@@ -153,7 +144,9 @@ def described(bench: Bench) -> Verdict:
     if unknown:
         return failed(f"promises {unknown[0]!r}, expected one of {', '.join(PROMISES)}")
     if not own_doc(type(strategy)):
-        return warned(f"class {type(strategy).__name__} has no docstring, expected what it does")
+        return kit.warned(
+            f"class {type(strategy).__name__} has no docstring, expected what it does"
+        )
     return passed()
 
 
@@ -165,7 +158,7 @@ def options_documented(bench: Bench) -> Verdict:
     strategy: Any = _inner(bench)
     fields = dataclasses.fields(strategy) if dataclasses.is_dataclass(strategy) else ()
     if not fields:
-        return not_applicable("it has no options")
+        return kit.not_applicable("it has no options")
     text = " ".join(own_doc(base) for base in type(strategy).__mro__)
     names = [field.name for field in fields]
     missing = [name for name in names if not re.search(rf"\b{re.escape(name)}\b", text)]
@@ -189,10 +182,10 @@ def own_doc(cls: type) -> str:
 )
 def picklable(bench: Bench) -> Verdict:
     """Pickle it, and look at how its results travelled."""
-    sent = sent_to_workers(bench, "a strategy")
+    sent = kit.picklable(bench, "a strategy")
     if sent.status != "pass":
         return sent
-    return not_applicable(bench.sound) if bench.sound else _of_results(bench, "picklable")
+    return kit.not_applicable(bench.sound) if bench.sound else _of_results(bench, "picklable")
 
 
 @check(
@@ -215,7 +208,7 @@ def deterministic(bench: Bench) -> Verdict:
                 "to the last bit (randomness comes from `rng` alone)"
             )
     if all(item.kind == "lacking" for item in found):
-        return not_applicable(found[0].text)
+        return kit.not_applicable(found[0].text)
     return passed()
 
 
@@ -247,7 +240,7 @@ def capabilities(bench: Bench) -> Verdict:
     """Take away what it does not declare."""
     withheld = _withheld(bench)
     if not withheld:
-        return not_applicable("it needs everything that there is")
+        return kit.not_applicable("it needs everything that there is")
     plain, *found = bench.observe([Want(PLAIN), *(want for _, want in withheld)])
     for (capability, _), item in zip(withheld, found, strict=True):
         # Who refuses the plain frame as well does not refuse for what was taken away.
@@ -281,7 +274,7 @@ def resources(bench: Bench) -> Verdict:
     """Compare time and traced memory with those of the reference."""
     found = bench.observe(_measured(bench))
     if any(item.kind != "result" for item in found[:2]):
-        return not_applicable("there is no result on the plain case")
+        return kit.not_applicable("there is no result on the plain case")
     seconds, peak = found[0].seconds, float(found[1].peak or 0)
     text = f"{seconds:.3g} s and {spoken_bytes(peak)}"
     if bench.reference is None or any(item.kind != "result" for item in found[2:]):
@@ -290,7 +283,7 @@ def resources(bench: Bench) -> Verdict:
     larger = peak / max(float(found[3].peak or 0), _LEAST_BYTES)
     text += f" on the {PLAIN}, {slower:.2g} and {larger:.2g} times those of {bench.reference.name}"
     if max(slower, larger) > _MUCH:
-        return warned(f"{text}, expected at most {_MUCH:g} times")
+        return kit.warned(f"{text}, expected at most {_MUCH:g} times")
     return passed(text)
 
 
@@ -310,7 +303,11 @@ def _measured(bench: Bench) -> Sequence[Want]:
 )
 def returns(bench: Bench) -> Verdict:
     """Run it on a grounded frame with complete data."""
-    return not_applicable(UNSENT) if isinstance(bench.code, str) else _survives(bench, (PLAIN,))
+    return (
+        kit.not_applicable(kit.UNSENT)
+        if isinstance(bench.code, str)
+        else _survives(bench, (PLAIN,))
+    )
 
 
 for _name, (_sentence, _problems) in _SURVIVED.items():
@@ -327,5 +324,5 @@ for _name, (_sentence, _problems) in _SURVIVED.items():
 def cases(bench: Bench) -> Verdict:
     """Run it on the user's cases."""
     if not bench.cases:
-        return not_applicable("no --case was given")
+        return kit.not_applicable("no --case was given")
     return _survives(bench, tuple(bench.cases))
