@@ -15,10 +15,8 @@ import pytest
 from click.testing import CliRunner
 
 from femubench import Case, Diagnosis, InputError, Model, read_case
-from femubench.core.challenge import folder as folders
 from femubench.core.challenge.answer import Answer, AnswerCause, read_answer
 from femubench.core.challenge.draw import draw_case, registered_effects
-from femubench.core.challenge.folder import score_folder, write_blind
 from femubench.core.challenge.measuring import QUALITY, chi2, see
 from femubench.core.challenge.outside import OUTSIDE
 from femubench.core.challenge.score import judge_answer
@@ -38,6 +36,7 @@ from femubench.core.challenge.visibility import delta_chi2
 from femubench.core.cli.main import bench
 from femubench.core.errors import FemubenchError, ModelError
 from femubench.core.fem.frame import Place
+from femubench.core.library.challenge import any_hidden, challenge, score_challenge
 from femubench.core.modal.eigen import solve_modes
 from femubench.effect import EffectParameter, FrameEffect, Site, Size
 from femubench.fem import Frame, PointMass
@@ -488,7 +487,7 @@ def test_sizes_are_judged_in_standard_deviations() -> None:
 
 @pytest.fixture
 def blind(tmp_path: Path) -> Path:
-    write_blind(tmp_path / "case", 11, "A", hidden="one", effects=TOYS)
+    challenge(tmp_path / "case", 11, hidden="one", effects=TOYS)
     return tmp_path / "case"
 
 
@@ -512,21 +511,21 @@ def test_an_answer_to_a_folder_is_scored(blind: Path, tmp_path: Path) -> None:
     path = tmp_path / "answer.json"
     causes = [{"effect": hidden.effect, "place": hidden.place}]
     path.write_text(json.dumps({"verdict": "named", "causes": causes}), encoding="utf-8")
-    scored = score_folder(blind, path, effects=TOYS)
+    scored = score_challenge(blind, path, effects=TOYS)
     assert scored.judgement.right
     assert scored.judgement.places
     assert json.loads(scored.to_json())["judgement"]["right"] is True
     with pytest.raises(InputError, match="is not installed"):
-        score_folder(blind, path, effects={})
+        score_challenge(blind, path, effects={})
     modes = blind / "modes.csv"
     modes.write_text(modes.read_text().replace("1,", "1,", 1) + "\n", encoding="utf-8")
     with pytest.raises(InputError, match="changed since its truth was sealed"):
-        score_folder(blind, path, effects=TOYS)
+        score_challenge(blind, path, effects=TOYS)
 
 
 def test_no_folder_with_files_is_written_into(blind: Path) -> None:
     with pytest.raises(InputError, match="is not empty"):
-        write_blind(blind, 1, "C", hidden="none")
+        challenge(blind, 1, kind="C", hidden="none")
 
 
 def test_the_command_writes_and_scores(tmp_path: Path) -> None:
@@ -577,7 +576,7 @@ def test_an_error_of_the_diagnosis_is_a_wrong_answer() -> None:
 
 
 def test_any_hides_all_sorts() -> None:
-    drawn = [folders.any_hidden(seed) for seed in range(200)]
+    drawn = [any_hidden(seed) for seed in range(200)]
     counts = {word: drawn.count(word) for word in ("one", "none", "pair", "outside")}
     assert min(counts.values()) >= 12
     assert counts["one"] > 90

@@ -261,7 +261,7 @@ def test_command_line(tmp_path: Path) -> None:
 def test_exit_codes(monkeypatch: pytest.MonkeyPatch) -> None:
     strategies = {**BUILT_IN.strategies, "asymmetric": toys.Asymmetric()}
     known = replace(BUILT_IN, strategies=strategies)
-    monkeypatch.setattr("femubench.core.cli.plugins_check.plugins_for", lambda ctx: known)
+    monkeypatch.setattr("femubench.core.cli.plugins.plugins_for", lambda ctx: known)
     outcome = CliRunner().invoke(bench, ["plugins", "check", "asymmetric"])
     assert outcome.exit_code == 1
     assert re.search(r"^FAIL +symmetric +grounded .* allowed 1e-08", outcome.output, re.MULTILINE)

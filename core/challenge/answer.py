@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from femubench.core.challenge.sealed import read_small
 from femubench.core.diagnosis.result import Diagnosis
@@ -16,13 +16,18 @@ _LARGEST = 4 * 2**20  # bytes
 _AND = " + "
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Probability = Annotated[float, Field(ge=0.0, le=1.0 + 1e-9, allow_inf_nan=False)]
+# Sums of probabilities may round to a little more than 1.
+Probability = Annotated[
+    float,
+    Field(ge=0.0, le=1.0 + 1e-9, allow_inf_nan=False),
+    AfterValidator(lambda value: min(value, 1.0)),
+]
 Word = Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
 
 
 class _Part(BaseModel):
     # An answer may say more than is judged: rivals, residuals, advice.
-    model_config = ConfigDict(extra="ignore", frozen=True)
+    model_config = ConfigDict(extra="ignore", frozen=True, from_attributes=True)
 
 
 class AnswerParameter(_Part):
@@ -68,23 +73,7 @@ class Answer(_Part):
     @classmethod
     def of(cls, diagnosis: Diagnosis) -> Answer:
         """Return the answer that a diagnosis gives."""
-        fields: dict[str, Any] = {
-            "verdict": diagnosis.verdict,
-            "nothing": min(diagnosis.nothing, 1.0),
-            "causes": tuple(
-                AnswerCause(
-                    effect=cause.effect,
-                    place=cause.place,
-                    probability=min(cause.probability, 1.0),
-                    parameters=tuple(
-                        AnswerParameter(name=p.name, value=p.value, std=p.std, unit=p.unit)
-                        for p in cause.parameters
-                    ),
-                )
-                for cause in diagnosis.causes
-            ),
-        }
-        return cls(**fields)
+        return cls.model_validate(diagnosis)
 
     @property
     def probability(self) -> float | None:

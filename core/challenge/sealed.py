@@ -75,7 +75,7 @@ def unseal(text: str, file: Path | None = None) -> tuple[Truth, str]:
     if hashlib.sha256(raw).hexdigest() != content.commitment:
         raise InputError("changed since it was sealed", file=file, expected=wanted)
     try:
-        truth = _TRUTH.validate_python(_tuples(json.loads(raw)["truth"]))
+        truth = _TRUTH.validate_python(json.loads(raw)["truth"])
     except (ValidationError, ValueError, KeyError, TypeError, RecursionError):
         raise InputError("not a sealed truth", file=file, expected=wanted) from None
     return truth, content.commitment
@@ -104,12 +104,3 @@ def read_small(path: Path, largest: int) -> str:
         return read_bytes(path, largest).decode("utf-8")
     except UnicodeDecodeError:
         raise InputError("not a text", file=path, expected="UTF-8") from None
-
-
-def _tuples(value: object) -> object:
-    """Return plain data with tuples for lists, as the data class has them."""
-    if isinstance(value, list):
-        return tuple(_tuples(item) for item in value)
-    if isinstance(value, dict):
-        return {key: _tuples(item) for key, item in value.items()}
-    return value

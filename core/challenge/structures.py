@@ -91,6 +91,20 @@ def _points(words: Sequence[str]) -> dict[str, tuple[Place, str]]:
     return points
 
 
+def _specimen(
+    name: str, title: str, frame: Frame, words: Sequence[str], at: str, mass: float, spring: str
+) -> Specimen:
+    """Return a specimen whose known change is a mass (kg) and a spring (N/m) at mid-member.
+
+    Arguments:
+        at: the member, with its article where its name takes one.
+    """
+    middle = Place(member=at.removeprefix("the "), s=0.5)
+    change = (PointMass(middle, mass),), (GroundSpring(middle, "z", float(spring)),)
+    told = f"{mass:g} kg and {spring} N/m at the middle of {at}"
+    return Specimen(name, title, frame, _points(words), change, told)
+
+
 def _ladder(name: str, stretch: float = 1.0) -> Specimen:
     """Return the welded ladder, out of plane, free; 81 dofs.
 
@@ -120,15 +134,9 @@ def _ladder(name: str, stretch: float = 1.0) -> Specimen:
     }
     members = tuple(Member(key, pair, 4, tube, ALUMINIUM) for key, pair in ends.items())
     words = [f"{joint.name}:z" for joint in joints] + [f"{key}@0.5:z" for key in ends]
-    middle = Place(member="front-left", s=0.5)
-    return Specimen(
-        name,
-        "Ladder frame, out of plane",
-        Frame("out-of-plane", "euler-bernoulli", joints, members),
-        _points(words),
-        ((PointMass(middle, 0.5),), (GroundSpring(middle, "z", 1.0e6),)),
-        "0.5 kg and 1e6 N/m at the middle of front-left",
-    )
+    frame = Frame("out-of-plane", "euler-bernoulli", joints, members)
+    title = "Ladder frame, out of plane"
+    return _specimen(name, title, frame, words, "front-left", 0.5, "1e6")
 
 
 def _hframe(name: str) -> Specimen:
@@ -147,15 +155,8 @@ def _hframe(name: str) -> Specimen:
         members.append(Member(f"upper-{side}", (joint, high), 8, tube, STEEL))
         words += [f"{low}:x", f"lower-{side}@0.5:x", f"{high}:x"]
         words += [f"upper-{side}@{s}:x" for s in (0.25, 0.5, 0.75)]
-    middle = Place(member="horizontal", s=0.5)
-    return Specimen(
-        name,
-        "H-frame, in plane",
-        Frame("in-plane", "euler-bernoulli", tuple(joints), tuple(members)),
-        _points(words),
-        ((PointMass(middle, 1.0),), (GroundSpring(middle, "z", 1.0e6),)),
-        "1 kg and 1e6 N/m at the middle of the horizontal",
-    )
+    frame = Frame("in-plane", "euler-bernoulli", tuple(joints), tuple(members))
+    return _specimen(name, "H-frame, in plane", frame, words, "the horizontal", 1.0, "1e6")
 
 
 def _portal(name: str) -> Specimen:
@@ -181,16 +182,10 @@ def _portal(name: str) -> Specimen:
     columns = ("left-lower", "right-lower", "left-upper", "right-upper")
     words = ["C:x", "E:x", *(f"{name}@0.5:x" for name in columns)]
     words += [f"{name}@{s}:z" for name in ("floor", "roof") for s in (0.25, 0.5, 0.75)]
-    middle = Place(member="roof", s=0.5)
     supports = tuple(Support(Place(joint=name), ("x", "z", "ry")) for name in "AB")
-    return Specimen(
-        name,
-        "Two-storey portal on clamped feet, in plane",
-        Frame("in-plane", "euler-bernoulli", joints, members, supports=supports),
-        _points(words),
-        ((PointMass(middle, 2.0),), (GroundSpring(middle, "z", 2.0e5),)),
-        "2 kg and 2e5 N/m at the middle of the roof",
-    )
+    frame = Frame("in-plane", "euler-bernoulli", joints, members, supports=supports)
+    title = "Two-storey portal on clamped feet, in plane"
+    return _specimen(name, title, frame, words, "the roof", 2.0, "2e5")
 
 
 def _table(name: str) -> Specimen:
@@ -216,16 +211,10 @@ def _table(name: str) -> Specimen:
     words = [f"C{k}:{d}" for k in ("1", "3") for d in ("x", "y")]
     words += [f"leg-{k}@0.5:{d}" for k in corners for d in ("x", "y")]
     words += [f"{k}@0.5:z" for k in rims] + ["front-right@0.5:y", "right@0.5:x", "rail@0.5:x"]
-    middle = Place(member="rail", s=0.5)
     feet = tuple(Support(Place(joint=f"F{k}"), ("x", "y", "z")) for k in corners)
-    return Specimen(
-        name,
-        "Table on four hinged legs, in space",
-        Frame("3d", "euler-bernoulli", tuple(joints), tuple(members), supports=feet),
-        _points(words),
-        ((PointMass(middle, 0.5),), (GroundSpring(middle, "z", 5.0e4),)),
-        "0.5 kg and 5e4 N/m at the middle of the rail",
-    )
+    frame = Frame("3d", "euler-bernoulli", tuple(joints), tuple(members), supports=feet)
+    title = "Table on four hinged legs, in space"
+    return _specimen(name, title, frame, words, "the rail", 0.5, "5e4")
 
 
 # The names go into the seeds of hidden cases: another name is another draw.

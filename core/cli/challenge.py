@@ -7,11 +7,17 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from femubench.core.cli import options
+
 if TYPE_CHECKING:
     from femubench.core.challenge.score import Judgement
     from femubench.core.challenge.truth import DataKind, Hidden
 
 _HIDDEN = ("one", "none", "pair", "outside", "any")
+
+
+def _truth(what: str) -> options.Option:
+    return click.option("--truth", "sealed", type=options.PATH, help=what)
 
 
 @click.group()
@@ -20,36 +26,22 @@ def challenge() -> None:
 
 
 @challenge.command()
-@click.argument("folder", type=click.Path(path_type=Path))
+@click.argument("folder", type=options.PATH)
 @click.option("--seed", type=click.IntRange(min=0), required=True, help="Of all that is random.")
 @click.option(
-    "--kind",
-    type=click.Choice(("A", "B", "C")),
-    default="A",
-    show_default=True,
+    "--kind", type=click.Choice(("A", "B", "C")), default="A", show_default=True,
     help="How good the data are: A precise shapes, B poor shapes, C frequencies alone.",
-)
+)  # fmt: skip
 @click.option("--structure", default="ladder", show_default=True, help="What is measured.")
 @click.option(
-    "--hidden",
-    type=click.Choice(_HIDDEN),
-    default="any",
-    show_default=True,
+    "--hidden", type=click.Choice(_HIDDEN), default="any", show_default=True,
     help="One effect, none, two, one outside the catalogue, or any of these.",
-)
+)  # fmt: skip
 @click.option(
-    "--scatter",
-    type=click.FloatRange(0.0, 0.05),
-    default=0.0,
-    show_default=True,
+    "--scatter", type=click.FloatRange(0.0, 0.05), default=0.0, show_default=True,
     help="Standard deviation of each element's stiffness and mass, relative.",
-)
-@click.option(
-    "--truth",
-    "sealed",
-    type=click.Path(path_type=Path),
-    help="Where the sealed truth goes; FOLDER/truth.sealed by default.",
-)
+)  # fmt: skip
+@_truth("Where the sealed truth goes; FOLDER/truth.sealed by default.")
 def new(
     folder: Path,
     seed: int,
@@ -71,22 +63,15 @@ def new(
 
 
 @challenge.command()
-@click.argument("folder", type=click.Path(path_type=Path))
-@click.argument("answer", type=click.Path(path_type=Path))
-@click.option(
-    "--truth",
-    "sealed",
-    type=click.Path(path_type=Path),
-    help="The sealed truth; FOLDER/truth.sealed by default.",
-)
-@click.option("--json", "json_file", type=click.Path(path_type=Path), help="Write the judgement.")
+@click.argument("folder", type=options.PATH)
+@click.argument("answer", type=options.PATH)
+@_truth("The sealed truth; FOLDER/truth.sealed by default.")
+@click.option("--json", "json_file", type=options.OUTPUT_PATH, help="Write the scores.")
 def score(folder: Path, answer: Path, sealed: Path | None, json_file: Path | None) -> None:
     """Score ANSWER, a file written by `bench diagnose --json`, for the blind case in FOLDER."""
-    from femubench.core.files import check_writable, write_atomically
+    from femubench.core.files import write_atomically
     from femubench.core.library.challenge import score_challenge
 
-    if json_file is not None:
-        check_writable(json_file)
     scored = score_challenge(folder, answer, truth=sealed)
     if json_file is not None:
         write_atomically(json_file, scored.to_json())

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
+from femubench.core.cli import options
 from femubench.core.errors import InputError
-from femubench.core.files import check_writable, write_atomically
+from femubench.core.files import write_atomically
 from femubench.core.library.compare import compare as side_by_side, threshold_of
 from femubench.core.library.report import SUFFIXES, rendering
 from femubench.core.score.comparison import Threshold
@@ -31,54 +32,27 @@ def thresholds_of(
 @click.argument("before", metavar="A")
 @click.argument("after", metavar="[B]", required=False)
 @click.option(
-    "--of",
-    "first",
-    metavar="X",
-    help="Compare strategy X of A, and none else, B being optional.",
+    "--of", "first", metavar="X", help="Compare strategy X of A, and none else, B being optional."
 )
 @click.option(
     "--with", "second", metavar="Y", help="With strategy Y of B, or of A where there is no B."
 )
 @click.option(
-    "-s",
-    "--strategy",
-    "strategies",
-    multiple=True,
-    metavar="STRATEGY",
+    "-s", "--strategy", "strategies", multiple=True, metavar="STRATEGY",
     help="This one only; repeat.",
-)
+)  # fmt: skip
 @click.option(
-    "--fail",
-    "thresholds",
-    multiple=True,
-    metavar="METRIC>X",
-    callback=thresholds_of,
+    "--fail", "thresholds", multiple=True, metavar="METRIC>X", callback=thresholds_of,
     help="Exit with 1 if a ratio B/A exceeds X: skill, used, higher, modified, seconds; or the "
     "number of lost results: failures. May be repeated. Default: skill>1.01 and failures>0.",
-)
+)  # fmt: skip
+@options.style(*SUFFIXES, dest="form", what="What is printed or written.")
 @click.option(
-    "-f",
-    "--format",
-    "form",
-    type=click.Choice(tuple(SUFFIXES)),
-    default="terminal",
-    show_default=True,
-    help="What is printed or written.",
-)
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
+    "-o", "--output", type=options.OUTPUT_PATH, metavar="FILE",
     help="Write there instead of the screen.",
-)
-@click.option(
-    "--store",
-    type=click.Path(path_type=Path, file_okay=False),
-    metavar="DIR",
-    help="Where the runs are. Default: $FEMUBENCH_STORE or femubench-results.",
-)
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+)  # fmt: skip
+@options.store("Where the runs are.")
+@options.quiet
 @click.pass_context
 def compare(
     ctx: click.Context,
@@ -102,8 +76,6 @@ def compare(
         raise click.UsageError("--of and --with belong together, without --strategy", ctx)
     if after is None and first is None:
         raise click.UsageError("one run alone (expected A B, or A --of X --with Y)", ctx)
-    if output is not None:
-        check_writable(output)
     found = side_by_side(
         before,
         after,

@@ -8,20 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from femubench.core.cli import options
 from femubench.core.cli.progress import waiting
 from femubench.core.cli.registry import plugins_for
 from femubench.core.errors import FemubenchError, InputError, require
-from femubench.core.files import check_new, check_writable, write_atomically
+from femubench.core.files import check_new, write_atomically
 from femubench.core.library.cases import one_case
 from femubench.core.plugin.validation import chosen
 
 if TYPE_CHECKING:
     from femubench.core.diagnosis.result import Diagnosis
 
-FILE = click.Path(path_type=Path, dir_okay=False, allow_dash=True)
-FOLDER = click.Path(path_type=Path, file_okay=False)
-REPORT = click.Path(path_type=Path, dir_okay=False)
-SCREEN = Path("-")
 # Formats of a report by the suffix of its file.
 _STYLES = {".html": "html", ".md": "markdown"}
 
@@ -35,49 +32,25 @@ def _share(ctx: click.Context, param: click.Parameter, value: float | None) -> f
 
 @click.command("diagnose")
 @click.argument("case")
-@click.option(
-    "--json",
-    "json_file",
-    type=FILE,
-    metavar="FILE",
-    help="Write the diagnosis as JSON; - prints it.",
+@options.json_file("Write the diagnosis as JSON; - prints it.", options.OUTPUT_OR_SCREEN)
+@options.output_folder(
+    "Write the extended model as a case folder, which must be new or empty.", metavar="FOLDER"
 )
 @click.option(
-    "-o",
-    "--output",
-    type=FOLDER,
-    metavar="FOLDER",
-    help="Write the extended model as a case folder, which must be new or empty.",
-)
-@click.option(
-    "--tolerance",
-    type=float,
-    callback=_share,
-    metavar="X",
+    "--tolerance", type=float, callback=_share, metavar="X",
     help="Ordinary relative scatter of every element; 0 for none. Default: the case's.",
-)
+)  # fmt: skip
 @click.option("--no-pairs", is_flag=True, help="Look for single effects only, which is quicker.")
 @click.option(
     "--effects", metavar="A,B,...", help="Try these effects only. Default: all that apply."
 )
+@options.style("terminal", "markdown")
 @click.option(
-    "-f",
-    "--format",
-    "style",
-    type=click.Choice(["terminal", "markdown"]),
-    default="terminal",
-    show_default=True,
-    help="What is printed.",
-)
-@click.option(
-    "--report",
-    "report_file",
-    type=REPORT,
-    metavar="FILE",
+    "--report", "report_file", type=options.OUTPUT, metavar="FILE",
     help="Write the report to a file: .html is a page with drawings (needs femubench[plot]), "
     ".md is Markdown.",
-)
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+)  # fmt: skip
+@options.quiet
 @click.pass_context
 def diagnose(
     ctx: click.Context,
@@ -97,8 +70,6 @@ def diagnose(
     with a case.toml. Held-out modes and design changes only judge the outcome.
     """
     plugins = plugins_for(ctx)
-    if json_file is not None and json_file != SCREEN:
-        check_writable(json_file)
     if report_file is not None:
         if report_file.suffix.lower() not in _STYLES:
             known = " or ".join(_STYLES)
@@ -106,7 +77,6 @@ def diagnose(
             raise InputError(what, file=report_file, expected=f"a name with {known}")
         if _STYLES[report_file.suffix.lower()] == "html":
             require("matplotlib", "plot", "a page with drawings")
-        check_writable(report_file)
     if output is not None:
         check_new(output)
     names = None if effects is None else [word.strip() for word in effects.split(",")]
@@ -150,7 +120,7 @@ def _tell(data: Mapping[str, Any], json_file: Path | None, style: str | None) ->
 
     if json_file is not None:
         text = rendering(data, "json")
-        if json_file == SCREEN:
+        if json_file == options.SCREEN:
             click.echo(text)
             return
         write_atomically(json_file, text)

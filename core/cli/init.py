@@ -6,9 +6,11 @@ from pathlib import Path
 
 import click
 
+from femubench.core.cli import options
+
 
 @click.command()
-@click.argument("folder", type=click.Path(path_type=Path))
+@click.argument("folder", type=options.PATH)
 def init(folder: Path) -> None:
     """Write a commented example case into FOLDER, which must be new or empty."""
     from femubench.core.library.plugins import init_case

@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 import inspect
-import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
 
 from femubench.core.cli.registry import wrapped
 from femubench.core.plugin.loader import LoadedPlugin, Plugins
-from femubench.core.plugin.validation import CHECKS
+from femubench.core.plugin.validation import CHECKS, KINDS
 from femubench.core.plugin.variants import options_of
 from femubench.core.roles import Effect, Reader, Reporter, Scenario, Strategy, declared
 
 Row = tuple[str, str]
 
-_KINDS = {
-    "strategies": "strategy",
-    "scenarios": "scenario",
-    "effects": "effect",
-    "readers": "reader",
-    "reporters": "reporter",
-}
+_ROLES = {kind: role for role, kind in KINDS.items()}
 # Headings of docstrings: what follows is for programmers.
 _SECTIONS = ("Arguments:", "Attributes:", "Raises:", "Returns:", "Source:", "Args:", "Parameters")
 _PARAGRAPHS = 3
@@ -40,7 +33,7 @@ def pages_of(name: str, plugins: Plugins) -> Iterator[str]:
         if offered is not None:
             found = True
             source = _source(kind, name, plugins.loaded)
-            yield _page(f"{name}: {_KINDS[kind]}", _about(offered), [source, *_ROWS[kind](offered)])
+            yield _page(f"{name}: {_ROLES[kind]}", _about(offered), [source, *_ROWS[kind](offered)])
     for plugin in plugins.loaded:
         if plugin.plugin == name and not found:
             offers = [(kind, ", ".join(names)) for kind, names in plugin.offers.items() if names]
@@ -55,16 +48,7 @@ def _page(heading: str, paragraphs: Iterable[str], rows: Iterable[Row]) -> str:
         lines += [wrapped(paragraph, indent=2, hanging=2), ""]
     for key, value in listed:
         first = f"{key + ':':{width}}" if key else " " * width
-        # Filled without the key: wrapping would take blanks at the start of a line for its indent.
-        text = textwrap.fill(
-            value,
-            80,
-            initial_indent=f"  {first}",
-            subsequent_indent=" " * (width + 2),
-            break_on_hyphens=False,
-            break_long_words=False,
-        )
-        lines.append(text)
+        lines.append(wrapped(value, indent=2, lead=first, hanging=width + 2))
     return "\n".join(lines)
 
 

@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-from importlib import import_module
+import json
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from femubench.core.cli import options
 from femubench.core.cli.registry import plugins_for, warn, wrapped
+from femubench.core.conformance import SECONDS
+from femubench.core.display import counted
 from femubench.core.errors import InputError
+from femubench.core.files import write_atomically
+from femubench.core.library.cases import read_cases
 from femubench.core.plugin.loader import Plugins, load_plugins
-from femubench.core.plugin.validation import CHECKS, did_you_mean
+from femubench.core.plugin.validation import CHECKS, chosen, did_you_mean
+
+if TYPE_CHECKING:
+    from femubench.core.conformance.checking import Finding
 
 # What `new` writes, as in `KINDS` of the module that does it.
 _KINDS = ("strategy", "effect", "scenario", "reader")
+_WORDS = {"pass": "pass", "fail": "FAIL", "warn": "warn", "not-applicable": "-"}
 _NEXT = {
     "strategy": "{trial}",
     "effect": "bench init portal && bench diagnose portal --effects {name}",
@@ -23,19 +33,11 @@ _NEXT = {
 
 
 class _Verbs(click.Group):
-    """A group whose verb `check` is imported when it is asked for."""
+    """A group with an order of its own."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the verbs in the order in which one needs them."""
         return ["list", "show", "new", "check"]
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return one verb."""
-        if cmd_name != "check":
-            return super().get_command(ctx, cmd_name)
-        command = import_module("femubench.core.cli.plugins_check").check
-        assert isinstance(command, click.Command)
-        return command
 
 
 @click.group("plugins", cls=_Verbs)
@@ -84,20 +86,10 @@ def show(ctx: click.Context, name: str) -> None:
 @plugins.command("new")
 @click.argument("name")
 @click.option(
-    "--kind",
-    type=click.Choice(_KINDS),
-    default="strategy",
-    show_default=True,
+    "--kind", type=click.Choice(_KINDS), default="strategy", show_default=True,
     help="What the package contains.",
-)
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path, file_okay=False),
-    default=".",
-    metavar="DIR",
-    help="Write the folder NAME there. Default: here.",
-)
+)  # fmt: skip
+@options.output_folder("Write the folder NAME there. Default: here.", default=".")
 @click.pass_context
 def new(ctx: click.Context, name: str, kind: str, output: Path) -> None:
     """Write a pip-installable package with a working plugin in the new folder NAME.
@@ -120,3 +112,60 @@ def _names(found: Plugins) -> list[str]:
     """Return every name that `show` takes."""
     offered = [name for kind in CHECKS for name in getattr(found, kind)]
     return list(dict.fromkeys([*offered, *(plugin.plugin for plugin in found.loaded)]))
+
+
+@plugins.command("check")
+@click.argument("name")
+@click.option(
+    "--case", "words", multiple=True, metavar="CASE",
+    help="Try a strategy on this case too; may be repeated.",
+)  # fmt: skip
+@click.option(
+    "--timeout", type=click.FloatRange(0.0, min_open=True), default=SECONDS, metavar="SECONDS",
+    show_default=True, help="Give up on one trial after this time.",
+)  # fmt: skip
+@options.json_file("Write the findings as JSON.")
+@click.pass_context
+def check(
+    ctx: click.Context, name: str, words: tuple[str, ...], timeout: float, json_file: Path | None
+) -> int:
+    """Check that the plugin NAME follows the rules for plugins.
+
+    NAME is a strategy, with options after a colon if need be, an effect, a reader or a scenario.
+    Every trial runs in a process of its own. Exit: 0 nothing failed, 1 something did.
+    """
+    found = plugins_for(ctx)
+    named = (found.strategies, found.effects, found.readers, found.scenarios)
+    known = [word for offered in named for word in offered]
+    chosen("strategy, effect, reader or scenario", [name.partition(":")[0]], known)
+    from femubench.core.conformance.checking import counts, findings, subjects, to_json
+    from femubench.core.conformance.problems import of_case
+
+    cases = [of_case(case) for case in read_cases(words, found)] if words else []
+    records: list[dict[str, Any]] = []
+    bad = 0
+    for subject in subjects(name, found, cases=cases, seconds=timeout):
+        title = f"{subject.role} {subject.name}: {counted(len(subject.checks), 'check')}"
+        click.echo(title if not records else f"\n{title}")
+        seen = []
+        for finding in findings(subject):
+            click.echo(_line(finding))
+            seen.append(finding)
+        number = counts(seen)
+        click.echo(
+            f"{number['pass']} passed, {number['fail']} failed, "
+            f"{counted(number['warn'], 'warning')}, {number['not-applicable']} not applicable"
+        )
+        bad += number["fail"]
+        records.append(to_json(subject, seen))
+    if json_file is not None:
+        write_atomically(json_file, json.dumps({"checked": records}, indent=1))
+    return 1 if bad else 0
+
+
+def _line(finding: Finding) -> str:
+    """Return one line: what a finding says, or what was checked."""
+    word = _WORDS[finding.verdict.status]
+    plain = finding.verdict.status == "pass" and not finding.verdict.message
+    text = finding.check.sentence if plain else finding.verdict.message
+    return f"{word:4}  {finding.check.name:18}  {text}"

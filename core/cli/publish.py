@@ -6,15 +6,14 @@ from pathlib import Path
 
 import click
 
+from femubench.core.cli import options
 from femubench.core.display import counted
 
 
 @click.command("publish")
-@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
-@click.argument(
-    "files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path)
-)
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@click.argument("folder", metavar="DIR", type=options.PATH)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=options.PATH)
+@options.quiet
 def publish(folder: Path, files: tuple[Path, ...], quiet: bool) -> None:
     """Merge result files into a static site in DIR.
 

@@ -25,12 +25,18 @@ def warn(broken: Iterable[BrokenPlugin], *, with_traceback: bool) -> None:
             click.echo(fault.traceback, err=True, nl=False)
 
 
-def wrapped(text: str, *, indent: int = 0, hanging: int) -> str:
-    """Return text on lines of 80 columns, names whole; `hanging` indents all but the first."""
+def wrapped(text: str, *, indent: int = 0, lead: str = "", hanging: int) -> str:
+    """Return text on lines of 80 columns, names whole.
+
+    Arguments:
+        text: wrapped; blanks at its start are dropped.
+        indent, hanging: of the first line and of all others.
+        lead: stands before the text on the first line.
+    """
     return textwrap.fill(
         text,
         80,
-        initial_indent=" " * indent,
+        initial_indent=" " * indent + lead,
         subsequent_indent=" " * hanging,
         break_on_hyphens=False,
         break_long_words=False,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from femubench.core.cli import options
 from femubench.core.cli.registry import plugins_for
 from femubench.core.errors import InputError
 from femubench.core.files import check_writable, make_folder, write_atomically
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from femubench.core.roles import Reporter
     from femubench.core.schema.results import Run
 
-FOLDER = click.Path(path_type=Path, file_okay=False)
 _PAGE = "html"
 # Formats that tell of what was left out themselves.
 _TELLING = frozenset({"terminal", "markdown", _PAGE})
@@ -42,28 +42,10 @@ class _Formats(click.Option):
 
 @click.command("report")
 @click.argument("run", required=False)
-@click.option(
-    "-f",
-    "--format",
-    "formats",
-    multiple=True,
-    metavar="FORMAT",
-    cls=_Formats,
-)
+@click.option("-f", "--format", "formats", multiple=True, metavar="FORMAT", cls=_Formats)
 @click.option("--open", "opened", is_flag=True, help="Write the HTML page and open it.")
-@click.option(
-    "-o",
-    "--output",
-    type=FOLDER,
-    metavar="DIR",
-    help="Write files there. Default: the screen; for html and parquet, the store.",
-)
-@click.option(
-    "--store",
-    type=FOLDER,
-    metavar="DIR",
-    help="Where the results are. Default: $FEMUBENCH_STORE or femubench-results.",
-)
+@options.output_folder("Write files there. Default: the screen; for html and parquet, the store.")
+@options.store("Where the results are.")
 @click.pass_context
 def report(
     ctx: click.Context,

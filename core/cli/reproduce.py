@@ -6,44 +6,23 @@ from pathlib import Path
 
 import click
 
+from femubench.core.cli import options
 from femubench.core.cli.progress import waiting
 from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
 from femubench.core.errors import require
-from femubench.core.files import check_can_make, check_writable, write_atomically
+from femubench.core.files import check_can_make, write_atomically
 from femubench.core.plugin.validation import chosen
-
-FILE = click.Path(path_type=Path, dir_okay=False, allow_dash=True)
-FOLDER = click.Path(path_type=Path, file_okay=False)
-SCREEN = Path("-")
 
 
 @click.command("reproduce")
 @click.argument("paper", required=False, metavar="[frame|hframe]")
-@click.option(
-    "--json",
-    "json_file",
-    type=FILE,
-    metavar="FILE",
-    help="Write the cells as JSON; - prints them.",
+@options.json_file("Write the cells as JSON; - prints them.", options.OUTPUT_OR_SCREEN)
+@options.output_folder(
+    "Write reproduce.md, .html, .json and the figures there; needs femubench[plot]."
 )
-@click.option(
-    "-o",
-    "--output",
-    type=FOLDER,
-    metavar="DIR",
-    help="Write reproduce.md, .html, .json and the figures there; needs femubench[plot].",
-)
-@click.option(
-    "-f",
-    "--format",
-    "style",
-    type=click.Choice(["terminal", "markdown", "html"]),
-    default="terminal",
-    show_default=True,
-    help="What is printed.",
-)
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@options.style("terminal", "markdown", "html")
+@options.quiet
 @click.pass_context
 def reproduce(
     ctx: click.Context,
@@ -63,8 +42,6 @@ def reproduce(
     papers = chosen("paper", PAPERS if paper is None else [paper], PAPERS)
     if output is not None or style == "html":
         require("matplotlib", "plot", "drawing the figures")
-    if json_file is not None and json_file != SCREEN:
-        check_writable(json_file)
     if output is not None:
         check_can_make(output)
     from femubench.core.library.report import rendering
@@ -72,10 +49,10 @@ def reproduce(
 
     with waiting(f"recomputing {' and '.join(papers)}", quiet=quiet):
         studies = studies_of(papers, plugins_for(ctx))
-    if json_file is not None and json_file != SCREEN:
+    if json_file is not None and json_file != options.SCREEN:
         write_atomically(json_file, rendering(studies, "json"))
     files, figures = ([], 0) if output is None else write_studies(studies, output)
-    if json_file == SCREEN:
+    if json_file == options.SCREEN:
         click.echo(rendering(studies, "json"))
     elif not quiet:
         click.echo(rendering(studies, style))

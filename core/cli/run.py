@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from femubench.core.cli import options
 from femubench.core.cli.progress import progress_bar
 from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of
 from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
 from femubench.core.errors import InputError, PluginError
-from femubench.core.files import check_writable, write_atomically
+from femubench.core.files import write_atomically
 from femubench.core.library.cases import case_folders
 from femubench.core.plugin.validation import chosen
 from femubench.core.version import __version__
@@ -26,91 +27,62 @@ if TYPE_CHECKING:
     from femubench.core.run.store import Store
     from femubench.core.schema.results import Run
 
-FILE = click.Path(path_type=Path, dir_okay=False)
-FOLDER = click.Path(path_type=Path, file_okay=False)
-
 
 @click.command("run")
 @click.argument("cases", metavar="[CASE]...", nargs=-1)
 @click.option(
-    "-s",
-    "--strategy",
-    "strategies",
-    multiple=True,
-    metavar="STRATEGY",
+    "-s", "--strategy", "strategies", multiple=True, metavar="STRATEGY",
     help="Run this strategy, or STRATEGY:OPTION=VALUE,...; may be repeated. Default: all.",
-)
+)  # fmt: skip
 @click.option(
-    "-j",
-    "--jobs",
-    type=click.IntRange(1),
-    metavar="N",
+    "-j", "--jobs", type=click.IntRange(1), metavar="N",
     help="Number of worker processes. Default: one per core.",
-)
+)  # fmt: skip
 @click.option(
-    "--seeds",
-    type=click.IntRange(1),
-    metavar="N",
+    "--seeds", type=click.IntRange(1), metavar="N",
     help="Run N draws of measurement noise, seeds S+1 .. S+N, instead of the data as recorded.",
-)
+)  # fmt: skip
 @click.option(
-    "--seed",
-    type=click.IntRange(0, 2**62),
-    default=0,
-    metavar="S",
-    show_default=True,
+    "--seed", type=click.IntRange(0, 2**62), default=0, metavar="S", show_default=True,
     help="The first seed.",
-)
+)  # fmt: skip
 @click.option(
-    "--timeout",
-    "timeouts",
-    multiple=True,
-    callback=timeouts_of,
-    metavar="DURATION",
+    "--timeout", "timeouts", multiple=True, callback=timeouts_of, metavar="DURATION",
     help="Give up on a job after this time, e.g. 90s, 10m, 1h. STRATEGY=DURATION is for one "
     "strategy; may be repeated. Default: 10m.",
-)
+)  # fmt: skip
 @click.option(
-    "--memory",
-    callback=bytes_of,
-    metavar="SIZE",
+    "--memory", callback=bytes_of, metavar="SIZE",
     help="Stop a job that takes more, e.g. 512M, 4G. Default: an even share of the machine's.",
-)
+)  # fmt: skip
 @click.option(
-    "--resume",
-    is_flag=True,
+    "--resume", is_flag=True,
     help="Continue the last run of these jobs: run what is missing, and failed jobs again. Without "
     "CASE and -s, continue the last run in the store.",
-)
+)  # fmt: skip
 @click.option(
-    "--overwrite",
-    type=click.Choice(["always", "missing", "failed"]),
+    "--overwrite", type=click.Choice(["always", "missing", "failed"]),
     help="Which stored results of the same jobs are computed again: all, none, or the "
     "failures. Default: always; with --resume: failed.",
-)
+)  # fmt: skip
 @click.option(
-    "--locked",
-    metavar="RUN",
+    "--locked", metavar="RUN",
     help="Repeat a stored run and report differences; exit 1 if a result differs.",
-)
-@click.option("--strict-plugins", is_flag=True, help="Stop with exit code 2 if a plugin is broken.")
-@click.option("--json", "json_file", type=FILE, metavar="FILE", help="Write the results as JSON.")
-@click.option("--csv", "csv_file", type=FILE, metavar="FILE", help="Write one line per job as CSV.")
+)  # fmt: skip
 @click.option(
-    "--store",
-    type=FOLDER,
-    metavar="DIR",
-    help="Keep results there. Default: $FEMUBENCH_STORE or femubench-results.",
+    "--strict-plugins", is_flag=True, help="Stop with exit code 2 if a plugin is broken."
 )
+@options.json_file("Write the results as JSON.")
 @click.option(
-    "--report",
-    "report_file",
-    type=FILE,
-    metavar="FILE",
+    "--csv", "csv_file", type=options.OUTPUT, metavar="FILE", help="Write one line per job as CSV."
+)
+@options.store("Keep results there.")
+@click.option(
+    "--report", "report_file", type=options.OUTPUT, metavar="FILE",
     help="Write the report there; its suffix decides the format. Default: RUN.html and "
     "RUN.md in the store.",
-)
-@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+)  # fmt: skip
+@options.quiet
 @click.pass_context
 def run(
     ctx: click.Context,
@@ -226,7 +198,7 @@ def _compare(old: Run, new: Run) -> int:
 def _outputs(
     plugins: Plugins, json_file: Path | None, csv_file: Path | None, report_file: Path | None
 ) -> dict[Path, Reporter]:
-    """Return who writes which file; all of them can be written to."""
+    """Return who writes which file."""
     from femubench.core.library.report import reporter, reporter_for
 
     outputs: dict[Path, Reporter] = {}
@@ -235,7 +207,6 @@ def _outputs(
             continue
         if path in outputs:
             raise InputError("is to hold two outputs", file=path, expected="a file for each")
-        check_writable(path)
         outputs[path] = reporter(plugins, name) if name else reporter_for(plugins, path)
     return outputs
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
@@ -10,9 +10,7 @@ from femubench.core.conformance import (
     SECONDS,
     effect_checks,
     other_checks,
-    result_checks,
     strategy_checks,
-    survival_checks,
 )
 from femubench.core.conformance.kit import (
     CHECKS,
@@ -27,11 +25,11 @@ from femubench.core.conformance.kit import (
 from femubench.core.conformance.problems import Problem
 from femubench.core.errors import InputError
 from femubench.core.plugin.loader import Plugins
-from femubench.core.plugin.validation import did_you_mean
+from femubench.core.plugin.validation import KINDS, did_you_mean
 from femubench.core.plugin.variants import strategy_of
 
 # Importing them fills the list.
-_SOURCES = (strategy_checks, survival_checks, result_checks, effect_checks, other_checks)
+_SOURCES = (strategy_checks, effect_checks, other_checks)
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ def subjects(
         for role, item in _named(name, plugins)
     ]
     if not found:
-        known = {word for role in get_args(Role) for word in _of_role(role, plugins)}
+        known = {word for role in get_args(Role) for word in getattr(plugins, KINDS[role])}
         near = did_you_mean(name, sorted(known)) or "; bench plugins list shows what there is"
         raise InputError(f"no strategy, effect, reader or scenario {name!r}{near}")
     return found
@@ -123,22 +121,13 @@ def to_json(subject: Subject, found: Sequence[Finding]) -> dict[str, Any]:
     }
 
 
-def _of_role(role: Role, plugins: Plugins) -> Mapping[str, Any]:
-    by_role: dict[Role, Mapping[str, Any]] = {
-        "strategy": plugins.strategies,
-        "effect": plugins.effects,
-        "reader": plugins.readers,
-        "scenario": plugins.scenarios,
-    }
-    return by_role[role]
-
-
 def _named(name: str, plugins: Plugins) -> Iterator[tuple[Role, Any]]:
     if name.partition(":")[0] in plugins.strategies:
         yield "strategy", strategy_of(name, plugins.strategies)
     for role in get_args(Role)[1:]:
-        if name in _of_role(role, plugins):
-            yield role, _of_role(role, plugins)[name]
+        offered = getattr(plugins, KINDS[role])
+        if name in offered:
+            yield role, offered[name]
 
 
 def _bench(
@@ -152,4 +141,5 @@ def _bench(
         named = plugins.strategies.values()
         reference = next((s for s in named if getattr(s, "yardstick", False)), None)
         return Bench(item, reference=reference, cases=cases, seconds=seconds)
-    return Bench(item, helpers=tuple(plugins.readers.values()), seconds=seconds)
+    helpers = tuple(plugins.readers.values()) if role == "scenario" else ()
+    return Bench(item, helpers=helpers, seconds=seconds)

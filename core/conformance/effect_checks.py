@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from typing import get_args
 
 import numpy as np
 
+from femubench.core.conformance import kit
 from femubench.core.conformance.fingerprints import fingerprint, first_difference
-from femubench.core.conformance.kit import (
-    Bench,
-    Verdict,
-    check,
-    failed,
-    not_applicable,
-    passed,
-    warned,
-)
+from femubench.core.conformance.kit import Bench, Verdict, check, failed, passed
 from femubench.core.conformance.place_words import known_place
 from femubench.core.conformance.problems import PLAIN, problem
-from femubench.core.conformance.results import Given, finite as finite_entries, symmetric
+from femubench.core.conformance.results import (
+    Given,
+    finite as finite_entries,
+    sendable,
+    symmetric,
+)
 from femubench.core.conformance.strategy_checks import own_doc
 from femubench.core.effect.attachments import total_mass
 from femubench.core.effect.reading import Reading
@@ -52,12 +51,6 @@ def _spots(effect: Effect) -> Iterator[tuple[str, Model, str]]:
             yield f"{name}, place {place!r}", model, place
 
 
-def _apart(bench: Bench, function: Callable[[Effect], Verdict]) -> Verdict:
-    if isinstance(bench.code, str):
-        return not_applicable("not looked at: it cannot be sent to a worker")
-    return bench.apart(function, bench.subject)
-
-
 @check("effect", "described", "It has a summary or a docstring.")
 def described(bench: Bench) -> Verdict:
     """Look for a text that tells what the model lacks."""
@@ -70,45 +63,8 @@ def described(bench: Bench) -> Verdict:
 @check("effect", "picklable", "It can be sent to a worker, and an extended model back.")
 def picklable(bench: Bench) -> Verdict:
     """Pickle the effect and what it makes."""
-    if isinstance(bench.code, str):
-        return failed(f"{bench.code}, expected an effect that pickle can send")
-    return _apart(bench, _sendable)
-
-
-@check("effect", "places", "Its places are in the model, each once, and have parameters.")
-def places(bench: Bench) -> Verdict:
-    """Read every place of every model."""
-    return _apart(bench, _places)
-
-
-@check("effect", "neutral", "With neutral values the model stays what it was.")
-def neutral(bench: Bench) -> Verdict:
-    """Extend models with neutral values."""
-    return _apart(bench, _neutral)
-
-
-@check("effect", "finite", "The extended model and its rates of change are finite and symmetric.")
-def finite(bench: Bench) -> Verdict:
-    """Extend models by one scale, and by a little more."""
-    return _apart(bench, _finite)
-
-
-@check("effect", "deterministic", "Two extensions are equal to the last bit.")
-def deterministic(bench: Bench) -> Verdict:
-    """Extend models twice."""
-    return _apart(bench, _deterministic)
-
-
-@check("effect", "inputs", "The nominal model stays as it was given.")
-def inputs(bench: Bench) -> Verdict:
-    """Compare models before and after."""
-    return _apart(bench, _inputs)
-
-
-@check("effect", "worded", "Sizes, hints, wording and looks are of use, where it brings any.")
-def worded(bench: Bench) -> Verdict:
-    """Read what is optional, and look at every model beside its measurement."""
-    return _apart(bench, _worded)
+    sent = kit.picklable(bench, "an effect")
+    return bench.apart(sent_back) if sent.status == "pass" else sent
 
 
 def _values(parameters: tuple[EffectParameter, ...], x: float) -> list[float]:
@@ -124,6 +80,16 @@ def _extended(effect: Effect, model: Model, place: str, x: float = 1.0) -> Model
     return _with(effect, model, place, _values(tuple(effect.parameters(model, place)), x))
 
 
+def _tries(effect: Effect, *xs: float) -> Iterator[tuple[str, list[Model]]]:
+    """Yield the models extended by so many scales, wherever the effect applies."""
+    for where, model, place in _spots(effect):
+        try:
+            extended = [_extended(effect, model, place, x) for x in xs]
+        except NotApplicable:
+            continue
+        yield where, extended
+
+
 def _with(effect: Effect, model: Model, place: str, values: list[float]) -> Model:
     found = effect.extend(model, place, values)
     if not isinstance(found, Model):
@@ -131,12 +97,10 @@ def _with(effect: Effect, model: Model, place: str, values: list[float]) -> Mode
     return found
 
 
-def _sendable(effect: Effect) -> Verdict:
-    from femubench.core.conformance.results import sendable
-
+def sent_back(effect: Effect) -> Verdict:
+    """Send extended models as a worker does."""
     for where, model, place in _spots(effect):
-        extended = _extended(effect, model, place)
-        fault = sendable(_given(model, extended))
+        fault = sendable(_given(model, _extended(effect, model, place)))
         if fault:
             return failed(f"{where}: {fault}")
     return passed()
@@ -147,7 +111,9 @@ def _given(model: Model, extended: Model) -> Given:
     return Given(type(plain)("", model, plain.measurement), UpdateResult(extended), frozenset())
 
 
-def _places(effect: Effect) -> Verdict:
+@kit.check_apart("effect", "places", "Its places are in the model, each once, and have parameters.")
+def places(effect: Effect) -> Verdict:
+    """Read every place of every model."""
     count = 0
     for name, model in _models():
         found = list(effect.places(model))
@@ -161,7 +127,7 @@ def _places(effect: Effect) -> Verdict:
             fault = _parameters(effect, model, place)
             if fault:
                 return failed(f"{where}: {fault}")
-    return passed() if count else not_applicable("it has no place in any of the models")
+    return passed() if count else kit.not_applicable("it has no place in any of the models")
 
 
 def _parameters(effect: Effect, model: Model, place: str) -> str | None:
@@ -178,10 +144,11 @@ def _parameters(effect: Effect, model: Model, place: str) -> str | None:
     return None
 
 
-def _neutral(effect: Effect) -> Verdict:
-    count = 0
-    for where, model, place in _spots(effect):
-        count += 1
+@kit.check_apart("effect", "neutral", "With neutral values the model stays what it was.")
+def neutral(effect: Effect) -> Verdict:
+    """Extend models with neutral values."""
+    spots = list(_spots(effect))
+    for where, model, place in spots:
         values = [item.neutral for item in effect.parameters(model, place)]
         try:
             extended = _with(effect, model, place, values)
@@ -191,8 +158,8 @@ def _neutral(effect: Effect) -> Verdict:
         if not gap <= _SAME:
             text = f"{where}: neutral values change frequencies by {gap:.2g}, expected {_SAME:g}"
             # A rigid spring may leave the arm behind which it sits.
-            return failed(text) if np.isfinite(values).all() else warned(text)
-    return passed() if count else not_applicable("it has no place in any of the models")
+            return failed(text) if np.isfinite(values).all() else kit.warned(text)
+    return passed() if spots else kit.not_applicable("it has no place in any of the models")
 
 
 def _distance(model: Model, other: Model) -> float:
@@ -203,13 +170,13 @@ def _distance(model: Model, other: Model) -> float:
     return float(np.abs(np.sqrt(np.abs(two[: len(one)] / one)) - 1.0).max())
 
 
-def _finite(effect: Effect) -> Verdict:
+@kit.check_apart(
+    "effect", "finite", "The extended model and its rates of change are finite and symmetric."
+)
+def finite(effect: Effect) -> Verdict:
+    """Extend models by one scale, and by a little more."""
     count = 0
-    for where, model, place in _spots(effect):
-        try:
-            one, more = (_extended(effect, model, place, x) for x in (1.0, 1.0 + _STEP))
-        except NotApplicable:
-            continue
+    for where, (one, more) in _tries(effect, 1.0, 1.0 + _STEP):
         count += 1
         for extended in (one, more):
             given = _given(extended, extended)
@@ -219,35 +186,37 @@ def _finite(effect: Effect) -> Verdict:
         same = one.stiffness.shape == more.stiffness.shape
         if not same or not np.isfinite(_distance(one, more) / _STEP):
             return failed(f"{where}: no rate of change at one scale, expected a smooth change")
-    return passed() if count else not_applicable("it has no place in any of the models")
+    return passed() if count else kit.not_applicable("it has no place in any of the models")
 
 
-def _deterministic(effect: Effect) -> Verdict:
-    for where, model, place in _spots(effect):
-        try:
-            one, other = (fingerprint(_extended(effect, model, place), "model") for _ in range(2))
-        except NotApplicable:
-            continue
-        path = first_difference(one, other)
+@kit.check_apart("effect", "deterministic", "Two extensions are equal to the last bit.")
+def deterministic(effect: Effect) -> Verdict:
+    """Extend models twice."""
+    for where, extended in _tries(effect, 1.0, 1.0):
+        path = first_difference(*(fingerprint(model, "model") for model in extended))
         if path:
             return failed(f"{where}: {path} differs between two extensions, expected equality")
     return passed()
 
 
-def _inputs(effect: Effect) -> Verdict:
+@kit.check_apart("effect", "inputs", "The nominal model stays as it was given.")
+def inputs(effect: Effect) -> Verdict:
+    """Compare models before and after."""
     for where, model, place in _spots(effect):
         before = fingerprint(model, "model")
-        try:
+        with suppress(NotApplicable):
             _extended(effect, model, place)
-        except NotApplicable:
-            continue
         path = first_difference(before, fingerprint(model, "model"))
         if path:
             return failed(f"{where}: {path} was changed in place, expected a copy")
     return passed()
 
 
-def _worded(effect: Effect) -> Verdict:
+@kit.check_apart(
+    "effect", "worded", "Sizes, hints, wording and looks are of use, where it brings any."
+)
+def worded(effect: Effect) -> Verdict:
+    """Read what is optional, and look at every model beside its measurement."""
     hints = _hints(effect)
     if hints:
         return failed(hints)

@@ -8,11 +8,11 @@ import pickle
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 from femubench.core.conformance import SECONDS
 from femubench.core.conformance.problems import PLAIN, Problem, problem
-from femubench.core.conformance.trial import Observation, Trial, observation_of, run_trial
+from femubench.core.conformance.trial import Observation, Trial, Want, observation_of, run_trial
 from femubench.core.roles import Strategy
 from femubench.core.run.jobs import one_line, sent
 from femubench.core.run.limits import MIB, Limits
@@ -21,6 +21,7 @@ from femubench.core.run.workers import Ending, Workers
 Status = Literal["pass", "fail", "warn", "not-applicable"]
 Role = Literal["strategy", "effect", "reader", "scenario"]
 MEMORY = 1024 * MIB
+UNSENT = "not looked at: it cannot be sent to a worker"
 _ATTEMPTS = 3  # to start a process
 
 
@@ -53,23 +54,6 @@ def not_applicable(message: str) -> Verdict:
 
 
 @dataclass(frozen=True)
-class Want:
-    """A trial that a check looks at.
-
-    Arguments:
-        problem: its name.
-        seed, scramble, traced: as in `Trial`.
-        reference: whether it is the strategy to compare with that runs.
-    """
-
-    problem: str
-    seed: int = 0
-    scramble: int = 0
-    traced: bool = False
-    reference: bool = False
-
-
-@dataclass(frozen=True)
 class Check:
     """One thing that a plugin must keep.
 
@@ -85,11 +69,13 @@ class Check:
     role: Role
     name: str
     sentence: str
-    judge: Callable[[Bench], Verdict]
-    wants: Callable[[Bench], Sequence[Want]] = lambda bench: ()
-    first: bool = False
+    judge: Judge
+    wants: Wants
+    first: bool
 
 
+Judge: TypeAlias = Callable[["Bench"], Verdict]
+Wants: TypeAlias = Callable[["Bench"], Sequence[Want]]
 CHECKS: list[Check] = []
 
 
@@ -98,14 +84,26 @@ def check(
     name: str,
     sentence: str,
     *,
-    wants: Callable[[Bench], Sequence[Want]] = lambda bench: (),
+    wants: Wants = lambda bench: (),
     first: bool = False,
-) -> Callable[[Callable[[Bench], Verdict]], Callable[[Bench], Verdict]]:
+) -> Callable[[Judge], Judge]:
     """Put a function on the list of checks."""
 
-    def put(judge: Callable[[Bench], Verdict]) -> Callable[[Bench], Verdict]:
+    def put(judge: Judge) -> Judge:
         CHECKS.append(Check(role, name, sentence, judge, wants, first))
         return judge
+
+    return put
+
+
+def check_apart(
+    role: Role, name: str, sentence: str
+) -> Callable[[Callable[..., Verdict]], Callable[..., Verdict]]:
+    """Put a function on the list of checks that a worker calls with the subject and the helpers."""
+
+    def put(function: Callable[..., Verdict]) -> Callable[..., Verdict]:
+        check(role, name, sentence)(lambda bench: bench.apart(function, *bench.helpers))
+        return function
 
     return put
 
@@ -117,7 +115,7 @@ class Bench:
         subject: the strategy, effect, reader or scenario.
         reference: the strategy that time and memory are compared with, if there is one.
         cases: further problems.
-        helpers: what a check of another role needs besides, e.g. readers.
+        helpers: what a check in a worker is given besides, e.g. readers.
         seconds, memory: what one trial may take.
         jobs: number of workers; None for the number of processors.
     """
@@ -128,7 +126,7 @@ class Bench:
         *,
         reference: Strategy | None = None,
         cases: Sequence[Problem] = (),
-        helpers: Any = None,  # noqa: ANN401 - whatever the role needs
+        helpers: Sequence[object] = (),
         seconds: float = SECONDS,
         memory: int = MEMORY,
         jobs: int | None = None,
@@ -152,7 +150,7 @@ class Bench:
     def sound(self) -> str | None:
         """Return why there is no use in further trials; None where the plain one came back."""
         if isinstance(self.code, str):
-            return "not looked at: it cannot be sent to a worker"
+            return UNSENT
         if not self.observe([Want(PLAIN)])[0].survived:
             return f"not looked at: nothing came back from the {PLAIN}"
         return None
@@ -165,14 +163,16 @@ class Bench:
             self._seen[want] = observation_of(want.problem, ending)
         return [self._seen[want] for want in wants]
 
-    def apart(self, function: Callable[[Any], Verdict], argument: object) -> Verdict:
+    def apart(self, function: Callable[..., Verdict], *further: object) -> Verdict:
         """Return the verdict of a function that runs in a worker.
 
         Arguments:
-            function: importable by name.
-            argument: its argument.
+            function: importable by name; its first argument is the subject.
+            further: its other arguments.
         """
-        task = (_judged, (function, pickle.dumps(argument)))
+        if isinstance(self.code, str):
+            return not_applicable(UNSENT)
+        task = (_judged, (function, pickle.dumps((self.subject, *further))))
         ending = run_apart({0: task}, self.limits, 1)[0]
         if ending.how != "answer":
             return failed(f"{ending.reason}, expected an answer")
@@ -182,7 +182,7 @@ class Bench:
         code = sent(self.reference) if want.reference else self.code
         assert isinstance(code, bytes)
         given = self.cases.get(want.problem) or problem(want.problem)
-        return Trial(code, given, want.seed, want.scramble, want.traced)
+        return Trial(code, given, want)
 
 
 def run_apart(
@@ -215,14 +215,21 @@ def run_apart(
     return found
 
 
-def _judged(task: tuple[Callable[[Any], Verdict], bytes]) -> bytes:
+def _judged(task: tuple[Callable[..., Verdict], bytes]) -> bytes:
     """Return the verdict of a function as JSON; runs in a worker."""
-    function, argument = task
+    function, arguments = task
     try:
-        verdict = function(pickle.loads(argument))
+        verdict = function(*pickle.loads(arguments))
     except BaseException as error:
         verdict = failed(f"{one_line(error)}, expected no exception")
     return json.dumps([verdict.status, verdict.message]).encode()
+
+
+def picklable(bench: Bench, what: str) -> Verdict:
+    """Judge whether the subject can be sent to a worker."""
+    if isinstance(bench.code, str):
+        return failed(f"{bench.code}, expected {what} that pickle can send")
+    return passed()
 
 
 def judged(check: Check, bench: Bench) -> Verdict:

@@ -3,59 +3,53 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from femubench.core.case.case import Case
 from femubench.core.case.reader import read_case
-from femubench.core.conformance.kit import Bench, Verdict, check, failed, not_applicable, passed
+from femubench.core.conformance import kit
+from femubench.core.conformance.kit import Bench, Verdict, check, failed, passed
 from femubench.core.errors import FemubenchError, InputError
 from femubench.core.roles import Reader, Scenario
 from femubench.core.run.jobs import one_line
 from femubench.core.score.scoring import reference_of
 
-_UNSENT = "not looked at: it cannot be sent to a worker"
 _BYTES = 4096
+# What no reader may take for data: name of the check, how its sentence begins, words, content.
+_FILES = (
+    ("empty-file", "An empty file", "an empty file", b""),
+    (
+        "random-file",
+        "A file of random bytes",
+        "a file of random bytes",
+        np.random.default_rng(0).integers(0, 256, _BYTES, dtype=np.uint8).tobytes(),
+    ),
+    (
+        "text-file",
+        "A text that is not in its format",
+        "a text",
+        b"Dear reader,\nnothing of this is a measurement.\n-1\n 55\n1,2,x\n",
+    ),
+)
+
+check("reader", "picklable", "It can be sent to a worker.")(partial(kit.picklable, what="a reader"))
 
 
-@check("reader", "picklable", "It can be sent to a worker.")
-def reader_picklable(bench: Bench) -> Verdict:
-    """Pickle the reader."""
-    if isinstance(bench.code, str):
-        return failed(f"{bench.code}, expected a reader that pickle can send")
-    return passed()
+def _refused(bench: Bench, what: str, content: bytes) -> Verdict:
+    return bench.apart(refuses, what, content)
 
 
-@check("reader", "empty-file", "An empty file is refused by InputError.")
-def empty_file(bench: Bench) -> Verdict:
-    """Read an empty file as a matrix and as modes."""
-    return not_applicable(_UNSENT) if isinstance(bench.code, str) else bench.apart(
-        _refuses, (bench.subject, "an empty file", b"")
-    )  # fmt: skip
+for _name, _subject, _what, _content in _FILES:
+    _judge = partial(_refused, what=_what, content=_content)
+    check("reader", _name, f"{_subject} is refused by InputError.")(_judge)
 
 
-@check("reader", "random-file", "A file of random bytes is refused by InputError.")
-def random_file(bench: Bench) -> Verdict:
-    """Read random bytes as a matrix and as modes."""
-    noise = np.random.default_rng(0).integers(0, 256, _BYTES, dtype=np.uint8).tobytes()
-    return not_applicable(_UNSENT) if isinstance(bench.code, str) else bench.apart(
-        _refuses, (bench.subject, "a file of random bytes", noise)
-    )  # fmt: skip
-
-
-@check("reader", "text-file", "A text that is not in its format is refused by InputError.")
-def text_file(bench: Bench) -> Verdict:
-    """Read a text as a matrix and as modes."""
-    text = b"Dear reader,\nnothing of this is a measurement.\n-1\n 55\n1,2,x\n"
-    return not_applicable(_UNSENT) if isinstance(bench.code, str) else bench.apart(
-        _refuses, (bench.subject, "a text", text)
-    )  # fmt: skip
-
-
-def _refuses(task: tuple[Reader, str, bytes]) -> Verdict:
-    reader, what, content = task
+def refuses(reader: Reader, what: str, content: bytes) -> Verdict:
+    """Read a file that is none as a matrix and as modes."""
     with tempfile.TemporaryDirectory() as folder:
         for suffix in reader.suffixes:
             file = Path(folder) / f"file{suffix}"
@@ -74,32 +68,9 @@ def _refuses(task: tuple[Reader, str, bytes]) -> Verdict:
     return passed()
 
 
-@check("scenario", "reads", "Every case can be read.")
-def reads(bench: Bench) -> Verdict:
+@kit.check_apart("scenario", "reads", "Every case can be read.")
+def reads(scenario: Scenario, *readers: Reader) -> Verdict:
     """Read every case."""
-    return bench.apart(_reads, (bench.subject, bench.helpers or ()))
-
-
-@check("scenario", "held-out", "Every case holds out data by which a model can be judged.")
-def held_out(bench: Bench) -> Verdict:
-    """Look for held-out modes and modifications."""
-    return bench.apart(_held_out, (bench.subject, bench.helpers or ()))
-
-
-@check("scenario", "solves", "The nominal model of every case has modes that pair with used ones.")
-def solves(bench: Bench) -> Verdict:
-    """Solve and judge every nominal model."""
-    return bench.apart(_solves, (bench.subject, bench.helpers or ()))
-
-
-@check("scenario", "sources", "Every case says where its numbers come from.")
-def sources(bench: Bench) -> Verdict:
-    """Look for title and source."""
-    return bench.apart(_sources, (bench.subject, bench.helpers or ()))
-
-
-def _reads(task: tuple[Scenario, Sequence[Reader]]) -> Verdict:
-    scenario, readers = task
     for name, folder in scenario.cases.items():
         try:
             read_case(folder, name, readers)
@@ -108,42 +79,56 @@ def _reads(task: tuple[Scenario, Sequence[Reader]]) -> Verdict:
     return passed()
 
 
-def _cases(task: tuple[Scenario, Sequence[Reader]]) -> list[Case]:
-    scenario, readers = task
-    found = []
+def _first_fault(scenario: Scenario, fault_of: Callable[[Case], str], *readers: Reader) -> Verdict:
+    """Return the first fault of the cases that can be read; `reads` is about the others."""
+    count = 0
     for name, folder in scenario.cases.items():
         try:
-            found.append(read_case(folder, name, readers))
+            case = read_case(folder, name, readers)
         except InputError:
-            continue  # which is what `reads` is about
-    return found
+            continue
+        count += 1
+        if fault := fault_of(case):
+            return failed(f"{case.name}: {fault}")
+    return passed() if count else kit.not_applicable("no case can be read")
 
 
-def _held_out(task: tuple[Scenario, Sequence[Reader]]) -> Verdict:
-    cases = _cases(task)
-    for case in cases:
-        if not case.held_out and not case.modifications:
-            return failed(f"{case.name}: nothing is held out, expected modes or a modification")
-        if not case.used:
-            return failed(f"{case.name}: no used mode, expected one or more")
-    return passed() if cases else not_applicable("no case can be read")
+def held_out_fault(case: Case) -> str:
+    """Return what held-out modes and modifications lack."""
+    if not case.held_out and not case.modifications:
+        return "nothing is held out, expected modes or a modification"
+    return "" if case.used else "no used mode, expected one or more"
 
 
-def _solves(task: tuple[Scenario, Sequence[Reader]]) -> Verdict:
-    cases = _cases(task)
-    for case in cases:
-        try:
-            used = reference_of(case).blocks["used"]
-        except FemubenchError as error:
-            return failed(f"{case.name}: {error}, expected a nominal model with modes")
-        if all(mode.predicted_hz is None for mode in used.modes):
-            return failed(f"{case.name}: no used mode has a partner in the nominal model")
-    return passed() if cases else not_applicable("no case can be read")
+def nominal_fault(case: Case) -> str:
+    """Solve and judge the nominal model."""
+    try:
+        used = reference_of(case).blocks["used"]
+    except FemubenchError as error:
+        return f"{error}, expected a nominal model with modes"
+    lost = all(mode.predicted_hz is None for mode in used.modes)
+    return "no used mode has a partner in the nominal model" if lost else ""
 
 
-def _sources(task: tuple[Scenario, Sequence[Reader]]) -> Verdict:
-    cases = _cases(task)
-    for case in cases:
-        if not case.source.strip() or not case.title.strip():
-            return failed(f"{case.name}: title or source is empty, expected both")
-    return passed() if cases else not_applicable("no case can be read")
+def source_fault(case: Case) -> str:
+    """Look for title and source."""
+    told = case.source.strip() and case.title.strip()
+    return "" if told else "title or source is empty, expected both"
+
+
+_CASES = {
+    "held-out": ("Every case holds something back that a model can be judged by.", held_out_fault),
+    "solves": (
+        "The nominal model of every case has modes that pair with used ones.",
+        nominal_fault,
+    ),
+    "sources": ("Every case says where its numbers come from.", source_fault),
+}
+
+
+def _every_case(bench: Bench, fault_of: Callable[[Case], str]) -> Verdict:
+    return bench.apart(_first_fault, fault_of, *bench.helpers)
+
+
+for _name, (_sentence, _fault_of) in _CASES.items():
+    check("scenario", _name, _sentence)(partial(_every_case, fault_of=_fault_of))

@@ -3,49 +3,36 @@
 from __future__ import annotations
 
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.fem.frame import Frame
+from femubench.core.effect.places import elements_of, joints_of, pair_of, point_of, split_direction
+from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
-from femubench.core.fem.sensors import DIRECTIONS
+from femubench.core.fem.structure import Structure
 
 
 def known_place(model: Model, place: str) -> bool:
-    """Tell whether a place is in a model."""
+    """Tell whether a place, without its direction or role, is in a model."""
+    bare = split_direction(place.removesuffix(":branch"))[0]
     if model.structure is not None:
-        names = _in_frame
-        frame: Frame = model.structure.frame
-        return names(frame, place) or names(frame, _without_suffix(place))
+        return _in_frame(model.structure, bare) or _in_frame(model.structure, place)
     known = set(model.groups) | {"all"}
     if isinstance(model.geometry, MatrixGeometry):
         known |= set(model.geometry.names)
-    return place in known or _without_suffix(place) in known
+    return place in known or bare in known
 
 
-def _without_suffix(place: str) -> str:
-    """Return a place without its direction or role."""
-    head, colon, last = place.rpartition(":")
-    return head if colon and (last in DIRECTIONS or last == "branch") else place
-
-
-def _in_frame(frame: Frame, place: str) -> bool:
-    joints, members = set(frame.joint_index), frame.member_index
-    types = {joint.type for joint in frame.joints if joint.type}
-    if place in {"all", *joints, *members, *types} or place.removeprefix("type:") in types:
+def _in_frame(structure: Structure, place: str) -> bool:
+    frame = structure.frame
+    if joints_of(frame, place):
         return True
-    one, dash, other = place.partition("-")
-    if dash and {one, other} <= joints:
+    reads = (
+        lambda: elements_of(structure, place),
+        lambda: point_of(frame, place),
+        lambda: pair_of(frame, place),
+    )
+    for read in reads:
+        try:
+            read()
+        except ModelError:
+            continue
         return True
-    for mark in "/@":
-        member, found, rest = place.rpartition(mark)
-        if found and member in members:
-            chosen = frame.members[members[member]]
-            return _within(rest, mark, chosen.elements, chosen.ends)
     return False
-
-
-def _within(rest: str, mark: str, elements: int, ends: tuple[str, str]) -> bool:
-    if mark == "/":
-        return rest.isdecimal() and 1 <= int(rest) <= elements
-    try:
-        return rest in ends or 0.0 <= float(rest) <= 1.0
-    except ValueError:
-        return False

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from typing import Any
 
 import numpy as np
 
@@ -139,64 +140,47 @@ def frame_problem(
     name: str,
     plane: Plane,
     *,
-    grounded: bool = True,
-    sprung: bool = False,
     members: tuple[str, ...] = _MEMBERS,
     elements: int = ELEMENTS,
     torsion: tuple[float, float] = (1.0, 1.0),
+    **kind: Any,  # noqa: ANN401 - as `small_frame` has it
 ) -> Problem:
     """Return a coarse model that is too stiff, and a test of a finer one.
 
     Arguments:
         torsion: factor on the torsion constant, of the model and of the truth.
+        kind: whether it is grounded, and sprung, as in `small_frame`.
     """
-    model = small_frame(
-        plane, elements=elements, grounded=grounded, sprung=sprung, members=members,
-        torsion=torsion[0],
-    )  # fmt: skip
+    frame = partial(small_frame, plane, members=members, **kind)
+    model = frame(elements=elements, torsion=torsion[0])
     mass = PointMass(Place(joint=members[0][1]), 0.02)
-    truth = small_frame(
-        plane, elements=3 * elements, modulus=TRUE_E, grounded=grounded, sprung=sprung,
-        members=members, torsion=torsion[1], masses=(mass,),
-    )  # fmt: skip
+    truth = frame(elements=3 * elements, modulus=TRUE_E, torsion=torsion[1], masses=(mass,))
     return Problem(name, Model.of(model), measured(Model.of(truth), sensors_of(model)))
 
 
-def as_matrices(problem: Problem, name: str) -> Problem:
-    """Return the same problem with a model that came as matrices from files."""
+def _as_matrices(problem: Problem) -> Problem:
+    """Return a problem with a model that came as matrices from files."""
     model = problem.model
     names = tuple(f"n{number + 1}" for number in range(int(model.dofs.node.max()) + 1))
-    used = sorted(set(model.dofs.node.tolist()))
-    place = {node: i for i, node in enumerate(used)}
-    node = np.array([place[int(n)] for n in model.dofs.node], dtype=np.int64)
-    dofs = replace(model.dofs, node=node)
+    used, node = np.unique(model.dofs.node, return_inverse=True)
+    dofs = replace(model.dofs, node=node.astype(np.int64))
     geometry = MatrixGeometry(tuple(names[n] for n in used), dofs)
-    return Problem(name, Model(model.mass, model.stiffness, dofs, geometry), problem.measurement)
+    return replace(problem, model=Model(model.mass, model.stiffness, dofs, geometry))
 
 
-def without_cells(problem: Problem) -> Problem:
-    """Return a problem in which one sensor never worked and others missed a mode."""
+def _without(problem: Problem, *cells: tuple[int | slice, int | slice]) -> Problem:
+    """Return a problem in which some cells of the shapes are missing, by sensors and modes."""
     shapes, std = problem.measurement.shapes.copy(), problem.measurement.shape_std.copy()
-    shapes[1, :] = std[1, :] = np.nan
-    shapes[0, 2] = std[0, 2] = shapes[3, 0] = std[3, 0] = np.nan
+    for cell in cells:
+        shapes[cell] = std[cell] = np.nan
     measurement = replace(problem.measurement, shapes=shapes, shape_std=std)
-    return Problem("some shape cells missing", problem.model, measurement)
+    return replace(problem, measurement=measurement)
 
 
-def without_shape(problem: Problem, *modes: int, name: str) -> Problem:
-    """Return a problem in which some modes, by their column, have a frequency alone."""
-    shapes, std = problem.measurement.shapes.copy(), problem.measurement.shape_std.copy()
-    shapes[:, modes] = std[:, modes] = np.nan
-    return replace(
-        problem, name=name, measurement=replace(problem.measurement, shapes=shapes, shape_std=std)
-    )
-
-
-def _noisy(name: str, draw: int) -> Problem:
+def _noisy(problem: Problem, draw: int) -> Problem:
     """Return a problem with one draw of measurement noise."""
-    plain = problem(name)
-    measurement = plain.measurement.with_noise(np.random.default_rng(draw))
-    return replace(plain, name=f"{name} with noise, draw {draw}", measurement=measurement)
+    measurement = problem.measurement.with_noise(np.random.default_rng(draw))
+    return replace(problem, measurement=measurement)
 
 
 def of_case(case: Case) -> Problem:
@@ -207,45 +191,40 @@ def of_case(case: Case) -> Problem:
 @cache
 def problem(name: str) -> Problem:
     """Return one of the built problems by name; raises KeyError."""
-    return _PROBLEMS[name]()
+    if name in _FRAMES:
+        return frame_problem(name, **_FRAMES[name])
+    base, change = _CHANGED[name]
+    return replace(change(problem(base)), name=name)
 
 
 PLAIN = "grounded frame out of plane"
 CROSSED = "frame whose modes change order"
 _FREE = "free frame out of plane"
-_IN_PLANE = "grounded frame in plane"
+_ALL = slice(None)
 
-_PROBLEMS: Mapping[str, Callable[[], Problem]] = {
-    PLAIN: lambda: frame_problem(PLAIN, "out-of-plane"),
-    _IN_PLANE: lambda: frame_problem(_IN_PLANE, "in-plane"),
-    "grounded frame in space": lambda: frame_problem("grounded frame in space", "3d"),
-    _FREE: lambda: frame_problem(_FREE, "out-of-plane", grounded=False),
-    "free frame in space": lambda: frame_problem("free frame in space", "3d", grounded=False),
-    CROSSED: lambda: frame_problem(CROSSED, "out-of-plane", grounded=False, torsion=(0.1, 0.2)),
-    "matrices alone": lambda: as_matrices(problem(PLAIN), "matrices alone"),
-    "one member": lambda: frame_problem(
-        "one member", "out-of-plane", members=("AB",), elements=FINER
-    ),
-    "some shape cells missing": lambda: without_cells(problem(PLAIN)),
-    "one mode without a shape": lambda: without_shape(
-        problem(PLAIN), 1, name="one mode without a shape"
-    ),
-    "no shapes at all": lambda: without_shape(
-        problem(PLAIN), *range(USED), name="no shapes at all"
-    ),
-    "one used mode": lambda: Problem(
-        "one used mode", problem(PLAIN).model, problem(PLAIN).measurement.select([1])
-    ),
-    "joints without mass": lambda: frame_problem(
-        "joints without mass", "out-of-plane", sprung=True
-    ),
-    "joints without mass, free": lambda: frame_problem(
-        "joints without mass, free", "out-of-plane", sprung=True, grounded=False
-    ),
+_FRAMES: Mapping[str, Mapping[str, Any]] = {
+    PLAIN: {"plane": "out-of-plane"},
+    "grounded frame in plane": {"plane": "in-plane"},
+    "grounded frame in space": {"plane": "3d"},
+    _FREE: {"plane": "out-of-plane", "grounded": False},
+    "free frame in space": {"plane": "3d", "grounded": False},
+    CROSSED: {"plane": "out-of-plane", "grounded": False, "torsion": (0.1, 0.2)},
+    "one member": {"plane": "out-of-plane", "members": ("AB",), "elements": FINER},
+    "joints without mass": {"plane": "out-of-plane", "sprung": True},
+    "joints without mass, free": {"plane": "out-of-plane", "sprung": True, "grounded": False},
+}
+# The problem that is changed, and how.
+_CHANGED: Mapping[str, tuple[str, Callable[[Problem], Problem]]] = {
+    "matrices alone": (PLAIN, _as_matrices),
+    # One sensor never worked, and others missed a mode.
+    "some shape cells missing": (PLAIN, lambda p: _without(p, (1, _ALL), (0, 2), (3, 0))),
+    "one mode without a shape": (PLAIN, lambda p: _without(p, (_ALL, 1))),
+    "no shapes at all": (PLAIN, lambda p: _without(p, (_ALL, _ALL))),
+    "one used mode": (PLAIN, lambda p: replace(p, measurement=p.measurement.select([1]))),
     **{
-        f"{name} with noise, draw {draw}": partial(_noisy, name, draw)
+        f"{name} with noise, draw {draw}": (name, partial(_noisy, draw=draw))
         for name in (PLAIN, _FREE)
         for draw in (1, 2)
     },
 }
-PROBLEMS = tuple(_PROBLEMS)
+PROBLEMS = (*_FRAMES, *_CHANGED)

@@ -1,4 +1,4 @@
-"""What a strategy must be and leave alone, one check a function."""
+"""What a strategy must be, give, survive and leave alone."""
 
 from __future__ import annotations
 
@@ -6,28 +6,119 @@ import dataclasses
 import inspect
 import re
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
+from femubench.core.conformance import kit
 from femubench.core.conformance.fingerprints import first_difference
-from femubench.core.conformance.kit import (
-    Bench,
-    Verdict,
-    Want,
-    check,
-    failed,
-    not_applicable,
-    passed,
-    warned,
-)
-from femubench.core.conformance.problems import PLAIN
-from femubench.core.conformance.result_checks import FREE, of_results, with_results
+from femubench.core.conformance.kit import Bench, Verdict, check, failed, passed
+from femubench.core.conformance.problems import CROSSED, PLAIN, PROBLEMS
 from femubench.core.conformance.results import PROMISES
+from femubench.core.conformance.trial import Observation, Want, promises_of
 from femubench.core.plugin.variants import Variant
 from femubench.core.roles import CAPABILITIES, Strategy, declared
 from femubench.core.run.limits import spoken_bytes
 
 _MUCH = 100.0  # times what the reference takes
 _LEAST_SECONDS, _LEAST_BYTES = 1e-3, 1e4  # below which a ratio says nothing
+_HONEST = "expected a result, or NotApplicable or StrategyFailure with a sentence"
+_PLANES = ("grounded frame in plane", "grounded frame in space")
+_FREE = ("free frame out of plane", "free frame in space")
+_MISSING = ("some shape cells missing", "one mode without a shape")
+_MASSLESS = ("joints without mass", "joints without mass, free")
+_NOISE = tuple(name for name in PROBLEMS if " with noise, " in name)
+# The problem without the feature that is looked at, where that is not the plain one.
+_SIMPLER = {
+    "free frame in space": "grounded frame in space",
+    "joints without mass, free": "free frame out of plane",
+    **{name: name.partition(" with noise, ")[0] for name in _NOISE},
+}
+# What every result must be, by the name of the look that each worker takes at it.
+_RESULTS = {
+    "sizes": "The matrices are sparse and as large as the model has dofs.",
+    "finite": "The matrices hold finite real numbers.",
+    "symmetric": "The matrices are symmetric.",
+    "figures": "History, diagnostics and parameters hold finite numbers.",
+    "parameter-count": "The number of unknowns is whole, and not 0 for another model.",
+    "promises": "Every result keeps what the class attribute `promises` lists.",
+}
+# What must be left alone: the part of an observation that tells, and what is wrong with it.
+_UNTOUCHED = {
+    "inputs": (
+        "Model and measurement stay as they were given.",
+        "changed",
+        "was changed in place, expected a copy",
+    ),
+    "global-state": (
+        "Global state of the process is left as it was.",
+        "disturbed",
+        "changed, expected no trace",
+    ),
+}
+# What must be survived, by a result or by an honest refusal, and on which problems.
+_SURVIVED = {
+    "planes": ("Frames in plane and in space give a result or a refusal.", _PLANES),
+    "free-structure": ("A structure without supports, with singular K, is survived.", _FREE),
+    "massless-dofs": ("Degrees of freedom without mass are survived.", _MASSLESS),
+    "missing-shapes": ("Missing shape cells, sensors and whole shapes are survived.", _MISSING),
+    "one-mode": ("One used mode is survived.", ("one used mode",)),
+    "noise": ("Draws of measurement noise are survived.", _NOISE),
+}
+
+
+def _runs(names: Sequence[str]) -> Sequence[Want]:
+    return [Want(name) for name in names]
+
+
+def _wanted(_: Bench, names: Sequence[str]) -> Sequence[Want]:
+    return _runs(names)
+
+
+def _with_results(bench: Bench) -> Sequence[Want]:
+    """Return the trials whose results every check of results looks at."""
+    further = (CROSSED, "matrices alone", "one used mode", *bench.cases)
+    return _runs((PLAIN, *_PLANES, *_FREE, *_MASSLESS, *_NOISE, *_MISSING, *further))
+
+
+def _more(found: Sequence[Observation]) -> str:
+    return f" (and on {len(found) - 1} more)" if len(found) > 1 else ""
+
+
+def _survives(bench: Bench, names: Sequence[str]) -> Verdict:
+    """Judge whether every problem gave a result or an honest refusal.
+
+    What already fails without the feature that is looked at is no matter of that feature.
+    """
+    found = bench.observe(_runs(names))
+    simpler = bench.observe(_runs([_SIMPLER.get(name, PLAIN) for name in names]))
+    pairs = zip(names, found, simpler, strict=True)
+    told = [item for name, item, base in pairs if name == PLAIN or base.survived]
+    if not told:
+        return kit.not_applicable(f"not looked at: {simpler[0].problem} fails already")
+    lost = [item for item in told if not item.survived]
+    if lost:
+        return failed(f"{lost[0].problem}: {lost[0].text}, {_HONEST}{_more(lost)}")
+    if all(item.kind == "lacking" for item in told):
+        return kit.not_applicable(told[0].text)
+    refused = [item for item in told if item.kind in ("not-applicable", "failed")]
+    return passed(f"refused {refused[0].problem}: {refused[0].text}" if refused else "")
+
+
+def _of_results(bench: Bench, name: str) -> Verdict:
+    """Judge what the workers saw of every result."""
+    if name == "promises" and not promises_of(bench.subject):
+        return kit.not_applicable("nothing promised")
+    found = [item for item in bench.observe(_with_results(bench)) if item.kind == "result"]
+    if not found:
+        return kit.not_applicable("there is no result to look at")
+    wrong = [item for item in found if name in item.faults]
+    if wrong:
+        return failed(f"{wrong[0].problem}: {wrong[0].faults[name]}{_more(wrong)}")
+    return passed()
+
+
+for _name, _sentence in _RESULTS.items():
+    check("strategy", _name, _sentence, wants=_with_results)(partial(_of_results, name=_name))
 
 
 def _inner(bench: Bench) -> Strategy:
@@ -53,7 +144,9 @@ def described(bench: Bench) -> Verdict:
     if unknown:
         return failed(f"promises {unknown[0]!r}, expected one of {', '.join(PROMISES)}")
     if not own_doc(type(strategy)):
-        return warned(f"class {type(strategy).__name__} has no docstring, expected what it does")
+        return kit.warned(
+            f"class {type(strategy).__name__} has no docstring, expected what it does"
+        )
     return passed()
 
 
@@ -65,7 +158,7 @@ def options_documented(bench: Bench) -> Verdict:
     strategy: Any = _inner(bench)
     fields = dataclasses.fields(strategy) if dataclasses.is_dataclass(strategy) else ()
     if not fields:
-        return not_applicable("it has no options")
+        return kit.not_applicable("it has no options")
     text = " ".join(own_doc(base) for base in type(strategy).__mro__)
     names = [field.name for field in fields]
     missing = [name for name in names if not re.search(rf"\b{re.escape(name)}\b", text)]
@@ -85,15 +178,14 @@ def own_doc(cls: type) -> str:
     "picklable",
     "It can be sent to a worker, and its result back.",
     first=True,
-    wants=with_results,
+    wants=_with_results,
 )
 def picklable(bench: Bench) -> Verdict:
     """Pickle it, and look at how its results travelled."""
-    if isinstance(bench.code, str):
-        return failed(f"{bench.code}, expected a strategy that pickle can send")
-    if bench.sound:
-        return not_applicable(bench.sound)
-    return of_results(bench, "picklable")
+    sent = kit.picklable(bench, "a strategy")
+    if sent.status != "pass":
+        return sent
+    return kit.not_applicable(bench.sound) if bench.sound else _of_results(bench, "picklable")
 
 
 @check(
@@ -116,38 +208,26 @@ def deterministic(bench: Bench) -> Verdict:
                 "to the last bit (randomness comes from `rng` alone)"
             )
     if all(item.kind == "lacking" for item in found):
-        return not_applicable(found[0].text)
+        return kit.not_applicable(found[0].text)
     return passed()
 
 
 def _twice() -> Sequence[Want]:
-    names = (PLAIN, FREE[0])
+    names = (PLAIN, _FREE[0])
     return [Want(name, scramble=state) for name in names for state in (0, 1)]
 
 
-@check("strategy", "inputs", "Model and measurement stay as they were given.", wants=with_results)
-def inputs(bench: Bench) -> Verdict:
-    """Compare what it was given before and after."""
-    found = bench.observe(with_results(bench))
-    changed = [item for item in found if item.changed]
-    if changed:
-        first = changed[0]
-        return failed(f"{first.problem}: {first.changed} was changed in place, expected a copy")
+def _untouched(bench: Bench, part: str, wrong: str) -> Verdict:
+    """Judge what was seen of the surroundings before and after."""
+    for item in bench.observe(_with_results(bench)):
+        if getattr(item, part):
+            return failed(f"{item.problem}: {getattr(item, part)} {wrong}")
     return passed()
 
 
-@check(
-    "strategy",
-    "global-state",
-    "Global state of the process is left as it was.",
-    wants=with_results,
-)
-def global_state(bench: Bench) -> Verdict:
-    """Compare numpy's and Python's shared state before and after."""
-    found = [item for item in bench.observe(with_results(bench)) if item.disturbed]
-    if found:
-        return failed(f"{found[0].problem}: {found[0].disturbed} changed, expected no trace")
-    return passed()
+for _name, (_sentence, _part, _wrong) in _UNTOUCHED.items():
+    _judge = partial(_untouched, part=_part, wrong=_wrong)
+    check("strategy", _name, _sentence, wants=_with_results)(_judge)
 
 
 @check(
@@ -160,7 +240,7 @@ def capabilities(bench: Bench) -> Verdict:
     """Take away what it does not declare."""
     withheld = _withheld(bench)
     if not withheld:
-        return not_applicable("it needs everything that there is")
+        return kit.not_applicable("it needs everything that there is")
     plain, *found = bench.observe([Want(PLAIN), *(want for _, want in withheld)])
     for (capability, _), item in zip(withheld, found, strict=True):
         # Who refuses the plain frame as well does not refuse for what was taken away.
@@ -194,7 +274,7 @@ def resources(bench: Bench) -> Verdict:
     """Compare time and traced memory with those of the reference."""
     found = bench.observe(_measured(bench))
     if any(item.kind != "result" for item in found[:2]):
-        return not_applicable("there is no result on the plain case")
+        return kit.not_applicable("there is no result on the plain case")
     seconds, peak = found[0].seconds, float(found[1].peak or 0)
     text = f"{seconds:.3g} s and {spoken_bytes(peak)}"
     if bench.reference is None or any(item.kind != "result" for item in found[2:]):
@@ -203,7 +283,7 @@ def resources(bench: Bench) -> Verdict:
     larger = peak / max(float(found[3].peak or 0), _LEAST_BYTES)
     text += f" on the {PLAIN}, {slower:.2g} and {larger:.2g} times those of {bench.reference.name}"
     if max(slower, larger) > _MUCH:
-        return warned(f"{text}, expected at most {_MUCH:g} times")
+        return kit.warned(f"{text}, expected at most {_MUCH:g} times")
     return passed(text)
 
 
@@ -212,3 +292,37 @@ def _measured(bench: Bench) -> Sequence[Want]:
     if bench.reference is None:
         return own
     return own + [dataclasses.replace(want, reference=True) for want in own]
+
+
+@check(
+    "strategy",
+    "returns",
+    "A plain case gives a result, or a refusal with its reason.",
+    first=True,
+    wants=lambda bench: _runs([PLAIN]),
+)
+def returns(bench: Bench) -> Verdict:
+    """Run it on a grounded frame with complete data."""
+    return (
+        kit.not_applicable(kit.UNSENT)
+        if isinstance(bench.code, str)
+        else _survives(bench, (PLAIN,))
+    )
+
+
+for _name, (_sentence, _problems) in _SURVIVED.items():
+    _judge, _wants = partial(_survives, names=_problems), partial(_wanted, names=_problems)
+    check("strategy", _name, _sentence, wants=_wants)(_judge)
+
+
+@check(
+    "strategy",
+    "cases",
+    "The cases given with --case give a result or a refusal.",
+    wants=lambda bench: _runs(tuple(bench.cases)),
+)
+def cases(bench: Bench) -> Verdict:
+    """Run it on the user's cases."""
+    if not bench.cases:
+        return kit.not_applicable("no --case was given")
+    return _survives(bench, tuple(bench.cases))

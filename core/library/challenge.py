@@ -3,16 +3,40 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+import shutil
+from dataclasses import asdict, dataclass, replace
 from os import PathLike
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Literal
 
-from femubench.core.challenge.folder import Scored, any_hidden, score_folder, write_blind
-from femubench.core.challenge.truth import DataKind, Hidden
+import numpy as np
+
+from femubench.core.case.reader import read_case
+from femubench.core.case.writing import write_case
+from femubench.core.challenge.answer import Answer, read_answer
+from femubench.core.challenge.draw import Effects, draw_case, registered_effects
+from femubench.core.challenge.score import Judgement, judge_answer
+from femubench.core.challenge.sealed import SEALED_FILE, read_sealed, seal
+from femubench.core.challenge.truth import HIDDEN, DataKind, Hidden, Truth
+from femubench.core.challenge.visibility import delta_chi2
 from femubench.core.diagnosis.result import Diagnosis
-from femubench.core.diagnosis.serial import diagnosis_to_json
+from femubench.core.errors import InputError
+
+_SHARES = (0.6, 0.15, 0.125, 0.125)  # of one, none, pair, outside where any may be hidden
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A judged answer with all that it was judged by."""
+
+    truth: Truth
+    delta_chi2: tuple[float, ...]
+    judgement: Judgement
+    commitment: str
+
+    def to_json(self) -> str:
+        """Return everything as JSON."""
+        return json.dumps(asdict(self), indent=1)
 
 
 @dataclass(frozen=True)
@@ -34,6 +58,12 @@ class Challenge:
         return score_challenge(self.folder, answer, truth=self.truth)
 
 
+def any_hidden(seed: int) -> Hidden:
+    """Return how much a seed hides where nobody says so."""
+    rng = np.random.default_rng(np.random.SeedSequence([seed, len(HIDDEN)]))
+    return HIDDEN[int(rng.choice(len(HIDDEN), p=_SHARES))]
+
+
 def challenge(
     folder: str | PathLike[str],
     seed: int,
@@ -43,6 +73,7 @@ def challenge(
     hidden: Hidden | Literal["any"] = "any",
     scatter: float = 0.0,
     truth: str | PathLike[str] | None = None,
+    effects: Effects | None = None,
 ) -> Challenge:
     """Write a blind case with a hidden fault, and its sealed truth.
 
@@ -54,20 +85,30 @@ def challenge(
         hidden: ``one`` effect, ``none``, a ``pair``, one ``outside`` the catalogue, or ``any``.
         scatter: standard deviation of each element's stiffness and mass, relative.
         truth: where the sealed truth goes; ``truth.sealed`` in the folder by default.
+        effects: the catalogue by name; None for those of all plugins.
 
     Raises:
         InputError: when the folder is not empty, the truth exists, or nothing can be drawn.
     """
-    path, commitment = write_blind(
-        Path(folder),
-        seed,
-        kind,
-        structure=structure,
-        hidden=any_hidden(seed) if hidden == "any" else hidden,
-        scatter=scatter,
-        sealed=None if truth is None else Path(truth),
+    case, path = Path(folder), Path(folder, SEALED_FILE) if truth is None else Path(truth)
+    if case.exists() and (not case.is_dir() or any(case.iterdir())):
+        raise InputError("is not empty", file=case, expected="a new or an empty folder")
+    if path.exists():
+        raise InputError("exists", file=path, expected="a new file for the sealed truth")
+    much = any_hidden(seed) if hidden == "any" else hidden
+    blind = draw_case(
+        seed, kind, structure=structure, hidden=much, scatter=scatter, effects=effects
     )
-    return Challenge(Path(folder), path, commitment)
+    new = not case.exists()
+    try:
+        write_case(case, blind.case)
+        text, commitment = seal(replace(blind.truth, digest=read_case(case).digest))
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        if new:
+            shutil.rmtree(case, ignore_errors=True)
+        raise InputError(f"cannot be written: {error.strerror}", file=path) from None
+    return Challenge(case, path, commitment)
 
 
 def score_challenge(
@@ -75,6 +116,7 @@ def score_challenge(
     answer: Diagnosis | str | PathLike[str],
     *,
     truth: str | PathLike[str] | None = None,
+    effects: Effects | None = None,
 ) -> Scored:
     """Judge an answer to a blind case.
 
@@ -82,14 +124,21 @@ def score_challenge(
         folder: of the case.
         answer: a diagnosis, or a file as ``bench diagnose --json`` writes it.
         truth: the sealed truth; ``truth.sealed`` in the folder by default.
+        effects: the catalogue by name; None for those of all plugins.
 
     Raises:
         InputError: when case, truth or answer cannot be read, or do not belong together.
     """
-    sealed = None if truth is None else Path(truth)
-    if not isinstance(answer, Diagnosis):
-        return score_folder(Path(folder), Path(answer), sealed)
-    with TemporaryDirectory() as scratch:
-        file = Path(scratch, "answer.json")
-        file.write_text(json.dumps(diagnosis_to_json(answer), allow_nan=False), encoding="utf-8")
-        return score_folder(Path(folder), file, sealed)
+    given = Answer.of(answer) if isinstance(answer, Diagnosis) else read_answer(Path(answer))
+    hidden, commitment = read_sealed(Path(folder, SEALED_FILE) if truth is None else Path(truth))
+    folder = Path(folder)
+    case = read_case(folder)
+    if case.digest != hidden.digest:
+        raise InputError("the case was changed since its truth was sealed", file=folder)
+    known = registered_effects() if effects is None else effects
+    missing = [cause.effect for cause in hidden.causes if cause.effect not in known]
+    if missing:
+        what = f"the hidden effect {missing[0]!r} is not installed"
+        raise InputError(what, file=folder, expected="the plugins that the case was drawn with")
+    falls = delta_chi2(case, hidden, known)
+    return Scored(hidden, falls, judge_answer(hidden, given, falls), commitment)

@@ -17,17 +17,18 @@ from typing import TYPE_CHECKING, Any
 from femubench.core.case.example import write_example
 from femubench.core.case.files import CASE_FILE
 from femubench.core.errors import InputError
+from femubench.core.plugin import validation
 from femubench.core.plugin.markers import PROJECT
 
 if TYPE_CHECKING:
     from femubench.core.plugin.loader import Plugins
 
-# kind: the collection of `Plugins` that it joins, and one line on what is written.
-KINDS: Mapping[str, tuple[str, str]] = {
-    "strategy": ("strategies", "An updating strategy for femubench"),
-    "effect": ("effects", "A cause that a model can lack, for the diagnosis of femubench"),
-    "scenario": ("scenarios", "A measured structure as a scenario for femubench"),
-    "reader": ("readers", "A reader of measured modes for femubench"),
+# What can be written, and one line on it.
+KINDS: Mapping[str, str] = {
+    "strategy": "An updating strategy for femubench",
+    "effect": "A cause that a model can lack, for the diagnosis of femubench",
+    "scenario": "A measured structure as a scenario for femubench",
+    "reader": "A reader of measured modes for femubench",
 }
 # Path in the package: template.
 _COMMON = {
@@ -122,7 +123,7 @@ def check_name(name: str, kind: str, plugins: Plugins) -> None:
 
 def _fault_of(name: str, kind: str, plugins: Plugins) -> str:
     """Return what stands against a well-formed name; empty where nothing does."""
-    module, taken = module_of(name), getattr(plugins, KINDS[kind][0])
+    module, taken = module_of(name), getattr(plugins, validation.KINDS[kind])
     if keyword.iskeyword(module):
         return "it is a keyword of Python"
     if module == PROJECT:
@@ -176,7 +177,7 @@ def _files(name: str, kind: str, trial: str) -> Iterator[tuple[str, str]]:
         "kind": kind,
         "module": module,
         "cls": _class_of(name, kind),
-        "description": KINDS[kind][1],
+        "description": KINDS[kind],
         "trial": trial,
     }
     for path, template in templates.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -65,12 +65,8 @@ class Request:
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data."""
-        return {
-            **asdict(self),
-            "cases": list(self.cases),
-            "strategies": list(self.strategies),
-            "timeouts": dict(self.timeouts),
-        }
+        plain: dict[str, Any] = TypeAdapter(Request).dump_python(self, mode="json")
+        return plain
 
 
 def request_of(run: results.Run) -> Request:

@@ -117,52 +117,51 @@ def rendering(what: object, style: str) -> str:
     Raises:
         InputError: for a style that it does not have.
     """
-    if isinstance(what, Diagnosis):
-        what = diagnosis_to_json(what, case=what.subject)
-    if isinstance(what, Mapping):
+    data: Any = what
+    if isinstance(data, Diagnosis):
+        data = diagnosis_to_json(data, case=data.subject)
+    if isinstance(data, Mapping):
         writers = _diagnosis_writers()
-    elif isinstance(what, Comparison):
-        what, writers = finite(what.to_json()), _comparison_writers()
+    elif isinstance(data, Comparison):
+        data, writers = finite(data.to_json()), _comparison_writers()
     else:
-        what, writers = [what] if isinstance(what, Study) else what, _study_writers()
-    if style not in writers:
-        raise InputError(f"there is no style {style!r}", expected=f"one of {', '.join(writers)}")
-    return writers[SHORT.get(style, style)](what)
+        data, writers = [data] if isinstance(data, Study) else data, _study_writers()
+    by_style = dict(zip(SUFFIXES, writers, strict=True))
+    if style not in by_style:
+        raise InputError(f"there is no style {style!r}", expected=f"one of {', '.join(by_style)}")
+    return by_style[style](data)
 
 
 def _plain_json(data: object) -> str:
     return json.dumps(data, indent=1, allow_nan=False)
 
 
-def _diagnosis_writers() -> dict[str, Callable[[Any], str]]:
+Writers = tuple[Callable[[Any], str], ...]
+
+
+def _diagnosis_writers() -> Writers:
     from femubench.reports.diagnosis import diagnosis_markdown, diagnosis_text
     from femubench.reports.diagnosis_page import diagnosis_html
 
-    texts = (diagnosis_text, diagnosis_markdown, diagnosis_html, _plain_json)
-    return dict(zip(SUFFIXES, texts, strict=True))
+    return diagnosis_text, diagnosis_markdown, diagnosis_html, _plain_json
 
 
-def _comparison_writers() -> dict[str, Callable[[Any], str]]:
+def _comparison_writers() -> Writers:
     from femubench.reports import compare_page as page
 
-    texts = (page.comparison_text, page.comparison_markdown, page.comparison_html, _plain_json)
-    return dict(zip(SUFFIXES, texts, strict=True))
+    return page.comparison_text, page.comparison_markdown, page.comparison_html, _plain_json
 
 
-def _study_writers() -> dict[str, Callable[[Any], str]]:
-    from femubench.reports.reproduction import (
-        reproduction_html,
-        reproduction_markdown,
-        reproduction_text,
-    )
+def _study_writers() -> Writers:
+    from femubench.reports import reproduction as page
 
-    def page(studies: Sequence[Study]) -> str:
-        return reproduction_html(studies, dict(drawings(studies)))
+    def html(studies: Sequence[Study]) -> str:
+        return page.reproduction_html(studies, dict(drawings(studies)))
 
     def data(studies: Sequence[Study]) -> str:
         return json.dumps(cells_to_json(studies), indent=1, ensure_ascii=False, allow_nan=False)
 
-    return dict(zip(SUFFIXES, (reproduction_text, reproduction_markdown, page, data), strict=True))
+    return page.reproduction_text, page.reproduction_markdown, html, data
 
 
 def drawings(studies: Sequence[Study]) -> Iterator[tuple[str, str]]:

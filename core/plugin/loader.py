@@ -10,11 +10,12 @@ from __future__ import annotations
 import inspect
 import tomllib
 import traceback
+from collections import UserDict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import pluggy
 
@@ -27,8 +28,6 @@ from femubench.core.version import __version__
 
 PREFIX = f"{PROJECT}_"
 HOOKS = tuple(PREFIX + kind for kind in CHECKS)
-
-Made = TypeVar("Made")
 
 # A plugin that calls sys.exit() on import is as broken as one that raises; Ctrl-C is the user's.
 _FAULTS = (Exception, SystemExit)
@@ -66,34 +65,18 @@ class LoadedPlugin:
     offers: Mapping[str, tuple[str, ...]]
 
 
-class Offers(Mapping[str, Made]):
+class Offers(UserDict[str, Any]):
     """What plugins offer of one kind, by name, in the order of the plugins.
 
     Asking for an entry that was offered by reference loads it, and raises PluginError where that
     fails or where the entry does not fill its role.
     """
 
-    def __init__(self) -> None:
-        self._entries: dict[str, Made | _Reference] = {}
-
-    def __getitem__(self, name: str) -> Made:
-        entry = self._entries[name]
+    def __getitem__(self, name: str) -> Any:  # noqa: ANN401 - as the kind has it
+        entry = self.data[name]
         if isinstance(entry, _Reference):
-            entry = self._entries[name] = entry.load()
+            entry = self.data[name] = entry.load()
         return entry
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._entries
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._entries)
-
-    def __len__(self) -> int:
-        return len(self._entries)
-
-    def add(self, name: str, entry: Made | _Reference) -> None:
-        """Take an entry whose name is not taken."""
-        self._entries[name] = entry
 
 
 @dataclass(frozen=True)
@@ -162,7 +145,7 @@ def load_plugins(
     sources += [
         _Source(name, "given by hand", given=plugin) for name, plugin in (extra or {}).items()
     ]
-    found: dict[str, Offers[Any]] = {kind: Offers() for kind in CHECKS}
+    found: dict[str, Offers] = {kind: Offers() for kind in CHECKS}
     loaded: list[LoadedPlugin] = []
     broken: list[BrokenPlugin] = []
     for source in sources:
@@ -268,7 +251,7 @@ def _collect(
     source: _Source,
     manager: pluggy.PluginManager,
     kind: str,
-    taken: Offers[Any],
+    taken: Offers,
     broken: list[BrokenPlugin],
 ) -> Iterator[str]:
     """Call one hook of one plugin; what passes the checks goes into `taken`."""
@@ -290,7 +273,7 @@ def _collect(
         except _FAULTS as fault:
             broken.append(_broken(source, fault, hook))
             continue
-        taken.add(filled.name, filled)
+        taken[filled.name] = filled
         yield filled.name
 
 

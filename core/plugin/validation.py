@@ -30,9 +30,7 @@ def check_strategy(offered: object) -> Strategy:
     Raises:
         PluginError: when it has no update(), name or citation, or needs the unknown.
     """
-    strategy = _instance(offered)
-    _check_members(strategy, offered, "Strategy", ("update",))
-    _check_name(strategy, offered)
+    strategy: Strategy = _filled(offered, "Strategy", "update")
     if not _is_text(getattr(strategy, "citation", None)):
         raise PluginError(f"{_label(offered)}: citation is missing (author, year, title, equation)")
     needs: object = declared(strategy, "needs")
@@ -44,7 +42,6 @@ def check_strategy(offered: object) -> Strategy:
                 f"{_label(offered)}: needs {need!r}, which is none of "
                 f"{', '.join(CAPABILITIES)}{did_you_mean(str(need), CAPABILITIES)}"
             )
-    assert isinstance(strategy, Strategy)
     return strategy
 
 
@@ -56,7 +53,7 @@ def check_scenario(offered: object) -> Scenario:
     """
     if not isinstance(offered, Scenario):
         raise PluginError(f"{_label(offered)} is not a femubench.Scenario")
-    _check_name(offered, offered)
+    _check_name(offered, offered, one_word=True)
     if not isinstance(offered.cases, Mapping) or not offered.cases:
         raise PluginError(f"scenario {offered.name!r}: cases is not a mapping of names to folders")
     for name, folder in offered.cases.items():
@@ -79,10 +76,8 @@ def check_reader(offered: object) -> Reader:
     Raises:
         PluginError: when it lacks a method, a name or a suffix.
     """
-    reader = _instance(offered)
-    _check_members(reader, offered, "Reader", ("read_matrix", "read_modes"))
-    if not _is_text(getattr(reader, "name", None)):
-        raise PluginError(f"{_label(offered)}: name is missing")
+    # The name of a reader is for messages alone and may have blanks.
+    reader: Reader = _filled(offered, "Reader", "read_matrix", "read_modes", one_word=False)
     suffixes = getattr(reader, "suffixes", None)
     if not isinstance(suffixes, (tuple, list)) or not suffixes:
         raise PluginError(
@@ -91,7 +86,6 @@ def check_reader(offered: object) -> Reader:
     for suffix in suffixes:
         if not isinstance(suffix, str) or suffix[:1] != "." or suffix != suffix.lower():
             raise PluginError(f"{_label(offered)}: suffix {suffix!r} is not like '.unv'")
-    assert isinstance(reader, Reader)
     return reader
 
 
@@ -101,13 +95,10 @@ def check_reporter(offered: object) -> Reporter:
     Raises:
         PluginError: when it lacks its method, a name or a suffix.
     """
-    reporter = _instance(offered)
-    _check_members(reporter, offered, "Reporter", ("render",))
-    _check_name(reporter, offered)
+    reporter: Reporter = _filled(offered, "Reporter", "render")
     suffix = getattr(reporter, "suffix", None)
     if not isinstance(suffix, str) or not re.fullmatch(r"\.[A-Za-z0-9.]+", suffix):
         raise PluginError(f"{_label(offered)}: suffix {suffix!r} is not like '.md'")
-    assert isinstance(reporter, Reporter)
     return reporter
 
 
@@ -117,10 +108,7 @@ def check_effect(offered: object) -> Effect:
     Raises:
         PluginError: when it lacks a method or a name.
     """
-    effect = _instance(offered)
-    _check_members(effect, offered, "Effect", ("places", "parameters", "extend"))
-    _check_name(effect, offered)
-    assert isinstance(effect, Effect)
+    effect: Effect = _filled(offered, "Effect", "places", "parameters", "extend")
     return effect
 
 
@@ -130,6 +118,16 @@ CHECKS: Mapping[str, Callable[[object], Any]] = {
     "effects": check_effect,
     "readers": check_reader,
     "reporters": check_reporter,
+}
+
+
+# Role: the collection of `Plugins` that holds what fills it.
+KINDS = {
+    "strategy": "strategies",
+    "effect": "effects",
+    "reader": "readers",
+    "scenario": "scenarios",
+    "reporter": "reporters",
 }
 
 
@@ -173,18 +171,23 @@ def _instance(offered: object) -> object:
         raise PluginError(f"{_label(offered)} cannot be made without arguments: {fault}") from fault
 
 
-def _check_name(filled: object, offered: object) -> None:
+def _filled(offered: object, role: str, *methods: str, one_word: bool = True) -> Any:  # noqa: ANN401
+    """Return an instance that has the methods and the name of a role."""
+    filled: Any = _instance(offered)
+    for method in methods:
+        if not callable(getattr(filled, method, None)):
+            what = f"is not a femubench.{role}: {method}() is missing"
+            raise PluginError(f"{_label(offered)} {what}")
+    _check_name(filled, offered, one_word=one_word)
+    return filled
+
+
+def _check_name(filled: object, offered: object, *, one_word: bool) -> None:
     name = getattr(filled, "name", None)
     if not _is_text(name):
         raise PluginError(f"{_label(offered)}: name is missing")
-    if not _WORD.fullmatch(str(name)):
+    if one_word and not _WORD.fullmatch(str(name)):
         raise PluginError(f"{_label(offered)}: name {name!r} is not one word of letters, digits, -")
-
-
-def _check_members(filled: object, offered: object, role: str, methods: tuple[str, ...]) -> None:
-    for method in methods:
-        if not callable(getattr(filled, method, None)):
-            raise PluginError(f"{_label(offered)} is not a femubench.{role}: {method}() is missing")
 
 
 def _is_text(value: object) -> bool:

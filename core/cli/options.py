@@ -1,0 +1,65 @@
+"""Options that several verbs have, each with one wording."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import click
+
+from femubench.core.files import check_writable
+
+Option: TypeAlias = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+PATH = click.Path(path_type=Path)
+FOLDER = click.Path(path_type=Path, file_okay=False)
+SCREEN = Path("-")
+
+
+class _Output(click.Path):
+    """A file that can be written to, which is known before hours are spent on its content."""
+
+    def convert(
+        self,
+        value: str | os.PathLike[str],
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> Any:  # noqa: ANN401 - as click has it
+        """Return the path."""
+        path: Any = super().convert(value, param, ctx)
+        if path != SCREEN:
+            check_writable(path)
+        return path
+
+
+OUTPUT = _Output(path_type=Path, dir_okay=False)
+OUTPUT_PATH = _Output(path_type=Path)
+OUTPUT_OR_SCREEN = _Output(path_type=Path, dir_okay=False, allow_dash=True)
+
+quiet = click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+
+
+def json_file(what: str, kind: click.Path = OUTPUT) -> Option:
+    """Return the option for a file of JSON, which tells what is in it."""
+    return click.option("--json", "json_file", type=kind, metavar="FILE", help=what)
+
+
+def style(*names: str, dest: str = "style", what: str = "What is printed.") -> Option:
+    """Return the option that chooses a style, the first by default."""
+    return click.option(
+        "-f", "--format", dest, type=click.Choice(names), default=names[0],
+        show_default=True, help=what,
+    )  # fmt: skip
+
+
+def output_folder(what: str, *, metavar: str = "DIR", default: str | None = None) -> Option:
+    """Return the option for a folder that files go to."""
+    return click.option("-o", "--output", type=FOLDER, metavar=metavar, default=default, help=what)
+
+
+def store(what: str) -> Option:
+    """Return the option for the store of runs."""
+    text = f"{what} Default: $FEMUBENCH_STORE or femubench-results."
+    return click.option("--store", type=FOLDER, metavar="DIR", help=text)
