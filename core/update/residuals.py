@@ -122,7 +122,7 @@ class Prediction:
             parts.append(np.where(lost, np.nan, misfit).T.ravel())
         if data.weigh and data.measurement.total_mass is not None:
             mass, std = data.measurement.total_mass
-            parts.append(np.array([(mass - total_mass(self.structure)) / std]))
+            parts.append(np.array([(mass - self.structure.total_mass) / std]))
         return np.concatenate(parts)
 
     @cached_property
@@ -169,14 +169,6 @@ class Prediction:
             slope = self._factor[j] * turn + np.outer(seen, factor_slope)
             rows[j] = weight[:, None] * slope
         return rows.reshape(-1, len(parameters))
-
-
-def total_mass(structure: Structure) -> float:
-    """Return the mass of members, attached masses and oscillators in kg."""
-    p = structure.properties
-    beams = p.rhoA @ (p.length - p.rigid_mass_1 - p.rigid_mass_2)
-    attached = sum(item.mass for item in structure.frame.masses)
-    return float(beams + attached + sum(item.mass for item in structure.frame.oscillators))
 
 
 def _mass_slope(structure: Structure, parameter: Parameter) -> float:

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from femubench import Model
-from femubench.effect import LookWarning, Seen, Size, total_mass
+from femubench.effect import LookWarning, Seen, Size
 from femubench.fem import FloatArray
 from femubench.plugins.effects.material import MaterialEffect
 
@@ -28,7 +28,7 @@ class Density(MaterialEffect):
         if seen.measurement.total_mass is None:
             return []
         weighed, std = seen.measurement.total_mass
-        mass = total_mass(seen.model)
+        mass = seen.model.total_mass
         if not abs(mass - weighed) > _SURE * std:
             return []
         apart = abs(mass - weighed) / std if std > 0.0 else np.inf
