@@ -122,12 +122,12 @@ def test_matrices_have_a_mass_of_their_own_and_causes_add_to_it() -> None:
     test = measured(truth_of(frame), frame, shapes=0)
     model = as_matrices(Model.of(frame))
     problem = problem_of(model, test, effects_named("added-mass", "density", "youngs-modulus"))
-    assert problem.space.mass == pytest.approx(Model.of(frame).total_mass, rel=1e-9)
+    assert problem.space.mass == pytest.approx(total_mass(model), rel=1e-9)
     for part in of_each_kind(problem):
         state = state_at(problem, (part,), inside(part))
         values = [float(v) for v in part.hypothesis.values(state.x[None])[0]]
         heavier = part.hypothesis.effect.extend(model, part.hypothesis.place, values)
-        assert state.mass == pytest.approx(heavier.total_mass, rel=1e-9), part.hypothesis.name
+        assert state.mass == pytest.approx(total_mass(heavier), rel=1e-9), part.hypothesis.name
 
 
 def test_slopes_of_several_causes_are_those_of_each_beside_the_others(

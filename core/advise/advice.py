@@ -107,7 +107,10 @@ def _more_modes(group: Group) -> Iterator[Option]:
 
 
 def _matched(wanted: FloatArray, view: Outlook) -> Predicted | None:
-    """Return the modes nearest to some frequencies, of those that were not measured."""
+    """Return the modes nearest to some frequencies, of those that were not measured.
+
+    By frequency alone: nothing was measured of them yet that `pair_measured` could pair.
+    """
     frequencies, zero = view.state.frequencies, view.zero
     free = np.setdiff1d(np.flatnonzero(frequencies > zero), view.state.partner)
     if len(free) < len(wanted):

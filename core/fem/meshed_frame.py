@@ -165,7 +165,8 @@ class MeshedFrame:
         """Return the mass of members, attached masses and oscillators in kg, supports or not."""
         p = self.properties
         members = p.rhoA @ (p.length - p.rigid_mass_1 - p.rigid_mass_2)
-        return float(members + sum(m.mass for m in (*self.frame.masses, *self.frame.oscillators)))
+        lumps = sum(item.mass for item in self.frame.masses)
+        return float(members + lumps + sum(item.mass for item in self.frame.oscillators))
 
     def attached(
         self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]

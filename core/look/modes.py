@@ -19,7 +19,7 @@ from femubench.core.modal.frequency_changes import (
     matched,
 )
 from femubench.core.modal.measurement import Measurement
-from femubench.core.modal.pairing import Pairing, pair_modes
+from femubench.core.modal.pairing import Pairing, pair_measured
 from femubench.core.schema.diagnosis import LookWarning
 from femubench.core.typing import FloatArray
 
@@ -56,8 +56,7 @@ class Seen:
     @cached_property
     def pairing(self) -> Pairing:
         """Return the partners of the measured modes."""
-        m = self.measurement
-        return pair_modes(m.frequencies, m.shapes, self.modes.natural_frequencies, self.readings)
+        return pair_measured(self.measurement, self.modes, self.readings)
 
     @cached_property
     def count(self) -> int:

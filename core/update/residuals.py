@@ -17,7 +17,7 @@ from femubench.core.fem.structure import Structure
 from femubench.core.modal.correlation import modal_scale_factor, seen_modes
 from femubench.core.modal.eigen import Modes, enough_modes, solve_modes
 from femubench.core.modal.measurement import Measurement
-from femubench.core.modal.pairing import pair_modes
+from femubench.core.modal.pairing import pair_measured
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities, shape_sensitivities
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
@@ -198,18 +198,11 @@ def predict(data: Data, structure: Structure, previous: Prediction | None = None
     model = Model.of(structure)
     count = enough_modes(model, len(data.measurement))
     modes = solve_modes(model, count)
-    elastic = np.flatnonzero(~modes.rigid)
     if previous is None or _observed_anew(structure):
         observer = model.observe(data.measurement.sensors)
     else:
         observer = previous.observer
-    pairing = pair_modes(
-        data.measurement.frequencies,
-        data.measurement.shapes,
-        modes.natural_frequencies[elastic],
-        observer @ modes.shapes[:, elastic],
-    )
-    partner = np.where(pairing.index >= 0, elastic[pairing.index], -1)
+    partner = pair_measured(data.measurement, modes, observer @ modes.shapes).index
     if previous is not None:
         partner = _followed(partner, model, modes, previous)
     return Prediction(data, structure, model, modes, partner, observer)
