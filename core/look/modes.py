@@ -25,7 +25,6 @@ from femubench.core.typing import FloatArray
 
 _MOST_MODES = 40
 _MARGIN = 4  # modes beyond those wanted, so that a pair may cross the end of the list
-_RIGID = 6
 _NOTABLE, _NOTABLE_DEVIATIONS = 0.005, 2.0
 Changes = tuple[tuple[int, float], ...]
 
