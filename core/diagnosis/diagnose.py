@@ -43,7 +43,6 @@ from femubench.core.score.scoring import score_model
 from femubench.core.ties import alike, in_order
 
 
-
 @dataclass(frozen=True)
 class _Proof:
     """Data that did not name the cause."""

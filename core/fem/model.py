@@ -142,10 +142,10 @@ class Model(Shown):
     def total_mass(self) -> float:
         """Return the mass of the whole structure in kg, as scales would show it.
 
-        Of a frame that of its parts, on supports or not; of matrices the largest that moves when
-        all dofs are shifted along x, y or z.
+        The largest that moves when all dofs are shifted along x, y or z; of a frame on supports,
+        where some of it cannot move, that of its parts.
         """
-        if self.structure is not None:
+        if self.structure is not None and self.structure.frame.supports:
             return self.structure.total_mass
         shift = self.dofs.motions[:, :3]
         return float(np.einsum("nd,nd->d", shift, self.mass_times(shift)).max())
