@@ -1,1 +1,1 @@
-"""The built-in plugins: one file each, on the same entry points as anyone's."""
+"""The built-in plugins, on the same entry points as anyone's."""

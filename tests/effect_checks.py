@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from femubench import Model, Sensors, solve_modes
+from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.fem.frame import ACTIVE
+from femubench.core.fem.model import Dofs
 from femubench.core.modal.eigen import solve_dense
 from femubench.effect import Change, Effect, once_for
 from femubench.fem import FloatArray
@@ -48,6 +50,15 @@ def changed_matrices(
         assert np.abs(applied - term.operator.project(unit)).max(initial=0.0) <= 1e-12 * scale
         matrices[term.matrix] += factor * applied
     return matrices["mass"], matrices["stiffness"]
+
+
+def as_matrices(model: Model) -> Model:
+    """Return the model as it would come from files, without its frame."""
+    joints = len(model.frame_structure.frame.joints)
+    names = tuple(f"n{i}" for i in range(int(model.dofs.node.max()) + 1))
+    assert joints <= len(names)
+    dofs = Dofs(model.dofs.node, model.dofs.direction, model.dofs.xyz)
+    return Model(model.mass, model.stiffness, dofs, MatrixGeometry(names, dofs))
 
 
 def joint_sensors(model: Model) -> Sensors:

@@ -17,11 +17,10 @@ from femubench.core.inference.fit import fit
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.residuals import Data
 from femubench.fem import Frame
-from femubench.plugins.effects.density import Density
 from femubench.plugins.effects.joint_rotation import JointRotation
+from femubench.plugins.effects.material import Density, YoungsModulus
 from femubench.plugins.effects.shear_deformation import ShearDeformation
 from femubench.plugins.effects.temperature import Temperature
-from femubench.plugins.effects.youngs_modulus import YoungsModulus
 
 sys.path.insert(0, str(Path(__file__).parent))
 from advice_problems import STD, advised, every_option, fitted, one_outlook, posed

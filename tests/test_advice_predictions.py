@@ -27,7 +27,7 @@ from femubench.plugins.effects.added_mass import AddedMass
 from femubench.plugins.effects.attached_oscillator import AttachedOscillator
 from femubench.plugins.effects.grounding_spring import GroundingSpring
 from femubench.plugins.effects.joint_rotation import JointRotation
-from femubench.plugins.effects.youngs_modulus import YoungsModulus
+from femubench.plugins.effects.material import YoungsModulus
 
 sys.path.insert(0, str(Path(__file__).parent))
 from advice_problems import STD, advised, every_option, fitted, one_outlook, part_of, posed

@@ -31,7 +31,7 @@ from diagnosis_problems import (
     part_at,
     problem_of,
 )
-from effect_checks import changed_matrices
+from effect_checks import as_matrices, changed_matrices
 
 FrameBuilder = Callable[..., Frame]
 NOTHING = np.zeros(0)
@@ -115,6 +115,19 @@ def test_only_what_has_weight_moves_the_mass(problems: dict[str, Problem], struc
         extended = h.effect.extend(problem.model, h.place, values)
         assert state.mass == pytest.approx(total_mass(extended), rel=1e-9), (h.name, h.place)
         assert (abs(state.mass / nominal - 1.0) > 1e-6) == (h.name in heavy)
+
+
+def test_matrices_have_a_mass_of_their_own_and_causes_add_to_it() -> None:
+    frame = structure_named("hframe").frame
+    test = measured(truth_of(frame), frame, shapes=0)
+    model = as_matrices(Model.of(frame))
+    problem = problem_of(model, test, effects_named("added-mass", "density", "youngs-modulus"))
+    assert problem.space.mass == pytest.approx(total_mass(model), rel=1e-9)
+    for part in of_each_kind(problem):
+        state = state_at(problem, (part,), inside(part))
+        values = [float(v) for v in part.hypothesis.values(state.x[None])[0]]
+        heavier = part.hypothesis.effect.extend(model, part.hypothesis.place, values)
+        assert state.mass == pytest.approx(total_mass(heavier), rel=1e-9), part.hypothesis.name
 
 
 def test_slopes_of_several_causes_are_those_of_each_beside_the_others(

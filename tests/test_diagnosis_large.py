@@ -35,9 +35,7 @@ from femubench.plugins.effects.grounding_spring import GroundingSpring
 from femubench.plugins.effects.joint_offset import JointOffset
 from femubench.plugins.effects.joint_rotation import JointRotation
 from femubench.plugins.effects.local_stiffness_loss import LocalStiffnessLoss
-from femubench.plugins.effects.member_mass import MemberMass
-from femubench.plugins.effects.member_stiffness import MemberStiffness
-from femubench.plugins.effects.youngs_modulus import YoungsModulus
+from femubench.plugins.effects.material import MemberMass, MemberStiffness, YoungsModulus
 
 FrameBuilder = Callable[..., Frame]
 KNOWN: tuple[Effect, ...] = (AddedMass(), JointRotation(), MemberStiffness(), YoungsModulus())

@@ -13,8 +13,6 @@ import pytest
 import scipy.linalg as la
 
 from femubench import Model, NotApplicable, Sensors, solve_modes
-from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.fem.model import Dofs
 from femubench.core.modal.eigen import counted_evaluations, solve_dense
 from femubench.effect import FrameEffect, directed_point, elastic_band, total_mass, translation_rows
 from femubench.fem import FloatArray, Frame, GroundSpring, ModelError, Place, Support
@@ -31,7 +29,7 @@ from femubench.plugins.effects.mass_eccentricity import MassEccentricity
 from femubench.plugins.effects.temperature import Temperature
 
 sys.path.insert(0, str(Path(__file__).parent))
-from effect_checks import changed_matrices
+from effect_checks import as_matrices, changed_matrices
 
 FrameBuilder = Callable[..., Frame]
 EXACT = 1e-9
@@ -346,15 +344,6 @@ def test_amplitude_needs_levels(models: dict[str, Model]) -> None:
     soft = solve_modes(effect.extend(model, "all", [0.04])).elastic
     ratio = soft.eigenvalues[:6] / solve_modes(model).elastic.eigenvalues[:6]
     np.testing.assert_allclose(ratio, 0.96, rtol=1e-8)
-
-
-def as_matrices(model: Model) -> Model:
-    """Return the model as it would come from files, without its frame."""
-    joints = len(model.frame_structure.frame.joints)
-    names = tuple(f"n{i}" for i in range(int(model.dofs.node.max()) + 1))
-    assert joints <= len(names)
-    dofs = Dofs(model.dofs.node, model.dofs.direction, model.dofs.xyz)
-    return Model(model.mass, model.stiffness, dofs, MatrixGeometry(names, dofs))
 
 
 def test_models_from_matrices(models: dict[str, Model]) -> None:

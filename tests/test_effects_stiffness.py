@@ -40,16 +40,13 @@ from femubench.fem import (
     mass_matrices,
     stiffness_matrices,
 )
-from femubench.plugins.effects.density import Density
 from femubench.plugins.effects.joint_offset import JointOffset
 from femubench.plugins.effects.joint_rotation import JointRotation
 from femubench.plugins.effects.local_stiffness_loss import LocalStiffnessLoss
-from femubench.plugins.effects.member_mass import MemberMass
-from femubench.plugins.effects.member_stiffness import MemberStiffness
+from femubench.plugins.effects.material import Density, MemberMass, MemberStiffness, YoungsModulus
 from femubench.plugins.effects.rotary_inertia import RotaryInertia
 from femubench.plugins.effects.shear_deformation import ShearDeformation
 from femubench.plugins.effects.torsion_constant import TorsionConstant, shape_torsion_constant
-from femubench.plugins.effects.youngs_modulus import YoungsModulus
 
 sys.path.insert(0, str(Path(__file__).parent))
 from effect_checks import changed_matrices, check_exact, check_neutral, compare

@@ -53,10 +53,8 @@ from femubench.core.update.equation_error import (
     updated,
 )
 from femubench.core.update.quasi import QuasiModes, quasi_measured_modes
-from femubench.plugins.strategies.generic_adjusted import GenericAdjusted
-from femubench.plugins.strategies.generic_ls import GenericLS
-from femubench.plugins.strategies.nobari import Nobari
-from femubench.plugins.strategies.nobari_rigid import NobariRigid
+from femubench.plugins.strategies.generic import GenericAdjusted, GenericLS
+from femubench.plugins.strategies.nobari import Nobari, NobariRigid
 from femubench.plugins.strategies.physical import Physical
 
 RNG = np.random.default_rng(0)

@@ -35,7 +35,7 @@ import json, sys
 import numpy as np
 from femubench import diagnose, read_case
 from femubench.core.modal.eigen import counted_evaluations
-from femubench.plugins.strategies.global_ import Global
+from femubench.plugins.strategies.factors import Global
 from femubench.scenarios import HERE
 
 out = {}

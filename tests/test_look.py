@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from femubench.core.effect.attachments import total_mass
-from femubench.core.fem.frame import Frame, Material
+from femubench.core.fem.frame import Frame, Material, Place, Support
 from femubench.core.fem.model import Model
 from femubench.core.fem.sections import (
     Section,
@@ -141,6 +141,15 @@ def test_the_weighed_mass_is_compared(clean: Frame) -> None:
         assert len(texts(look(model, data), "on the scales")) == expected
 
 
+def test_what_rests_on_supports_is_weighed_too(clean: Frame) -> None:
+    held = Support(Place(joint=clean.joints[0].name), ("z", "rx", "ry"))
+    model = Model.of(replace(clean, supports=(held,)))
+    mass = total_mass(Model.of(clean))
+    data = replace(measured(model), total_mass=(mass, 1e-4 * mass))
+    assert texts(look(model, data), "on the scales") == []
+    assert total_mass(model) == pytest.approx(mass, rel=1e-12)
+
+
 def test_the_mass_warning_scales_members_and_not_lumps(clean: Frame) -> None:
     model = Model.of(clean)
     lump = sum(item.mass for item in clean.masses)
@@ -186,8 +195,8 @@ def test_large_models_are_not_solved_anew(
 ) -> None:
     model = Model.of(ladder(elements=elements))
     exact = look(model, measured(model))
-    for module in ("look_modes", "look_mesh"):
-        monkeypatch.setattr(f"femubench.core.diagnosis.{module}.SOLVED_LIMIT", 0)
+    for module in ("look.modes", "inference.mesh_error"):
+        monkeypatch.setattr(f"femubench.core.{module}.SOLVED_LIMIT", 0)
     quick = look(model, measured(model))
     for effect, accuracy in (
         ("shear-deformation", 0.02),

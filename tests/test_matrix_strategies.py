@@ -34,8 +34,7 @@ from femubench.fem import Frame, JointSpring, Place, Support
 from femubench.plugins.strategies import baruch, berman
 from femubench.plugins.strategies.baruch import Baruch
 from femubench.plugins.strategies.berman import Berman
-from femubench.plugins.strategies.kabe import Kabe
-from femubench.plugins.strategies.kabe_rigid import KabeRigid
+from femubench.plugins.strategies.kabe import Kabe, KabeRigid
 from femubench.plugins.strategies.unchanged import Unchanged
 from femubench.update import SelfCheckFailed
 

@@ -12,8 +12,7 @@ import pytest
 
 from femubench import InputError, Strategy, read_case, solve_modes
 from femubench.core.plugin.variants import strategy_of
-from femubench.plugins.strategies.generic_adjusted import GenericAdjusted
-from femubench.plugins.strategies.generic_ls import GenericLS
+from femubench.plugins.strategies.generic import GenericAdjusted, GenericLS
 from femubench.plugins.strategies.nobari import Nobari
 from femubench.plugins.strategies.physical import Physical
 

@@ -43,8 +43,7 @@ from femubench.fem import (
     rectangular_tube,
 )
 from femubench.plugins.strategies.bayesian import Bayesian
-from femubench.plugins.strategies.global_ import Global
-from femubench.plugins.strategies.local import Local
+from femubench.plugins.strategies.factors import Global, Local
 from femubench.plugins.strategies.offset import Offset
 from femubench.plugins.strategies.spring import Spring
 from femubench.update import (

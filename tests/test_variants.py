@@ -9,7 +9,7 @@ import pytest
 
 from femubench import InputError, Strategy
 from femubench.core.plugin.variants import Variant, strategy_of
-from femubench.plugins.strategies.generic_ls import GenericLS
+from femubench.plugins.strategies.generic import GenericLS
 from femubench.plugins.strategies.spring import Spring
 from femubench.plugins.strategies.unchanged import Unchanged
 

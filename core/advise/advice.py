@@ -15,7 +15,6 @@ from femubench.core.advise.point_attachments import (
     points_of,
 )
 from femubench.core.advise.prediction import Outlook, Points, Predicted, distance, outlook_of
-from femubench.core.effect.attachments import total_mass
 from femubench.core.fem.model import Model
 from femubench.core.inference.fit import Fit, Problem
 from femubench.core.inference.residuals import Data
@@ -108,7 +107,10 @@ def _more_modes(group: Group) -> Iterator[Option]:
 
 
 def _matched(wanted: FloatArray, view: Outlook) -> Predicted | None:
-    """Return the modes nearest to some frequencies, of those that were not measured."""
+    """Return the modes nearest to some frequencies, of those that were not measured.
+
+    By frequency alone: nothing was measured of them yet that `pair_measured` could pair.
+    """
     frequencies, zero = view.state.frequencies, view.zero
     free = np.setdiff1d(np.flatnonzero(frequencies > zero), view.state.partner)
     if len(free) < len(wanted):
@@ -282,7 +284,7 @@ def advise(
     hertz = float(np.median(scatter * m.frequency_std / m.frequencies))
     structure = model.structure
     elements = len(structure.properties) if structure is not None else model.size
-    group = Group(views, points, total_mass(model), hertz, tolerance, elements)
+    group = Group(views, points, model.total_mass, hertz, tolerance, elements)
     return _ranked(options_for(group), [_label(view) for view in views], second_level(group))
 
 

@@ -20,7 +20,6 @@ from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.ties import least
 from femubench.core.typing import FloatArray, SparseArray
-from femubench.core.update.residuals import total_mass
 
 MODES = 16  # elastic modes kept of every model
 MASS_STD = 0.002  # of the mass
@@ -84,10 +83,8 @@ def see(model: Model, specimen: Specimen) -> Seen:
     if elastic.eigenvalues[0] <= 0.0:
         raise ModelError("the structure is a mechanism")
     rows = _reading_rows(model, specimen)
-    structure = model.frame_structure
-    mass = total_mass(structure)
     readings = np.asarray(rows @ elastic.shapes[:, :MODES])
-    return Seen(elastic.natural_frequencies[:MODES], readings, mass)
+    return Seen(elastic.natural_frequencies[:MODES], readings, model.total_mass)
 
 
 def _reading_rows(model: Model, specimen: Specimen) -> SparseArray:

@@ -20,7 +20,6 @@ from femubench.core.conformance.results import (
     symmetric,
 )
 from femubench.core.conformance.strategy_checks import own_doc
-from femubench.core.effect.attachments import total_mass
 from femubench.core.effect.reading import Reading
 from femubench.core.effect.sizes import Site, Size
 from femubench.core.errors import NotApplicable
@@ -275,7 +274,7 @@ def _sizes(
     if model.structure is None:
         return
     hertz = solve_modes(model).elastic.natural_frequencies
-    site = Site(model.structure.frame, place, total_mass(model), hertz)
+    site = Site(model.structure.frame, place, model.total_mass, hertz)
     for size, item in zip(sizes, parameters, strict=False):
         low, high = size.bounds(site)
         inside = item.lower < high and low < item.upper

@@ -42,8 +42,6 @@ from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning
 from femubench.core.score.scoring import score_model
 from femubench.core.ties import alike, in_order
 
-_SAME_MODEL = 0.3  # deviations by which the extended model may differ from the fit
-
 
 @dataclass(frozen=True)
 class _Proof:

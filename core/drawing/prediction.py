@@ -19,7 +19,7 @@ from femubench.core.modal.correlation import mac, modal_scale_factor
 from femubench.core.modal.eigen import Modes, modes_of
 from femubench.core.modal.frf import modal_sum, receptance
 from femubench.core.modal.measurement import Measurement
-from femubench.core.modal.pairing import Pairing, pair_modes
+from femubench.core.modal.pairing import Pairing, pair_measured
 from femubench.core.typing import FloatArray
 
 DIGITS = 4
@@ -86,8 +86,7 @@ def paired_with(model: Model, data: Measurement) -> tuple[Modes, FloatArray, Pai
     """
     elastic = modes_of(model).elastic
     at_sensors = np.asarray(model.observe(data.sensors) @ elastic.shapes)
-    frequencies = elastic.natural_frequencies
-    return elastic, at_sensors, pair_modes(data.frequencies, data.shapes, frequencies, at_sensors)
+    return elastic, at_sensors, pair_measured(data, elastic, at_sensors)
 
 
 def _structures(case: Case, model: Model) -> Iterator[tuple[str, Model, Measurement]]:

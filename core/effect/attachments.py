@@ -183,17 +183,8 @@ def with_extra(rows: SparseArray, extra: Sequence[float]) -> SparseArray:
 
 
 def total_mass(model: Model) -> float:
-    """Return the mass in kg that moves when the whole model is shifted."""
-    return once_for(model, "mass", lambda: _total_mass(model))
-
-
-def _total_mass(model: Model) -> float:
-    dofs = model.dofs
-    axes = dofs.axes
-    if axes is None:
-        axes = np.eye(6)[[DIRECTIONS.index(name) for name in dofs.direction]]
-    shift = np.asarray(axes[:, :3])
-    return float(np.einsum("nd,nd->d", shift, model.mass_times(shift)).max())
+    """Return the mass of the whole structure in kg."""
+    return model.total_mass
 
 
 def elastic_band(model: Model) -> FloatArray:

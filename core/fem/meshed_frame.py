@@ -160,6 +160,14 @@ class MeshedFrame:
                 groups[key] = groups.get(key, ()) + ends
         return groups
 
+    @property
+    def total_mass(self) -> float:
+        """Return the mass of members, attached masses and oscillators in kg, supports or not."""
+        p = self.properties
+        members = p.rhoA @ (p.length - p.rigid_mass_1 - p.rigid_mass_2)
+        lumps = sum(item.mass for item in self.frame.masses)
+        return float(members + lumps + sum(item.mass for item in self.frame.oscillators))
+
     def attached(
         self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]
     ) -> tuple[SparseArray, SparseArray]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -12,7 +13,7 @@ import scipy.sparse as sp
 from femubench.core.display import Shown, counted
 from femubench.core.errors import ModelError, NotApplicable
 from femubench.core.fem.frame import Frame, GroundSpring, PointMass
-from femubench.core.fem.sensors import Sensors
+from femubench.core.fem.sensors import DIRECTIONS, Sensors
 from femubench.core.fem.structure import Structure
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
@@ -36,6 +37,13 @@ class Dofs:
 
     def __len__(self) -> int:
         return len(self.direction)
+
+    @property
+    def motions(self) -> FloatArray:
+        """Return the unit motion of every dof in (x, y, z, rx, ry, rz), (n, 6)."""
+        if self.axes is not None:
+            return self.axes
+        return np.eye(6)[[DIRECTIONS.index(name) for name in self.direction]]
 
 
 @dataclass(frozen=True)
@@ -129,6 +137,18 @@ class Model(Shown):
     def size(self) -> int:
         """Return the number of degrees of freedom n."""
         return len(self.dofs)
+
+    @cached_property
+    def total_mass(self) -> float:
+        """Return the mass of the whole structure in kg, as scales would show it.
+
+        The largest that moves when all dofs are shifted along x, y or z; of a frame on supports,
+        where some of it cannot move, that of its parts.
+        """
+        if self.structure is not None and self.structure.frame.supports:
+            return self.structure.total_mass
+        shift = self.dofs.motions[:, :3]
+        return float(np.einsum("nd,nd->d", shift, self.mass_times(shift)).max())
 
     @property
     def frame_structure(self) -> Structure:

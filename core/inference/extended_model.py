@@ -13,7 +13,6 @@ from femubench.core.inference.fit import Fit, Problem, fit, signed_hz
 from femubench.core.inference.projection import Projection
 from femubench.core.modal.eigen import enough_modes, solve_modes
 from femubench.core.typing import FloatArray
-from femubench.core.update.residuals import total_mass
 
 _ROUNDS = 3
 _AGREES = 0.3  # deviations in all, below which a fit and its model are the same to the data
@@ -51,8 +50,7 @@ def raw_residual(problem: Problem, model: Model) -> FloatArray:
     seen = np.asarray(model.observe(data.measurement.sensors) @ modes.shapes[:, order])[None]
     hertz, seen = data.predicted(hertz, seen, problem.space.zero)
     partner = data.pair(hertz, seen)[0]
-    mass = total_mass(model.structure) if model.structure is not None else 0.0
-    residual = data.residual(hertz[:, partner], seen[:, :, partner], np.array([mass]))
+    residual = data.residual(hertz[:, partner], seen[:, :, partner], np.array([model.total_mass]))
     return np.asarray(residual[0])
 
 

@@ -12,11 +12,12 @@ from scipy.special import log_ndtr
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
+from femubench.core.gauss_newton import bounded_step
 from femubench.core.inference.modal_basis import Space, solve_pencil
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.projection import Projection
 from femubench.core.inference.residuals import Data
-from femubench.core.typing import FloatArray, IntArray
+from femubench.core.typing import BoolArray, FloatArray, IntArray
 
 _STEPS = 12
 _SETTLED = 2e-2  # of chi-square plus prior: a hundredth of a nat
@@ -247,18 +248,11 @@ def _step(point: State, low: FloatArray, high: FloatArray, damping: float) -> Fl
     normal = jacobian.T @ jacobian + np.eye(len(point.x))
     normal += damping * np.diag(normal.diagonal())
     right = jacobian.T @ point.residual - point.x
-    step = np.zeros(len(point.x))
-    free = np.ones(len(point.x), dtype=bool)
-    while free.any():
-        step[:] = 0.0
-        step[free] = la.solve(normal[np.ix_(free, free)], right[free], assume_a="pos")
-        stuck = free & (point.x <= low) & (step < 0.0)
-        stuck |= free & (point.x >= high) & (step > 0.0)
-        if not stuck.any():
-            break
-        free &= ~stuck
-    longest = float(np.abs(step).max(initial=0.0))
-    step = step * min(1.0, _LONGEST / longest) if longest > 0.0 else step
+
+    def solve(free: BoolArray) -> FloatArray:
+        return np.asarray(la.solve(normal[np.ix_(free, free)], right[free], assume_a="pos"))
+
+    step = bounded_step(solve, point.x, low, high, _LONGEST)
     return np.asarray(np.clip(point.x + step, low, high) - point.x)
 
 

@@ -22,7 +22,6 @@ from femubench.core.inference.hypothesis import Hypothesis
 from femubench.core.inference.projection import Projection, Projector
 from femubench.core.modal.eigen import Modes
 from femubench.core.typing import BoolArray, FloatArray, IntArray
-from femubench.core.update.residuals import total_mass
 
 
 @dataclass(frozen=True)
@@ -186,10 +185,9 @@ def nominal_space(
     modes = modes.take(order)
     project = Projector(model, modes.shapes)
     readings = np.asarray(model.observe(sensors) @ modes.shapes)
-    mass = total_mass(model.structure) if model.structure is not None else 0.0
     eigenvalues = np.where(modes.rigid, 0.0, modes.eigenvalues)
     projections = tuple(project(hypothesis) for hypothesis in hypotheses)
-    return Space(eigenvalues, readings, projections, mass, int(modes.rigid.sum()))
+    return Space(eigenvalues, readings, projections, model.total_mass, int(modes.rigid.sum()))
 
 
 def scatter_terms(structure: Structure, vectors: FloatArray, eigenvalues: FloatArray) -> FloatArray:

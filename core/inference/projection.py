@@ -69,14 +69,17 @@ class Projector:
     def __init__(self, model: Model, vectors: FloatArray) -> None:
         self.vectors, self.structure = vectors, model.structure
         self.wider: dict[int, FloatArray] = {0: vectors}
-        self.unit = np.zeros(len(vectors))
-        if self.structure is not None:
+        shift = model.dofs.motions[:, :3]
+        if self.structure is None:
+            carried = np.einsum("nd,nd->d", shift, model.mass_times(shift))
+            self.unit = shift[:, int(carried.argmax())]
+        else:
             # What cannot move in the plane of the frame has no part in any product.
             self.active = np.flatnonzero(self.structure.active_local)
             local = (self.structure.gather @ vectors).reshape(-1, 12, vectors.shape[1])
             self.local = local[:, self.active]
             self.shift = _translation(self.structure)[:, self.active]
-            self.unit = self.structure.kinematics.axes[:, _direction(self.structure)]
+            self.unit = shift[:, _direction(self.structure)]
 
     def __call__(self, hypothesis: Hypothesis) -> Projection:
         """Return a hypothesis in the coordinates of the basis."""
@@ -92,8 +95,6 @@ class Projector:
             rows = np.eye(grown.shape[1])
             cores = np.array([term.operator.project(grown) for term in change.terms])
             weights = np.array([self._weight(term, motion) for term in change.terms])
-        if self.structure is None:
-            weights = np.zeros(len(is_mass))
         return Projection(hypothesis, rows, cores, is_mass, np.where(is_mass, weights, 0.0))
 
     def _small(
@@ -141,8 +142,8 @@ class Projector:
 
     def _shifted(self, terms: Sequence[Term], extra: int) -> FloatArray:
         """Return all dofs in a unit translation; those that a change adds follow statically."""
-        if self.structure is None or not extra:
-            return np.concatenate([self.unit, np.zeros(extra)])
+        if not extra:
+            return self.unit
         n = len(self.unit)
         motion = np.concatenate([self.unit, np.zeros(extra)])
         both = np.column_stack([motion, np.zeros((n + extra, extra))])

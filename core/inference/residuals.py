@@ -69,7 +69,8 @@ class Data:
     def pair(self, frequencies: FloatArray, readings: FloatArray) -> IntArray:
         """Return the predicted partner of every measured mode for every candidate, (g, m).
 
-        The assignment with the least chi-square; frequencies count with a deviation of at least
+        Which mode fits best, where `pair_measured` asks which is the same and may find none: the
+        assignment with the least chi-square; frequencies count with a deviation of at least
         3 %, since a candidate may be far from its best fit.
 
         Arguments:

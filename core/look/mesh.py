@@ -12,7 +12,6 @@ from femubench.core.schema.diagnosis import LookWarning
 _NOTABLE = 0.001
 _NOTABLE_DEVIATIONS = 0.5
 _UNEQUAL = 20.0  # ratio of the lengths of neighbours
-_MARGIN = 4
 
 
 def look_at_mesh(seen: Seen) -> list[LookWarning]:

@@ -19,13 +19,12 @@ from femubench.core.modal.frequency_changes import (
     matched,
 )
 from femubench.core.modal.measurement import Measurement
-from femubench.core.modal.pairing import Pairing, pair_modes
+from femubench.core.modal.pairing import Pairing, pair_measured
 from femubench.core.schema.diagnosis import LookWarning
 from femubench.core.typing import FloatArray
 
 _MOST_MODES = 40
 _MARGIN = 4  # modes beyond those wanted, so that a pair may cross the end of the list
-_RIGID = 6
 _NOTABLE, _NOTABLE_DEVIATIONS = 0.005, 2.0
 Changes = tuple[tuple[int, float], ...]
 
@@ -56,8 +55,7 @@ class Seen:
     @cached_property
     def pairing(self) -> Pairing:
         """Return the partners of the measured modes."""
-        m = self.measurement
-        return pair_modes(m.frequencies, m.shapes, self.modes.natural_frequencies, self.readings)
+        return pair_measured(self.measurement, self.modes, self.readings)
 
     @cached_property
     def count(self) -> int:

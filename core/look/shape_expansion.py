@@ -13,7 +13,7 @@ from femubench.core.inference.mesh_error import mesh_bias
 from femubench.core.modal.eigen import Modes
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.modal.measurement import Measurement
-from femubench.core.modal.pairing import LEAST_SENSORS, Pairing, pair_modes
+from femubench.core.modal.pairing import LEAST_SENSORS, Pairing, pair_measured
 from femubench.core.modal.sparse_eigen import ShiftedModel
 from femubench.core.typing import FloatArray
 
@@ -51,9 +51,7 @@ class Comparison:
         """
         modes = elastic_modes(model, 2 * len(measurement) + 8)
         readings = np.asarray(model.observe(measurement.sensors) @ modes.shapes)
-        pairing = pair_modes(
-            measurement.frequencies, measurement.shapes, modes.natural_frequencies, readings
-        )
+        pairing = pair_measured(measurement, modes, readings)
         bias = np.zeros(len(modes))
         found = mesh_bias(model, int(pairing.index.max(initial=-1)) + 1, modes)
         if found is not None:

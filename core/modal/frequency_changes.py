@@ -24,7 +24,11 @@ def elastic_modes(model: Model, count: int) -> Modes:
 
 
 def matched(likeness: FloatArray) -> IntArray:
-    """Return the column that belongs to every row, all likenesses together as large as can be."""
+    """Return the column that belongs to every row, all likenesses together as large as can be.
+
+    Two models on the same dofs: every mode has a partner, in the metric of the mass. What was
+    measured at sensors is paired by `pairing.pair_measured`.
+    """
     return np.asarray(linear_sum_assignment(likeness, maximize=True)[1])
 
 

@@ -8,6 +8,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from femubench.core.modal.correlation import mac, seen_modes
+from femubench.core.modal.eigen import Modes
+from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import BoolArray, FloatArray, IntArray
 
 # Two shapes with a MAC below one half have more in what differs than in what they share; any
@@ -95,6 +97,24 @@ def pair_modes(
     score = likeness[np.arange(m), index]
     known = (index >= 0) & by_shape[np.arange(m), index]
     return Pairing(index, np.where(known, score, np.nan))
+
+
+def pair_measured(measurement: Measurement, modes: Modes, readings: FloatArray) -> Pairing:
+    """Return the partner of every measured mode among the modes of a model, rigid ones left out.
+
+    Arguments:
+        measurement: the modes to pair, in one assignment.
+        modes: of the model, p of them; the indices of the pairing count all of them.
+        readings: the same at the sensors, (n_sensors, p).
+    """
+    elastic = np.flatnonzero(~modes.rigid)
+    found = pair_modes(
+        measurement.frequencies,
+        measurement.shapes,
+        modes.natural_frequencies[elastic],
+        np.asarray(readings)[:, elastic],
+    )
+    return Pairing(np.append(elastic, -1)[found.index], found.mac)
 
 
 def _distance(measured: FloatArray, predicted: FloatArray) -> FloatArray:

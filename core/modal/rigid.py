@@ -8,7 +8,6 @@ import numpy as np
 import scipy.linalg as la
 
 from femubench.core.fem.model import Dofs, Model
-from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.typing import BoolArray, FloatArray
 
 _ZERO_ENERGY = 1e-12
@@ -20,19 +19,13 @@ def rigid_body_vectors(dofs: Dofs) -> FloatArray:
 
     Three translations and three rotations about the centroid, those that move nothing left out.
     """
-    vectors = _motions(dofs)(dofs.xyz, _axes(dofs))
+    vectors = _motions(dofs)(dofs.xyz, dofs.motions)
     return np.asarray(vectors[:, _moving(vectors)])
 
 
 def _moving(vectors: FloatArray) -> BoolArray:
     """Tell which motions move anything: a plane off the origin leaves roundoff in the others."""
     return np.asarray(np.abs(vectors).max(axis=0, initial=0.0) > _HELD)
-
-
-def _axes(dofs: Dofs) -> FloatArray:
-    if dofs.axes is not None:
-        return dofs.axes
-    return np.eye(6)[[DIRECTIONS.index(name) for name in dofs.direction]]
 
 
 def _motions(dofs: Dofs) -> Callable[[FloatArray, FloatArray], FloatArray]:
@@ -65,7 +58,7 @@ def rigid_modes_of(model: Model) -> FloatArray:
     the matrices; of a model from files, the strain energy.
     """
     motion, structure = _motions(model.dofs), model.structure
-    vectors = motion(model.dofs.xyz, _axes(model.dofs))
+    vectors = motion(model.dofs.xyz, model.dofs.motions)
     moving = _moving(vectors)
     if structure is None:
         candidates = _without_energy(model, vectors[:, moving])

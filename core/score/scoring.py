@@ -23,7 +23,7 @@ from femubench.core.modal.eigen import (
     zero_tolerance,
 )
 from femubench.core.modal.measurement import Measurement
-from femubench.core.modal.pairing import LEAST_SENSORS, WINDOW, pair_modes
+from femubench.core.modal.pairing import LEAST_SENSORS, WINDOW, pair_measured
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.schema.results import Block, PairedMode
 from femubench.core.score.leaderboard import leaderboard
@@ -181,7 +181,7 @@ def _predict(
     # Modes within two standard deviations of each other are one to the test.
     closeness = 2.0 * float(np.median(measurement.frequency_std / measurement.frequencies))
     readings = align_close_modes(frequencies, readings, measurement.shapes, closeness)
-    pairing = pair_modes(measurement.frequencies, measurement.shapes, frequencies, readings)
+    pairing = pair_measured(measurement, elastic, readings)
     return tuple(
         PairedMode(
             number=number,

@@ -13,7 +13,7 @@ from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import DENSE_LIMIT, Modes, enough_modes, solve_modes
 from femubench.core.modal.expansion import expand_by_dynamics, expand_by_rotation, measured_rows
 from femubench.core.modal.measurement import Measurement
-from femubench.core.modal.pairing import pair_modes
+from femubench.core.modal.pairing import pair_measured
 from femubench.core.typing import FloatArray, IntArray
 
 ITERATIONS = 5  # Ahmadian, Gladwell & Ismail (1997), section 4
@@ -41,15 +41,8 @@ class QuasiModes:
 def partners_of(model: Model, measurement: Measurement) -> tuple[Modes, IntArray]:
     """Return enough modes of a model and every measured mode's partner among them, -1 for none."""
     modes = solve_modes(model, enough_modes(model, len(measurement)))
-    candidates = np.flatnonzero(~modes.rigid)
-    at_sensors = model.observe(measurement.sensors) @ modes.shapes[:, candidates]
-    pairing = pair_modes(
-        measurement.frequencies,
-        measurement.shapes,
-        modes.natural_frequencies[candidates],
-        at_sensors,
-    )
-    return modes, np.where(pairing.index >= 0, candidates[pairing.index], -1)
+    readings = model.observe(measurement.sensors) @ modes.shapes
+    return modes, pair_measured(measurement, modes, readings).index
 
 
 def paired_modes(model: Model, measurement: Measurement) -> tuple[Modes, IntArray]:

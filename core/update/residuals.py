@@ -17,7 +17,7 @@ from femubench.core.fem.structure import Structure
 from femubench.core.modal.correlation import modal_scale_factor, seen_modes
 from femubench.core.modal.eigen import Modes, enough_modes, solve_modes
 from femubench.core.modal.measurement import Measurement
-from femubench.core.modal.pairing import pair_modes
+from femubench.core.modal.pairing import pair_measured
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities, shape_sensitivities
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
@@ -122,7 +122,7 @@ class Prediction:
             parts.append(np.where(lost, np.nan, misfit).T.ravel())
         if data.weigh and data.measurement.total_mass is not None:
             mass, std = data.measurement.total_mass
-            parts.append(np.array([(mass - total_mass(self.structure)) / std]))
+            parts.append(np.array([(mass - self.structure.total_mass) / std]))
         return np.concatenate(parts)
 
     @cached_property
@@ -171,14 +171,6 @@ class Prediction:
         return rows.reshape(-1, len(parameters))
 
 
-def total_mass(structure: Structure) -> float:
-    """Return the mass of members, attached masses and oscillators in kg."""
-    p = structure.properties
-    beams = p.rhoA @ (p.length - p.rigid_mass_1 - p.rigid_mass_2)
-    attached = sum(item.mass for item in structure.frame.masses)
-    return float(beams + attached + sum(item.mass for item in structure.frame.oscillators))
-
-
 def _mass_slope(structure: Structure, parameter: Parameter) -> float:
     """Return d total mass / d factor about the present value in kg."""
     if parameter.quantity not in ("rhoA", "density"):
@@ -206,18 +198,11 @@ def predict(data: Data, structure: Structure, previous: Prediction | None = None
     model = Model.of(structure)
     count = enough_modes(model, len(data.measurement))
     modes = solve_modes(model, count)
-    elastic = np.flatnonzero(~modes.rigid)
     if previous is None or _observed_anew(structure):
         observer = model.observe(data.measurement.sensors)
     else:
         observer = previous.observer
-    pairing = pair_modes(
-        data.measurement.frequencies,
-        data.measurement.shapes,
-        modes.natural_frequencies[elastic],
-        observer @ modes.shapes[:, elastic],
-    )
-    partner = np.where(pairing.index >= 0, elastic[pairing.index], -1)
+    partner = pair_measured(data.measurement, modes, observer @ modes.shapes).index
     if previous is not None:
         partner = _followed(partner, model, modes, previous)
     return Prediction(data, structure, model, modes, partner, observer)

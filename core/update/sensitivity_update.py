@@ -9,6 +9,7 @@ import numpy as np
 
 from femubench.core.errors import Diverged, ModelError, NotApplicable, StrategyFailure
 from femubench.core.fem.structure import Structure
+from femubench.core.gauss_newton import bounded_step
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import BoolArray, FloatArray
 from femubench.core.update.residuals import Data, Prediction, common_rows, predict
@@ -60,22 +61,15 @@ class _Iteration:
     def step(self, point: _Point) -> FloatArray:
         """Return dtheta / |theta| = (s's + beta I + P)^-1 (s'r - P q), limits respected."""
         s, residual = self.system(point)
-        free = np.ones(len(point.q), dtype=bool)
-        scaling, precision = self.scaling, self.scaling.precision
-        step = np.zeros(len(point.q))
-        while free.any():
-            rows = [s, np.sqrt(self.beta) * np.eye(len(step)), np.diag(np.sqrt(precision))]
-            right = [residual, np.zeros(len(step)), -np.sqrt(precision) * point.q]
-            matrix = np.vstack(rows)[:, free]
-            step[:] = 0.0
-            step[free] = np.linalg.lstsq(matrix, np.concatenate(right), rcond=None)[0]
-            stuck = free & (point.q <= scaling.lower) & (step < 0.0)
-            stuck |= free & (point.q >= scaling.upper) & (step > 0.0)
-            if not stuck.any():
-                break
-            free &= ~stuck
-        longest = float(np.abs(step).max(initial=0.0))
-        return step * min(1.0, self.options.max_step / longest) if longest > 0.0 else step
+        size, weight = len(point.q), np.sqrt(self.scaling.precision)
+        rows = np.vstack([s, np.sqrt(self.beta) * np.eye(size), np.diag(weight)])
+        right = np.concatenate([residual, np.zeros(size), -weight * point.q])
+
+        def solve(free: BoolArray) -> FloatArray:
+            return np.asarray(np.linalg.lstsq(rows[:, free], right, rcond=None)[0])
+
+        low, high = self.scaling.lower, self.scaling.upper
+        return bounded_step(solve, point.q, low, high, self.options.max_step)
 
     def gain(self, before: _Point, after: _Point) -> float:
         """Return the share of the cost that a step took away."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from femubench import Case, Measurement, Model, solve_modes
 from femubench.fem import FloatArray, Parameter
-from femubench.modal import pair_modes
+from femubench.modal import pair_measured
 from femubench.update import (
     Unknown,
     UpdateOptions,
@@ -69,9 +69,7 @@ def shape_paired_errors(case: Case, model: Model) -> FloatArray:
     A mode without a partner is nan.
     """
     data = in_plane(case)
-    modes = solve_modes(model).elastic
-    shapes = model.observe(data.sensors) @ modes.shapes
-    predicted = modes.natural_frequencies
-    partner = pair_modes(data.frequencies, data.shapes, predicted, shapes).index
-    errors = 100.0 * (predicted[partner] / data.frequencies - 1.0)
+    modes = solve_modes(model)
+    partner = pair_measured(data, modes, model.observe(data.sensors) @ modes.shapes).index
+    errors = 100.0 * (modes.natural_frequencies[partner] / data.frequencies - 1.0)
     return np.where(partner >= 0, errors, np.nan)

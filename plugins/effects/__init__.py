@@ -1,12 +1,12 @@
-"""The physical causes that come with femubench, one file each."""
+"""The physical causes that come with femubench."""
 
 from __future__ import annotations
 
 from femubench import hookimpl
 
 CLASSES = {
-    "youngs-modulus": "youngs_modulus:YoungsModulus",
-    "density": "density:Density",
+    "youngs-modulus": "material:YoungsModulus",
+    "density": "material:Density",
     "torsion-constant": "torsion_constant:TorsionConstant",
     "shear-deformation": "shear_deformation:ShearDeformation",
     "rotary-inertia": "rotary_inertia:RotaryInertia",
@@ -15,8 +15,8 @@ CLASSES = {
     "joint-mass": "joint_mass:JointMass",
     "added-mass": "added_mass:AddedMass",
     "grounding-spring": "grounding_spring:GroundingSpring",
-    "member-stiffness": "member_stiffness:MemberStiffness",
-    "member-mass": "member_mass:MemberMass",
+    "member-stiffness": "material:MemberStiffness",
+    "member-mass": "material:MemberMass",
     "local-stiffness-loss": "local_stiffness_loss:LocalStiffnessLoss",
     "axial-preload": "axial_preload:AxialPreload",
     "mass-eccentricity": "mass_eccentricity:MassEccentricity",

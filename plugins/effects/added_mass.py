@@ -19,7 +19,6 @@ from femubench.effect import (
     point_of,
     point_places,
     proportional,
-    total_mass,
 )
 from femubench.fem import Frame, PointMass
 
@@ -39,7 +38,7 @@ class AddedMass(FrameEffect):
 
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return the mass."""
-        scale = _SHARE * total_mass(model)
+        scale = _SHARE * model.total_mass
         return (EffectParameter("mass", "kg", scale, scaling="exponential", one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:

@@ -22,7 +22,6 @@ from femubench.effect import (
     directed_point,
     elastic_band,
     free_translations,
-    total_mass,
     translation_rows,
     with_extra,
 )
@@ -54,7 +53,7 @@ class AttachedOscillator(FrameEffect):
 
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return its mass, and its frequency around the middle of the lowest elastic ones."""
-        scale = _SHARE * total_mass(model)
+        scale = _SHARE * model.total_mass
         centre = float(np.exp(np.log(elastic_band(model)).mean()))
         return (
             EffectParameter("mass", "kg", scale, scaling="exponential", one_sided=True),

@@ -22,7 +22,6 @@ from femubench.effect import (
     elastic_band,
     point_places,
     proportional,
-    total_mass,
     translation_rows,
 )
 from femubench.fem import Frame, GroundSpring
@@ -46,7 +45,7 @@ class GroundingSpring(FrameEffect):
 
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return the stiffness; at its scale the lowest frequency rises by about a percent."""
-        scale = _SHARE * total_mass(model) * (2.0 * np.pi * float(elastic_band(model)[0])) ** 2
+        scale = _SHARE * model.total_mass * (2.0 * np.pi * float(elastic_band(model)[0])) ** 2
         return (EffectParameter("stiffness", "N/m", scale, scaling="exponential", one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:

@@ -16,7 +16,6 @@ from femubench.effect import (
     joints_of,
     mass_term,
     proportional,
-    total_mass,
     type_places,
 )
 from femubench.fem import Frame, Place, PointMass
@@ -37,7 +36,7 @@ class JointMass(FrameEffect):
 
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return the mass at each joint."""
-        scale = _SHARE * total_mass(model) / len(model.frame_structure.frame.joints)
+        scale = _SHARE * model.total_mass / len(model.frame_structure.frame.joints)
         return (EffectParameter("mass", "kg", scale, scaling="exponential", one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:

@@ -1,4 +1,4 @@
-"""What effects on Young's modulus or density have in common: one constant of some members."""
+"""Another Young's modulus or density than the material's, of all members or of one."""
 
 from __future__ import annotations
 
@@ -7,19 +7,35 @@ from dataclasses import replace
 from functools import partial
 from typing import ClassVar, Literal
 
+import numpy as np
+
 from femubench import Model
 from femubench.effect import (
     Change,
     EffectParameter,
     ElementOperator,
     FrameEffect,
+    LookWarning,
     MatrixOperator,
+    Seen,
+    Size,
     Term,
     elements_of,
+    member_labels,
     once_for,
     proportional,
 )
-from femubench.fem import Frame, Member, ModelError, SparseArray, mass_matrices, stiffness_matrices
+from femubench.fem import (
+    FloatArray,
+    Frame,
+    Member,
+    ModelError,
+    SparseArray,
+    mass_matrices,
+    stiffness_matrices,
+)
+
+_SURE = 3.0  # standard deviations of the weighed mass
 
 
 class MaterialEffect(FrameEffect):
@@ -30,6 +46,10 @@ class MaterialEffect(FrameEffect):
     """
 
     constant: ClassVar[Literal["E", "rho"]]
+
+    def places(self, model: Model) -> Sequence[str]:
+        """Return the whole structure."""
+        return ("all",)
 
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return the relative change."""
@@ -86,3 +106,82 @@ class MaterialEffect(FrameEffect):
         if low_rank is not None and place == "all":
             parts.append(low_rank)
         return proportional(*(Term(kind, MatrixOperator(part)) for part in parts))
+
+
+class YoungsModulus(MaterialEffect):
+    """Scale Young's modulus of the whole structure; shear follows, Poisson's ratio stays."""
+
+    name: ClassVar[str] = "youngs-modulus"
+    summary: ClassVar[str] = "Young's modulus is another"
+    caution: ClassVar[str] = (
+        "A stiffness that falls with the amplitude looks like youngs-modulus until a second "
+        "excitation level is measured."
+    )
+    softens: ClassVar[bool] = True
+    sizes: ClassVar[Sequence[Size]] = (Size(0.03, 0.15, signed=True),)
+    constant: ClassVar[Literal["E", "rho"]] = "E"
+
+
+class Density(MaterialEffect):
+    """Scale the density of the whole structure; of matrices without a frame the whole mass."""
+
+    name: ClassVar[str] = "density"
+    summary: ClassVar[str] = "the density is another"
+    sizes: ClassVar[Sequence[Size]] = (Size(0.03, 0.15, signed=True),)
+    constant: ClassVar[Literal["E", "rho"]] = "rho"
+
+    def look(self, seen: Seen) -> list[LookWarning]:
+        """Return whether the model weighs other than the structure does on the scales."""
+        if seen.measurement.total_mass is None:
+            return []
+        weighed, std = seen.measurement.total_mass
+        mass = seen.model.total_mass
+        if not abs(mass - weighed) > _SURE * std:
+            return []
+        apart = abs(mass - weighed) / std if std > 0.0 else np.inf
+        what = (
+            f"The model has {mass:.4g} kg, the structure {weighed:.4g} kg on the scales, "
+            f"{apart:.3g} standard deviations apart."
+        )
+        return [seen.warning(self.name, what, self._changes(seen, mass, weighed))]
+
+    def _changes(self, seen: Seen, mass: float, weighed: float) -> FloatArray | None:
+        """Return the changes with the density that gives the weighed mass, (count,)."""
+        if seen.model.structure is None:
+            return np.full(seen.count, np.sqrt(mass / weighed) - 1.0)
+        frame = seen.model.structure.frame
+        lumps = sum(m.mass for m in frame.masses) + sum(o.mass for o in frame.oscillators)
+        change = (weighed - mass) / (mass - lumps) if mass > lumps else -1.0
+        return seen.changes(self.frame(frame, "all", (change,))) if change > -1.0 else None
+
+
+class MemberStiffness(MaterialEffect):
+    """Scale Young's modulus of one member, or one stiffness group of matrices from files."""
+
+    name: ClassVar[str] = "member-stiffness"
+    summary: ClassVar[str] = "a member has another stiffness"
+    softens: ClassVar[bool] = True
+    sizes: ClassVar[Sequence[Size]] = (Size(0.05, 0.30, signed=True),)
+    constant: ClassVar[Literal["E", "rho"]] = "E"
+
+    def places(self, model: Model) -> Sequence[str]:
+        """Return the members, or the groups; a single one is `youngs-modulus`."""
+        structure = model.structure
+        parts = tuple(model.groups) if structure is None else member_labels(structure.frame)
+        return parts if len(parts) > 1 or structure is None else ()
+
+
+class MemberMass(MaterialEffect):
+    """Scale the density of one member; what is attached to it stays."""
+
+    name: ClassVar[str] = "member-mass"
+    summary: ClassVar[str] = "a member has another mass"
+    sizes: ClassVar[Sequence[Size]] = (Size(0.05, 0.30, signed=True),)
+    constant: ClassVar[Literal["E", "rho"]] = "rho"
+
+    def places(self, model: Model) -> Sequence[str]:
+        """Return the members; a single one is `density`."""
+        if model.structure is None:
+            return ()
+        members = member_labels(model.structure.frame)
+        return members if len(members) > 1 else ()

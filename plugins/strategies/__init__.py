@@ -1,4 +1,4 @@
-"""The updating strategies that come with femubench, one file each."""
+"""The updating strategies that come with femubench."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ CLASSES = {
     "baruch": "baruch:Baruch",
     "berman": "berman:Berman",
     "kabe": "kabe:Kabe",
-    "kabe-rigid": "kabe_rigid:KabeRigid",
+    "kabe-rigid": "kabe:KabeRigid",
     "physical": "physical:Physical",
     "nobari": "nobari:Nobari",
-    "nobari-rigid": "nobari_rigid:NobariRigid",
-    "generic-ls": "generic_ls:GenericLS",
-    "generic-adjusted": "generic_adjusted:GenericAdjusted",
-    "global": "global_:Global",
-    "local": "local:Local",
+    "nobari-rigid": "nobari:NobariRigid",
+    "generic-ls": "generic:GenericLS",
+    "generic-adjusted": "generic:GenericAdjusted",
+    "global": "factors:Global",
+    "local": "factors:Local",
     "spring": "spring:Spring",
     "offset": "offset:Offset",
     "bayesian": "bayesian:Bayesian",

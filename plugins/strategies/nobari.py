@@ -27,3 +27,20 @@ class Nobari(ElementStrategy):
     def family(self, structure: Structure) -> ElementFamily:
         """Return factors on the kinds of entries of every element matrix."""
         return nobari_family(structure)
+
+
+@dataclass(frozen=True)
+class NobariRigid(Nobari):
+    """Change the terms of every element matrix as `nobari` does, rigid-body modes kept exactly.
+
+    They are hard constraints. What is left are the physical factors, (21), here without bounds:
+    wherever those of `physical` stay above theirs, both give the same model.
+    """
+
+    name: ClassVar[str] = "nobari-rigid"
+    citation: ClassVar[str] = (
+        "Nobari, Robb & Ewins (1993), with the rigid-body modes as data: Ahmadian, Gladwell & "
+        "Ismail (1997), section 4.2"
+    )
+    promises: ClassVar[frozenset[str]] = frozenset({"rigid-body-modes"})
+    keep_rigid: ClassVar[bool] = True

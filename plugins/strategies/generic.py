@@ -1,4 +1,4 @@
-"""Generic element matrices, every element on its own."""
+"""Generic element matrices, every element on its own or alike for all elements of a kind."""
 
 from __future__ import annotations
 
@@ -28,10 +28,30 @@ class GenericLS(ElementStrategy):
         "Ahmadian (1995), Generic element matrices suitable for finite element model updating"
     )
     promises: ClassVar[frozenset[str]] = frozenset({"no-negative-eigenvalue"})
+    tied: ClassVar[bool] = False
 
     plain: Symmetry = "half-turn"
     joint: Symmetry = "none"
 
     def family(self, structure: Structure) -> ElementFamily:
-        """Return a core for every element."""
-        return generic_family(structure, plain=self.plain, joint=self.joint)
+        """Return a core for every element, or one for all elements of a kind."""
+        return generic_family(structure, plain=self.plain, joint=self.joint, tied=self.tied)
+
+
+@dataclass(frozen=True)
+class GenericAdjusted(GenericLS):
+    """Give the elements at joints of one type, and all plain elements, one generic core each.
+
+    Cores are relative to the nominal element. Where the second end of an element is at the joint,
+    the core is turned end for end. They stay positive definite as in `generic-ls`.
+
+    Arguments:
+        plain, joint: as for `generic-ls`.
+    """
+
+    name: ClassVar[str] = "generic-adjusted"
+    citation: ClassVar[str] = (
+        "Ahmadian, Gladwell & Ismail (1997), section 4.3, table 4, adjusted solution; Gladwell & "
+        "Ahmadian (1995), Generic element matrices suitable for finite element model updating"
+    )
+    tied: ClassVar[bool] = True

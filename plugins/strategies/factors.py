@@ -1,0 +1,92 @@
+"""Stiffness factors: one for the whole frame, or some for the elements at the joints."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+
+from femubench import Measurement, Model, Strategy, UpdateResult
+from femubench.fem import Structure
+from femubench.update import (
+    Unknown,
+    UpdateOptions,
+    global_stiffness,
+    groups_within,
+    joint_stiffness,
+    sensitivity_update,
+)
+
+
+@dataclass(frozen=True)
+class _Factors(Strategy):
+    """Base class of updates of stiffness factors by the sensitivity method."""
+
+    options: UpdateOptions = field(default_factory=UpdateOptions)
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        """Return the model with the factors that fit the used frequencies."""
+        structure = model.frame_structure
+        unknowns = self.unknowns(structure, len(measurement))
+        return sensitivity_update(structure, unknowns, measurement, self.options)
+
+    @abstractmethod
+    def unknowns(self, structure: Structure, count: int) -> list[Unknown]:
+        """Return the factors, where so many frequencies were measured."""
+
+
+@dataclass(frozen=True)
+class Global(_Factors):
+    """Scale the stiffness of all members by one factor.
+
+    In plane the factor is on EI, as in the paper. Out of plane and in 3-D it is on E, that is on
+    EI, GJ, EA and GA together: with EI alone the torsion of the members would stay as it was, and
+    the update would no longer be one of the whole structure.
+
+    Arguments:
+        options: of the iteration.
+
+    Source: Horton et al. (1999), table 4(a).
+    """
+
+    name: ClassVar[str] = "global"
+    citation: ClassVar[str] = (
+        "Horton, Gurgenci, Veidt & Friswell (1999), Finite element model updating of the welded "
+        "joints in a tubular H-frame, equation (4), table 4(a)"
+    )
+    needs: ClassVar[frozenset[str]] = frozenset({"geometry"})
+
+    def unknowns(self, structure: Structure, count: int) -> list[Unknown]:
+        """Return one factor on all members."""
+        return [global_stiffness(structure)]
+
+
+@dataclass(frozen=True)
+class Local(_Factors):
+    """Scale the bending stiffness of the elements that touch joints.
+
+    One factor for every joint type and role: at joints that a member passes, one for the elements
+    that branch off and one for the two of the member that passes; else one for all elements of
+    the joint. With more groups than measured frequencies all joints count as one type, and if
+    need be all their elements as one group. In plane the factors are on EI, else on E.
+
+    Arguments:
+        options: of the iteration.
+
+    Source: Horton et al. (1999), table 4(b).
+    """
+
+    name: ClassVar[str] = "local"
+    citation: ClassVar[str] = (
+        "Horton, Gurgenci, Veidt & Friswell (1999), Finite element model updating of the welded "
+        "joints in a tubular H-frame, equation (4), table 4(b)"
+    )
+    needs: ClassVar[frozenset[str]] = frozenset({"geometry", "joints"})
+
+    def unknowns(self, structure: Structure, count: int) -> list[Unknown]:
+        """Return the factors on the elements at joints."""
+        return [joint_stiffness(structure, g) for g in groups_within(structure.frame, count)]
