@@ -57,6 +57,10 @@ def challenge(
 
     Raises:
         InputError: when the folder is not empty, the truth exists, or nothing can be drawn.
+
+    Examples:
+        >>> femubench.challenge("blind", seed=3, hidden="none").folder.name
+        'blind'
     """
     path, commitment = write_blind(
         Path(folder),
@@ -85,6 +89,11 @@ def score_challenge(
 
     Raises:
         InputError: when case, truth or answer cannot be read, or do not belong together.
+
+    Examples:
+        >>> blind = femubench.challenge("blind", seed=3, hidden="none")
+        >>> femubench.score_challenge("blind", found).judgement.right  # it names a cause
+        False
     """
     sealed = None if truth is None else Path(truth)
     if not isinstance(answer, Diagnosis):

@@ -208,6 +208,10 @@ def rank(
 
     Raises:
         InputError: for an unknown name, an option that does not exist, or a faulty case.
+
+    Examples:
+        >>> femubench.rank("frame", ["unchanged", "physical"]).leaderboard["strategy"].tolist()
+        ['physical', 'unchanged']
     """
     kept = None if store is None else store_in(store)
     plan = plan_of(
@@ -340,6 +344,11 @@ def read_run(
 
     Raises:
         InputError: when there is no such run, or it cannot be read.
+
+    Examples:
+        >>> file = femubench.report(run, "results.json")
+        >>> femubench.read_run(file).leaderboard["strategy"].tolist()
+        ['global', 'unchanged']
     """
     if isinstance(run, results.Run):
         return Run.of(run)

@@ -49,6 +49,10 @@ def mac(
         InputError: when two things cannot be compared.
 
     Source: Allemang & Brown 1982, A correlation coefficient for modal vector analysis.
+
+    Examples:
+        >>> plot.mac(case).get_ylabel()
+        'measured mode: frequency, Hz'
     """
     if second is None:
         second = first.model if isinstance(first, Case) else first

@@ -47,6 +47,9 @@ def mode_shape(
 
     Raises:
         InputError: when there is no such mode, or too many nodes to draw.
+
+    Examples:
+        >>> plot.mode_shape(case, 2).get_figure().savefig("mode-2.svg")
     """
     check_kind(source, (Case, Model), "mode shapes on a structure")
     model = source.model if isinstance(source, Case) else source

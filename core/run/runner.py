@@ -57,6 +57,11 @@ def run_jobs(
     Raises:
         InputError: for two of one name, no worker, or a run that another process works on.
         ModelError: when the nominal model of a case cannot be solved.
+
+    Examples:
+        >>> done = results.run_jobs([case], [femubench.strategies["unchanged"]])
+        >>> [one.status for one in done.results]
+        ['ok']
     """
     workers = worker_count(jobs)
     _check_names("case", [case.name for case in cases])

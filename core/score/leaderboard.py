@@ -65,6 +65,10 @@ def leaderboard(run: Run) -> pd.DataFrame:
 
     Arguments:
         run: with `reference`, `seeds`, `seed` and `strategies` in its meta.
+
+    Examples:
+        >>> results.leaderboard(run)[["rank", "strategy"]].values.tolist()
+        [[1, 'global'], [2, 'unchanged']]
     """
     import pandas as pd
 

@@ -59,6 +59,11 @@ def ranked(
     Arguments:
         key: tier, score and name; the tier counts first, then the score, less being better. The
             name orders those that share a rank.
+
+    Examples:
+        >>> skills = {"b": 1.0, "a": 1.0, "c": 2.0}
+        >>> results.ranked(skills, lambda name: ((), skills[name], name))
+        [(1, 'a'), (1, 'b'), (3, 'c')]
     """
     keyed = sorted(((key(item), item) for item in items), key=lambda pair: pair[0])
     groups: list[list[tuple[str, _Item]]] = []
@@ -91,6 +96,10 @@ def rank_results(
             them. None keeps the scores that the results have; one that has none scores against
             the result of the baseline in the same case and seed, or 10 where there is none.
         baseline: name of the strategy that leaves the model as it is, where one ran.
+
+    Examples:
+        >>> [(one.strategy, one.rank) for one in results.rank_results(run.results)]
+        [('unchanged', 2), ('global', 1)]
     """
     listed = tuple(results)
     given = {

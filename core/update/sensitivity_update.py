@@ -201,6 +201,13 @@ def sensitivity_update(
         Diverged: when a parameter leaves the range in which it makes sense.
 
     Source: Horton, Gurgenci, Veidt & Friswell (1999), equations (1)-(4).
+
+    Examples:
+        >>> fitted = update.sensitivity_update(
+        ...     structure, [update.global_stiffness(structure)], measurement
+        ... )
+        >>> round(fitted.parameters[0].after, 2)
+        0.86
     """
     if not unknowns:
         raise NotApplicable("there is no parameter to update")
