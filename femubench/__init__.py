@@ -18,11 +18,12 @@ The example of every function starts from these lines:
 >>> stiffness = fem.Parameter("E", "E", update.all_elements(structure))
 >>> joints = update.joint_groups(frame)
 >>> joint = update.joint_stiffness(structure, joints[0])
->>> result = femubench.strategies["global"].update(model, measurement, None)
->>> run = femubench.rank(case, ["unchanged", "global"])
->>> found = femubench.diagnose(case, "torsion-constant", pairs=False)
->>> torsion = [femubench.effects["torsion-constant"]]
->>> examination = diagnosis.examine(model, measurement, torsion, tolerance=0.005)
+>>> nominal, scaled = femubench.strategies["unchanged"], femubench.strategies["global"]
+>>> result = scaled.update(model, measurement, None)
+>>> run = femubench.rank(case, [nominal, scaled])
+>>> torsion = femubench.effects["torsion-constant"]
+>>> found = femubench.diagnose(case, torsion, pairs=False)
+>>> examination = diagnosis.examine(model, measurement, [torsion], tolerance=0.005)
 """
 
 from __future__ import annotations

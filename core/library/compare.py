@@ -49,7 +49,7 @@ def compare(
         InputError: when a run cannot be found, or they have no job in common.
 
     Examples:
-        >>> femubench.compare(run, against=("unchanged", "global")).worse
+        >>> femubench.compare(run, against=(nominal.name, scaled.name)).worse
         False
     """
     one = read_run(before, store)

@@ -50,8 +50,8 @@ def diagnose(
         ModelError: when the model has no modes.
 
     Examples:
-        >>> femubench.diagnose(case, ["torsion-constant"], pairs=False).causes[0].effect
-        'torsion-constant'
+        >>> femubench.diagnose(case, torsion, pairs=False).causes[0].effect == torsion.name
+        True
     """
     if output is not None:
         check_new(Path(output))

@@ -69,7 +69,7 @@ def check(
         PluginError: when an object is no strategy.
 
     Examples:
-        >>> all(finding.verdict.status == "pass" for finding in femubench.check("frame-solid"))
+        >>> all(finding.verdict.status == "pass" for finding in femubench.check(case.name))
         True
     """
     plugins = usable_plugins()

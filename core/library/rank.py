@@ -210,8 +210,8 @@ def rank(
         InputError: for an unknown name, an option that does not exist, or a faulty case.
 
     Examples:
-        >>> femubench.rank("frame", ["unchanged", "physical"]).leaderboard["strategy"].tolist()
-        ['physical', 'unchanged']
+        >>> femubench.rank(case, [nominal, scaled]).leaderboard["skill"].round(2).tolist()
+        [0.34, 1.0]
     """
     kept = None if store is None else store_in(store)
     plan = plan_of(
@@ -347,8 +347,8 @@ def read_run(
 
     Examples:
         >>> file = femubench.report(run, "results.json")
-        >>> femubench.read_run(file).leaderboard["strategy"].tolist()
-        ['global', 'unchanged']
+        >>> femubench.read_run(file).leaderboard["skill"].round(2).tolist()
+        [0.34, 1.0]
     """
     if isinstance(run, results.Run):
         return Run.of(run)

@@ -47,7 +47,7 @@ def receptance(
         InputError: when there is no such sensor or modification, or no measured shape.
 
     Examples:
-        >>> plot.receptance(case, {"global": result}).get_ylabel()
+        >>> plot.receptance(case, {scaled.name: result}).get_ylabel()
         'receptance at 9Z, dB re 1 m/N'
     """
     check_kind(case, (Case,), "receptance")

@@ -183,7 +183,7 @@ def registered_effects() -> tuple[Effect, ...]:
     """Return every effect that plugins offer, the built-in ones first.
 
     Examples:
-        >>> "torsion-constant" in [one.name for one in diagnosis.registered_effects()]
+        >>> torsion.name in [one.name for one in diagnosis.registered_effects()]
         True
     """
     return tuple(load_plugins().effects.values())

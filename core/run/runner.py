@@ -59,13 +59,11 @@ def run_jobs(
         ModelError: when the nominal model of a case cannot be solved.
 
     Examples:
-        >>> done = results.run_jobs([case], [femubench.strategies["unchanged"]])
-        >>> [one.status for one in done.results]
-        ['ok']
+        >>> results.run_jobs([case], [nominal]).results[0].status
+        'ok'
     """
     workers = worker_count(jobs)
-    _check_names("case", [case.name for case in cases])
-    _check_names("strategy", [strategy.name for strategy in strategies])
+    _check_names(case=cases, strategy=strategies)
     share = memory_share(workers) if memory is None else memory
     limits = {s.name: Limits((timeouts or {}).get(s.name, timeout), share) for s in strategies}
     settings: dict[str, Any] = {"seed": run_seed, "jobs": workers, "timeout": timeout}
@@ -98,7 +96,9 @@ def worker_count(jobs: int | None) -> int:
     return jobs
 
 
-def _check_names(kind: str, names: Sequence[str]) -> None:
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise InputError(f"{kind} {twice[0]!r} is there twice", expected="every name once")
+def _check_names(**given: Sequence[Case] | Sequence[Strategy]) -> None:
+    for kind, things in given.items():
+        names = [thing.name for thing in things]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise InputError(f"{kind} {twice[0]!r} is there twice", expected="every name once")

@@ -67,8 +67,8 @@ def leaderboard(run: Run) -> pd.DataFrame:
         run: with `reference`, `seeds`, `seed` and `strategies` in its meta.
 
     Examples:
-        >>> results.leaderboard(run)[["rank", "strategy"]].values.tolist()
-        [[1, 'global'], [2, 'unchanged']]
+        >>> results.leaderboard(run)[["rank", "skill"]].round(2).values.tolist()
+        [[1.0, 0.34], [2.0, 1.0]]
     """
     import pandas as pd
 

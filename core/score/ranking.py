@@ -98,8 +98,8 @@ def rank_results(
         baseline: name of the strategy that leaves the model as it is, where one ran.
 
     Examples:
-        >>> [(one.strategy, one.rank) for one in results.rank_results(run.results)]
-        [('unchanged', 2), ('global', 1)]
+        >>> [(round(one.score, 2), one.rank) for one in results.rank_results(run.results)]
+        [(1.0, 2), (0.34, 1)]
     """
     listed = tuple(results)
     given = {

@@ -155,7 +155,7 @@ def tell_apart(run: Run, order: Sequence[str]) -> Groups:
         order: the strategies, best first.
 
     Examples:
-        >>> results.tell_apart(run, ["global", "unchanged"]).groups
+        >>> results.tell_apart(run, [scaled.name, nominal.name]).groups
         ()
     """
     columns: dict[str, list[JobResult]] = {name: [] for name in order}

@@ -203,9 +203,8 @@ def sensitivity_update(
     Source: Horton, Gurgenci, Veidt & Friswell (1999), equations (1)-(4).
 
     Examples:
-        >>> fitted = update.sensitivity_update(
-        ...     structure, [update.global_stiffness(structure)], measurement
-        ... )
+        >>> factor = update.global_stiffness(structure)
+        >>> fitted = update.sensitivity_update(structure, [factor], measurement)
         >>> round(fitted.parameters[0].after, 2)
         0.86
     """
