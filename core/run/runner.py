@@ -77,9 +77,8 @@ def run_jobs(
         meta, known = recorded(stack, store, meta, overwrite, resume)
         ending = stack.enter_context(ended(store, meta["run"]))
         results = Results(slots, store, meta["run"], progress)
-        wanted = results.keep(known)
-        for index, result in computed(slots, wanted, references, limits, workers, results.shelf):
-            results.add(index, result)
+        for one in computed(slots, results.keep(known), references, limits, workers, results.shelf):
+            results.add(*one)
     return Run({**meta, **ending}, rank_results(results.in_order(), meta["reference"]))
 
 
