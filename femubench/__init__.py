@@ -3,6 +3,27 @@
 What a user calls is a name of this module; what an author of a strategy, an effect or a report
 needs besides is in `femubench.fem`, `.modal`, `.update`, `.effect`, `.diagnosis`, `.results`,
 `.reproduction`. Names are imported on first use, so that ``import femubench`` costs nothing.
+
+The example of every function starts from these lines:
+
+>>> import numpy as np
+>>> import femubench
+>>> from femubench import diagnosis, effect, fem, modal, plot, reproduction, results, update
+>>> case = femubench.cases["frame"]
+>>> model, measurement = case.model, case.used_measurement()
+>>> structure = model.frame_structure
+>>> frame, properties = structure.frame, structure.properties
+>>> readings = model.observe(measurement.sensors)
+>>> modes = femubench.solve_modes(model)
+>>> stiffness = fem.Parameter("E", "E", update.all_elements(structure))
+>>> joints = update.joint_groups(frame)
+>>> joint = update.joint_stiffness(structure, joints[0])
+>>> nominal, scaled = femubench.strategies["unchanged"], femubench.strategies["global"]
+>>> result = scaled.update(model, measurement, None)
+>>> run = femubench.rank(case, [nominal, scaled])
+>>> torsion = femubench.effects["torsion-constant"]
+>>> found = femubench.diagnose(case, torsion, pairs=False)
+>>> examination = diagnosis.examine(model, measurement, [torsion], tolerance=0.005)
 """
 
 from __future__ import annotations

@@ -74,6 +74,10 @@ def read_case(
 
     Raises:
         InputError: for anything wrong in the folder.
+
+    Examples:
+        >>> femubench.read_case(case.folder).used
+        (1, 2, 3)
     """
     files = CaseFiles(Path(folder), links=installed)
     text = read_text(files.case_file, LARGEST_CASE)

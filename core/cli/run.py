@@ -69,9 +69,7 @@ if TYPE_CHECKING:
     "--locked", metavar="RUN",
     help="Repeat a stored run and report differences; exit 1 if a result differs.",
 )  # fmt: skip
-@click.option(
-    "--strict-plugins", is_flag=True, help="Stop with exit code 2 if a plugin is broken."
-)
+@click.option("--strict-plugins", is_flag=True, help="Stop with exit code 2 if a plugin is broken.")
 @options.json_file("Write the results as JSON.")
 @click.option(
     "--csv", "csv_file", type=options.OUTPUT, metavar="FILE", help="Write one line per job as CSV."

@@ -242,7 +242,12 @@ _TIED, _PLACES = 0.1, 6
 
 
 def extended_by(model: Model, explanation: Explanation) -> Model:
-    """Return the model with textbook effects and causes in it."""
+    """Return the model with textbook effects and causes in it.
+
+    Examples:
+        >>> diagnosis.extended_by(model, examination.best).size == model.size
+        True
+    """
     base = extended(model, explanation.base.parts, explanation.base.x)
     return extended(base, explanation.parts, explanation.fit.state.x)
 

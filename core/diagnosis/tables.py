@@ -52,6 +52,12 @@ def causes_in(explanation: Explanation, share: float, earned: frozenset[str]) ->
         explanation: fitted.
         share: probability of the name and, within it, of these places.
         earned: textbook effects that are part of the name.
+
+    Examples:
+        >>> best = examination.best
+        >>> (cause,) = diagnosis.causes_in(best, 1.0, frozenset(best.base.names))
+        >>> cause.effect == torsion.name
+        True
     """
     causes = []
     book = {part.hypothesis.name: part.hypothesis for part in explanation.base.parts}

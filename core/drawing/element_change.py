@@ -77,6 +77,10 @@ def element_norms(structure: Structure, matrices: FloatArray) -> FloatArray:
     Arguments:
         structure: whose elements they belong to.
         matrices: (n, 12, 12).
+
+    Examples:
+        >>> results.element_norms(structure, fem.stiffness_matrices(properties)).shape
+        (28,)
     """
     return np.asarray(np.linalg.norm(_scaled(structure, matrices), axis=(1, 2)))
 
@@ -181,6 +185,10 @@ def stiffness_difference(nominal: Model, updated: Model) -> FloatArray:
 
     Arguments:
         nominal, updated: small models on the same dofs.
+
+    Examples:
+        >>> results.stiffness_difference(model, result.model).shape
+        (81, 81)
     """
     scale, unit = _one_unit(nominal), np.eye(nominal.size)
     change = nominal.stiffness_times(unit) - updated.stiffness_times(unit)

@@ -169,6 +169,10 @@ def wireframe_of(source: Case | Model) -> Wireframe:
 
     Arguments:
         source: a case has sensors, a model has none.
+
+    Examples:
+        >>> len(plot.wireframe_of(case).members)
+        7
     """
     model = source.model if isinstance(source, Case) else source
     sensors = _sensors(source.measurement.sensors) if isinstance(source, Case) else ()

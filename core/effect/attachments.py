@@ -33,6 +33,10 @@ def point_in(model: Model, place: str) -> Place:
 
     Raises:
         ModelError: when there is no such point.
+
+    Examples:
+        >>> effect.point_in(model, "rung-middle@0.5").s
+        0.5
     """
     if model.structure is None:
         return Place(joint=split_direction(place)[0])
@@ -46,6 +50,10 @@ def directed_point(source: Frame | Model, place: str) -> tuple[Place, str]:
 
     Raises:
         ModelError: when there is no such point, or the direction is missing.
+
+    Examples:
+        >>> effect.directed_point(frame, "J1")[1]
+        'z'
     """
     frame: Frame | None
     if isinstance(source, Frame):
@@ -65,6 +73,10 @@ def directed_places(model: Model, points: Sequence[str]) -> tuple[str, ...]:
 
     Arguments:
         points: words of `point_places`.
+
+    Examples:
+        >>> effect.directed_places(model, ["J1", "rung-middle@0.5"])
+        ('J1', 'rung-middle@0.5')
     """
     structure = model.structure
     if structure is not None and structure.frame.plane == "out-of-plane":
@@ -82,6 +94,10 @@ def point_motion(model: Model, at: Place) -> SparseArray:
 
     Raises:
         ModelError: when there is no such place.
+
+    Examples:
+        >>> effect.point_motion(model, fem.Place(joint="J1")).shape
+        (6, 81)
     """
     return once_for(model, ("motion", at), lambda: _point_motion(model, at))
 
@@ -112,6 +128,10 @@ def free_translations(model: Model, at: Place) -> tuple[str, ...]:
 
     Raises:
         ModelError: when there is no such place.
+
+    Examples:
+        >>> effect.free_translations(model, fem.Place(joint="J1"))
+        ('z',)
     """
     return once_for(model, ("free", at), lambda: _free_translations(model, at))
 
@@ -130,6 +150,10 @@ def translation_rows(model: Model, at: Place, directions: Sequence[str]) -> Spar
 
     Raises:
         ModelError: when there is no such place.
+
+    Examples:
+        >>> effect.translation_rows(model, fem.Place(joint="J1"), ["z"]).shape
+        (1, 81)
     """
     # Picking rows by hand takes a tenth of the time, and there is a point for every hypothesis.
     motion = point_motion(model, at)
@@ -146,6 +170,10 @@ def mass_term(model: Model, places: Sequence[Place]) -> Term:
 
     Raises:
         ModelError: when there is no such place.
+
+    Examples:
+        >>> effect.mass_term(model, [fem.Place(joint="J1")]).matrix
+        'mass'
     """
     rows = [translation_rows(model, at, free_translations(model, at)) for at in places]
     together = rows[0] if len(rows) == 1 else sp.csr_array(sp.vstack(rows))
@@ -157,6 +185,10 @@ def elongation_row(model: Model, ends: tuple[str, str]) -> SparseArray:
 
     Raises:
         ModelError: when there are no such joints, or they lie at one point.
+
+    Examples:
+        >>> effect.elongation_row(model, ("J1", "J7")).shape
+        (1, 81)
     """
     frame = model.frame_structure.frame
     first, last = (Place(joint=name) for name in ends)
@@ -174,6 +206,10 @@ def with_extra(rows: SparseArray, extra: Sequence[float]) -> SparseArray:
     Arguments:
         rows: sparse (p, n).
         extra: what each row has there, (p,).
+
+    Examples:
+        >>> effect.with_extra(readings[:1], [-1.0]).shape
+        (1, 82)
     """
     count, size = rows.shape
     data = np.insert(rows.data, rows.indptr[1:], extra)
@@ -183,7 +219,12 @@ def with_extra(rows: SparseArray, extra: Sequence[float]) -> SparseArray:
 
 
 def total_mass(model: Model) -> float:
-    """Return the mass of the whole structure in kg."""
+    """Return the mass of the whole structure in kg.
+
+    Examples:
+        >>> round(effect.total_mass(model), 3)
+        1.214
+    """
     return model.total_mass
 
 
@@ -192,6 +233,10 @@ def elastic_band(model: Model) -> FloatArray:
 
     Raises:
         ModelError: when the model has no elastic mode.
+
+    Examples:
+        >>> print(effect.elastic_band(model).round())
+        [ 256.  278.  581.  911. 1049. 1318.]
     """
     return once_for(model, "band", lambda: _elastic_band(model))
 

@@ -133,13 +133,24 @@ class Change:
 
 
 def proportional(*terms: Term, neutral: float = 0.0) -> Change:
-    """Return a change that grows with the distance of one value from its neutral one."""
+    """Return a change that grows with the distance of one value from its neutral one.
+
+    Examples:
+        >>> mass = effect.proportional(effect.mass_term(model, [fem.Place(joint="J1")]))
+        >>> print(mass.coefficients(np.array([[0.5]])))
+        [[0.5]]
+    """
     count = len(terms)
     return Change(terms, lambda values: np.repeat(values[:, :1] - neutral, count, axis=1))
 
 
 def chebyshev_nodes(low: float, high: float, count: int) -> FloatArray:
-    """Return the Chebyshev points of the second kind between two bounds, ascending, (count,)."""
+    """Return the Chebyshev points of the second kind between two bounds, ascending, (count,).
+
+    Examples:
+        >>> print(effect.chebyshev_nodes(0.0, 2.0, 3))
+        [0. 1. 2.]
+    """
     return 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.pi * np.arange(count) / (count - 1))
 
 
@@ -149,6 +160,11 @@ def barycentric(nodes: FloatArray, points: FloatArray) -> FloatArray:
     Arguments:
         nodes: Chebyshev points of the second kind, (n_nodes,).
         points: where to evaluate, (n_points,).
+
+    Examples:
+        >>> nodes = effect.chebyshev_nodes(0.0, 2.0, 4)
+        >>> np.allclose(effect.barycentric(nodes, np.array([0.7])) @ nodes**3, 0.7**3)
+        True
     """
     weight = (-1.0) ** np.arange(len(nodes))
     weight[[0, -1]] *= 0.5
@@ -162,5 +178,10 @@ def barycentric(nodes: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def sparse_term(matrix: Literal["mass", "stiffness"], change: SparseArray) -> Term:
-    """Return a term of a sparse matrix."""
+    """Return a term of a sparse matrix.
+
+    Examples:
+        >>> effect.sparse_term("stiffness", model.stiffness).matrix
+        'stiffness'
+    """
     return Term(matrix, MatrixOperator(sp.csr_array(change)))

@@ -51,6 +51,11 @@ def rate_nodes(rates: FloatArray) -> tuple[FloatArray, FloatArray]:
     Returns:
         nodes (q,) and weights (k, q): f(rates) = weights @ f(nodes), exactly for up to 24
         different rates, else to about 1e-6 of the largest share over a range of 1:1000.
+
+    Examples:
+        >>> nodes, weights = effect.rate_nodes(np.array([1.0, 2.0, 5.0]))
+        >>> np.allclose(weights @ nodes, [1.0, 2.0, 5.0])
+        True
     """
     if not len(rates):
         return np.zeros(0), np.zeros((0, 0))
@@ -86,6 +91,10 @@ def end_arm(structure: Structure, end: str) -> float:
 
     Half the depth of the crossing member, as far as the end element has room for it; 0 behind a
     spring that is there already.
+
+    Examples:
+        >>> round(effect.end_arm(structure, "rung-middle@J5"), 4)
+        0.0127
     """
     frame = structure.frame
     member, _, joint = end.rpartition("@")
@@ -108,6 +117,11 @@ def flexible_ends_change(
         ends: ``member@joint``.
         parts: for every value of the change, the local directions of its springs. The values are
             stiffnesses in N m/rad, infinite for rigid connections, of which the arms remain.
+
+    Examples:
+        >>> change = effect.flexible_ends_change(model, ["rung-middle@J5"], [("rx", "ry")])
+        >>> sorted({term.matrix for term in change.terms})
+        ['mass', 'stiffness']
     """
     structure = model.frame_structure
     rows = np.array(sorted({structure.element_ends[end][0] for end in ends}), dtype=np.int64)

@@ -37,6 +37,10 @@ def elements_of(structure: Structure, place: str, *, arms: bool = False) -> IntA
 
     Raises:
         ModelError: when there is no such place.
+
+    Examples:
+        >>> print(effect.elements_of(structure, "rung-middle"))
+        [24 25 26 27]
     """
     mesh, frame = structure.mesh, structure.frame
     plain = np.isnan(mesh.arm_factor)
@@ -57,28 +61,53 @@ def elements_of(structure: Structure, place: str, *, arms: bool = False) -> IntA
 
 
 def member_labels(frame: Frame) -> tuple[str, ...]:
-    """Return the names of the members."""
+    """Return the names of the members.
+
+    Examples:
+        >>> effect.member_labels(frame)[:2]
+        ('rung-right', 'front-right')
+    """
     return tuple(member.name for member in frame.members)
 
 
 def element_labels(frame: Frame) -> tuple[str, ...]:
-    """Return ``member/k`` of every element."""
+    """Return ``member/k`` of every element.
+
+    Examples:
+        >>> effect.element_labels(frame)[:2]
+        ('rung-right/1', 'rung-right/2')
+    """
     return tuple(f"{m.name}/{k}" for m in frame.members for k in range(1, m.elements + 1))
 
 
 def member_length(frame: Frame, member: str) -> float:
-    """Return the distance of a member's two joints in m."""
+    """Return the distance of a member's two joints in m.
+
+    Examples:
+        >>> round(effect.member_length(frame, "rung-middle"), 4)
+        0.2794
+    """
     first, last = frame.corners[frame.member_ends[frame.member_index[member]]]
     return float(np.linalg.norm(last - first))
 
 
 def joints_with_members(frame: Frame) -> tuple[str, ...]:
-    """Return the joints at which two members meet at least; a free end is none."""
+    """Return the joints at which two members meet at least; a free end is none.
+
+    Examples:
+        >>> effect.joints_with_members(frame)
+        ('J1', 'J3', 'J5', 'J7', 'J9', 'J11')
+    """
     return tuple(joint.name for joint in frame.joints if len(frame.ends_at(joint.name)) > 1)
 
 
 def joint_types(frame: Frame) -> Mapping[str, tuple[str, ...]]:
-    """Return from every joint type to its joints, free ends and joints without type left out."""
+    """Return from every joint type to its joints, free ends and joints without type left out.
+
+    Examples:
+        >>> dict(effect.joint_types(frame))
+        {'L': ('J1', 'J3', 'J7', 'J9'), 'T': ('J5', 'J11')}
+    """
     types: dict[str, tuple[str, ...]] = {}
     for name in joints_with_members(frame):
         kind = frame.joint(name).type
@@ -88,17 +117,32 @@ def joint_types(frame: Frame) -> Mapping[str, tuple[str, ...]]:
 
 
 def type_place(frame: Frame, type: str) -> str:
-    """Return the place of a joint type: ``type:L`` where a joint has that name, else ``L``."""
+    """Return the place of a joint type: ``type:L`` where a joint has that name, else ``L``.
+
+    Examples:
+        >>> effect.type_place(frame, "L")
+        'L'
+    """
     return f"{_TYPE}{type}" if type in frame.joint_index else type
 
 
 def type_places(frame: Frame) -> tuple[str, ...]:
-    """Return the places of the joint types with two joints at least; else the joint says it."""
+    """Return the places of the joint types with two joints at least; else the joint says it.
+
+    Examples:
+        >>> effect.type_places(frame)
+        ('L', 'T')
+    """
     return tuple(type_place(frame, kind) for kind, names in joint_types(frame).items() if names[1:])
 
 
 def joints_of(frame: Frame, place: str) -> tuple[str, ...]:
-    """Return the joints of a joint or a joint type; nothing where the place is neither."""
+    """Return the joints of a joint or a joint type; nothing where the place is neither.
+
+    Examples:
+        >>> effect.joints_of(frame, "T")
+        ('J5', 'J11')
+    """
     if place in frame.joint_index:
         return (place,)
     return joint_types(frame).get(place.removeprefix(_TYPE), ())
@@ -108,6 +152,10 @@ def end_places(frame: Frame) -> tuple[str, ...]:
     """Return the ``member@joint`` ends at joints of three members or more.
 
     At a joint of two, a flexible end and a flexible joint are the same.
+
+    Examples:
+        >>> effect.end_places(frame)[:2]
+        ('front-right@J5', 'front-left@J5')
     """
     return tuple(
         f"{member}@{joint}"
@@ -122,6 +170,10 @@ def branch_places(frame: Frame) -> tuple[str, ...]:
 
     A member that passes is continuous; what turns is the end that is welded to its face. Types
     with one such end are left out: the end says it.
+
+    Examples:
+        >>> effect.branch_places(frame)
+        ('T:branch',)
     """
     return tuple(
         type_place(frame, group.type) + _BRANCH
@@ -135,6 +187,10 @@ def ends_of(frame: Frame, place: str) -> tuple[str, ...]:
 
     Raises:
         ModelError: when there is no such place.
+
+    Examples:
+        >>> effect.ends_of(frame, "J5")
+        ('front-right@J5', 'front-left@J5', 'rung-middle@J5')
     """
     if place.endswith(_BRANCH):
         kind = place.removesuffix(_BRANCH).removeprefix(_TYPE)
@@ -152,7 +208,12 @@ def ends_of(frame: Frame, place: str) -> tuple[str, ...]:
 
 
 def split_direction(place: str) -> tuple[str, str | None]:
-    """Return a place without its suffix ``:z``, and the direction; None where it has none."""
+    """Return a place without its suffix ``:z``, and the direction; None where it has none.
+
+    Examples:
+        >>> effect.split_direction("rung-middle@0.5:z")
+        ('rung-middle@0.5', 'z')
+    """
     head, _, tail = place.rpartition(":")
     # "type:x" is the joint type x.
     if head and head != _TYPE[:-1] and tail.lstrip("+-") in DIRECTIONS:
@@ -165,6 +226,10 @@ def point_of(frame: Frame, place: str) -> Place:
 
     Raises:
         ModelError: when there is no such point.
+
+    Examples:
+        >>> effect.point_of(frame, "rung-middle@0.25").s
+        0.25
     """
     place, _ = split_direction(place)
     if place in frame.joint_index:
@@ -188,6 +253,10 @@ def point_places(model: Model) -> tuple[str, ...]:
 
     A member of up to four elements offers its mesh nodes, a longer one those nearest to its
     quarter points; a model that came as matrices offers its nodes.
+
+    Examples:
+        >>> effect.point_places(model)[-3:]
+        ('rung-middle@0.25', 'rung-middle@0.5', 'rung-middle@0.75')
     """
     if model.structure is None:
         return model.geometry.names if isinstance(model.geometry, MatrixGeometry) else ()
@@ -205,6 +274,10 @@ def pair_of(frame: Frame, place: str) -> tuple[str, str]:
 
     Raises:
         ModelError: when there is no such pair.
+
+    Examples:
+        >>> effect.pair_of(frame, "J1-J7")
+        ('J1', 'J7')
     """
     words = place.split("-")
     for cut in range(1, len(words)):

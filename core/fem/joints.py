@@ -78,6 +78,10 @@ def joint_groups(frame: Frame, *, merged: bool = False) -> tuple[JointGroup, ...
     Arguments:
         frame: any frame; an end without a second member is no joint.
         merged: take all joints for one type.
+
+    Examples:
+        >>> [group.name for group in update.joint_groups(frame)]
+        ['L', 'T through', 'T branch']
     """
     found: dict[tuple[str, str], list[str]] = {}
     for joint in frame.joints:
@@ -99,6 +103,10 @@ def groups_within(frame: Frame, count: int, *, passing: bool = True) -> tuple[Jo
 
     Raises:
         NotApplicable: when the frame has no joint.
+
+    Examples:
+        >>> [group.name for group in update.groups_within(frame, 3)]
+        ['L', 'T through', 'T branch']
     """
     groups = joint_groups(frame)
     if not groups:
@@ -111,7 +119,12 @@ def groups_within(frame: Frame, count: int, *, passing: bool = True) -> tuple[Jo
 
 
 def all_elements(structure: Structure) -> tuple[str, ...]:
-    """Return the label of every element that is no arm of a joint."""
+    """Return the label of every element that is no arm of a joint.
+
+    Examples:
+        >>> update.all_elements(structure)[:3]
+        ('rung-right/1', 'rung-right/2', 'rung-right/3')
+    """
     return tuple(dict.fromkeys(label for label in structure.labels if label))
 
 
@@ -127,6 +140,10 @@ def flexible_ends(frame: Frame, group: JointGroup) -> tuple[str, ...]:
 
     At a joint of two members, a spring at one end or at the other is the same; with more, the
     first member stays tied to the joint so that the joint keeps its inertia.
+
+    Examples:
+        >>> update.flexible_ends(frame, joints[0])
+        ('back-right@J1', 'front-right@J3', 'rung-left@J7', 'back-left@J9')
     """
     taken = {f"{spring.member}@{spring.joint}" for spring in frame.joint_springs}
     ends = group.ends
@@ -150,6 +167,10 @@ def half_depth(frame: Frame, end: str) -> float:
 
     Of several, the one that stands squarest on it counts; a member that only continues it has no
     depth to offer, nor has one whose section was given as numbers.
+
+    Examples:
+        >>> round(update.half_depth(frame, "rung-middle@J5"), 4)
+        0.0127
     """
     name, _, joint = end.rpartition("@")
     members = _members_at(frame, joint)
@@ -170,7 +191,12 @@ def _element_length(structure: Structure, end: str) -> float:
 
 
 def available_length(structure: Structure, end: str) -> float:
-    """Return the longest arm or rigid length that the element at a member end can take in m."""
+    """Return the longest arm or rigid length that the element at a member end can take in m.
+
+    Examples:
+        >>> round(update.available_length(structure, "rung-middle@J5"), 4)
+        0.0629
+    """
     element = structure.element_ends[end][0]
     both = sum(index == element for index, _ in structure.element_ends.values())
     return _LARGEST_SHARE * _element_length(structure, end) / both
@@ -183,6 +209,10 @@ def spring_estimates(frame: Frame, ends: tuple[str, ...]) -> dict[str, float]:
     ends.
 
     Source: Horton et al. (1999), section 7; GJ/L by analogy.
+
+    Examples:
+        >>> list(update.spring_estimates(frame, ("rung-middle@J5",)))
+        ['z', 'rx', 'ry']
     """
     members = {member.name: member for member in frame.members}
     rows = []
@@ -221,6 +251,11 @@ def with_joint_springs(
         arm_factor: the arm's rigidities in those of the member; None for a rigid arm.
 
     Source: Horton et al. (1999), section 3.1.
+
+    Examples:
+        >>> springs = {"rung-middle@J5": {"rx": 1e4, "ry": 1e4}}
+        >>> len(update.with_joint_springs(structure, springs).frame.joint_springs)
+        1
     """
     springs = []
     for end, values in stiffness.items():
@@ -242,6 +277,10 @@ def with_rigid_ends(structure: Structure, lengths: Mapping[str, tuple[float, flo
             matrix, in m.
 
     Source: Horton et al. (1999), section 3.2, equation (5).
+
+    Examples:
+        >>> len(update.with_rigid_ends(structure, {"rung-middle@J5": (0.01, 0.0)}).frame.rigid_ends)
+        1
     """
     rigid = []
     for end, (a, a0) in lengths.items():

@@ -238,6 +238,10 @@ def preload_stiffness(structure: MeshedFrame, member: str, force: float) -> Spar
 
     Raises:
         ModelError: when the member is unknown or the frame is not redundant there.
+
+    Examples:
+        >>> fem.preload_stiffness(structure, "rung-middle", 100.0).shape
+        (81, 81)
     """
     return force * preload_stiffnesses(structure, [member])[0]
 
@@ -251,6 +255,11 @@ def preload_stiffnesses(structure: MeshedFrame, members: Sequence[str]) -> tuple
 
     Raises:
         ModelError: when a member is unknown or the frame is not redundant there.
+
+    Examples:
+        >>> unit, _ = fem.preload_stiffnesses(structure, ["rung-middle", "rung-left"])
+        >>> unit.shape
+        (81, 81)
     """
     states = [statics_of(structure).state(member) for member in members]
     count = len(structure.mesh.ends)
@@ -282,7 +291,12 @@ def _geometric(structure: MeshedFrame, states: Sequence[StressState]) -> FloatAr
 
 
 def redundant_members(structure: MeshedFrame) -> tuple[str, ...]:
-    """Return the members whose lack of fit the rest of the frame resists, in the frame's order."""
+    """Return the members whose lack of fit the rest of the frame resists, in the frame's order.
+
+    Examples:
+        >>> len(fem.redundant_members(structure))
+        7
+    """
     try:
         resisting = statics_of(structure).resisting()
     except ModelError:

@@ -40,7 +40,12 @@ class Section:
 
 
 def constant_kappa(value: float) -> ShearCoefficients:
-    """Return a shear coefficient that is the same along both axes and for every material."""
+    """Return a shear coefficient that is the same along both axes and for every material.
+
+    Examples:
+        >>> fem.constant_kappa(0.44)(0.33)
+        (0.44, 0.44)
+    """
     return partial(_constant, value)
 
 
@@ -54,6 +59,10 @@ def bredt(b: float, h: float, wall: float) -> float:
     Arguments:
         b, h: centre-line width and height in m.
         wall: wall thickness in m.
+
+    Examples:
+        >>> round(fem.bredt(0.1, 0.05, 0.002) * 1e12)
+        666667
     """
     return 2.0 * wall * (b * h) ** 2 / (b + h)
 
@@ -92,7 +101,12 @@ def _circle_kappa(ratio: float, nu: float) -> tuple[float, float]:
 
 
 def rectangular_tube(width: float, height: float, wall: float) -> Section:
-    """Return a tube with sharp corners; sizes are outer sizes in m."""
+    """Return a tube with sharp corners; sizes are outer sizes in m.
+
+    Examples:
+        >>> round(fem.rectangular_tube(0.0254, 0.0254, 0.00238).A * 1e6, 1)
+        219.2
+    """
     inner_w, inner_h = width - 2 * wall, height - 2 * wall
     iy = (width * height**3 - inner_w * inner_h**3) / 12
     iz = (height * width**3 - inner_h * inner_w**3) / 12
@@ -111,7 +125,12 @@ def rectangular_tube(width: float, height: float, wall: float) -> Section:
 
 
 def solid_rectangle(width: float, height: float) -> Section:
-    """Return a solid rectangle; sizes in m."""
+    """Return a solid rectangle; sizes in m.
+
+    Examples:
+        >>> round(fem.solid_rectangle(0.02, 0.01).A * 1e6, 1)
+        200.0
+    """
     iy, iz = width * height**3 / 12, height * width**3 / 12
     return Section(
         A=width * height,
@@ -127,7 +146,12 @@ def solid_rectangle(width: float, height: float) -> Section:
 
 
 def round_tube(diameter: float, wall: float) -> Section:
-    """Return a circular tube; `wall` of half the diameter makes it solid; sizes in m."""
+    """Return a circular tube; `wall` of half the diameter makes it solid; sizes in m.
+
+    Examples:
+        >>> round(fem.round_tube(0.02, 0.01).A * 1e6, 1)
+        314.2
+    """
     outer, inner = diameter / 2, diameter / 2 - wall
     second = np.pi / 4 * (outer**4 - inner**4)
     return Section(

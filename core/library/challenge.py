@@ -89,6 +89,10 @@ def challenge(
 
     Raises:
         InputError: when the folder is not empty, the truth exists, or nothing can be drawn.
+
+    Examples:
+        >>> femubench.challenge("blind", seed=3, hidden="none").folder.name
+        'blind'
     """
     case, path = Path(folder), Path(folder, SEALED_FILE) if truth is None else Path(truth)
     if case.exists() and (not case.is_dir() or any(case.iterdir())):
@@ -128,6 +132,11 @@ def score_challenge(
 
     Raises:
         InputError: when case, truth or answer cannot be read, or do not belong together.
+
+    Examples:
+        >>> blind = femubench.challenge("blind", seed=3, hidden="none")
+        >>> femubench.score_challenge("blind", found).judgement.right  # it names a cause
+        False
     """
     given = Answer.of(answer) if isinstance(answer, Diagnosis) else read_answer(Path(answer))
     hidden, commitment = read_sealed(Path(folder, SEALED_FILE) if truth is None else Path(truth))

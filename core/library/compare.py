@@ -47,6 +47,10 @@ def compare(
 
     Raises:
         InputError: when a run cannot be found, or they have no job in common.
+
+    Examples:
+        >>> femubench.compare(run, against=(nominal.name, scaled.name)).worse
+        False
     """
     one = read_run(before, store)
     if after is None and against is None:

@@ -48,6 +48,10 @@ def diagnose(
     Raises:
         InputError: when the case or an effect is unknown, or the case lacks what it takes.
         ModelError: when the model has no modes.
+
+    Examples:
+        >>> femubench.diagnose(case, torsion, pairs=False).causes[0].effect == torsion.name
+        True
     """
     if output is not None:
         check_new(Path(output))

@@ -22,6 +22,10 @@ def init_case(folder: str | PathLike[str]) -> tuple[Path, ...]:
 
     Raises:
         InputError: when the folder holds anything, or cannot be written.
+
+    Examples:
+        >>> [path.name for path in femubench.init_case("my-structure")]
+        ['case.toml', 'sensors.csv', 'modes.csv', 'modified.csv']
     """
     return write_example(Path(folder))
 
@@ -38,6 +42,10 @@ def new_plugin(
 
     Raises:
         InputError: for a name that cannot be used, or a folder that cannot be written.
+
+    Examples:
+        >>> femubench.new_plugin("my-method")[0].parts[0]
+        'my-method'
     """
     return write_package(name, kind, Path(output), usable_plugins())
 
@@ -59,6 +67,10 @@ def check(
     Raises:
         InputError: when there is nothing of that name.
         PluginError: when an object is no strategy.
+
+    Examples:
+        >>> all(finding.verdict.status == "pass" for finding in femubench.check(case.name))
+        True
     """
     plugins = usable_plugins()
     name = plugin

@@ -27,6 +27,10 @@ def publish(
 
     Raises:
         InputError: for a file that is not sound, or a folder with something else in it.
+
+    Examples:
+        >>> len(femubench.publish("site", run).added)
+        1
     """
     from femubench.reports.publish_page import pages_of
 

@@ -204,6 +204,10 @@ def rank(
 
     Raises:
         InputError: for an unknown name, an option that does not exist, or a faulty case.
+
+    Examples:
+        >>> femubench.rank(case, [nominal, scaled]).leaderboard["skill"].round(2).tolist()
+        [0.34, 1.0]
     """
     kept = None if store is None else store_in(store)
     plan = plan_of(
@@ -336,6 +340,11 @@ def read_run(
 
     Raises:
         InputError: when there is no such run, or it cannot be read.
+
+    Examples:
+        >>> file = femubench.report(run, "results.json")
+        >>> femubench.read_run(file).leaderboard["skill"].round(2).tolist()
+        [0.34, 1.0]
     """
     if isinstance(run, results.Run):
         return Run.of(run)

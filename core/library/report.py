@@ -52,6 +52,10 @@ def report(
 
     Raises:
         InputError: when it cannot be read or written, or has no such style.
+
+    Examples:
+        >>> femubench.report(run, "page.html").name
+        'page.html'
     """
     path = None if file is None else Path(file)
     if path is not None:

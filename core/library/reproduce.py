@@ -30,6 +30,10 @@ def reproduce(
 
     Raises:
         InputError: for an unknown paper, or a folder that cannot be written.
+
+    Examples:
+        >>> len(femubench.reproduce())
+        2
     """
     if output is not None:
         check_can_make(Path(output))

@@ -20,6 +20,11 @@ def real_modes(shapes: NDArray[np.complex128], align_phase: bool = False) -> Flo
             the rule holds for any complex scale.
 
     Source: Ahmadian, Gladwell & Ismail (1997), section 3.
+
+    Examples:
+        >>> print(modal.real_modes(np.array([[3 + 4j], [-5 + 0j]])))
+        [[ 5.]
+         [-5.]]
     """
     values = np.asarray(shapes, dtype=np.complex128)
     if align_phase:

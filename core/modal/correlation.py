@@ -36,6 +36,12 @@ def mac(a: Any, b: Any) -> FloatArray:  # noqa: ANN401 - real or complex arrays
         b: the same sensors, (n_sensors, m_b) or (n_sensors,).
 
     Source: Allemang & Brown 1982, A correlation coefficient for modal vector analysis.
+
+    Examples:
+        >>> print(modal.mac(measurement.shapes, readings @ modes.shapes[:, [3, 4, 5]]).round(2))
+        [[0.98 0.05 0.  ]
+         [0.01 0.97 0.  ]
+         [0.   0.   1.  ]]
     """
     left, has_left = _filled(a)
     right, has_right = _filled(b)
@@ -48,7 +54,14 @@ def mac(a: Any, b: Any) -> FloatArray:  # noqa: ANN401 - real or complex arrays
 
 
 def auto_mac(shapes: Any) -> FloatArray:  # noqa: ANN401 - real or complex arrays
-    """Return the MAC of shapes with each other, (m, m): what the sensors can tell apart."""
+    """Return the MAC of shapes with each other, (m, m): what the sensors can tell apart.
+
+    Examples:
+        >>> print(modal.auto_mac(measurement.shapes).round(2))
+        [[1. 0. 0.]
+         [0. 1. 0.]
+         [0. 0. 1.]]
+    """
     return mac(shapes, shapes)
 
 
@@ -68,6 +81,10 @@ def modal_scale_factor(
         weights: W >= 0, e.g. 1/sigma^2, (n_sensors,) or (n_sensors, m); None for equal ones.
 
     Source: Allemang 1980, Investigation of some multiple input/output FRF techniques.
+
+    Examples:
+        >>> print(modal.modal_scale_factor([2.0, 4.0, np.nan], [1.0, 2.0, 3.0]))
+        [2.]
     """
     left, has_left = _columns(measured)
     right, has_right = _columns(predicted)

@@ -57,6 +57,12 @@ def expand_by_rotation(
         full: the same at all dofs, mass-normalised, (n, m).
 
     Source: Ahmadian, Gladwell & Ismail (1997), equations (16)-(17).
+
+    Examples:
+        >>> full = modes.shapes[:, [3, 4, 5]]
+        >>> shapes, rotation = modal.expand_by_rotation(measurement.shapes, readings @ full, full)
+        >>> np.allclose(rotation @ rotation.T, np.eye(3))
+        True
     """
     rotation = procrustes_rotation(same_length(measured, at_sensors), at_sensors)
     return np.asarray(full @ rotation.T), rotation
@@ -66,6 +72,11 @@ def expand_by_serep(measured: FloatArray, at_sensors: FloatArray, full: FloatArr
     """Return shapes at all dofs as least-squares combinations of analytical ones, (n, m).
 
     Source: O'Callahan, Avitabile & Riemer (1989), system equivalent reduction expansion process.
+
+    Examples:
+        >>> full = modes.shapes[:, :6]
+        >>> np.allclose(modal.expand_by_serep(readings @ full, readings @ full, full), full)
+        True
     """
     return np.asarray(full @ la.lstsq(at_sensors, measured)[0])
 
@@ -83,6 +94,13 @@ def expand_by_dynamics(
 
     Source: Ahmadian, Gladwell & Ismail (1997), equation (15). Displacements and rotations are
     scaled by the square root of the stiffness diagonal, so that the residual has one unit.
+
+    Examples:
+        >>> shapes = modal.expand_by_dynamics(
+        ...     model, readings, measurement.shapes, measurement.eigenvalues
+        ... )
+        >>> np.allclose(readings @ shapes, measurement.shapes)
+        True
     """
     mass, stiffness = dense_matrices(model)
     rows = np.asarray(sensor_rows.toarray())

@@ -28,6 +28,10 @@ def receptance(
         ModelError: at the very frequency of an undamped mode, such as 0 Hz of a free structure.
 
     Source: Ewins (2000), Modal Testing, (2.45): sum of phi_i phi_j / (lambda - w^2 + 2 i z w_r w).
+
+    Examples:
+        >>> modal.receptance(modes, readings, readings[:1], np.linspace(100.0, 300.0, 5)).shape
+        (5, 13, 1)
     """
     ratio = np.broadcast_to(np.nan_to_num(np.asarray(damping, dtype=float)), len(modes))
     out, into = response @ modes.shapes, excitation @ modes.shapes

@@ -74,6 +74,16 @@ def pair_modes(
         least_mac: smallest MAC of a pair.
         window: largest ratio of the two frequencies.
         window_without_shape: the same where shapes cannot be compared.
+
+    Examples:
+        >>> pairs = modal.pair_modes(
+        ...     measurement.frequencies,
+        ...     measurement.shapes,
+        ...     modes.natural_frequencies[:8],
+        ...     readings @ modes.shapes[:, :8],
+        ... )
+        >>> print(pairs.index)
+        [3 4 5]
     """
     measured = np.asarray(measured_frequencies, dtype=float)
     predicted = np.asarray(predicted_frequencies, dtype=float)

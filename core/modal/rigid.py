@@ -18,6 +18,10 @@ def rigid_body_vectors(dofs: Dofs) -> FloatArray:
     """Return the rigid-body motions of labelled dofs, (n, r) with r up to six.
 
     Three translations and three rotations about the centroid, those that move nothing left out.
+
+    Examples:
+        >>> modal.rigid_body_vectors(model.dofs).shape
+        (81, 3)
     """
     vectors = _motions(dofs)(dofs.xyz, dofs.motions)
     return np.asarray(vectors[:, _moving(vectors)])
@@ -56,6 +60,11 @@ def rigid_modes_of(model: Model) -> FloatArray:
 
     Of a frame it is the supports and springs to ground that decide, whatever an update made of
     the matrices; of a model from files, the strain energy.
+
+    Examples:
+        >>> rigid = modal.rigid_modes_of(model)
+        >>> np.allclose(rigid.T @ model.mass @ rigid, np.eye(3))
+        True
     """
     motion, structure = _motions(model.dofs), model.structure
     vectors = motion(model.dofs.xyz, model.dofs.motions)

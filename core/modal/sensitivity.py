@@ -30,6 +30,11 @@ def eigenvalue_sensitivities(
         change: the derivatives of the matrices, where they are at hand.
 
     Source: Fox & Kapoor (1968); Horton et al. (1999), equation (2).
+
+    Examples:
+        >>> slopes = modal.eigenvalue_sensitivities(model, modes.take([3, 4]), [stiffness])
+        >>> np.allclose(slopes[:, 0], modes.eigenvalues[[3, 4]])
+        True
     """
     change = derivatives(model.frame_structure, parameters) if change is None else change
     stiffness, mass = change.quadratic(modes.shapes, modes.shapes)
@@ -61,6 +66,10 @@ def shape_sensitivities(
         ModelError: when the bordered system is singular.
 
     Source: Fox & Kapoor (1968), full modal sum; Nelson (1976).
+
+    Examples:
+        >>> modal.shape_sensitivities(model, modes, 3, [stiffness]).shape
+        (81, 1)
     """
     change = derivatives(model.frame_structure, parameters) if change is None else change
     if len(modes) == model.size:
@@ -118,7 +127,13 @@ def _nelson(model: Model, modes: Modes, index: int, change: Derivatives) -> Floa
 def frequency_sensitivities(
     model: Model, modes: Modes, parameters: Sequence[Parameter]
 ) -> FloatArray:
-    """Return d f_j / d p in Hz a unit of the parameter, elastic modes only, (m, n_parameters)."""
+    """Return d f_j / d p in Hz a unit of the parameter, elastic modes only, (m, n_parameters).
+
+    Examples:
+        >>> print(modal.frequency_sensitivities(model, modes.take([3, 4]), [stiffness]).round(1))
+        [[127.9]
+         [138.8]]
+    """
     slope = eigenvalue_sensitivities(model, modes, parameters)
     omega = np.sqrt(np.abs(modes.eigenvalues))[:, None]
     return np.asarray(slope / (4.0 * np.pi * omega))

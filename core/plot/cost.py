@@ -36,6 +36,10 @@ def error_against_cost(run: Run, *, error: str = "skill", ax: Axes | None = None
 
     Raises:
         InputError: when there is no such error, or no strategy with an error and a time.
+
+    Examples:
+        >>> plot.error_against_cost(run).get_xlabel()
+        'wall time of the strategy, s (median over cases)'
     """
     check_kind(run, (Run,), "strategies")
     if error not in _LABELS:

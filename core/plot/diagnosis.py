@@ -103,6 +103,10 @@ def residual_dots(diagnosis: Diagnosis | Data, kind: Kind) -> list[ResidualDot]:
 
     Raises:
         InputError: for what is no diagnosis, or no such kind.
+
+    Examples:
+        >>> [dot.name for dot in plot.residual_dots(found, "frequency")]
+        ['1: 226.8 Hz', '2: 275.2 Hz', '3: 537.4 Hz']
     """
     rows = _data(diagnosis)["residuals"]
     if kind == "frequency":
@@ -157,6 +161,10 @@ def residuals(
 
     Raises:
         InputError: when there are no residuals of that kind.
+
+    Examples:
+        >>> plot.residuals(found).get_xlabel()
+        'standard deviations of the measurement'
     """
     dots = residual_dots(diagnosis, kind)[:MOST_ROWS]
     if not dots:
@@ -225,6 +233,10 @@ def strongest_places(diagnosis: Diagnosis | Data, indicator: str = "evidence") -
     Arguments:
         diagnosis: or its JSON as plain data.
         indicator: ``evidence``, or one of the classical indicators.
+
+    Examples:
+        >>> plot.strongest_places(found)[0].place
+        'all'
     """
     data = _data(diagnosis)
     values = {
@@ -272,6 +284,9 @@ def evidence(
 
     Raises:
         InputError: when there is no structure, or none with an extent.
+
+    Examples:
+        >>> plot.evidence(found, case=case).get_figure().savefig("evidence.svg")
     """
     data = _data(diagnosis, case)
     structure = _structure(data.get("structure"))

@@ -49,6 +49,10 @@ def mac(
         InputError: when two things cannot be compared.
 
     Source: Allemang & Brown 1982, A correlation coefficient for modal vector analysis.
+
+    Examples:
+        >>> plot.mac(case).get_ylabel()
+        'measured mode: frequency, Hz'
     """
     if second is None:
         second = first.model if isinstance(first, Case) else first
@@ -78,11 +82,15 @@ def mac(
     ax.set(xlabel=label, ylabel=row_label)
     ax.set_title("MAC", fontsize=10.0)
     if values.size <= _MOST_NUMBERED:
-        for (i, j), value in np.ndenumerate(values):
-            colour = "white" if value > 0.6 else "black"
-            text = f"{value:.2f}" if np.isfinite(value) else "–"
-            ax.text(j, i, text, ha="center", va="center", fontsize=8.0, color=colour)
+        _write_numbers(ax, values)
     return ax
+
+
+def _write_numbers(ax: Axes, values: FloatArray) -> None:
+    for (i, j), value in np.ndenumerate(values):
+        colour = "white" if value > 0.6 else "black"
+        text = f"{value:.2f}" if np.isfinite(value) else "–"
+        ax.text(j, i, text, ha="center", va="center", fontsize=8.0, color=colour)
 
 
 def _shapes(source: Any, key: str) -> Named:  # noqa: ANN401 - whatever a caller brings

@@ -47,6 +47,9 @@ def mode_shape(
 
     Raises:
         InputError: when there is no such mode, or too many nodes to draw.
+
+    Examples:
+        >>> plot.mode_shape(case, 2).get_figure().savefig("mode-2.svg")
     """
     check_kind(source, (Case, Model), "mode shapes on a structure")
     model = source.model if isinstance(source, Case) else source
@@ -54,11 +57,7 @@ def mode_shape(
     if not wireframe.nodes:
         raise InputError(f"more than {MOST_NODES} nodes are no picture")
     elastic = modes_of(model).elastic
-    numbers = [mode] if isinstance(mode, int) else list(mode)
-    for number in numbers:
-        if not 1 <= number <= len(elastic):
-            expected = f"1 to {len(elastic)}"
-            raise InputError(f"there is no elastic mode {number!r}", key="mode", expected=expected)
+    numbers = _numbers_in(mode, len(elastic))
     view = view_of(wireframe, oblique=wireframe.plane != "in-plane")
     columns = [number - 1 for number in numbers]
     motion = node_motions(model, model, elastic.shapes[:, columns])
@@ -82,6 +81,20 @@ def mode_shape(
     below = (0.5, -0.12 if view.names else 0.0)
     ax.legend(loc="upper center", bbox_to_anchor=below, ncols=3, fontsize=8.5, frameon=False)
     return ax
+
+
+def _numbers_in(mode: int | Sequence[int], count: int) -> list[int]:
+    """Return the numbers of modes that are asked for.
+
+    Raises:
+        InputError: when one of them is not among so many.
+    """
+    numbers = [mode] if isinstance(mode, int) else list(mode)
+    for number in numbers:
+        if not 1 <= number <= count:
+            expected = f"1 to {count}"
+            raise InputError(f"there is no elastic mode {number!r}", key="mode", expected=expected)
+    return numbers
 
 
 def _draw_moved(

@@ -45,6 +45,10 @@ def receptance(
 
     Raises:
         InputError: when there is no such sensor or modification, or no measured shape.
+
+    Examples:
+        >>> plot.receptance(case, {scaled.name: result}).get_ylabel()
+        'receptance at 9Z, dB re 1 m/N'
     """
     check_kind(case, (Case,), "receptance")
     label = _sensor(case, sensor)

@@ -36,6 +36,14 @@ def svg(
         size: in inch.
         themed: for the middle of a page: colours are those of the page's style sheet, by the names
             in `COLOURS`, and nothing is cut off at the edge of the axes.
+
+    Examples:
+        >>> from functools import partial
+        >>> text = plot.svg(
+        ...     partial(plot.mac, case), name="mac", title="MAC", caption="Measured and nominal."
+        ... )
+        >>> text.startswith("<svg")
+        True
     """
     text = io.StringIO()
     with report_style(name), warnings.catch_warnings():

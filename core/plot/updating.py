@@ -40,6 +40,10 @@ def convergence(
 
     Raises:
         InputError: when nothing iterated, or nothing has that quantity.
+
+    Examples:
+        >>> plot.convergence(result).get_xlabel()
+        'iteration'
     """
     check_kind(source, (UpdateResult, JobResult, Run), "iterations")
     whole = isinstance(source, Run)
@@ -102,6 +106,10 @@ def parameters(source: UpdateResult | JobResult, *, ax: Axes | None = None) -> A
 
     Raises:
         InputError: when there is no named parameter, or no scale for all of them.
+
+    Examples:
+        >>> plot.parameters(result).get_xlabel()
+        'change, %'
     """
     check_kind(source, (UpdateResult, JobResult), "parameters")
     items: list[Mapping[str, Any]] = [

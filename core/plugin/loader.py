@@ -163,7 +163,12 @@ def load_plugins(
 
 
 def registered_effects() -> tuple[Effect, ...]:
-    """Return every effect that plugins offer, the built-in ones first."""
+    """Return every effect that plugins offer, the built-in ones first.
+
+    Examples:
+        >>> torsion.name in [one.name for one in diagnosis.registered_effects()]
+        True
+    """
     return tuple(load_plugins().effects.values())
 
 

@@ -58,7 +58,13 @@ class Study:
 
 
 def verdict_counts(cells: Sequence[Cell]) -> dict[Verdict, int]:
-    """Return the number of cells of every verdict, none left out."""
+    """Return the number of cells of every verdict, none left out.
+
+    Examples:
+        >>> page = reproduction.Page("paper", "1", unit="Hz", tolerance=0.1)
+        >>> reproduction.verdict_counts([page.cell("mode 1", "FE", 255.8, 255.83)])
+        {'agrees': 1, 'agrees-under': 0, 'does-not-follow': 0}
+    """
     return {verdict: sum(cell.verdict == verdict for cell in cells) for verdict in VERDICTS}
 
 

@@ -21,6 +21,10 @@ def results_frame(run: Run) -> pd.DataFrame:
     for ``higher`` and ``modified`` (nan where the case has no such block); rigid_body_modes
     rigid_body_modes_expected negative_eigenvalues unphysical parameter_count evaluations score
     rank.
+
+    Examples:
+        >>> results.results_frame(run)["status"].tolist()
+        ['ok', 'ok']
     """
     import pandas as pd
 
@@ -41,6 +45,10 @@ def modes_frame(run: Run) -> pd.DataFrame:
     Columns: case strategy seed block modification mode measured_hz predicted_hz error_percent
     mac. The error is signed, (f_p / f_m - 1), and nan for a mode without partner or with an
     imaginary one; `counted_percent` is what the score takes, 100 for such a mode.
+
+    Examples:
+        >>> len(results.modes_frame(run))
+        10
     """
     import pandas as pd
 

@@ -57,10 +57,13 @@ def run_jobs(
     Raises:
         InputError: for two of one name, no worker, or a run that another process works on.
         ModelError: when the nominal model of a case cannot be solved.
+
+    Examples:
+        >>> results.run_jobs([case], [nominal]).results[0].status
+        'ok'
     """
     workers = worker_count(jobs)
-    _check_names("case", [case.name for case in cases])
-    _check_names("strategy", [strategy.name for strategy in strategies])
+    _check_names(case=cases, strategy=strategies)
     share = memory_share(workers) if memory is None else memory
     limits = {s.name: Limits((timeouts or {}).get(s.name, timeout), share) for s in strategies}
     settings: dict[str, Any] = {"seed": run_seed, "jobs": workers, "timeout": timeout}
@@ -74,9 +77,8 @@ def run_jobs(
         meta, known = recorded(stack, store, meta, overwrite, resume)
         ending = stack.enter_context(ended(store, meta["run"]))
         results = Results(slots, store, meta["run"], progress)
-        wanted = results.keep(known)
-        for index, result in computed(slots, wanted, references, limits, workers, results.shelf):
-            results.add(index, result)
+        for one in computed(slots, results.keep(known), references, limits, workers, results.shelf):
+            results.add(*one)
     return Run({**meta, **ending}, rank_results(results.in_order(), meta["reference"]))
 
 
@@ -93,7 +95,9 @@ def worker_count(jobs: int | None) -> int:
     return jobs
 
 
-def _check_names(kind: str, names: Sequence[str]) -> None:
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise InputError(f"{kind} {twice[0]!r} occurs twice", expected="every name once")
+def _check_names(**given: Sequence[Case] | Sequence[Strategy]) -> None:
+    for kind, things in given.items():
+        names = [thing.name for thing in things]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise InputError(f"{kind} {twice[0]!r} occurs twice", expected="every name once")

@@ -219,7 +219,12 @@ def result_from_json(
 
 
 def run_to_json(run: Run) -> dict[str, Any]:
-    """Return a run in the JSON contract of ``bench run --json``."""
+    """Return a run in the JSON contract of ``bench run --json``.
+
+    Examples:
+        >>> sorted(results.run_to_json(run))
+        ['meta', 'results']
+    """
     meta: dict[str, Any] = finite(dict(run.meta))
     return {"meta": meta, "results": [result_to_json(result) for result in run.results]}
 
@@ -229,6 +234,10 @@ def run_from_json(data: object, *, file: Path | str | None = None) -> Run:
 
     Raises:
         InputError: naming the first field that is wrong.
+
+    Examples:
+        >>> results.run_from_json(results.run_to_json(run)).results == run.results
+        True
     """
     record = validated(RunRecord, data, file, None, "")
     meta = meta_from_json(record.meta, file=file)

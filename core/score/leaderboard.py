@@ -65,6 +65,10 @@ def leaderboard(run: Run) -> pd.DataFrame:
 
     Arguments:
         run: with `reference`, `seeds`, `seed` and `strategies` in its meta.
+
+    Examples:
+        >>> results.leaderboard(run)[["rank", "skill"]].round(2).values.tolist()
+        [[1.0, 0.34], [2.0, 1.0]]
     """
     import pandas as pd
 

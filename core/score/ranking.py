@@ -59,6 +59,11 @@ def ranked(
     Arguments:
         key: tier, score and name; the tier counts first, then the score, less being better. The
             name orders those that share a rank.
+
+    Examples:
+        >>> skills = {"b": 1.0, "a": 1.0, "c": 2.0}
+        >>> results.ranked(skills, lambda name: ((), skills[name], name))
+        [(1, 'a'), (1, 'b'), (3, 'c')]
     """
     keyed = sorted(((*key(item), item) for item in items), key=lambda entry: entry[:3])
     found: list[tuple[int, str, _Item]] = []
@@ -87,6 +92,10 @@ def rank_results(
             them. None keeps the scores that the results have; one that has none scores against
             the result of the baseline in the same case and seed, or 10 where there is none.
         baseline: name of the strategy that leaves the model as it is, where one ran.
+
+    Examples:
+        >>> [(round(one.score, 2), one.rank) for one in results.rank_results(run.results)]
+        [(1.0, 2), (0.34, 1)]
     """
     listed = tuple(results)
     given = {

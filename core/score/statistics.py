@@ -153,6 +153,10 @@ def tell_apart(run: Run, order: Sequence[str]) -> Groups:
 
     Arguments:
         order: the strategies, best first.
+
+    Examples:
+        >>> results.tell_apart(run, [scaled.name, nominal.name]).groups
+        ()
     """
     columns: dict[str, list[JobResult]] = {name: [] for name in order}
     for result in run.results:

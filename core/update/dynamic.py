@@ -35,6 +35,11 @@ def expand_measured_shapes(
         ModelError: when K - lambda M of a large model is singular.
 
     Source: Ahmadian, Gladwell & Ismail (1997), equation (15).
+
+    Examples:
+        >>> shapes = update.expand_measured_shapes(model, measurement)
+        >>> np.allclose(readings @ shapes, measurement.shapes)
+        True
     """
     rows = model.observe(measurement.sensors)
     at_rest = _at_rest(model, rigid)

@@ -230,6 +230,10 @@ def physical_family(structure: Structure) -> ElementFamily:
     with EI, so that the ratio of shear to bending flexibility stays.
 
     Source: Ahmadian, Gladwell & Ismail (1997), section 4.2.
+
+    Examples:
+        >>> update.physical_family(structure).names[:2]
+        ('EI rung-right/1', 'GJ rung-right/1')
     """
     spatial = structure.frame.plane == "3d"
     xz, xy = _TRANSLATION_XZ + _SLOPE_XZ, _TRANSLATION_XY + _SLOPE_XY
@@ -259,6 +263,10 @@ def nobari_family(structure: Structure) -> ElementFamily:
 
     Source: Nobari, Robb & Ewins (1993); Ahmadian, Gladwell & Ismail (1997), equation (20), whose
     third matrix is [2, 1; 1, 2] on the slopes.
+
+    Examples:
+        >>> len(update.nobari_family(structure))
+        112
     """
     spatial = structure.frame.plane == "3d"
     masks: dict[str, FloatArray] = {}
@@ -351,6 +359,10 @@ def generic_family(
             core; that of an element is turned end for end where its second end is at the joint.
 
     Source: Ahmadian, Gladwell & Ismail (1997), section 4.3.
+
+    Examples:
+        >>> len(update.generic_family(structure, tied=True))
+        16
     """
     elements, _, labels = _changeable(structure)
     kinds, ends = _joint_of(structure)

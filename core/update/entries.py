@@ -307,6 +307,11 @@ def update_entries(
         NotApplicable: when the matrix has too many entries, or a low-rank term.
         StrategyFailure: when a measured mode has no partner in the nominal model.
         SelfCheckFailed: when no matrix of this pattern was found that has the used modes.
+
+    Examples:
+        >>> entries = update.update_entries(model, measurement, np.zeros((model.size, 0)))
+        >>> entries.residuals.forces < 1e-8
+        True
     """
     pattern = EntryPattern.of(model)
     free = _free_directions(pattern, model, rigid)

@@ -21,6 +21,11 @@ def total_change(parts: Sequence[LowRank | None]) -> LowRank | None:
 
     Arguments:
         parts: changes of one matrix; None stands for no change.
+
+    Examples:
+        >>> change = fem.LowRank(np.eye(4, 2), np.eye(2))
+        >>> np.allclose(update.total_change([change, None, change]).toarray(), 2 * change.toarray())
+        True
     """
     changes = [part for part in parts if part is not None]
     if not changes:
@@ -47,6 +52,11 @@ def with_measured_frequencies(model: Model, measurement: Measurement) -> Model:
         SelfCheckFailed: when the frequencies are not met to 1e-8.
 
     Source: Baruch & Bar-Itzhack (1978), where the measured shapes are those of the model.
+
+    Examples:
+        >>> met = femubench.solve_modes(update.with_measured_frequencies(model, measurement))
+        >>> np.allclose(met.elastic.natural_frequencies[:3], measurement.frequencies)
+        True
     """
     modes, partner = partners_of(model, measurement)
     found = partner >= 0

@@ -17,7 +17,12 @@ ROUNDED_TERMS = 32.0
 
 
 def force_scale(model: Model) -> FloatArray:
-    """Return factors that give forces and moments one unit, (n,)."""
+    """Return factors that give forces and moments one unit, (n,).
+
+    Examples:
+        >>> update.force_scale(model).shape
+        (81,)
+    """
     diagonal = np.abs(model.stiffness.diagonal())
     return np.asarray(1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)))
 
@@ -85,6 +90,11 @@ def check_used_modes(model: Model, shapes: FloatArray, eigenvalues: FloatArray) 
 
     Raises:
         SelfCheckFailed: when they are not modes of the model.
+
+    Examples:
+        >>> used = modes.take([3, 4])
+        >>> update.check_used_modes(model, used.shapes, used.eigenvalues).forces < 1e-8
+        True
     """
     found = measure_residuals(model, shapes, eigenvalues)
     allowed = max(ALLOWED, found.rounding)

@@ -70,6 +70,11 @@ def quasi_measured_modes(model: Model, measurement: Measurement) -> QuasiModes:
         NotApplicable: when there are fewer complete sensors than modes.
 
     Source: Ahmadian, Gladwell & Ismail (1997), equations (16)-(17).
+
+    Examples:
+        >>> quasi = update.quasi_measured_modes(model, measurement)
+        >>> np.allclose(quasi.shapes.T @ model.mass @ quasi.shapes, np.eye(3))
+        True
     """
     rows = measured_rows(measurement.shapes)
     modes, partners = paired_modes(model, measurement)

@@ -195,6 +195,11 @@ def sensitivity_update(
         Diverged: when a parameter leaves the range in which it makes sense.
 
     Source: Horton, Gurgenci, Veidt & Friswell (1999), equations (1)-(4).
+
+    Examples:
+        >>> factor = update.global_stiffness(structure)
+        >>> update.sensitivity_update(structure, [factor], measurement).parameter_count
+        1
     """
     if not unknowns:
         raise NotApplicable("there is no parameter to update")

@@ -114,6 +114,10 @@ def global_stiffness(structure: Structure, *, prior_std: float | None = None) ->
     Arguments:
         structure: the frame.
         prior_std: of its logarithm; None for no prior.
+
+    Examples:
+        >>> update.global_stiffness(structure).parameter.name
+        'E all members'
     """
     quantity = stiffness_quantity(structure)
     parameter = Parameter(f"{quantity} all members", quantity, all_elements(structure))
@@ -129,6 +133,10 @@ def joint_stiffness(
         structure: the frame.
         group: which ends.
         prior_std: of its logarithm; None for no prior.
+
+    Examples:
+        >>> update.joint_stiffness(structure, joints[0]).parameter.name
+        'E at L'
     """
     quantity = stiffness_quantity(structure)
     parameter = Parameter(f"{quantity} at {group.name}", quantity, elements_at(structure, group))
@@ -146,6 +154,11 @@ def carried_by(levels: Sequence[Sequence[Unknown]], count: int) -> list[Unknown]
         count: number of measured frequencies.
 
     Source: Horton et al. (1999), section 2.
+
+    Examples:
+        >>> levels = [[update.global_stiffness(structure)], [joint, joint]]
+        >>> [len(update.carried_by(levels, count)) for count in (1, 2, 3)]
+        [1, 1, 3]
     """
     taken: list[Unknown] = []
     for level in levels:
