@@ -15,7 +15,8 @@ SUFFIXES = (".py", ".js", ".html", ".jinja")
 ALLOWED = {
     "frame": r"kind\b|'frame' or 'matrices'|`parameters` and `frame`",  # kind of model, a method
     "density": r"rhoA|\"E\"",  # a quantity of elements, beside the others
-    "spring": r"quantity|properties|lookup|weights|name|property|rigid|: \(\)|counted|marker|stiffness",  # likewise
+    # likewise, and a symbol in drawings
+    "spring": r"quantity|properties|lookup|weights|name|property|rigid|: \(\)|counted|marker|stiff",
     "offset": r"`offset` \(global",  # where a point mass sits
     "hframe": r"\"hframe\": _hframe",  # a structure of the challenge; in its seeds
     "physical": r"\"unphysical\"",  # a label beside its contrary
