@@ -135,7 +135,8 @@ def as_restructured_text(
     app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]
 ) -> None:
     """Escape what is plain text in a docstring of ours and markup to Sphinx, such as |x|."""
-    text = re.sub(r"(`[^`]*`)(\w?)|[|*\\]|(?<=\w)_(?!\w)", _escaped, "\n".join(lines))
+    plain, mark, examples = "\n".join(lines).partition("\nExamples:\n")
+    text = re.sub(r"(`[^`]*`)(\w?)|[|*\\]|(?<=\w)_(?!\w)", _escaped, plain) + mark + examples
     lines[:] = re.sub(r"^Source: ", "**Source:** ", text, flags=re.MULTILINE).split("\n")
 
 

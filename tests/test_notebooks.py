@@ -1,0 +1,95 @@
+"""The notebooks of `examples/` run, say what is true, and are kept without their outputs."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import nbformat
+import pytest
+from jupyter_client.manager import AsyncKernelManager
+from nbclient import NotebookClient
+
+ROOT = Path(__file__).parents[1]
+NOTEBOOKS = sorted((ROOT / "examples").glob("*.ipynb"))
+LIMIT = 300  # seconds a cell, for a machine that has much else to do
+
+
+def read(path: Path) -> nbformat.NotebookNode:
+    return nbformat.read(path, as_version=4)
+
+
+def code(path: Path) -> list[str]:
+    """Return the code cells as Python, magics left out."""
+    cells = [cell.source for cell in read(path).cells if cell.cell_type == "code"]
+    return ["\n".join(x for x in cell.splitlines() if x[:1] != "%") for cell in cells]
+
+
+def test_there_are_six() -> None:
+    assert [path.name[0] for path in NOTEBOOKS] == list("123456")
+
+
+@pytest.mark.filterwarnings("default")  # those of the machinery; a cell's own are its output
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_it_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every cell ends without an error; the facts are `assert`s in the cells."""
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), os.getenv("PYTHONPATH", "")]))
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / ".ipython"))
+    monkeypatch.delenv("FEMUBENCH_STORE", raising=False)
+    work = tmp_path / "work"
+    work.mkdir()
+    book = read(path)
+    manager = AsyncKernelManager(kernel_name="python3")
+    # This very Python, whatever kernel a user has installed under that name.
+    assert manager.kernel_spec is not None
+    manager.kernel_spec.argv[0] = sys.executable
+    NotebookClient(
+        book, km=manager, timeout=LIMIT, resources={"metadata": {"path": work}}
+    ).execute()
+    kinds = [
+        kind for cell in book.cells for o in cell.get("outputs", []) for kind in o.get("data", ())
+    ]
+    assert "image/png" in kinds
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_it_is_kept_without_outputs(path: Path) -> None:
+    """So that a difference in git is one that somebody typed."""
+    data = json.loads(path.read_text(encoding="utf-8"))
+    nbformat.validate(data)
+    for cell in data["cells"]:
+        assert not cell.get("outputs")
+        assert cell.get("execution_count") is None
+        assert cell["metadata"] == {}
+    assert data["metadata"].keys() == {"kernelspec", "language_info"}
+    assert data["metadata"]["language_info"] == {"name": "python"}
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_it_teaches_facts_by_public_names(path: Path) -> None:
+    text = "\n".join(code(path))
+    assert text.count("\nassert ") + text.count("\n    assert ") >= 4
+    for private in ("femubench.core", "femubench.plugins", "femubench.papers", "seconds"):
+        assert private not in text
+
+
+def test_pyright_finds_nothing(tmp_path: Path) -> None:
+    """It reads no notebooks: their cells are given to it as modules."""
+    for path in NOTEBOOKS:
+        module = tmp_path / f"{path.stem.replace('-', '_')}.py"
+        module.write_text("\n\n".join(code(path)), encoding="utf-8")
+    settings = {
+        "include": ["."],
+        "extraPaths": [str(ROOT)],
+        "typeCheckingMode": "basic",
+        # A last expression is what a cell shows.
+        "reportUnusedExpression": False,
+    }
+    (tmp_path / "pyrightconfig.json").write_text(json.dumps(settings))
+    command = ("-m", "pyright", "--pythonpath", sys.executable, "--project", str(tmp_path))
+    done = subprocess.run([sys.executable, *command], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
