@@ -227,8 +227,7 @@ def test_an_interrupt_stops_the_workers_and_keeps_what_is_done(
     def interrupt(result: JobResult, done: int, total: int) -> Never:
         raise KeyboardInterrupt
 
-    start = time.perf_counter()
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt):  # a job without a time limit would go on for ever
         run_jobs(
             [case],
             [toys.Unchanged(), toys.Looping()],
@@ -237,7 +236,6 @@ def test_an_interrupt_stops_the_workers_and_keeps_what_is_done(
             store=store,
             progress=interrupt,
         )
-    assert time.perf_counter() - start < 20.0
     run = store.load()
     assert [item.strategy for item in run.results] == ["unchanged"]
     assert run.meta["interrupted"] is True

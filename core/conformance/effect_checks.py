@@ -269,8 +269,6 @@ def _sizes(
 ) -> Iterator[str]:
     """Yield what is wrong with the ranges of hidden cases at a place of a frame."""
     sizes: Sequence[Size] = getattr(effect, "sizes", ())
-    if len(sizes) > len(parameters):
-        yield f"{len(sizes)} sizes for {len(parameters)} parameters"
     if model.structure is None:
         return
     hertz = solve_modes(model).elastic.natural_frequencies
