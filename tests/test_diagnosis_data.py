@@ -90,9 +90,9 @@ def test_what_is_not_measured_does_not_count() -> None:
     # A shape at one sensor has a scale and nothing else.
     assert (mode.tolist(), sensor.tolist()) == ([0, 0], [0, 1])
     assert (len(data), data.scale_count) == (5, 1)
-    with pytest.raises(NotApplicable, match="no standard deviation"):
+    with pytest.raises(NotApplicable, match="not every used frequency has a standard deviation"):
         Data(replace(data.measurement, frequency_std=np.array([0.1, np.nan, 0.1])), NOTHING)
-    with pytest.raises(NotApplicable, match="no standard deviation"):
+    with pytest.raises(NotApplicable, match="not every used frequency has a standard deviation"):
         Data(replace(data.measurement, frequency_std=np.array([0.1, 0.0, 0.1])), NOTHING)
 
 

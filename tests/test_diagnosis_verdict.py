@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from femubench import Case, Diagnosis, Measurement, Model, NotApplicable, diagnose
+from femubench import Case, Diagnosis, InputError, Measurement, Model, NotApplicable, diagnose
 from femubench.core.case.modes import NO_SENSORS
 from femubench.core.challenge.structures import structure_named
 from femubench.core.diagnosis.verdict import (
@@ -351,7 +351,7 @@ def test_a_used_frequency_needs_a_deviation() -> None:
     std = case.measurement.frequency_std.copy()
     std[2] = np.nan
     spoiled = replace(case, measurement=replace(case.measurement, frequency_std=std))
-    with pytest.raises(NotApplicable, match="no standard deviation"):
+    with pytest.raises(InputError, match="not every used frequency has a standard deviation"):
         diagnosed(spoiled)
 
 
@@ -426,5 +426,5 @@ def test_without_effects_there_is_nothing_to_name(effects: tuple[Effect, ...]) -
 
 def test_there_must_be_a_used_mode() -> None:
     case = trial("density", "all", 0.08)
-    with pytest.raises(NotApplicable, match="no used mode"):
+    with pytest.raises(InputError, match="no used mode"):
         diagnosed(replace(case, used=()))

@@ -86,5 +86,5 @@ def test_elements_out_of_proportion_are_found(ladder: FrameBuilder) -> None:
 def test_no_mesh_bias_of_a_model_that_is_too_large(
     ladder: FrameBuilder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("femubench.core.look.mesh.SOLVED_LIMIT", 80)
+    monkeypatch.setattr("femubench.core.inference.mesh_error.SOLVED_LIMIT", 80)
     assert mesh_bias(Model.of(ladder()), 5) is None

@@ -8,6 +8,7 @@ import numpy as np
 
 from femubench.core.errors import SelfCheckFailed
 from femubench.core.fem.model import Model
+from femubench.core.ties import least
 from femubench.core.typing import FloatArray
 
 ALLOWED = 1e-8
@@ -100,7 +101,7 @@ def check_used_modes(model: Model, shapes: FloatArray, eigenvalues: FloatArray) 
     allowed = max(ALLOWED, found.rounding)
     forces, rayleigh, masses, _ = _by_mode(model, shapes, eigenvalues)
     hertz, own = (np.sqrt(np.abs(values)) / (2.0 * np.pi) for values in (eigenvalues, rayleigh))
-    mode = int(np.argmax(np.abs(rayleigh / eigenvalues - 1.0)))
+    mode = int(least(-np.abs(rayleigh / eigenvalues - 1.0), 1e-9))
     if not found.frequencies <= allowed:
         percent = 100.0 * (own[mode] / hertz[mode] - 1.0)
         raise SelfCheckFailed(

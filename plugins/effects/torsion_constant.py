@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import root_scalar
 
 from femubench import Model
 from femubench.effect import (
@@ -189,7 +189,8 @@ def _thin_tube(a: float, iy: float, iz: float) -> tuple[float, float, float]:
     def excess(r: float) -> float:
         return float(r**2 * (3.0 + r) / (3.0 * r + 1.0) - iy / iz)
 
-    r = float(brentq(excess, 1e-6, 1e6, xtol=1e-12, rtol=1e-12))  # height over width
+    # height over width
+    r = float(root_scalar(excess, bracket=(1e-6, 1e6), xtol=1e-12, rtol=1e-12).root)
     b = float(np.sqrt(12.0 * iy / a * (1.0 + r) / (r**2 * (3.0 + r))))
     return b, r * b, a / (2.0 * b * (1.0 + r))
 
