@@ -6,6 +6,7 @@ import re
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -57,7 +58,7 @@ _AT_LINE = re.compile(r"\s*\(at line (\d+), column \d+\)")
 
 
 def read_case(
-    folder: Path,
+    folder: str | PathLike[str],
     name: str | None = None,
     readers: Sequence[Reader] = (),
     *,

@@ -10,14 +10,11 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 from femubench.core.errors import InputError
 from femubench.core.plugin.validation import did_you_mean
-from femubench.core.roles import Result, Strategy, declared
-
-if TYPE_CHECKING:
-    import numpy as np
+from femubench.core.roles import Strategy, declared
 
 _SIMPLE = (bool, int, float, str, type(None))
 _UNKNOWN = object()
@@ -50,8 +47,8 @@ class Variant:
         """Return those of the strategy."""
         return declared(self.base, "promises")
 
-    def update(self, model: Any, measurement: Any, rng: np.random.Generator) -> Result:  # noqa: ANN401
-        """Return what the strategy returns."""
+    def update(self, model: Any, measurement: Any, rng: Any) -> Any:  # noqa: ANN401
+        """Return what the strategy returns, mostly an `UpdateResult`."""
         return self.base.update(model, measurement, rng)
 
     def __call__(self, **options: object) -> Variant:
