@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from femubench import Case, Diagnosis, InputError, Measurement, Model, NotApplicable, diagnose
+from femubench import Case, Diagnosis, InputError, Measurement, Model, diagnose
 from femubench.core.case.modes import NO_SENSORS
 from femubench.core.challenge.structures import structure_named
 from femubench.core.diagnosis.verdict import (
