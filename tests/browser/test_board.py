@@ -153,7 +153,7 @@ def test_a_strategy_opens_case_by_case(page: Page) -> None:
     page.keyboard.press("Enter")
     assert button.get_attribute("aria-expanded") == "true"
     text = page.locator(f"#{button.get_attribute('aria-controls')}").inner_text()
-    assert "failed: used modes reproduced" in text
+    assert "failed: after step 1 no mode of the model matches measured mode" in text
     page.keyboard.press("Enter")
     assert button.get_attribute("aria-expanded") == "false"
 
