@@ -82,7 +82,7 @@ def test_same_text_every_time(figure: Figure) -> None:
 def test_same_text_in_another_process() -> None:
     here = "\n".join(drawn(figure) for figure in (MATRIX, BARS))
     code = (
-        "import sys, numpy as np; from femubench import Bars, MatrixImage;"
+        "import sys, numpy as np; from femubench.reproduction import Bars, MatrixImage;"
         "from femubench.core.plot.figure import drawn;"
         f"array = np.array; print(drawn({MATRIX!r}) + chr(10) + drawn({BARS!r}), end='')"
     )
