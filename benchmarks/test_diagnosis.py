@@ -11,13 +11,14 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from femubench.core.case.case import Case
 from femubench.core.challenge.draw import draw_case
 from femubench.core.challenge.truth import Hidden
-from femubench.core.diagnosis.diagnose import diagnose, registered
+from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import FemubenchError
 from femubench.core.fem.model import Model
 from femubench.core.inference.examine import posed
 from femubench.core.inference.extended_model import raw_residual
 from femubench.core.inference.hypothesis import Hypothesis, hypotheses_of
+from femubench.core.plugin.loader import registered_effects
 
 _MAGNITUDES = (0.3, 1.0, 2.5)  # deviations of the prior
 _SEED = 19
@@ -45,7 +46,7 @@ def test_diagnosis(benchmark: BenchmarkFixture, hidden: Hidden) -> None:
 def test_every_hypothesis_solved_anew(benchmark: BenchmarkFixture) -> None:
     """The rival: three models a hypothesis, nothing refined, no second cause, no proof."""
     case = _case("one")
-    known = hypotheses_of(case.model, registered(None))
+    known = hypotheses_of(case.model, registered_effects())
     problem, _ = posed(case.model, case.measurement.select(case.used), known, case.tolerance)
 
     def solve_all() -> float:
