@@ -14,6 +14,15 @@ $(error femubench/core is no link to the folder core: clone once more with \
   `git clone -c core.symlinks=true` (on Windows, in developer mode))
 endif
 
+# Tests whose figures go through linear algebra; KERNELS are those of OpenBLAS, of which a processor
+# without AVX-512 runs all but SkylakeX, and every x86-64 runs Nehalem.
+NUMERICAL := $(addprefix tests/test_,advice*.py assembly.py asymmetric_frame.py attach*.py \
+	beam_elements.py challenge.py close_modes.py condensation.py diagnos*.py effects_*.py eigen.py \
+	element_strategies.py exhibits.py expansion.py frame_extensions.py frf.py kernels.py \
+	localisation.py look*.py matrix_strategies.py pairing.py papers_*.py preload.py rigid_modes.py \
+	scenarios.py scoring.py sections.py sensitiv*.py sparse_eigen.py)
+ON_ALL_CORES := -n 2 -p no:benchmark
+
 .PHONY: run test docs kernels bench sweep fuzz format clean
 .DELETE_ON_ERROR:
 
@@ -26,25 +35,22 @@ test: $(VENV)/.installed-test
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy -p femubench
 	$(BIN)/pyright --pythonpath $(BIN)/python
+ifeq ($(ARGS),)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest $(ON_ALL_CORES) $(NUMERICAL)
+	$(BIN)/pytest $(addprefix --ignore=,$(wildcard $(NUMERICAL)))
+else
 	$(BIN)/pytest $(ARGS)
+endif
 
 docs: $(VENV)/.installed-test
 	$(BIN)/sphinx-build -q -E -W --keep-going -c docs -b html . build/site $(ARGS)
 	@echo "build/site/index.html"
 
-# Tests whose figures go through linear algebra; KERNELS are those of OpenBLAS, of which a processor
-# without AVX-512 runs all but SkylakeX, and every x86-64 runs Nehalem.
-NUMERICAL := $(addprefix tests/test_,advice*.py assembly.py asymmetric_frame.py attach*.py \
-	beam_elements.py challenge.py close_modes.py condensation.py diagnos*.py effects_*.py eigen.py \
-	element_strategies.py exhibits.py expansion.py frame_extensions.py frf.py kernels.py \
-	localisation.py look*.py matrix_strategies.py pairing.py papers_*.py preload.py rigid_modes.py \
-	scenarios.py scoring.py sections.py sensitiv*.py sparse_eigen.py)
-
 kernels: $(VENV)/.installed-test
 	for kernel in $(KERNELS); do \
 		echo "OPENBLAS_CORETYPE=$$kernel"; \
 		OPENBLAS_CORETYPE=$$kernel OPENBLAS_NUM_THREADS=1 \
-			$(BIN)/pytest -n 2 -p no:benchmark $(or $(ARGS),$(NUMERICAL)) || exit 1; done
+			$(BIN)/pytest $(ON_ALL_CORES) $(or $(ARGS),$(NUMERICAL)) || exit 1; done
 
 bench: $(VENV)/.installed-test
 	$(BIN)/pytest benchmarks -o addopts="--import-mode=importlib -ra" --benchmark-only $(ARGS)
