@@ -24,6 +24,7 @@ from femubench.core.cli.main import bench
 from femubench.core.library import new_package
 from femubench.core.library.new_package import KINDS, write_package
 from femubench.core.plugin.loader import load_plugins
+from femubench.core.plugin.validation import KINDS as COLLECTIONS
 
 SITE = Path(str(femubench.__file__)).parents[1]
 LONGEST = "a-method-that-has-got-a-rather-long-name"
@@ -183,7 +184,7 @@ class TestInstalled:
     def test_list_names_all_of_them(self, bench_with: Any) -> None:
         result = bench_with(tuple(KINDS), "plugins", "list")
         assert (result.returncode, result.stderr) == (0, "")
-        for kind, (offers, _) in KINDS.items():
+        for kind, offers in ((kind, COLLECTIONS[kind]) for kind in KINDS):
             assert f"my-{kind} (my-{kind} 0.1.0)\n  {offers}: my-{kind}\n" in result.stdout
 
     def test_show_knows_where_it_comes_from(self, bench_with: Any) -> None:
