@@ -132,7 +132,7 @@ def test_dependencies_are_what_is_imported() -> None:
 
 def test_help_names_every_report_format() -> None:
     text = " ".join(CliRunner().invoke(bench, ["report", "--help"]).output.split())
-    (listed,) = re.findall(r"FORMAT (.*?); several with commas", text)
+    (listed,) = re.findall(r"FORMAT (.*?); several separated by commas", text)
     assert [word.split()[0] for word in listed.split(", ")] == list(load_plugins().reporters)
 
 

@@ -117,7 +117,7 @@ def source_fault(case: Case) -> str:
 
 
 _CASES = {
-    "held-out": ("Every case holds something back that a model can be judged by.", held_out_fault),
+    "held-out": ("Every case holds out data by which a model can be judged.", held_out_fault),
     "solves": (
         "The nominal model of every case has modes that pair with used ones.",
         nominal_fault,

@@ -116,6 +116,11 @@ def pair_measured(measurement: Measurement, modes: Modes, readings: FloatArray) 
         measurement: the modes to pair, in one assignment.
         modes: of the model, p of them; the indices of the pairing count all of them.
         readings: the same at the sensors, (n_sensors, p).
+
+    Examples:
+        >>> readings = model.observe(measurement.sensors) @ modes.shapes
+        >>> (modal.pair_measured(measurement, modes, readings).index >= 0).all().item()
+        True
     """
     elastic = np.flatnonzero(~modes.rigid)
     found = pair_modes(
