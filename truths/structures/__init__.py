@@ -1,0 +1,1 @@
+"""One file a structure; each holds its description as `STRUCTURE`."""

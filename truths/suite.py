@@ -1,0 +1,160 @@
+"""Write the scenario folder of a structure: drawn model, measured data, README, picture."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+import truths.structures
+from truths.drawing import case_text, text
+from truths.measurement import modes_csv, record, sensors_csv
+from truths.modes_of import Observed, assembled, mesh_difference, mesh_of, modes_of
+from truths.picture import picture
+from truths.structure import Structure
+
+Array = npt.NDArray[np.float64]
+SUITE = Path(__file__).parents[1] / "scenarios" / "suite"
+LARGEST_DIFFERENCE = 0.007  # of a listed mode's frequency, between the two meshes
+
+
+def structures() -> dict[str, Structure]:
+    """Return all structures by name: `STRUCTURE` of every file in `truths/structures`."""
+    found = {}
+    for module in pkgutil.iter_modules(truths.structures.__path__):
+        item: Structure = importlib.import_module(f"truths.structures.{module.name}").STRUCTURE
+        found[item.name] = item
+    return dict(sorted(found.items()))
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Hold what the solids say of a structure.
+
+    Arguments:
+        states: the structure as built, then after each change of its design.
+        differences: relative difference of the two meshes in each listed mode of the first state.
+        alike: MAC of these modes between the two meshes.
+        nodes: of the two meshes.
+        mass: kg, without what hangs on it for a change.
+    """
+
+    states: tuple[Observed, ...]
+    differences: Array
+    alike: Array
+    nodes: tuple[int, int]
+    mass: float
+    seconds: float
+
+
+def truth_of(structure: Structure) -> Truth:
+    """Solve a structure on two meshes, and its changes on the finer one.
+
+    Raises:
+        ValueError: where a listed mode differs by more than 0.7 % between the meshes.
+    """
+    began, count = time.perf_counter(), structure.used + structure.held_out
+    coarse, fine = (assembled(structure, mesh_of(structure, size)) for size in structure.size)
+    states = tuple(
+        modes_of(structure, fine, count, change) for change in (None, *structure.changes)
+    )
+    difference, alike = mesh_difference(modes_of(structure, coarse, count), states[0], count)
+    if difference.max() > LARGEST_DIFFERENCE:
+        raise ValueError(
+            f"{structure.name}: mode {difference.argmax() + 1} differs by "
+            f"{100 * difference.max():.2f} % between the meshes, at most 0.7 % expected"
+        )
+    if min(len(state.frequencies) for state in states) < count:
+        raise ValueError(f"{structure.name}: fewer than {count} modes were found")
+    lumps = sum(lump.mass for lump in structure.lumps)
+    lumps += sum(strut.mass for strut in structure.struts)
+    lumps += sum(item.mass for item in structure.oscillators)
+    nodes = (coarse.nodes.shape[1], fine.nodes.shape[1])
+    mass = fine.total_mass + lumps
+    return Truth(states, difference, alike, nodes, mass, time.perf_counter() - began)
+
+
+def readme(structure: Structure, truth: Truth) -> str:
+    """Return the README of a scenario."""
+    count = structure.used + structure.held_out
+    rows = [
+        f"| {i + 1} | {'used' if i < structure.used else 'held out'} "
+        f"| {truth.states[0].frequencies[i]:.3f} | {100 * truth.differences[i]:.3f} "
+        f"| {truth.alike[i]:.4f} |"
+        for i in range(count)
+    ]
+    elements = "20-node bricks" if structure.mesher == "bricks" else "10-node tetrahedra"
+    changes = "\n".join(
+        f"{number}. {change.name}" for number, change in enumerate(structure.changes, 1)
+    )
+    return f"""# {structure.name}: {structure.title}
+
+![the structure](picture.svg)
+
+{structure.story.strip()}
+
+**Origin.** The measured side is a solid model: {elements} by scikit-fem, {truth.nodes[0]} and
+{truth.nodes[1]} nodes; what is published comes from the finer mesh. `truths/structures` holds the
+description, `make truths ARGS={structure.name}` computes it again. The nominal model is drawn from
+centre lines and catalogue values and knows nothing else of the solid.
+
+**Scatter of the test** (seed {structure.seed}): frequencies {100 * structure.scatter:g} %, of whose
+variance all modes share {100 * structure.together:g} %; shapes {100 * structure.shape_scatter:g} % of the
+largest component, half of the variance a gain of each sensor. `frequency_std` holds the scatter and the
+difference of the two meshes.
+
+**Changes of the design**, solved on the same solid:
+
+{changes}
+
+| mode | | frequency of the solid, Hz | difference of the meshes, % | MAC of the meshes |
+|---|---|---|---|---|
+""" + "\n".join(rows) + "\n"
+
+
+def files_of(structure: Structure, truth: Truth) -> dict[str, str]:
+    """Return the text of every file of a scenario folder."""
+    count = structure.used + structure.held_out
+    mesh = truth.differences
+    weighed = np.random.default_rng((structure.seed, 99)).standard_normal() * structure.weighed
+    files = {
+        "case.toml": case_text(structure, truth.mass * (1 + weighed)),
+        "sensors.csv": sensors_csv(structure),
+        "README.md": readme(structure, truth),
+        "picture.svg": picture(structure),
+    }
+    names = ["modes.csv", *(f"change-{i + 1}.csv" for i in range(len(structure.changes)))]
+    for number, (name, state) in enumerate(zip(names, truth.states, strict=True)):
+        recording = record(
+            structure, state.frequencies[:count], state.sensors[:count], mesh, structure.seed, number
+        )
+        files[name] = modes_csv(structure, recording)
+    return files
+
+
+def index_text(all_structures: dict[str, Structure]) -> str:
+    """Return `suite.toml`: title and classes of each structure."""
+    tables = []
+    for name, item in all_structures.items():
+        values = {"title": item.title, "classes": list(item.classes), "default": item.default}
+        tables.append(f"[{name}]\n" + "".join(f"{k} = {text(v)}\n" for k, v in values.items()))
+    return "# Written by `make truths`.\n\n" + "\n".join(tables)
+
+
+def write(structure: Structure, folder: Path) -> list[str]:
+    """Compute a structure and write its folder; return what differs from what was there."""
+    truth = truth_of(structure)
+    target, differences = folder / structure.name, []
+    for name, content in files_of(structure, truth).items():
+        path = target / name
+        old = path.read_text(encoding="utf-8") if path.exists() else None
+        if old != content:
+            differences.append(f"{structure.name}/{name}: {'new' if old is None else 'changed'}")
+            target.mkdir(parents=True, exist_ok=True)
+            path.write_text(content, encoding="utf-8")
+    return differences
