@@ -218,7 +218,8 @@ class Scenario:
         except FemubenchError:
             raise
         except Exception as error:
-            what = f"the folder of {case!r} cannot be made: {type(error).__name__}: {error}"
+            told = " ".join(f"{type(error).__name__}: {error}".split())
+            what = f"the folder of {case!r} cannot be made: {told}"
             raise PluginError(f"scenario {self.name!r}: {what}") from error
 
 
