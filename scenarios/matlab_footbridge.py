@@ -57,11 +57,12 @@ def case_folder() -> Path:
     named = os.environ.get(VARIABLE)
     if not named:
         raise InputError(f"{VARIABLE} is not set", expected=_EXPECTED)
+    data = Path(named).expanduser()
     for file in (MODEL, TEST):
-        if not (Path(named) / file).is_file():
+        if not (data / file).is_file():
             what = f"missing file {file}, {VARIABLE} names the wrong folder"
-            raise InputError(what, file=named, expected=_EXPECTED)
-    return _written(Path(named).resolve())
+            raise InputError(what, file=data, expected=_EXPECTED)
+    return _written(data.resolve())
 
 
 @cache
