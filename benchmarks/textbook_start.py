@@ -16,7 +16,8 @@ from unittest.mock import patch
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from femubench import Case, FemubenchError, Model, NotApplicable, Run, Strategy, read_case
+from femubench import Case, FemubenchError, Model, NotApplicable, Run, Strategy
+from femubench.core.library.cases import read_cases
 from femubench.core.plugin.loader import load_plugins
 from femubench.effect import Effect
 from femubench.plugins.strategies import diagnosed
@@ -78,11 +79,7 @@ def figures() -> dict[str, dict[str, dict[str, float]]]:
     """Return the boards: from the model as drawn, from textbook, and without textbook effects."""
     plugins = load_plugins()
     effects, strategies = tuple(plugins.effects.values()), tuple(plugins.strategies.values())
-    cases = [
-        read_case(folder, name)
-        for scenario in plugins.scenarios.values()
-        for name, folder in scenario.cases.items()
-    ]
+    cases = read_cases((), plugins)
     drawn = {case.name: case.model for case in cases}
     better = {name: textbook(model, effects) for name, model in drawn.items()}
     known = {e.name for e in effects for case in cases if textbook_values(e, case.model)}

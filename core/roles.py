@@ -8,10 +8,12 @@ the data class); what they hand back is typed by its protocol.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol, runtime_checkable
+
+from femubench.core.errors import FemubenchError, PluginError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -186,14 +188,39 @@ class Scenario:
     """A named set of case folders that are run together.
 
     Arguments:
-        name: the word after ``bench run``.
+        name: the word after ``bench run``. ``group/name`` belongs to a group, and ``bench run
+            group`` runs all of it.
         title: one line for lists.
-        cases: from the case's name (the scenario's own, or ``scenario/part``) to its folder.
+        cases: from the case's name (the scenario's own, or ``scenario/part``) to its folder, or
+            to a function without arguments that makes the folder when the case is asked for.
+        classes: kinds of structure and of truth, for lists.
+        default: whether ``bench run`` without a case runs it.
     """
 
     name: str
     title: str
-    cases: Mapping[str, Path]
+    cases: Mapping[str, Path | Callable[[], Path]]
+    classes: tuple[str, ...] = ()
+    default: bool = True
+
+    def folder(self, case: str) -> Path:
+        """Return the folder of a case.
+
+        Raises:
+            InputError: when it has to be made, and what it is made of is not there or is wrong.
+            PluginError: when the function that makes it fails otherwise.
+        """
+        found = self.cases[case]
+        if isinstance(found, Path):
+            return found
+        try:
+            return found()
+        except FemubenchError:
+            raise
+        except Exception as error:
+            told = " ".join(f"{type(error).__name__}: {error}".split())
+            what = f"the folder of {case!r} cannot be made: {told}"
+            raise PluginError(f"scenario {self.name!r}: {what}") from error
 
 
 @runtime_checkable

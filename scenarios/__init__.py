@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 from femubench import Scenario, hookimpl
 
 HERE = Path(__file__).parent
+SUITE = HERE / "suite"
 
-TITLES = {
-    "frame": "Ladder frame of Ahmadian et al., published test",
-    "hframe": "H-frame of Horton et al., published test",
-    "frame-solid": "Ladder frame, everything from its solid twin",
-    "hframe-solid": "H-frame, everything from its solid twin",
-    "frame-beam": "Ladder frame, truth of shear-flexible beams and soft joints",
-    "frame-beam-asymmetric": "The same with one half side 4 % longer and one soft joint",
-    "design-change": "Eight design changes of both structures, nothing else held out",
+_TUBES = ("planar frame", "hollow sections", "free")
+_TESTED, _COMPUTED = (*_TUBES, "published test"), (*_TUBES, "computed truth")
+# Name: title, classes.
+_OWN = {
+    "frame": ("Ladder frame of Ahmadian et al., published test", _TESTED),
+    "hframe": ("H-frame of Horton et al., published test", _TESTED),
+    "frame-solid": ("Ladder frame, everything from its solid twin", _COMPUTED),
+    "hframe-solid": ("H-frame, everything from its solid twin", _COMPUTED),
+    "frame-beam": ("Ladder frame, truth of shear-flexible beams and soft joints", _COMPUTED),
+    "frame-beam-asymmetric": (
+        "The same with one half side 4 % longer and one soft joint",
+        _COMPUTED,
+    ),
+    "design-change": (
+        "Eight design changes of both structures, nothing else held out",
+        (*_COMPUTED, "design changes"),
+    ),
 }
 
 
@@ -28,7 +39,41 @@ def _cases(name: str) -> dict[str, Path]:
     return {f"{name}/{part.name}": part for part in parts}
 
 
+def _suite() -> list[Scenario]:
+    """Return the structures that `suite.toml` lists, each as a scenario; none without the file."""
+    table = SUITE / "suite.toml"
+    if not table.is_file():
+        return []
+    listed = tomllib.loads(table.read_text(encoding="utf-8"))
+    return [
+        Scenario(
+            f"suite/{name}",
+            item["title"],
+            {f"suite/{name}": SUITE / name},
+            tuple(item["classes"]),
+            item["default"],
+        )
+        for name, item in listed.items()
+    ]
+
+
+def _footbridge() -> Path:
+    """Return the case folder made of the user's own copy of the footbridge's data."""
+    # Names are listed without what reads data.
+    from femubench.scenarios.matlab_footbridge import case_folder
+
+    return case_folder()
+
+
 @hookimpl
 def femubench_scenarios() -> list[Scenario]:
     """Return the built-in scenarios."""
-    return [Scenario(name, title, _cases(name)) for name, title in TITLES.items()]
+    own = [Scenario(name, title, _cases(name), kinds) for name, (title, kinds) in _OWN.items()]
+    footbridge = Scenario(
+        "footbridge",
+        "Steel pedestrian bridge, published test; needs FEMUBENCH_FOOTBRIDGE",
+        {"footbridge": _footbridge},
+        ("bridge", "matrices", "soft supports", "published test"),
+        default=False,
+    )
+    return [*own, *_suite(), footbridge]

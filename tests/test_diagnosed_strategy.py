@@ -21,6 +21,7 @@ from femubench import (
     read_case,
     solve_modes,
 )
+from femubench.core.library.cases import read_cases
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.variants import strategy_of
 from femubench.fem import (
@@ -308,12 +309,7 @@ def test_the_solid_twin_is_predicted_where_others_are_not(harness_run: Run) -> N
 @pytest.mark.sweep
 def test_it_is_first_over_all_scenarios() -> None:
     plugins = load_plugins()
-    cases = [
-        read_case(folder, name)
-        for scenario in plugins.scenarios.values()
-        for name, folder in scenario.cases.items()
-    ]
-    board = leaderboard(run_jobs(cases, list(plugins.strategies.values())))
+    board = leaderboard(run_jobs(read_cases((), plugins), list(plugins.strategies.values())))
     assert board["strategy"][0] == "diagnosed"
     found = board.set_index("strategy")
     assert found["skill"]["diagnosed"] < 0.5 * found["skill"].drop("diagnosed").min()

@@ -17,8 +17,9 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from femubench import Run, read_case
+from femubench import Run
 from femubench.core.cli.main import bench
+from femubench.core.library.cases import read_cases
 from femubench.core.plugin.loader import load_plugins
 from femubench.results import JobResult, leaderboard, run_jobs
 
@@ -32,12 +33,7 @@ NUMBERS = {"eleven": 11, "twelve": 12, "sixteen": 16}
 @pytest.fixture(scope="module")
 def run() -> Run:
     plugins = load_plugins()
-    cases = [
-        read_case(folder, name)
-        for scenario in plugins.scenarios.values()
-        for name, folder in scenario.cases.items()
-    ]
-    return run_jobs(cases, list(plugins.strategies.values()), jobs=2)
+    return run_jobs(read_cases((), plugins), list(plugins.strategies.values()), jobs=2)
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from femubench import read_case
+from femubench.core.library.cases import read_cases
 from femubench.core.plugin.loader import load_plugins
 from femubench.results import Run, leaderboard, run_jobs
 
@@ -21,11 +21,7 @@ SEEDS = tuple(range(1, 11))
 @pytest.fixture(scope="module")
 def noisy() -> Run:
     plugins = load_plugins()
-    cases = [
-        read_case(folder, name)
-        for scenario in plugins.scenarios.values()
-        for name, folder in scenario.cases.items()
-    ]
+    cases = read_cases((), plugins)
     return run_jobs(cases, list(plugins.strategies.values()), seeds=SEEDS)
 
 

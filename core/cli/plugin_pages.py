@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, is_dataclass
+from pathlib import Path
 
 from femubench.core.cli.registry import wrapped
 from femubench.core.plugin.loader import LoadedPlugin, Plugins
@@ -99,8 +100,11 @@ def _value(value: object) -> str:
 
 def _scenario(scenario: Scenario) -> Iterator[Row]:
     yield "title", scenario.title
+    if scenario.classes:
+        yield "classes", ", ".join(scenario.classes)
     for number, (name, folder) in enumerate(scenario.cases.items()):
-        yield "" if number else "cases", f"{name} in {folder}"
+        where = f" in {folder}" if isinstance(folder, Path) else ", made when it is asked for"
+        yield "" if number else "cases", f"{name}{where}"
     yield "run", f"bench run {scenario.name}"
 
 

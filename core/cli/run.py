@@ -103,8 +103,8 @@ def run(
 ) -> int:
     """Run strategies on cases and rank them.
 
-    A CASE is a scenario (bench scenarios list), one case of it as SCENARIO/PART, or a folder
-    with a case.toml. Without any, all built-in scenarios run.
+    A CASE is a scenario (bench scenarios list), a group of them, one case of a scenario as
+    SCENARIO/PART, or a folder with a case.toml. Without any, the scenarios of the default set run.
     """
     plugins = _checked(ctx, cases, strategies)
     from femubench.core.library.rank import repeated, request_of, store_in

@@ -144,9 +144,10 @@ def _timed(
 
     plugins = load_plugins()
     update = strategy_of(strategy, plugins.strategies).update
-    folders = {k: v for each in plugins.scenarios.values() for k, v in each.cases.items()}
+    owner = next((s for s in plugins.scenarios.values() if case in s.cases), None)
+    folder = Path(case) if owner is None else owner.folder(case)
     readers = tuple(plugins.readers.values())
-    read = read_case(folders.get(case, Path(case)), readers=readers, installed=case in folders)
+    read = read_case(folder, readers=readers, installed=owner is not None)
     given = read.used_measurement()
     benchmark.group = f"update on {case}"
     try:

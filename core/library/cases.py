@@ -73,22 +73,38 @@ class Catalogue(Mapping[str, Thing], Generic[Thing]):
         return clipped(f"{self._kind}: {', '.join(self._known())}")
 
 
-def _parts(scenarios: Mapping[str, Scenario]) -> dict[str, Path]:
-    return {name: path for scenario in scenarios.values() for name, path in scenario.cases.items()}
+def scenarios_of(scenarios: Mapping[str, Scenario]) -> dict[str, Scenario]:
+    """Return the scenario of every case by the case's name; the first keeps a name."""
+    found: dict[str, Scenario] = {}
+    for scenario in scenarios.values():
+        for case in scenario.cases:
+            found.setdefault(case, scenario)
+    return found
+
+
+def _groups(scenarios: Mapping[str, Scenario]) -> dict[str, list[str]]:
+    """Return the scenarios called ``group/name`` by their group."""
+    found: dict[str, list[str]] = {}
+    for name in scenarios:
+        group, slash, _ = name.partition("/")
+        if slash:
+            found.setdefault(group, []).append(name)
+    return found
 
 
 def _case(plugins: Plugins, name: str) -> Case:
     from femubench.core.case.reader import read_case
 
     readers = tuple(plugins.readers.values())
-    return read_case(_parts(plugins.scenarios)[name], name, readers, installed=True)
+    folder = scenarios_of(plugins.scenarios)[name].folder(name)
+    return read_case(folder, name, readers, installed=True)
 
 
 def _strategy(plugins: Plugins, name: str) -> Variant:
     return Variant(plugins.strategies[name], name)
 
 
-cases: Catalogue[Case] = Catalogue("case", lambda p: _parts(p.scenarios), _case)
+cases: Catalogue[Case] = Catalogue("case", lambda p: scenarios_of(p.scenarios), _case)
 strategies: Catalogue[Variant] = Catalogue("strategy", lambda p: p.strategies, _strategy)
 effects: Catalogue[Effect] = Catalogue(
     "effect", lambda p: p.effects, lambda p, name: p.effects[name]
@@ -106,8 +122,8 @@ def read_cases(given: CaseLike | Iterable[CaseLike], plugins: Plugins) -> list[C
     """Read and validate cases, each once.
 
     Arguments:
-        given: names of scenarios, of one case of a scenario, folders, or cases; none for all
-            scenarios.
+        given: names of scenarios, of a group of them, of one case of a scenario, folders, or
+            cases; none for the scenarios of the default set.
         plugins: where scenarios and readers come from.
 
     Raises:
@@ -143,7 +159,7 @@ def case_folders(
     """
     # By resolved folder, so that each runs once; messages name it as it was typed.
     wanted: dict[object, tuple[str | None, Path] | Case] = {}
-    for word in listed(given) or scenarios:
+    for word in listed(given) or _default_set(scenarios):
         if not isinstance(word, (str, PathLike)):
             wanted.setdefault(id(word), word)
             continue
@@ -169,26 +185,36 @@ def one_case(given: CaseLike, plugins: Plugins) -> Case:
 
 def case_words(words: Iterable[str], plugins: Plugins) -> tuple[str, ...]:
     """Return words for cases that mean the same from any working directory."""
-    known = {*_parts(plugins.scenarios), *plugins.scenarios}
-    given = tuple(words) or tuple(plugins.scenarios)
+    known = {*_words(plugins.scenarios)}
+    given = tuple(words) or _default_set(plugins.scenarios)
     return tuple(word if word in known else str(Path(word).absolute()) for word in given)
+
+
+def _default_set(scenarios: Mapping[str, Scenario]) -> tuple[str, ...]:
+    return tuple(name for name, scenario in scenarios.items() if scenario.default)
+
+
+def _words(scenarios: Mapping[str, Scenario]) -> list[str]:
+    """Return every word that stands for cases of scenarios."""
+    return [*scenarios, *_groups(scenarios), *scenarios_of(scenarios)]
 
 
 def _folders(word: str, scenarios: Mapping[str, Scenario]) -> Iterable[tuple[str | None, Path]]:
     """Return name and folder of every case that a word stands for."""
-    if word in scenarios:
-        return list(scenarios[word].cases.items())
-    parts = _parts(scenarios)
-    if word in parts:
-        return [(word, parts[word])]
+    groups, owners = _groups(scenarios), scenarios_of(scenarios)
+    if word in scenarios or word in groups:
+        named = [scenarios[name] for name in ([word] if word in scenarios else groups[word])]
+        return [(case, scenario.folder(case)) for scenario in named for case in scenario.cases]
+    if word in owners:
+        return [(word, owners[word].folder(word))]
     path = Path(word)
     if path.name == "case.toml" and path.is_file():
         path = path.parent
     if path.is_dir():
         return [(None, path)]
-    if "/" in word and word.partition("/")[0] not in scenarios:
+    if "/" in word and word.partition("/")[0] not in {*scenarios, *groups}:
         raise InputError("folder does not exist", file=path, expected="a folder with a case.toml")
-    raise unknown("case", word, [*scenarios, *parts])
+    raise unknown("case", word, _words(scenarios))
 
 
 def _check_names(cases: Iterable[Case]) -> None:

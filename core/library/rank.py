@@ -186,7 +186,7 @@ def rank(
     """Run strategies on cases, each job in a process of its own, and rank them.
 
     Arguments:
-        cases: names, folders or `Case`s; all built-in ones where there is none.
+        cases: names, folders or `Case`s; the default set where there is none.
         strategies: names (``"NAME:OPTION=VALUE"`` with options), ``strategies[NAME](...)``,
             classes or instances, also of a notebook; all that are installed where there is none.
         seeds: number of draws of measurement noise; None for the data as recorded.

@@ -22,6 +22,7 @@ from femubench.core.roles import (
 
 # Names become words on the command line and parts of file names.
 _WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
+_GROUPED = re.compile(rf"({_WORD.pattern}/)?{_WORD.pattern}")
 
 
 def check_strategy(offered: object) -> Strategy:
@@ -49,24 +50,26 @@ def check_scenario(offered: object) -> Scenario:
     """Return a scenario whose cases carry its name.
 
     Raises:
-        PluginError: when it is no Scenario or its cases are misnamed.
+        PluginError: when it is no Scenario, or its cases or classes are none.
     """
     if not isinstance(offered, Scenario):
         raise PluginError(f"{_label(offered)} is not a femubench.Scenario")
-    _check_name(offered, offered, one_word=True)
+    _check_name(offered, offered, _GROUPED)
     if not isinstance(offered.cases, Mapping) or not offered.cases:
         raise PluginError(f"scenario {offered.name!r}: cases is not a mapping of names to folders")
     for name, folder in offered.cases.items():
-        prefix, slash, part = str(name).partition("/")
-        if prefix != offered.name or (slash and not _WORD.fullmatch(part)):
+        part = str(name).removeprefix(f"{offered.name}/")
+        if name != offered.name and (part == name or not _WORD.fullmatch(part)):
             raise PluginError(
                 f"scenario {offered.name!r}: case {name!r} is neither "
                 f"'{offered.name}' nor '{offered.name}/PART'"
             )
-        if not isinstance(folder, Path):
+        if not isinstance(folder, Path) and not callable(folder):
             raise PluginError(
                 f"scenario {offered.name!r}: folder of {name!r} is not a pathlib.Path"
             )
+    if not isinstance(offered.classes, tuple) or not all(map(_is_text, offered.classes)):
+        raise PluginError(f"scenario {offered.name!r}: classes is no tuple of words")
     return offered
 
 
@@ -77,7 +80,7 @@ def check_reader(offered: object) -> Reader:
         PluginError: when it lacks a method, a name or a suffix.
     """
     # The name of a reader is for messages alone and may have blanks.
-    reader: Reader = _filled(offered, "Reader", "read_matrix", "read_modes", one_word=False)
+    reader: Reader = _filled(offered, "Reader", "read_matrix", "read_modes", pattern=None)
     suffixes = getattr(reader, "suffixes", None)
     if not isinstance(suffixes, (tuple, list)) or not suffixes:
         raise PluginError(
@@ -171,22 +174,24 @@ def _instance(offered: object) -> object:
         raise PluginError(f"{_label(offered)} cannot be made without arguments: {fault}") from fault
 
 
-def _filled(offered: object, role: str, *methods: str, one_word: bool = True) -> Any:  # noqa: ANN401
+def _filled(
+    offered: object, role: str, *methods: str, pattern: re.Pattern[str] | None = _WORD
+) -> Any:  # noqa: ANN401
     """Return an instance that has the methods and the name of a role."""
     filled: Any = _instance(offered)
     for method in methods:
         if not callable(getattr(filled, method, None)):
             what = f"is not a femubench.{role}: {method}() is missing"
             raise PluginError(f"{_label(offered)} {what}")
-    _check_name(filled, offered, one_word=one_word)
+    _check_name(filled, offered, pattern)
     return filled
 
 
-def _check_name(filled: object, offered: object, *, one_word: bool) -> None:
+def _check_name(filled: object, offered: object, pattern: re.Pattern[str] | None) -> None:
     name = getattr(filled, "name", None)
     if not _is_text(name):
         raise PluginError(f"{_label(offered)}: name is missing")
-    if one_word and not _WORD.fullmatch(str(name)):
+    if pattern is not None and not pattern.fullmatch(str(name)):
         raise PluginError(f"{_label(offered)}: name {name!r} is not one word of letters, digits, -")
 
 
