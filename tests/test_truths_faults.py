@@ -249,6 +249,19 @@ def test_a_suite_without_room_for_a_kind_says_so(suite: Path) -> None:
         list(drafts([Structure(suite / "frame-solid")]))
 
 
+def test_no_structure_has_the_same_fault_twice(
+    suite: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (kind,) = (kind for kind in FAULT_KINDS if kind.effect == "support-missing")
+    monkeypatch.setattr(faults, "FAULT_KINDS", (replace(kind, count=4),))
+    places = [truth.causes[0].place for _, truth, _ in drafts([Structure(suite / "bench")])]
+    assert {place for place in places if place.count(":") == 1} == {"support:J1", "support:J9"}
+    assert len(set(places)) == 4
+    monkeypatch.setattr(faults, "FAULT_KINDS", (replace(kind, count=5),))
+    with pytest.raises(InputError, match="no structure can have support-missing number 5"):
+        list(drafts([Structure(suite / "bench")]))
+
+
 def test_writing_says_what_differs(
     suite: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -280,6 +293,9 @@ def test_committed_faults_are_what_the_generator_writes() -> None:
         effect = truth.causes[0].effect
         # What a fault changes takes a case to read: once for each kind.
         if effect not in seen:
-            chi2 = visibility(structure, truth, draft)
-            assert (said.chi2, said.chi2_frequencies) == pytest.approx(chi2, rel=1e-3)
+            whole, part = visibility(structure, truth, draft)
+            assert (said.chi2 is None) == (whole is None)
+            if whole is not None:
+                stated = (said.chi2, said.chi2_frequencies)
+                assert stated == pytest.approx((whole, part), rel=1e-3)
             seen.add(effect)

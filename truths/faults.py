@@ -30,7 +30,7 @@ from femubench.core.errors import InputError
 from femubench.core.inference.residuals import Data
 from femubench.core.modal.eigen import enough_modes, solve_modes
 from truths.posing import CASE_FILE, FAULTS, SUITE, overlay
-from truths.truth import TRUTH_FILE, TrueCause, Truth, read_truth, truth_text
+from truths.truth import TRUTH_FILE, TrueCause, Truth, read_truth, rounded, truth_text
 
 SEED = 12_000
 TURNED = 0.02  # a section whose sizes differ by less looks the same when turned
@@ -233,7 +233,7 @@ def _sigma_misstated(structure: Structure, option: Option, rng: np.random.Genera
         files.update(_edited(structure, lambda d: d["measurement"].update(shape_std=share)))
     word = "three times" if factor > 1.0 else "a third of"
     what = f"the deviations of the {quantity} are stated as {word} what they are"
-    return Draft(files, TrueCause(what, "sigma-misstated", "data", size=factor))
+    return Draft(files, TrueCause(what, "sigma-misstated", "data", size=rounded(factor)))
 
 
 def _slips(structure: Structure, number: int) -> Sequence[Option]:
@@ -242,13 +242,12 @@ def _slips(structure: Structure, number: int) -> Sequence[Option]:
     key = ("E", "rho", "size")[number % 3]
     if key == "size":
         sizes = ("width", "height", "diameter")
-        found = [
+        return [
             ("sections", name, size, 1e3)
             for name, section in model.get("sections", {}).items()
             for size in sizes
             if size in section and structure.members("section", name)
         ]
-        return found
     factor = 1e3 if key == "E" and number % 2 else 1e-3
     materials = model.get("materials", {})
     return [
