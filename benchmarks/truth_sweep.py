@@ -54,6 +54,7 @@ OUTCOMES = (
     "right",
     "other place",
     "in the group",
+    "with others",
     "one of two",
     "none",
     "unknown",
@@ -130,6 +131,11 @@ def diagnosed(task: Task, key: tuple[str, str]) -> Record:
             answer = Answer.of(diagnosis)
             record["answer"] = answer.model_dump(mode="json")
             record["verdict"], record["probability"] = answer.verdict, answer.probability
+            record["textbook"] = [
+                cause.effect
+                for cause in diagnosis.causes
+                if all(parameter.textbook for parameter in cause.parameters)
+            ]
             record["chi2"] = list(diagnosis.chi2)
             record["adequacy_p"] = diagnosis.adequacy_p
         except TooLong:
@@ -213,11 +219,11 @@ def _names(part: tuple[str, str], cause: TrueCause, same: Same) -> bool:
     return any(effect == known and same(place, where) for known, where in cause.findings)
 
 
-def _full(truth: Truth, parts: Parts, same: Same) -> bool:
-    """Tell whether parts name every cause and nothing else."""
-    return len(parts) == len(truth.causes) and any(
-        all(_names(part, cause, same) for part, cause in zip(order, truth.causes, strict=True))
-        for order in permutations(parts)
+def _holds(truth: Truth, parts: Parts, same: Same) -> bool:
+    """Tell whether every cause is among the parts, each by a part of its own."""
+    return any(
+        all(_names(part, cause, same) for part, cause in zip(chosen, truth.causes, strict=True))
+        for chosen in permutations(parts, len(truth.causes))
     )
 
 
@@ -228,22 +234,40 @@ def _half(truth: Truth, parts: Parts, same: Same) -> bool:
     return any(_names(parts[0], cause, same) for cause in truth.causes)
 
 
+def said_sets(truth: Truth, record: Record) -> list[Parts]:
+    """Return what a record takes for possible, without what it takes at the textbook value.
+
+    What handbooks give a drawn model lacks whether the structure has a defect or not.
+    """
+    wanted = {effect for cause in truth.causes for effect, _ in cause.findings}
+    textbook = set(record.get("textbook", ())) - wanted
+    return [
+        tuple(part for part in parts if part[0] not in textbook)
+        for parts in candidates(Answer.model_validate(record["answer"]))
+    ]
+
+
 def outcome(truth: Truth, record: Record, same: Same) -> str:
     """Return which of `OUTCOMES` a record is.
 
-    A name is right with effect and place, or as an entry of `also`; one cause more than there is
-    makes it wrong. A group holds the truth when one of its members is right by itself.
+    A name is right with effect and place, or as an entry of `also`. A group holds the truth when
+    one of its members is right by itself.
     """
     verdict = str(record["verdict"]).replace("-", " ")
     if verdict not in ("named", "ambiguous"):
         return verdict
-    sets = candidates(Answer.model_validate(record["answer"]))
+    sets = said_sets(truth, record)
+    if not any(sets):
+        return "none"
     if not truth.causes:
         return "wrong"
-    if any(_full(truth, parts, same) for parts in sets):
+    exact = [parts for parts in sets if len(parts) == len(truth.causes)]
+    if any(_holds(truth, parts, same) for parts in exact):
         return "right" if verdict == "named" else "in the group"
-    if any(_full(truth, parts, anywhere) for parts in sets):
+    if any(_holds(truth, parts, anywhere) for parts in exact):
         return "other place"
+    if any(_holds(truth, parts, same) for parts in sets):
+        return "with others"
     return "one of two" if any(_half(truth, parts, same) for parts in sets) else "wrong"
 
 

@@ -55,11 +55,12 @@ def same() -> sweep.Same:
         ("other place", said("named", "joint-rotation@J5")),
         ("other place", said("named", "joint-offset@J9")),
         ("wrong", said("named", "added-mass@J1")),
-        ("wrong", said("named", "joint-rotation@J1", "added-mass@J5")),
+        ("with others", said("named", "joint-rotation@J1", "added-mass@J5")),
+        ("wrong", said("named", "joint-rotation@J5", "added-mass@J5")),
         ("in the group", said("ambiguous", "added-mass@J1", "joint-rotation@J1")),
         ("other place", said("ambiguous", "added-mass@J1", "joint-rotation@J5")),
         ("wrong", said("ambiguous", "added-mass@J1", "density@all")),
-        ("wrong", said("ambiguous", "joint-rotation@J1 + density@all")),
+        ("with others", said("ambiguous", "joint-rotation@J1 + density@all")),
         ("none", said("none")),
         ("unknown", said("unknown", "joint-rotation@J1")),
         ("not confirmed", said("not-confirmed", "joint-rotation@J1")),
@@ -82,8 +83,22 @@ def test_outcome_of_a_pair(same: sweep.Same) -> None:
     assert sweep.outcome(pair, said("named", both[0]), same) == "one of two"
     assert sweep.outcome(pair, said("ambiguous", *both), same) == "one of two"
     assert sweep.outcome(pair, said("named", "added-mass@J1"), same) == "wrong"
+    assert sweep.outcome(pair, said("named", *both, "density@all"), same) == "with others"
+    assert sweep.outcome(pair, said("named", both[0], "density@all"), same) == "wrong"
     twice = truth("pair", LOOSE, LOOSE)
     assert sweep.outcome(twice, said("named", "joint-rotation@J1"), same) == "one of two"
+
+
+def test_textbook_values_are_no_finding(same: sweep.Same) -> None:
+    defect, clean = truth("defect", LOOSE), truth("clean")
+    record = said("named", "joint-rotation@J1", "shear-deformation@all")
+    assert sweep.outcome(defect, record, same) == "with others"
+    assert sweep.outcome(defect, {**record, "textbook": ["shear-deformation"]}, same) == "right"
+    # What is sought is a finding, wherever it was taken from.
+    assert sweep.outcome(defect, {**record, "textbook": ["joint-rotation"]}, same) == "with others"
+    plain = {**said("named", "shear-deformation@all"), "textbook": ["shear-deformation"]}
+    assert sweep.outcome(clean, plain, same) == sweep.outcome(defect, plain, same) == "none"
+    assert sweep.outcome(clean, {**record, "textbook": ["shear-deformation"]}, same) == "wrong"
 
 
 def test_outcome_without_a_name_to_give(same: sweep.Same) -> None:
@@ -137,7 +152,7 @@ def test_tables_count_both_halves_apart() -> None:
         sweep.scored({**records, kept[0]: said("none")}, truths, ROOT / "scenarios"), truths
     )
     assert development in everything
-    assert "| defect | 1 | 0 | 0 | 0 | 0 | 1 " in " ".join(everything.split())
+    assert "| defect | 1 | 0 | 0 | 0 | 0 | 0 | 1 " in " ".join(everything.split())
 
 
 def test_the_page_keeps_its_words() -> None:
