@@ -34,6 +34,7 @@ test: $(VENV)/.installed-test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy -p femubench
+	$(BIN)/mypy truths
 	$(BIN)/pyright --pythonpath $(BIN)/python
 ifeq ($(ARGS),)
 	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest $(ON_ALL_CORES) $(NUMERICAL)

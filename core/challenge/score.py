@@ -94,15 +94,15 @@ def _judge_causes(
     pairs = list(zip(truth.causes, delta_chi2, strict=True))
     visible = frozenset(cause.effect for cause, delta in pairs if delta >= TOO_SMALL)
     every = frozenset(cause.effect for cause in truth.causes)
-    candidates = _candidates(answer)
-    named = [parts for parts in candidates if parts and visible <= _effects(parts) <= every]
+    possible = candidates(answer)
+    named = [parts for parts in possible if parts and visible <= _effects(parts) <= every]
     if answer.verdict == "ambiguous":
         # The group as one: each visible cause is an entry of what these data cannot tell apart.
-        whole = tuple(part for parts in candidates if len(parts) == 1 for part in parts)
+        whole = tuple(part for parts in possible if len(parts) == 1 for part in parts)
         among = tuple(part for part in whole if part[0] in every)
         named += [among] if among and visible <= _effects(among) else []
     fits = [parts for parts in named if _places_fit(frame, parts, truth.causes)]
-    found = len(every & frozenset(effect for parts in candidates for effect, _ in parts))
+    found = len(every & frozenset(effect for parts in possible for effect, _ in parts))
     too_small = not visible
     if answer.verdict == "none":
         reason = "too small to see" if too_small else f"it misses {truth}"
@@ -129,7 +129,7 @@ def _judge_outside(answer: Answer, excess: float) -> Judgement:
     return Judgement(right, None, None, _group_size(answer), 0, too_small, False, (), reason)
 
 
-def _candidates(answer: Answer) -> tuple[Parts, ...]:
+def candidates(answer: Answer) -> tuple[Parts, ...]:
     """Return every set of causes that the answer takes for possible."""
     if answer.verdict == "ambiguous":
         return tuple(cause.parts for cause in answer.causes)

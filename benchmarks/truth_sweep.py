@@ -1,0 +1,455 @@
+"""Diagnose every case whose truth comes from outside, and write the tables of docs/truth-sweep.md.
+
+python benchmarks/truth_sweep.py run --jobs 2         # appends, goes on where it stopped
+python benchmarks/truth_sweep.py run --reference      # with the healthy structure beside it
+python benchmarks/truth_sweep.py tables
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import math
+import multiprocessing
+import signal
+import sys
+import tempfile
+import time
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from itertools import permutations
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import pandas as pd
+from threadpoolctl import threadpool_limits
+
+sys.path.insert(0, str(Path(__file__).parents[1]))  # the truths are not installed
+
+from femubench import read_case
+from femubench.core.challenge.answer import Answer
+from femubench.core.challenge.score import Parts, candidates
+from femubench.core.challenge.sweep import Record, wilson
+from femubench.core.effect.places import match
+from femubench.core.fem.frame import Frame
+from truths.posing import DEFECTS, FAULTS, HEALTHY, SUITE, pose
+from truths.truth import TRUTH_FILE, TrueCause, Truth, read_truth
+
+ROOT = Path(__file__).parents[1]
+RESULTS = ROOT / "femubench-results" / "truth-sweep.jsonl"
+PAGE = ROOT / "docs" / "truth-sweep.md"
+MARK = "truth-sweep"
+SURE = 0.99
+# Upper ends of the ranges of chi-square.
+EDGES = (9.0, 30.0, 100.0, 1000.0, math.inf)
+RANGES = ("< 9", "9 to 30", "30 to 100", "100 to 1000", "> 1000")
+KIND_ORDER = ("defect", "pair", "clean", "outside")
+OUTCOMES = (
+    "right",
+    "other place",
+    "in the group",
+    "with others",
+    "one of two",
+    "none",
+    "unknown",
+    "not confirmed",
+    "wrong",
+    "error",
+    "too long",
+)
+
+
+class TooLong(BaseException):
+    """A case took more processor time than it may; nothing on the way catches it."""
+
+
+@contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """Stop what is in the block after so much processor time, whatever else the machine does."""
+
+    def stop(signum: int, frame: FrameType | None) -> None:
+        raise TooLong
+
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
+@dataclass(frozen=True)
+class Task:
+    """A case of the sweep.
+
+    Arguments:
+        folder: of its truth.
+        suite: where the structures are.
+        reference: whether it brings the healthy structure's measurement.
+        seconds: of processor time that it may take.
+    """
+
+    folder: Path
+    suite: Path
+    reference: bool
+    seconds: float
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Return its name and a hash over what is diagnosed."""
+        with tempfile.TemporaryDirectory() as scratch:
+            target = Path(scratch, "case")
+            pose(self.folder, target, self.reference, suite=self.suite)
+            total = hashlib.sha256()
+            for path in sorted(target.iterdir()):
+                content = path.read_bytes()
+                total.update(f"{path.name}\0{len(content)}\0".encode() + content)
+        return self.folder.name, total.hexdigest()[:16]
+
+
+def diagnosed(task: Task, key: tuple[str, str]) -> Record:
+    """Return the record of one case, on one thread; a failure is a record too."""
+    from femubench.core.diagnosis.diagnose import diagnose
+
+    record: Record = {"name": key[0], "digest": key[1], "verdict": "error"}
+    begin = time.process_time()
+    with tempfile.TemporaryDirectory() as scratch, threadpool_limits(1):
+        target = Path(scratch, "case")
+        pose(task.folder, target, task.reference, suite=task.suite)
+        try:
+            with warnings.catch_warnings(record=True) as told, limited(task.seconds):
+                warnings.simplefilter("default")
+                diagnosis = diagnose(read_case(target))
+            record["warnings"] = sorted({str(warning.message)[:80] for warning in told})
+            answer = Answer.of(diagnosis)
+            record["answer"] = answer.model_dump(mode="json")
+            record["verdict"], record["probability"] = answer.verdict, answer.probability
+            record["textbook"] = [
+                cause.effect
+                for cause in diagnosis.causes
+                if all(parameter.textbook for parameter in cause.parameters)
+            ]
+            record["chi2"] = list(diagnosis.chi2)
+            record["adequacy_p"] = diagnosis.adequacy_p
+        except TooLong:
+            record["verdict"] = "too-long"
+        except Exception as error:  # a fault of the diagnosis is a finding of the sweep
+            record["error"] = f"{type(error).__name__}: {error}"
+    return {**record, "seconds": round(time.process_time() - begin, 2)}
+
+
+def read_records(path: Path) -> dict[str, Record]:
+    """Return the last record of every case; a line that was cut off is left out."""
+    records: dict[str, Record] = {}
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
+        try:
+            record = json.loads(line)
+        except json.JSONDecodeError:
+            continue
+        records[record["name"]] = record
+    return records
+
+
+def truth_folders(*rooms: Path) -> list[Path]:
+    """Return the folders with a truth."""
+    return [file.parent for room in rooms for file in sorted(room.glob(f"*/{TRUTH_FILE}"))]
+
+
+def run(path: Path, tasks: Sequence[Task], jobs: int) -> None:
+    """Diagnose what is not in the results file yet, or has changed since; append a line a case."""
+    known = read_records(path)
+    keyed = [(task, task.key) for task in tasks]
+    rest = [(task, key) for task, key in keyed if not is_of(known.get(key[0]), key)]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    print(f"{len(keyed) - len(rest)} of {len(keyed)} cases are in {path}", file=sys.stderr)
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(jobs, mp_context=context) as pool, path.open("a") as stream:
+        futures = [pool.submit(diagnosed, task, key) for task, key in rest]
+        for i, future in enumerate(as_completed(futures), 1):
+            record = future.result()
+            stream.write(json.dumps(record) + "\n")
+            stream.flush()
+            said = record.get("error", record["verdict"])
+            seconds = f"{record['seconds']:.0f} s"
+            print(f"{i}/{len(rest)} {record['name']}: {said}, {seconds}", file=sys.stderr)
+
+
+def is_of(record: Record | None, key: tuple[str, str]) -> bool:
+    """Tell whether a record is of a case as it is now."""
+    return record is not None and (record["name"], record["digest"]) == key
+
+
+Same = Callable[[str, str], bool]
+
+
+def _in_order(place: str) -> str:
+    """Return a place with the two of a swap sorted: ``sensor:S5+S7``."""
+    head, colon, tail = place.partition(":")
+    return head + colon + "+".join(sorted(tail.split("+")))
+
+
+def same_place(frame: Frame | None) -> Same:
+    """Return what tells whether two words stand for one place.
+
+    Arguments:
+        frame: of the structure; None compares words.
+    """
+
+    def same(first: str, second: str) -> bool:
+        one, two = _in_order(first), _in_order(second)
+        return one == two if frame is None else match(frame, one, two)
+
+    return same
+
+
+def anywhere(first: str, second: str) -> bool:
+    """Take every two places for the same."""
+    return True
+
+
+def _names(part: tuple[str, str], cause: TrueCause, same: Same) -> bool:
+    effect, place = part
+    return any(effect == known and same(place, where) for known, where in cause.findings)
+
+
+def _holds(truth: Truth, parts: Parts, same: Same) -> bool:
+    """Tell whether every cause is among the parts, each by a part of its own."""
+    return any(
+        all(_names(part, cause, same) for part, cause in zip(chosen, truth.causes, strict=True))
+        for chosen in permutations(parts, len(truth.causes))
+    )
+
+
+def _half(truth: Truth, parts: Parts, same: Same) -> bool:
+    """Tell whether parts are just one of two causes."""
+    if len(truth.causes) != 2 or len(parts) != 1:
+        return False
+    return any(_names(parts[0], cause, same) for cause in truth.causes)
+
+
+def said_sets(truth: Truth, record: Record) -> list[Parts]:
+    """Return what a record takes for possible, without what it takes at the textbook value.
+
+    What handbooks give a drawn model lacks whether the structure has a defect or not.
+    """
+    wanted = {effect for cause in truth.causes for effect, _ in cause.findings}
+    textbook = set(record.get("textbook", ())) - wanted
+    return [
+        tuple(part for part in parts if part[0] not in textbook)
+        for parts in candidates(Answer.model_validate(record["answer"]))
+    ]
+
+
+def outcome(truth: Truth, record: Record, same: Same) -> str:
+    """Return which of `OUTCOMES` a record is.
+
+    A name is right with effect and place, or as an entry of `also`. A group holds the truth when
+    one of its members is right by itself.
+    """
+    verdict = str(record["verdict"]).replace("-", " ")
+    if verdict not in ("named", "ambiguous"):
+        return verdict
+    sets = said_sets(truth, record)
+    if not any(sets):
+        return "none"
+    if not truth.causes:
+        return "wrong"
+    exact = [parts for parts in sets if len(parts) == len(truth.causes)]
+    if any(_holds(truth, parts, same) for parts in exact):
+        return "right" if verdict == "named" else "in the group"
+    if any(_holds(truth, parts, anywhere) for parts in exact):
+        return "other place"
+    if any(_holds(truth, parts, same) for parts in sets):
+        return "with others"
+    return "one of two" if any(_half(truth, parts, same) for parts in sets) else "wrong"
+
+
+def counts_as_right(truth: Truth, said: str) -> bool:
+    """Tell whether an outcome is the best that can be said of a truth."""
+    if truth.kind == "clean":
+        return said == "none"
+    good = ("right", "in the group")
+    return said in (*good, "unknown", "not confirmed") if truth.kind == "outside" else said in good
+
+
+def reach(truth: Truth) -> str:
+    """Return the range of the visibility of a truth; a dash where it has none."""
+    if truth.chi2 is None:
+        return "-"
+    return next(word for word, edge in zip(RANGES, EDGES, strict=True) if truth.chi2 < edge)
+
+
+def kind_of(truth: Truth) -> str:
+    """Return the row of a truth: faults of the data by what they are, all others by kind."""
+    return truth.causes[0].effect if truth.kind.endswith("-fault") else truth.kind
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A truth and what was said of it.
+
+    Arguments:
+        truth: of the case.
+        said: one of `OUTCOMES`.
+        sure: whether the verdict states a probability of at least `SURE`.
+    """
+
+    truth: Truth
+    said: str
+    sure: bool
+
+
+def scored(records: Mapping[str, Record], truths: Iterable[Truth], suite: Path) -> list[Scored]:
+    """Return what was said of every truth that has a record."""
+
+    @cache
+    def same(structure: str) -> Same:
+        model = read_case(suite / structure).model
+        return same_place(model.structure.frame if model.structure is not None else None)
+
+    found = []
+    for truth in truths:
+        if truth.name in records:
+            record = records[truth.name]
+            said = outcome(truth, record, same(truth.structure))
+            found.append(Scored(truth, said, (record.get("probability") or 0.0) >= SURE))
+    return found
+
+
+def outcome_row(first: Mapping[str, str], cases: Sequence[Scored]) -> dict[str, str]:
+    """Return the row of a table of outcomes: how many of each, and the share that counts."""
+    right = sum(counts_as_right(case.truth, case.said) for case in cases)
+    low, high = wilson(right, len(cases))
+    row = {**first, "cases": str(len(cases))}
+    for word in OUTCOMES:
+        if word == "wrong":
+            row[f"wrong, P >= {SURE:g}"] = str(sum(c.said == word and c.sure for c in cases))
+        row[word] = str(sum(case.said == word for case in cases))
+    share = f"{100.0 * right / len(cases):.0f} % ({100.0 * low:.0f} to {100.0 * high:.0f})"
+    return {**row, "counts as right": share}
+
+
+def outcome_table(
+    head: str, group: Callable[[Truth], str], cases: Iterable[Scored], order: Sequence[str] = ()
+) -> str:
+    """Return a table with one row a group of cases, in a given order or by name."""
+    groups: dict[str, list[Scored]] = {}
+    for case in cases:
+        groups.setdefault(group(case.truth), []).append(case)
+    return _markdown(outcome_row({head: name}, groups[name]) for name in ranked(groups, order))
+
+
+def ranked(names: Iterable[str], order: Sequence[str]) -> list[str]:
+    """Return names in a given order, then all others by the alphabet."""
+    known = set(names)
+    first = [name for name in order if name in known]
+    return [*first, *sorted(known - set(first))]
+
+
+def visibility_table(truths: Iterable[Truth]) -> str:
+    """Return how many cases of each kind change the data by how much."""
+    kinds: dict[str, list[str]] = {}
+    for truth in truths:
+        kinds.setdefault(kind_of(truth), []).append(reach(truth))
+    return _markdown(
+        {
+            "kind": name,
+            "cases": str(len(kinds[name])),
+            **{word: str(kinds[name].count(word)) for word in (*RANGES, "-")},
+        }
+        for name in ranked(kinds, KIND_ORDER)
+    )
+
+
+def _markdown(rows: Iterable[Mapping[str, str]]) -> str:
+    return str(pd.DataFrame(list(rows)).to_markdown(index=False, disable_numparse=True))
+
+
+def half(title: str, cases: Sequence[Scored]) -> str:
+    """Return the tables of one half of the cases."""
+    single = [case for case in cases if case.truth.kind == "defect"]
+    found = [case for case in cases if case.truth.chi2 is not None and case.truth.causes]
+    parts = [f"## {title}", outcome_table("kind", kind_of, cases, KIND_ORDER)]
+    if single:
+        effects = outcome_table("effect", lambda truth: truth.causes[0].effect, single)
+        parts += ["Single defects by effect:", effects]
+    if found:
+        ranges = outcome_table("chi-square", reach, found, RANGES)
+        parts += ["All that hide something, by the chi-square of the change:", ranges]
+    return "\n\n".join(parts)
+
+
+def tables(cases: Sequence[Scored], truths: Sequence[Truth]) -> str:
+    """Return all tables: visibility, then the outcomes of both halves apart.
+
+    Arguments:
+        cases: what has a record.
+        truths: all that there are.
+    """
+    parts = ["## How visible the cases are", visibility_table(truths)]
+    for title, is_held in (("Development half", False), ("Held half", True)):
+        own = [case for case in cases if case.truth.held is is_held]
+        parts += [half(title, own)] if own else [f"## {title}", "No case was diagnosed yet."]
+    return "\n\n".join(parts)
+
+
+def filled(page: str, text: str) -> str:
+    """Return a page with a text between its markers."""
+    head, rest = page.split(f"<!-- {MARK} -->\n", 1)
+    tail = rest.split(f"<!-- /{MARK} -->", 1)[1]
+    return f"{head}<!-- {MARK} -->\n\n{text}\n\n<!-- /{MARK} -->{tail}"
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the command line."""
+    found = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    found.add_argument("what", choices=("run", "tables"))
+    found.add_argument("names", nargs="*", help="cases; all by default")
+    found.add_argument("--jobs", type=int, default=2, help="processes")
+    found.add_argument("--reference", action="store_true", help="with the healthy structure")
+    found.add_argument("--seconds", type=float, default=120.0, help="processor time a case")
+    found.add_argument("--results", type=Path, help=f"{RESULTS.relative_to(ROOT)} by default")
+    found.add_argument("--suite", type=Path, default=SUITE)
+    found.add_argument("--truths", type=Path, nargs="*", default=(DEFECTS, FAULTS))
+    found.add_argument("--page", type=Path, default=PAGE)
+    return found
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the sweep, or write its page."""
+    known = parser()
+    options: Any = known.parse_args(arguments)
+    folders = truth_folders(*options.truths)
+    if unknown := set(options.names) - {folder.name for folder in folders}:
+        known.error(f"no case {sorted(unknown)[0]!r} in {', '.join(map(str, options.truths))}")
+    if options.names:
+        folders = [folder for folder in folders if folder.name in options.names]
+    if options.reference:
+        folders = [folder for folder in folders if (folder / HEALTHY).is_file()]
+    stem = RESULTS.stem + ("-reference" if options.reference else "")
+    results = options.results or RESULTS.with_stem(stem)
+    tasks = [Task(f, options.suite, options.reference, options.seconds) for f in folders]
+    if options.what == "run":
+        run(results, tasks, options.jobs)
+        return
+    truths = [read_truth(folder) for folder in folders]
+    keys = dict(task.key for task in tasks)
+    records = read_records(results)
+    records = {n: r for n, r in records.items() if n in keys and is_of(r, (n, keys[n]))}
+    cases = scored(records, truths, options.suite)
+    if not cases:
+        known.error(f"no results in {results}: run the sweep first")
+    page = filled(options.page.read_text(encoding="utf-8"), tables(cases, truths))
+    options.page.write_text(page, encoding="utf-8")
+    print(f"{len(cases)} of {len(truths)} cases, {options.page}")
+
+
+if __name__ == "__main__":
+    main()

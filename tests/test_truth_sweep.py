@@ -1,0 +1,209 @@
+"""How the sweep over all truths scores what is said of them, on records made by hand."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from femubench import read_case
+from femubench.core.diagnosis import diagnose as diagnosing
+from truths.truth import TrueCause, Truth, held, truth_text
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+import truth_sweep as sweep
+
+ROOT = Path(__file__).parents[1]
+LOOSE = TrueCause("a loose joint", "joint-rotation", "J1", ("joint-rotation@J9", "joint-offset@J1"))
+CLAMP = TrueCause("a clamp", "added-mass", "rung-middle@0.5")
+SWAP = TrueCause("swapped cables", "sensors-swapped", "sensor:5Z+7Z")
+TAPER = TrueCause("a tapered member", "", "front-left")
+
+
+def truth(kind: str, *causes: TrueCause, chi2: float | None = 50.0, name: str = "x") -> Truth:
+    return Truth(name, "frame-solid", kind, 1, causes, chi2, chi2)
+
+
+def said(verdict: str, *causes: str, p: float = 0.9) -> dict[str, Any]:
+    """Return a record: every cause as ``effect@place``, with `` + `` for a pair in a group."""
+    listed = []
+    for cause in causes:
+        parts = [part.partition("@")[::2] for part in cause.split(" + ")]
+        effect, place = (" + ".join(words) for words in zip(*parts, strict=True))
+        listed.append({"effect": effect, "place": place, "probability": p})
+    answer = {"verdict": verdict, "causes": listed}
+    return {"verdict": verdict, "answer": answer, "probability": p if listed else None}
+
+
+@pytest.fixture(scope="module")
+def same() -> sweep.Same:
+    frame = read_case(ROOT / "scenarios" / "frame-solid").model.frame_structure.frame
+    return sweep.same_place(frame)
+
+
+@pytest.mark.parametrize(
+    ("expected", "record"),
+    [
+        ("right", said("named", "joint-rotation@J1")),
+        ("right", said("named", "joint-rotation@rung-right@J1")),  # an end at a joint of two
+        ("right", said("named", "joint-rotation@J9")),
+        ("right", said("named", "joint-offset@J1")),
+        ("other place", said("named", "joint-rotation@J5")),
+        ("other place", said("named", "joint-offset@J9")),
+        ("wrong", said("named", "added-mass@J1")),
+        ("with others", said("named", "joint-rotation@J1", "added-mass@J5")),
+        ("wrong", said("named", "joint-rotation@J5", "added-mass@J5")),
+        ("in the group", said("ambiguous", "added-mass@J1", "joint-rotation@J1")),
+        ("other place", said("ambiguous", "added-mass@J1", "joint-rotation@J5")),
+        ("wrong", said("ambiguous", "added-mass@J1", "density@all")),
+        ("with others", said("ambiguous", "joint-rotation@J1 + density@all")),
+        ("none", said("none")),
+        ("unknown", said("unknown", "joint-rotation@J1")),
+        ("not confirmed", said("not-confirmed", "joint-rotation@J1")),
+        ("error", {"verdict": "error", "error": "ModelError: no modes"}),
+        ("too long", {"verdict": "too-long"}),
+    ],
+)
+def test_outcome_of_a_single_defect(
+    same: sweep.Same, expected: str, record: dict[str, Any]
+) -> None:
+    assert sweep.outcome(truth("defect", LOOSE), record, same) == expected
+
+
+def test_outcome_of_a_pair(same: sweep.Same) -> None:
+    pair = truth("pair", LOOSE, CLAMP)
+    both = ("added-mass@rung-middle@0.5", "joint-rotation@J9")
+    assert sweep.outcome(pair, said("named", *both), same) == "right"
+    assert sweep.outcome(pair, said("ambiguous", " + ".join(both)), same) == "in the group"
+    assert sweep.outcome(pair, said("named", both[0], "joint-rotation@T"), same) == "other place"
+    assert sweep.outcome(pair, said("named", both[0]), same) == "one of two"
+    assert sweep.outcome(pair, said("ambiguous", *both), same) == "one of two"
+    assert sweep.outcome(pair, said("named", "added-mass@J1"), same) == "wrong"
+    assert sweep.outcome(pair, said("named", *both, "density@all"), same) == "with others"
+    assert sweep.outcome(pair, said("named", both[0], "density@all"), same) == "wrong"
+    twice = truth("pair", LOOSE, LOOSE)
+    assert sweep.outcome(twice, said("named", "joint-rotation@J1"), same) == "one of two"
+
+
+def test_textbook_values_are_no_finding(same: sweep.Same) -> None:
+    defect, clean = truth("defect", LOOSE), truth("clean")
+    record = said("named", "joint-rotation@J1", "shear-deformation@all")
+    assert sweep.outcome(defect, record, same) == "with others"
+    assert sweep.outcome(defect, {**record, "textbook": ["shear-deformation"]}, same) == "right"
+    # What is sought is a finding, wherever it was taken from.
+    assert sweep.outcome(defect, {**record, "textbook": ["joint-rotation"]}, same) == "with others"
+    plain = {**said("named", "shear-deformation@all"), "textbook": ["shear-deformation"]}
+    assert sweep.outcome(clean, plain, same) == sweep.outcome(defect, plain, same) == "none"
+    assert sweep.outcome(clean, {**record, "textbook": ["shear-deformation"]}, same) == "wrong"
+
+
+def test_outcome_without_a_name_to_give(same: sweep.Same) -> None:
+    clean, outside = truth("clean"), truth("outside", TAPER)
+    assert sweep.outcome(clean, said("named", "density@all"), same) == "wrong"
+    assert sweep.outcome(outside, said("named", "density@all"), same) == "wrong"
+    good = {"none", "unknown", "not confirmed", "right", "in the group"}
+    for kind, right in (
+        (clean, {"none"}),
+        (outside, good - {"none"}),
+        (truth("defect", LOOSE), {"right", "in the group"}),
+    ):
+        assert {word for word in sweep.OUTCOMES if sweep.counts_as_right(kind, word)} == right
+
+
+def test_swapped_sensors_have_no_order(same: sweep.Same) -> None:
+    fault = truth("data-fault", SWAP)
+    assert sweep.outcome(fault, said("named", "sensors-swapped@sensor:7Z+5Z"), same) == "right"
+    assert sweep.outcome(fault, said("named", "sensors-swapped@sensor:7Z+6Z"), same) != "right"
+    assert sweep.kind_of(fault) == "sensors-swapped"
+    words = sweep.same_place(None)
+    assert words("sensor:a+b", "sensor:b+a")
+    assert not words("J1", "J9")
+
+
+def test_ranges_of_visibility() -> None:
+    values = (0.0, 8.9, 9.0, 29.0, 30.0, 100.0, 999.0, 1000.0, 1e12)
+    found = [sweep.RANGES.index(sweep.reach(truth("clean", chi2=v))) for v in values]
+    assert found == [0, 0, 1, 1, 2, 3, 3, 4, 4]
+    assert sweep.reach(truth("clean", chi2=None)) == "-"
+
+
+def test_tables_count_both_halves_apart() -> None:
+    names = [str(i) for i in range(20)]
+    kept, shown = ([n for n in names if held(n) is half] for half in (True, False))
+    truths = [truth("defect", LOOSE, name=name) for name in names]
+    records = {name: said("named", "joint-rotation@J1") for name in shown}
+    records[shown[0]] = said("named", "density@all", p=0.995)
+    records[shown[1]] = said("named", "density@all", p=0.5)
+    cases = sweep.scored(records, truths, ROOT / "scenarios")
+    assert {case.truth.name for case in cases} == set(shown)
+    row = sweep.outcome_row({"kind": "defect"}, cases)
+    assert (row["cases"], row["right"]) == (str(len(shown)), str(len(shown) - 2))
+    assert (row["wrong"], row["wrong, P >= 0.99"]) == ("2", "1")
+    text = sweep.tables(cases, truths)
+    development, kept_text = text.split("## Development half")[1].split("## Held half")
+    assert f"| defect | {len(shown)} " in " ".join(development.split())
+    assert "| joint-rotation |" in " ".join(development.split())
+    assert kept_text.strip() == "No case was diagnosed yet."
+    everything = sweep.tables(
+        sweep.scored({**records, kept[0]: said("none")}, truths, ROOT / "scenarios"), truths
+    )
+    assert development in everything
+    assert "| defect | 1 | 0 | 0 | 0 | 0 | 0 | 1 " in " ".join(everything.split())
+
+
+def test_the_page_keeps_its_words() -> None:
+    page = (ROOT / "docs" / "truth-sweep.md").read_text(encoding="utf-8")
+    once = sweep.filled(page, "a table")
+    assert once.startswith(page.split("<!-- truth-sweep -->")[0])
+    assert sweep.filled(once, "a table") == once
+    assert "No case was diagnosed" not in once
+
+
+@pytest.fixture
+def task(tmp_path: Path) -> sweep.Task:
+    room = tmp_path / "x"
+    room.mkdir()
+    (room / "truth.toml").write_text(truth_text(truth("defect", LOOSE)), encoding="utf-8")
+    shutil.copyfile(ROOT / "scenarios" / "frame-solid" / "modes.csv", room / "modes.csv")
+    return sweep.Task(room, ROOT / "scenarios", False, 0.1)
+
+
+def test_a_case_that_changed_is_another(task: sweep.Task) -> None:
+    key = task.key
+    record = {"name": key[0], "digest": key[1]}
+    assert sweep.is_of(record, task.key)
+    file = task.folder / "truth.toml"
+    file.write_text(file.read_text(encoding="utf-8").replace("loose", "soft"), encoding="utf-8")
+    assert sweep.is_of(record, task.key)
+    modes = task.folder / "modes.csv"
+    modes.write_text(modes.read_text(encoding="utf-8").replace("231.", "232."), encoding="utf-8")
+    assert not sweep.is_of(record, task.key)
+    assert not sweep.is_of(None, task.key)
+
+
+def test_failures_are_outcomes(task: sweep.Task, monkeypatch: pytest.MonkeyPatch) -> None:
+    def forever(case: object) -> None:
+        while True:
+            with suppress(Exception):  # as a search that goes on after every error
+                sum(range(1000))
+
+    def fails(case: object) -> None:
+        raise ZeroDivisionError("as it were")
+
+    monkeypatch.setattr(diagnosing, "diagnose", forever)
+    assert sweep.diagnosed(task, task.key)["verdict"] == "too-long"
+    monkeypatch.setattr(diagnosing, "diagnose", fails)
+    record = sweep.diagnosed(task, task.key)
+    assert (record["verdict"], record["error"]) == ("error", "ZeroDivisionError: as it were")
+
+
+def test_records_cut_off_are_left_out(tmp_path: Path) -> None:
+    file = tmp_path / "results.jsonl"
+    assert sweep.read_records(file) == {}
+    lines = ['{"name": "a", "digest": 1}', '{"name": "a", "digest": 2}', '{"name": "b", "dig']
+    file.write_text("\n".join(lines), encoding="utf-8")
+    assert sweep.read_records(file) == {"a": {"name": "a", "digest": 2}}

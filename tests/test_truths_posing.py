@@ -1,0 +1,114 @@
+"""Truth files, and the cases that are posed from them."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from femubench import InputError, read_case
+from truths.posing import pose
+from truths.truth import TrueCause, Truth, held, read_truth, truth_text
+
+sys.path.insert(0, str(Path(__file__).parent))
+from small_suite import write_suite
+
+CAUSES = (
+    TrueCause("a loose joint", "joint-rotation", "J5", ("joint-rotation@T",), 1.25e5, "N m/rad"),
+    TrueCause("a tapered member", "", "front-left"),
+)
+TRUTH = Truth("two", "frame-solid", "pair", 7, CAUSES, 83.2, 61.0)
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_suite(tmp_path_factory.mktemp("suite"))
+
+
+def written(folder: Path, truth: Truth = TRUTH, **files: str) -> Path:
+    """Write a truth with files of the structure's names, a dot for every underline."""
+    room = folder / truth.name
+    room.mkdir(parents=True)
+    (room / "truth.toml").write_text(truth_text(truth), encoding="utf-8")
+    for name, text in files.items():
+        (room / name.replace("_", ".")).write_text(text, encoding="utf-8")
+    return room
+
+
+def test_a_truth_is_read_as_it_was_written(tmp_path: Path) -> None:
+    assert read_truth(written(tmp_path)) == TRUTH
+    clean = Truth("sound", "frame-solid", "clean", 8)
+    assert read_truth(written(tmp_path, clean)) == clean
+    assert CAUSES[0].findings == (("joint-rotation", "J5"), ("joint-rotation", "T"))
+    assert CAUSES[1].findings == ()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line"),
+    [
+        ('kind = "pair"', 'kind = "other"', "kind: unknown kind 'other'"),
+        ('kind = "pair"', 'kind = "defect"', "cause: not what 'defect' has (expected 1 tables"),
+        ("seed = 7", "seed = true", "seed: 'True' is not allowed"),
+        ("seed = 7", "seed = -7", "seed: -7"),
+        ("seed = 7", "", "seed: missing key"),
+        ("held = ", "held = not", "expected valid TOML"),
+        ("chi2 = 83.2", "chi2 = nan", "visible.chi2: not finite"),
+        ("chi2 = 83.2", "chi2 = -1", "visible.chi2: -1 (expected a number >= 0)"),
+        ("size = 125000.0", 'size = "big"', "cause[0].size: 'big' is not allowed"),
+        ('place = "J5"', 'where = "J5"', "cause[0].where: unknown key"),
+        ('["joint-rotation@T"]', '["joint-rotation"]', "cause[0].also: 'joint-rotation'"),
+    ],
+)
+def test_a_faulty_key_is_one_line(tmp_path: Path, old: str, new: str, line: str) -> None:
+    room = written(tmp_path)
+    text = (room / "truth.toml").read_text(encoding="utf-8")
+    assert old in text
+    (room / "truth.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        read_truth(room)
+    assert str(caught.value).startswith(str(room / "truth.toml"))
+    assert line in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_truth_in_a_folder_of_another_half_is_refused(tmp_path: Path) -> None:
+    room = written(tmp_path)
+    other = next(name for name in map(str, range(99)) if held(name) != held(room.name))
+    with pytest.raises(InputError, match="held: the half is another"):
+        read_truth(room.rename(tmp_path / other))
+
+
+def test_a_case_is_the_files_of_the_truth_over_those_of_the_structure(
+    tmp_path: Path, suite: Path
+) -> None:
+    modes = (suite / "frame-solid" / "modes.csv").read_text(encoding="utf-8")
+    changed = modes.replace("231.4113", "222.2222")
+    room = written(tmp_path, modes_csv=changed, healthy_csv=modes)
+    assert pose(room, tmp_path / "case", suite=suite) == TRUTH
+    names = {path.name for path in (tmp_path / "case").iterdir()}
+    assert names == {"case.toml", "modes.csv", "sensors.csv"}
+    case = read_case(tmp_path / "case")
+    assert case.measurement.frequencies[0] == 222.2222
+    assert case.modifications == ()
+    assert "# of the largest component" in (tmp_path / "case" / "case.toml").read_text()
+
+
+def test_a_reference_is_written_where_it_is_asked_for(tmp_path: Path, suite: Path) -> None:
+    modes = (suite / "frame-solid" / "modes.csv").read_text(encoding="utf-8")
+    room = written(tmp_path, healthy_csv=modes)
+    pose(room, tmp_path / "case", True, suite=suite)
+    assert (tmp_path / "case" / "healthy.csv").read_text(encoding="utf-8") == modes
+    text = (tmp_path / "case" / "case.toml").read_text(encoding="utf-8")
+    assert '[reference]\nmodes = "healthy.csv"\n' in text
+    assert "modification" not in text
+
+
+def test_what_cannot_be_posed_is_one_line(tmp_path: Path, suite: Path) -> None:
+    room = written(tmp_path)
+    with pytest.raises(InputError, match=r"there is no reference \(expected a file healthy.csv\)"):
+        pose(room, tmp_path / "case", True, suite=suite)
+    with pytest.raises(InputError, match="structure: no structure 'frame-solid'"):
+        pose(room, tmp_path / "case", suite=tmp_path)
+    with pytest.raises(InputError, match="is not empty"):
+        pose(room, room, suite=suite)
