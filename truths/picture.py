@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import re
+from itertools import pairwise
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -16,7 +18,9 @@ from truths.structure import Structure
 Array = npt.NDArray[np.float64]
 PIECES = 6  # of a member along its length, so that a warp shows
 ROUND = 10  # sides by which a round section is drawn
-BOX = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
+BOX = np.array(
+    [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+)
 FACES = [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
 
 
@@ -49,7 +53,7 @@ def polygons(structure: Structure) -> list[tuple[str, Array]]:
                 for x in np.linspace(*ends, pieces + 1)
             ]
             faces += [(member.material, rings[0]), (member.material, rings[-1])]
-            for one, two in zip(rings[:-1], rings[1:], strict=True):
+            for one, two in pairwise(rings):
                 for i in range(len(ring)):
                     j = (i + 1) % len(ring)
                     faces.append((member.material, np.array([one[i], one[j], two[j], two[i]])))
@@ -65,9 +69,11 @@ def picture(structure: Structure) -> str:
     """Return the picture as SVG."""
     mpl.rcParams["svg.hashsalt"] = "truths"
     figure = Figure(figsize=(6.4, 4.8))
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d", computed_zorder=False)
+    axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d", computed_zorder=False)
     faces = polygons(structure)
-    tones = dict(zip(structure.materials, ("#9db4c8", "#d8b98a", "#b5cfa8", "#c9a7c7"), strict=False))
+    tones = dict(
+        zip(structure.materials, ("#9db4c8", "#d8b98a", "#b5cfa8", "#c9a7c7"), strict=False)
+    )
     solids = Poly3DCollection(
         [points for _, points in faces],
         facecolors=[tones.get(material, "#cccccc") for material, _ in faces],

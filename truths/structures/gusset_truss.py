@@ -1,7 +1,5 @@
 """A planar truss of flat bars on gusset plates, clamped at one end."""
 
-from itertools import pairwise
-
 from truths.sections import bar
 from truths.structure import STEEL, Block, Change, Clamp, Lump, Member, Spring, Structure
 
@@ -17,7 +15,9 @@ def _gusset(name: str) -> Block:
     return Block(f"gusset-{name}", (x - 0.06, -0.006, low), (x + 0.06, 0.006, high), "steel")
 
 
-CHORDS = [(f"L{i}", f"L{i + 1}") for i in range(BAYS)] + [(f"U{i}", f"U{i + 1}") for i in range(BAYS)]
+CHORDS = [(f"L{i}", f"L{i + 1}") for i in range(BAYS)] + [
+    (f"U{i}", f"U{i + 1}") for i in range(BAYS)
+]
 POSTS = [(f"L{i}", f"U{i}") for i in range(1, BAYS + 1)]
 DIAGONALS = [(f"U{i}", f"L{i + 1}") for i in range(BAYS)]
 
@@ -26,8 +26,8 @@ STRUCTURE = Structure(
     title="Cantilever truss of flat bars on gusset plates",
     classes=("truss", "gussets", "clamped", "solid sections"),
     story="""
-Chords 30 x 12 mm, posts and diagonals 20 x 12 mm, welded to gusset plates of 120 x 80 x 12 mm, which no
-drawing of centre lines shows. Both chords are clamped at the wall.
+Chords 30 x 12 mm, posts and diagonals 20 x 12 mm, welded to gussets of 120 x 80 x 12 mm, which
+no drawing of centre lines shows. Both chords are clamped at the wall.
 """,
     materials={"steel": STEEL},
     sections={"chord": bar(0.012, 0.03), "web": bar(0.012, 0.02)},
@@ -39,7 +39,11 @@ drawing of centre lines shows. Both chords are clamped at the wall.
     ),
     blocks=tuple(_gusset(name) for name in JOINTS),
     clamps=tuple(
-        Clamp(f"{c}0", (-0.061, -0.1, JOINTS[f"{c}0"][2] - 0.07), (0.0, 0.1, JOINTS[f"{c}0"][2] + 0.07))
+        Clamp(
+            f"{c}0",
+            (-0.061, -0.1, JOINTS[f"{c}0"][2] - 0.07),
+            (0.0, 0.1, JOINTS[f"{c}0"][2] + 0.07),
+        )
         for c in "LU"
     ),
     plane="in-plane",
