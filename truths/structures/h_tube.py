@@ -10,16 +10,16 @@ STRUCTURE = Structure(
     title="H of unequal tubes, free, motion across its plane",
     classes=("planar frame", "hollow sections", "out of plane", "free"),
     story="""
-A long leg 60 x 60 x 4 mm, a short one 40 x 60 x 3 mm, a crossbar 40 x 40 x 3 mm at neither's middle, welded
+A long leg 60 x 50 x 4 mm, a short one 40 x 50 x 4 mm, a crossbar 40 x 50 x 4 mm at neither's middle, welded
 all around onto the legs' side walls. What moves across the plane twists the crossbar, and its ends turn on
 walls that bend. A plate of 10 mm closes one end of the long leg. The drawing has centre lines and rigid
 joints; it knows the 0.9 kg block at the short leg's end.
 """,
     materials={"steel": STEEL},
     sections={
-        "long": rectangular_tube(0.06, 0.06, 0.004),
-        "short": rectangular_tube(0.04, 0.06, 0.003),
-        "bar": rectangular_tube(0.04, 0.04, 0.003),
+        "long": rectangular_tube(0.06, 0.05, 0.004),
+        "short": rectangular_tube(0.04, 0.05, 0.004),
+        "bar": rectangular_tube(0.04, 0.05, 0.004),
     },
     joints={
         "A": (0.0, -0.5, 0.0),
@@ -37,7 +37,7 @@ joints; it knows the 0.9 kg block at the short leg's end.
         Member("short-south", ("D", "E"), "short", "steel", 4),
         Member("short-north", ("E", "F"), "short", "steel", 4),
     ),
-    blocks=(Block("end-plate", (-0.03, 0.77, -0.03), (0.03, 0.78, 0.03), "steel"),),
+    blocks=(Block("end-plate", (-0.03, 0.77, -0.025), (0.03, 0.78, 0.025), "steel"),),
     lumps=(Lump("F", 0.9),),
     plane="out-of-plane",
     sensors=(
@@ -65,7 +65,7 @@ joints; it knows the 0.9 kg block at the short leg's end.
     ),
     used=4,
     held_out=3,
-    size=(0.024, 0.016),
+    size=(0.018, 0.0125),
     guess=60.0,
     scatter=0.002,
     shape_scatter=0.02,
