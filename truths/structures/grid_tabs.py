@@ -11,10 +11,11 @@ WIDTH, HEIGHT = 0.03, 0.024  # m, of the long bars
 NAMES = {(i, j): f"{row}{i + 1}" for j, row in enumerate("ABC") for i in range(3)}
 
 
-def _root(i: int, j: int, side: int) -> Block:
-    """Return the unfused root of the weld between a cross bar and a long bar."""
+def _notch(i: int, j: int, side: int, edge: int) -> Block:
+    """Return the edge of a cross bar that its weld to a long bar does not reach."""
     x, y = XS[i], YS[j] + side * (WIDTH / 2 + 0.001)
-    return Block("root-gap", (x - 0.0125, y - 0.001, -0.006), (x + 0.0125, y + 0.001, 0.006), "")
+    low, high = sorted((x + edge * 0.0075, x + edge * 0.0125))
+    return Block("notch", (low, y - 0.001, -0.012), (high, y + 0.001, 0.012), "")
 
 
 STRUCTURE = Structure(
@@ -22,13 +23,13 @@ STRUCTURE = Structure(
     title="Grid of three by three solid bars on four clamped tabs",
     classes=("grid", "solid sections", "out of plane", "clamped"),
     story="""
-Three long bars 30 x 24 mm run through, cross bars 25 x 24 mm are butt-welded between them with roots that
-are not fused over half their height. Plates of 60 x 70 x 5 mm cover the middle crossing above and below.
-At each corner a tab of 25 x 10 mm, 75 mm long, is clamped at its end, in jaws that also grip 15 mm of it.
-The drawing has centre lines, and the tabs up to the ends where the jaws were meant to grip.
+Three long bars 30 x 24 mm run through; cross bars 25 x 24 mm are butt-welded between them over the middle
+15 mm of their width. Plates of 60 x 70 x 5 mm cover the middle crossing above and below. At each corner a
+tab of 12 x 24 mm ends in jaws that grip the last 15 mm of it. The drawing has centre lines, welds that hold
+over the whole section, and the tabs up to their ends.
 """,
     materials={"steel": STEEL},
-    sections={"long": bar(WIDTH, HEIGHT), "cross": bar(0.025, HEIGHT), "tab": bar(0.025, 0.01)},
+    sections={"long": bar(WIDTH, HEIGHT), "cross": bar(0.025, HEIGHT), "tab": bar(0.012, HEIGHT)},
     joints={name: (XS[i], YS[j], 0.0) for (i, j), name in NAMES.items()}
     | {f"T{row}1": (-TAB, YS[j], 0.0) for j, row in ((0, "A"), (2, "C"))}
     | {f"T{row}3": (XS[-1] + TAB, YS[j], 0.0) for j, row in ((0, "A"), (2, "C"))},
@@ -58,18 +59,23 @@ The drawing has centre lines, and the tabs up to the ends where the jaws were me
     blocks=(
         Block("plate-above", (0.39, 0.265, 0.012), (0.45, 0.335, 0.017), "steel"),
         Block("plate-below", (0.39, 0.265, -0.017), (0.45, 0.335, -0.012), "steel"),
-        *(_root(i, j, side) for i in range(3) for j, side in ((0, 1), (1, -1), (1, 1), (2, -1))),
+        *(
+            _notch(i, j, side, edge)
+            for i in range(3)
+            for j, side in ((0, 1), (1, -1), (1, 1), (2, -1))
+            for edge in (-1, 1)
+        ),
     ),
     clamps=(
         *(
-            Clamp(f"T{row}1", (-TAB, YS[j] - 0.02, -0.01), (-TAB + 0.015, YS[j] + 0.02, 0.01))
+            Clamp(f"T{row}1", (-TAB, YS[j] - 0.006, -0.012), (-TAB + 0.015, YS[j] + 0.006, 0.012))
             for j, row in ((0, "A"), (2, "C"))
         ),
         *(
             Clamp(
                 f"T{row}3",
-                (XS[-1] + TAB - 0.015, YS[j] - 0.02, -0.01),
-                (XS[-1] + TAB, YS[j] + 0.02, 0.01),
+                (XS[-1] + TAB - 0.015, YS[j] - 0.006, -0.012),
+                (XS[-1] + TAB, YS[j] + 0.006, 0.012),
             )
             for j, row in ((0, "A"), (2, "C"))
         ),
@@ -90,8 +96,8 @@ The drawing has centre lines, and the tabs up to the ends where the jaws were me
     ),
     used=6,
     held_out=4,
-    size=(0.02, 0.013),
-    guess=40.0,
+    size=(0.02, 0.014),
+    guess=80.0,
     scatter=0.002,
     shape_scatter=0.02,
     together=0.5,
