@@ -56,8 +56,12 @@ def assembled(structure: Structure, solid: Solid) -> Matrices:
 
 
 def stations(structure: Structure) -> tuple[tuple[Place, str], ...]:
-    """Return places all over the structure, three directions each."""
-    return tuple(((m.name, share), "xyz") for m in structure.members for share in SHARES)
+    """Return places all over the solid, three directions each; a drawn link has none."""
+    sections = structure.sections
+    made = [
+        m for m in structure.members if sections[m.section].rectangles or sections[m.section].round
+    ]
+    return tuple(((m.name, share), "xyz") for m in made for share in SHARES)
 
 
 def in_plane(structure: Structure, modes: Observed) -> Observed:

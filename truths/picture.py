@@ -79,10 +79,11 @@ def picture(structure: Structure) -> str:
         facecolors=[tones.get(material, "#cccccc") for material, _ in faces],
         edgecolors="#37474f",
         linewidths=0.25,
+        clip_on=False,
     )
     axes.add_collection3d(solids)
     dots = [structure.warped(structure.point(at)[:, None])[:, 0] for at, _ in structure.sensors]
-    axes.scatter(*np.array(dots).T, color="#c62828", s=9, depthshade=False, zorder=5)
+    axes.scatter(*np.array(dots).T, color="#c62828", s=9, depthshade=False, zorder=5, clip_on=False)
     corners = np.concatenate([points for _, points in faces])
     low, high = corners.min(axis=0), corners.max(axis=0)
     size = np.maximum(high - low, 0.08 * (high - low).max())
