@@ -192,7 +192,7 @@ def loose_joint(structure: Structure, solid: Solid, rng: Generator) -> Defect | 
 
 def thin_wall(structure: Structure, solid: Solid, rng: Generator) -> Defect | None:
     """Make the wall of one hollow member thinner, outside unchanged."""
-    member = pick(rng, [m for m in structure.members if is_tube(structure, m)])
+    member = pick(rng, [m for m in structure.solid_members if is_tube(structure, m)])
     if member is None or structure.mesher != "bricks":
         return None
     section = structure.sections[member.section]
@@ -223,7 +223,7 @@ def thin_wall(structure: Structure, solid: Solid, rng: Generator) -> Defect | No
 
 def slot(structure: Structure, solid: Solid, rng: Generator) -> Defect | None:
     """Cut a slot into one side of a member."""
-    member = pick(rng, list(structure.members))
+    member = pick(rng, structure.solid_members)
     assert member is not None
     _, length = structure.axes(member)
     share = float(rng.uniform(0.15, 0.85))
@@ -255,7 +255,7 @@ def cut_flange(structure: Structure, solid: Solid, rng: Generator) -> Defect | N
     """Cut one side of a flange of an open section away over some length."""
     opened = [
         m
-        for m in structure.members
+        for m in structure.solid_members
         if len(structure.sections[m.section].rectangles) > 1 and not is_tube(structure, m)
     ]
     member = pick(rng, opened)
@@ -281,7 +281,7 @@ def cut_flange(structure: Structure, solid: Solid, rng: Generator) -> Defect | N
 
 def clamp_mass(structure: Structure, solid: Solid, rng: Generator) -> Defect | None:
     """Leave a clamp beside the axis of a member."""
-    member = pick(rng, list(structure.members))
+    member = pick(rng, structure.solid_members)
     assert member is not None
     share = round(float(rng.uniform(0.1, 0.9)), 2)
     mass = between(rng, 0.001, 0.06) * total_mass(solid)
@@ -361,7 +361,7 @@ def soft_foot(structure: Structure, solid: Solid, rng: Generator) -> Defect | No
 
 def wrong_material(structure: Structure, solid: Solid, rng: Generator) -> Defect | None:
     """Make one member of another metal."""
-    member = pick(rng, list(structure.members))
+    member = pick(rng, structure.solid_members)
     assert member is not None
     drawn = structure.materials[member.material]
     others = {k: m for k, m in OTHER_MATERIALS.items() if abs(m.E / drawn.E - 1) > 0.03}
@@ -380,7 +380,7 @@ def wrong_material(structure: Structure, solid: Solid, rng: Generator) -> Defect
 
 def water(structure: Structure, solid: Solid, rng: Generator) -> Defect | None:
     """Fill a hollow member with water to some length of it."""
-    member = pick(rng, [m for m in structure.members if is_tube(structure, m)])
+    member = pick(rng, [m for m in structure.solid_members if is_tube(structure, m)])
     if member is None:
         return None
     _, length = structure.axes(member)
@@ -514,7 +514,7 @@ def unfit_member(structure: Structure, solid: Solid, rng: Generator) -> Defect |
     """Weld a member in that is too long or too short."""
     if structure.mesher != "bricks" or structure.plane == "out-of-plane":
         return None
-    member = pick(rng, [m for m in structure.members if in_a_loop(structure, m)])
+    member = pick(rng, [m for m in structure.solid_members if in_a_loop(structure, m)])
     if member is None:
         return None
     strain = between(rng, 2e-4, 4e-3) * (1 if rng.random() < 0.5 else -1)
@@ -553,7 +553,7 @@ def waist(structure: Structure, solid: Solid, rng: Generator) -> Defect | None:
     """Turn a member down towards its middle."""
     if structure.mesher != "bricks":
         return None
-    member = pick(rng, list(structure.members))
+    member = pick(rng, structure.solid_members)
     assert member is not None
     axes, length = structure.axes(member)
     depth = between(rng, 0.05, 0.3)
@@ -583,7 +583,7 @@ def patch(structure: Structure, solid: Solid, rng: Generator) -> Defect | None:
     """Bond a plate onto one side of a member."""
     if structure.mesher != "bricks":
         return None
-    member = pick(rng, list(structure.members))
+    member = pick(rng, structure.solid_members)
     assert member is not None
     axes, length = structure.axes(member)
     section = structure.sections[member.section]

@@ -57,10 +57,7 @@ def assembled(structure: Structure, solid: Solid) -> Matrices:
 
 def stations(structure: Structure) -> tuple[tuple[Place, str], ...]:
     """Return places all over the solid, three directions each; a drawn link has none."""
-    sections = structure.sections
-    made = [
-        m for m in structure.members if sections[m.section].rectangles or sections[m.section].round
-    ]
+    made = structure.solid_members
     return tuple(((m.name, share), "xyz") for m in made for share in SHARES)
 
 

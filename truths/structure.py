@@ -233,6 +233,12 @@ class Structure:
         y /= np.linalg.norm(y)
         return np.array([x, y, np.cross(x, y)]), length
 
+    @property
+    def solid_members(self) -> list[Member]:
+        """Return the members that the solid has; a drawn link only joins centre lines."""
+        made = {name for name, s in self.sections.items() if s.rectangles or s.round}
+        return [member for member in self.members if member.section in made]
+
     def at_joint(self, joint: str) -> Member:
         """Return the first member that ends at a joint."""
         return next(member for member in self.members if joint in member.ends)

@@ -18,7 +18,7 @@ ROW = re.compile(r"^\| \d+ \| (used|held out) \| ([\d.]+) \| ([\d.]+) \|", re.MU
 
 
 def suite_rows() -> list[str]:
-    """Return one row of Markdown a structure: its classes, meshes, and how far the drawing is off."""
+    """Return one row of Markdown a structure: classes, meshes, how far the drawing is off."""
     table = tomllib.loads((SUITE / "suite.toml").read_text(encoding="utf-8"))
     results = rank(["suite"], ["unchanged"]).results
     errors = {result.case: result for result in results}

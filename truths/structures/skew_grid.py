@@ -47,12 +47,12 @@ lines and rigid joints.
         "cross": replace(CROSS, drawn=DRAWN),
     },
     joints={name: (XS[i], YS[j], 0.0) for (i, j), name in NAMES.items()},
-    types={
-        name: "edge" if j in (0, 2) else "middle" for (i, j), name in NAMES.items()
-    },
+    types={name: "edge" if j in (0, 2) else "middle" for (i, j), name in NAMES.items()},
     members=(
         *(
-            Member(f"cross-{i + 1}{a}", (NAMES[i, j], NAMES[i, j + 1]), "cross", "steel", 3, weld=0.004)
+            Member(
+                f"cross-{i + 1}{a}", (NAMES[i, j], NAMES[i, j + 1]), "cross", "steel", 3, weld=0.004
+            )
             for i in range(4)
             for j, a in ((0, "A"), (1, "B"))
         ),
