@@ -68,7 +68,7 @@ def polygons(structure: Structure) -> list[tuple[str, Array]]:
 def picture(structure: Structure) -> str:
     """Return the picture as SVG."""
     mpl.rcParams["svg.hashsalt"] = "truths"
-    figure = Figure(figsize=(6.4, 4.8))
+    figure = Figure(figsize=(8.0, 8.0))
     axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d", computed_zorder=False)
     faces = polygons(structure)
     tones = dict(
@@ -90,10 +90,12 @@ def picture(structure: Structure) -> str:
     middle = (high + low) / 2
     for axis, centre, half in zip("xyz", middle, size / 2, strict=True):
         getattr(axes, f"set_{axis}lim")(centre - half, centre + half)
-    axes.set_box_aspect(size, zoom=1.25)
+    axes.set_box_aspect(size, zoom=1.0)
     axes.view_init(elev=24, azim=-58)
     axes.set_axis_off()
     stream = io.StringIO()
-    figure.savefig(stream, format="svg", metadata={"Date": None})
+    figure.savefig(
+        stream, format="svg", metadata={"Date": None}, bbox_inches="tight", pad_inches=0.05
+    )
     # Two decimals of a point are finer than any screen, and a third of the size.
     return re.sub(r"(\d+\.\d{2})\d+", r"\1", stream.getvalue())
