@@ -38,15 +38,20 @@ def digest(name: str) -> str:
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
 
 
+def made_before() -> dict[str, str]:
+    """Return the digests of the structures that were made."""
+    found: dict[str, str] = json.loads(STATE.read_text()) if STATE.exists() else {}
+    return found
+
+
 def make_suite(names: list[str], again: bool) -> bool:
     """Write the folders of the structures; tell whether all could be made."""
     from truths.suite import SUITE, index_text, structures, write
 
     known = structures()
-    state = json.loads(STATE.read_text()) if STATE.exists() else {}
     sound = True
     for number, name in enumerate(names or known, 1):
-        if not again and not names and state.get(name) == digest(name):
+        if not again and not names and made_before().get(name) == digest(name):
             continue
         began = time.perf_counter()
         try:
@@ -58,9 +63,8 @@ def make_suite(names: list[str], again: bool) -> bool:
         seconds = time.perf_counter() - began
         print(f"{number}/{len(names or known)} {name}: {seconds:.0f} s", file=sys.stderr)
         print("\n".join(differences) or f"{name}: as it was", flush=True)
-        state[name] = digest(name)
         STATE.parent.mkdir(exist_ok=True)
-        STATE.write_text(json.dumps(state, indent=1))
+        STATE.write_text(json.dumps({**made_before(), name: digest(name)}, indent=1))
     made = {name: item for name, item in known.items() if (SUITE / name).is_dir()}
     (SUITE / "suite.toml").write_text(index_text(made), encoding="utf-8")
     return sound
