@@ -6,7 +6,7 @@ from truths.sections import bar
 from truths.structure import ALUMINIUM, Array, Block, Change, Clamp, Lump, Member, Spring, Structure
 
 LEVELS = (0.0, 0.45, 0.85, 1.2)  # m
-LEG, RAIL, KNEE, REACH = 0.024, 0.014, 0.006, 0.04  # m
+LEG, RAIL, REACH = 0.024, 0.014, 0.03  # m
 HALF, LEAN = np.array([0.18, 0.15]), 0.07
 CORNERS = {"A": (-1, -1), "B": (1, -1), "C": (1, 1), "D": (-1, 1)}
 AROUND = (("A", "B"), ("B", "C"), ("D", "C"), ("A", "D"))
@@ -20,14 +20,14 @@ def leaning(points: Array) -> Array:
 
 
 def _knee(corner: str, level: int, along: int) -> Block:
-    """Return the plate under a rail, between it and the leg."""
+    """Return the block under a rail, between it and the leg."""
     sign = CORNERS[corner]
     face = np.array(sign) * (HALF - LEG / 2)
     low, high = [0.0, 0.0], [0.0, 0.0]
     ends = sorted((face[along], face[along] - sign[along] * REACH))
     low[along], high[along] = ends
     across = sign[1 - along] * HALF[1 - along]
-    low[1 - along], high[1 - along] = across - KNEE / 2, across + KNEE / 2
+    low[1 - along], high[1 - along] = across - RAIL / 2, across + RAIL / 2
     under = LEVELS[level] - RAIL / 2
     return Block(
         f"knee-{corner}{level}-{'xy'[along]}",
@@ -57,11 +57,11 @@ RAILS = tuple(
 
 STRUCTURE = Structure(
     name="tower",
-    title="Tapered tower of aluminium bars with knee plates, clamped",
-    classes=("tower", "space frame", "solid sections", "gussets", "clamped"),
+    title="Tapered tower of aluminium bars with knee blocks, clamped",
+    classes=("tower", "space frame", "solid sections", "clamped"),
     story="""
 Four legs of 24 mm square bar lean inwards by 4 degrees, three rings of rails of 14 mm square bar tie them,
-all aluminium and welded. Knee plates of 6 mm sit below the rails of the lowest ring. The drawing takes rails
+all aluminium and welded. Knee blocks of 30 x 30 x 14 mm sit below the rails of the lowest ring. The drawing takes rails
 from centre line to centre line and leaves the knees out.
 """,
     materials={"aluminium": ALUMINIUM},
@@ -94,7 +94,7 @@ from centre line to centre line and leaves the knees out.
     ),
     used=6,
     held_out=4,
-    size=(0.042, 0.03),
+    size=(0.04, 0.028),
     graded=False,
     guess=40.0,
     scatter=0.003,
