@@ -1,7 +1,17 @@
 """A mast on a base plate that stands on a soft layer."""
 
 from truths.sections import rectangular_tube
-from truths.structure import ALUMINIUM, Block, Change, Clamp, Lump, Material, Member, Spring, Structure
+from truths.structure import (
+    ALUMINIUM,
+    Block,
+    Change,
+    Clamp,
+    Lump,
+    Material,
+    Member,
+    Spring,
+    Structure,
+)
 
 LOW, HIGH, ARM = 1.0, 1.7, 0.35  # m
 PLATE, PAD = 0.012, 0.01  # m, thickness

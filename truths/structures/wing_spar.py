@@ -35,7 +35,14 @@ def tapered(points: Array) -> Array:
 
 
 SPAR = tuple(
-    Member(f"spar-{i}", (f"S{i - 1}", f"S{i}"), f"spar-{i}", "aluminium", 4, extend=(0.0, RIB / 2 * (i == 4)))
+    Member(
+        f"spar-{i}",
+        (f"S{i - 1}", f"S{i}"),
+        f"spar-{i}",
+        "aluminium",
+        4,
+        extend=(0.0, RIB / 2 * (i == 4)),
+    )
     for i in range(1, len(STATIONS))
 )
 RIBS = tuple(
