@@ -69,5 +69,4 @@ with a restrained end, and its flow of force narrows at the steps and at the cro
     scatter=0.002,
     shape_scatter=0.02,
     together=0.2,
-    default=True,
 )

@@ -56,5 +56,4 @@ face. The drawing lets the bar begin at the tube's axis and knows no foot.
     scatter=0.001,
     shape_scatter=0.01,
     together=0.0,
-    default=True,
 )
