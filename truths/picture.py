@@ -73,19 +73,17 @@ def picture(structure: Structure) -> str:
         facecolors=[tones.get(material, "#cccccc") for material, _ in faces],
         edgecolors="#37474f",
         linewidths=0.25,
-        clip_on=False,
     )
     axes.add_collection3d(solids)
     dots = [structure.warped(structure.point(at)[:, None])[:, 0] for at, _ in structure.sensors]
-    axes.scatter(*np.array(dots).T, color="#c62828", s=9, depthshade=False, zorder=5, clip_on=False)
+    axes.scatter(*np.array(dots).T, color="#c62828", s=9, depthshade=False, zorder=5)
     corners = np.concatenate([points for _, points in faces])
     low, high = corners.min(axis=0), corners.max(axis=0)
     size = np.maximum(high - low, 0.08 * (high - low).max())
     middle = (high + low) / 2
     for axis, centre, half in zip("xyz", middle, size / 2, strict=True):
         getattr(axes, f"set_{axis}lim")(centre - half, centre + half)
-    # Tall boxes leave the frame first.
-    axes.set_box_aspect(size, zoom=1.3 - 0.4 * size[2] / size.max())
+    axes.set_box_aspect(size, zoom=1.25)
     axes.view_init(elev=24, azim=-58)
     axes.set_axis_off()
     stream = io.StringIO()

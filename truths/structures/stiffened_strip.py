@@ -40,7 +40,12 @@ line, the middle one a T with its own centroid: the step between the axes and th
         Member("right", ("C", "D"), "strip", "aluminium", 5),
     ),
     blocks=tuple(
-        Block(f"run-out-{side}-{i}", (low, -RIB / 2, -PLATE / 2 - drop), (high, RIB / 2, -PLATE / 2), "aluminium")
+        Block(
+            f"run-out-{side}-{i}",
+            (low, -RIB / 2, -PLATE / 2 - drop),
+            (high, RIB / 2, -PLATE / 2),
+            "aluminium",
+        )
         for i, drop in enumerate((0.02, 0.01))
         for side, low, high in (
             ("left", START - 0.0225 * (i + 1), START - 0.0225 * i),

@@ -35,7 +35,12 @@ and welded to each other; an instrument of 4 kg on the frame is drawn.
     joints={
         f"{c}{i}": (x, y, z)
         for i, z in ((0, 0.0), (1, HEIGHT))
-        for c, x, y in (("A", 0.0, 0.0), ("B", LENGTH, 0.0), ("C", LENGTH, WIDTH), ("D", 0.0, WIDTH))
+        for c, x, y in (
+            ("A", 0.0, 0.0),
+            ("B", LENGTH, 0.0),
+            ("C", LENGTH, WIDTH),
+            ("D", 0.0, WIDTH),
+        )
     },
     types={f"{c}{i}": ("foot", "corner")[i] for c in "ABCD" for i in (0, 1)},
     members=(
