@@ -23,7 +23,7 @@ NUMERICAL := $(addprefix tests/test_,advice*.py assembly.py asymmetric_frame.py 
 	scenarios.py scoring.py sections.py sensitiv*.py sparse_eigen.py)
 ON_ALL_CORES := -n 2 -p no:benchmark
 
-.PHONY: run test docs kernels bench sweep fuzz format clean
+.PHONY: run test docs kernels bench sweep fuzz truths format clean
 .DELETE_ON_ERROR:
 
 run: $(VENV)/.installed
@@ -62,6 +62,10 @@ sweep: $(VENV)/.installed-test
 fuzz: $(VENV)/.installed-test
 	$(BIN)/pytest tests/test_fuzz.py -m fuzz -s $(ARGS)
 
+# gmsh's wheel wants Debian's libglu1-mesa, libxcursor1, libxft2 and libxinerama1.
+truths: $(VENV)/.installed-truths
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m truths $(ARGS)
+
 format: $(VENV)/.installed-test
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
@@ -83,4 +87,8 @@ $(VENV)/.installed: pyproject.toml | $(BIN)/python
 
 $(VENV)/.installed-test: pyproject.toml | $(BIN)/python
 	$(PIP) install --quiet -e '.[test]'
+	touch $@ $(VENV)/.installed
+
+$(VENV)/.installed-truths: pyproject.toml | $(BIN)/python
+	$(PIP) install --quiet -e '.[truths]'
 	touch $@ $(VENV)/.installed

@@ -76,4 +76,11 @@ def femubench_scenarios() -> list[Scenario]:
         ("bridge", "matrices", "soft supports", "published test"),
         default=False,
     )
-    return [*own, *_suite(), footbridge]
+    garteur = Scenario(
+        "garteur",
+        "Aeroplane-like test bed GARTEUR SM-AG19, published test",
+        _cases("garteur"),
+        ("published test", "wing-like", "free"),
+        default=False,
+    )
+    return [*own, garteur, *_suite(), footbridge]

@@ -74,7 +74,7 @@ def inside(part: Projection) -> FloatArray:
     return np.clip(np.linspace(0.7, 0.5, len(low)), low + 0.05, high - 0.05)
 
 
-def slopes_by_differences(state: State, step: float = 1e-3) -> FloatArray:
+def slopes_by_differences(state: State, step: float = 4e-3) -> FloatArray:
     columns = []
     for i in range(len(state.x)):
         shift = step * (np.arange(len(state.x)) == i)

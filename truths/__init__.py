@@ -1,4 +1,4 @@
-"""Truth from outside: structures as solids, their modes, and the beam model an engineer draws of them.
+"""Truth from outside: solids of structures, their modes, the beam model an engineer draws.
 
 Nothing here is installed with femubench. The side of the solids imports nothing of it either.
 """

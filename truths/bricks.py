@@ -37,28 +37,33 @@ def member_boxes(structure: Structure, member: Member) -> Iterator[Box]:
         raise ValueError(f"section {member.section} of {structure.name} is round: no bricks fit it")
     start = structure.point(member.ends[0])
     for y0, y1, z0, z1, solid in section.rectangles:
-        local = np.array(
-            [[-member.extend[0], y0, z0], [length + member.extend[1], y1, z1]]
-        )
+        local = np.array([[-member.extend[0], y0, z0], [length + member.extend[1], y1, z1]])
         corners = start + local @ axes
         yield member.name, corners.min(axis=0), corners.max(axis=0), member.material * solid
 
 
 def boxes(structure: Structure) -> list[Box]:
     """Return everything that is painted, in order; the later covers the earlier."""
-    blocks = [(b.first, (b.name, np.array(b.low), np.array(b.high), b.material)) for b in structure.blocks]
+    blocks = [
+        (b.first, (b.name, np.array(b.low), np.array(b.high), b.material)) for b in structure.blocks
+    ]
     painted = [box for first, box in blocks if first]
     painted += [box for member in structure.members for box in member_boxes(structure, member)]
     return painted + [box for first, box in blocks if not first]
 
 
 def planes(structure: Structure, painted: list[Box], axis: int, size: float) -> Array:
-    """Return the coordinates of the grid's planes across one axis, at most `size` apart near joints, m."""
+    """Return the grid's planes across one axis, at most `size` (m) apart near joints."""
     found = [value for _, low, high, _ in painted for value in (low[axis], high[axis])]
     for member in structure.members:
-        axes, length = structure.axes(member)
+        axes, _ = structure.axes(member)
         if member.weld and abs(axes[0, axis]) > 0.5:
             found += [_weld_plane(structure, member, end, axis) for end in (0, 1)]
+    found += [
+        float(structure.point(at)[axis])
+        for at in structure.seats
+        if abs(structure.axes(structure.member(at[0]))[0][0, axis]) > 0.5
+    ]
     for clamp in structure.clamps:
         found += [clamp.low[axis], clamp.high[axis]]
     inside = (min(low[axis] for _, low, _, _ in painted), max(b[axis] for _, _, b, _ in painted))
@@ -94,7 +99,9 @@ def face_of(structure: Structure, member: Member, end: int) -> float:
         across, _ = structure.axes(other)
         section = structure.sections[other.section]
         if abs(across[0] @ axes[0]) < 0.5:
-            sizes = abs(across[1] @ axes[0]) * section.width + abs(across[2] @ axes[0]) * section.height
+            sizes = (
+                abs(across[1] @ axes[0]) * section.width + abs(across[2] @ axes[0]) * section.height
+            )
             depths.append(float(sizes) / 2)
     return max(depths)
 

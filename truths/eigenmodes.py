@@ -33,14 +33,16 @@ class System:
 
 @dataclass(frozen=True)
 class Modes:
-    """Hold natural frequencies (Hz), mode shapes (dofs of the solid, modes), and the rigid ones left out."""
+    """Hold frequencies (Hz), shapes (dofs of the solid, modes), the number of rigid modes."""
 
     frequencies: Array
     shapes: Array
     rigid: int
 
 
-def translation(fit: sparse.csr_array, offset: Sequence[float] = (0.0, 0.0, 0.0)) -> sparse.csr_array:
+def translation(
+    fit: sparse.csr_array, offset: Sequence[float] = (0.0, 0.0, 0.0)
+) -> sparse.csr_array:
     """Return the (3, dofs) motion of a point at an offset (m) from a seat's place."""
     x, y, z = offset
     arm = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
@@ -77,7 +79,9 @@ def attach(
         K, M = grow.T @ K @ grow, grow.T @ M @ grow
     for i, item in enumerate(oscillators):
         d = DIRECTIONS.index(item.direction)
-        fit = rigid_fit(structure, matrices, item.at) @ sparse.csr_array(sparse.eye_array(n, n + extra))
+        fit = rigid_fit(structure, matrices, item.at) @ sparse.csr_array(
+            sparse.eye_array(n, n + extra)
+        )
         own = sparse.csr_array(([1.0], ([0], [n + i])), shape=(1, n + extra))
         stretch = own - fit[[d]]
         K = K + item.mass * (2 * np.pi * item.frequency) ** 2 * (stretch.T @ stretch)

@@ -40,7 +40,7 @@ class Matrices:
 
 
 def basis_of(solid: Solid, points: Array) -> skfem.CellBasis:
-    """Return scikit-fem's basis of one scalar field on a solid whose corners are `points` (3, n)."""
+    """Return scikit-fem's basis of a scalar field on a solid with corners `points` (3, n)."""
     bricks = solid.cells.shape[0] == 8
     mesh = (skfem.MeshHex if bricks else skfem.MeshTet)(points, solid.cells, validate=False)
     element = skfem.ElementHexS2() if bricks else skfem.ElementTetP2()

@@ -1,6 +1,6 @@
 """Sixty variants of the suite with one fault each in the data, or in what was typed in.
 
-    python -m truths.faults        # writes truths/faults/, says what differs
+    python -m truths.faults        # writes truths/data/faults/, says what differs
 
 A fault edits the files of its structure; nothing else of the structure changes. Everything comes
 from one seed and from the suite.

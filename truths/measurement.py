@@ -66,14 +66,16 @@ def record(
     rng, gains = np.random.default_rng(seed), np.random.default_rng(seed[0])
     modes, sensors = shapes.shape
     shared, own = np.sqrt(structure.together), np.sqrt(1 - structure.together)
-    scatter = structure.scatter * (shared * rng.standard_normal() + own * rng.standard_normal(modes))
+    scatter = structure.scatter * (
+        shared * rng.standard_normal() + own * rng.standard_normal(modes)
+    )
     gain = 1 + structure.shape_scatter * np.sqrt(GAIN_SHARE) * gains.standard_normal(sensors)
     noise = structure.shape_scatter * np.sqrt(1 - GAIN_SHARE) * rng.standard_normal(shapes.shape)
     return Recording(
         frequencies=frequencies * (1 + scatter),
         frequency_std=frequencies * np.hypot(structure.scatter, mesh),
         shapes=scaled(scaled(shapes) * gain + noise),
-        damping=np.exp(rng.uniform(*np.log(DAMPING), modes)),
+        damping=np.geomspace(*DAMPING, 1000)[rng.integers(0, 1000, modes)],
     )
 
 

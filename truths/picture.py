@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 import re
+from itertools import pairwise
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -16,7 +18,9 @@ from truths.structure import Structure
 Array = npt.NDArray[np.float64]
 PIECES = 6  # of a member along its length, so that a warp shows
 ROUND = 10  # sides by which a round section is drawn
-BOX = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)])
+BOX = np.array(
+    [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+)
 FACES = [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
 
 
@@ -49,7 +53,7 @@ def polygons(structure: Structure) -> list[tuple[str, Array]]:
                 for x in np.linspace(*ends, pieces + 1)
             ]
             faces += [(member.material, rings[0]), (member.material, rings[-1])]
-            for one, two in zip(rings[:-1], rings[1:], strict=True):
+            for one, two in pairwise(rings):
                 for i in range(len(ring)):
                     j = (i + 1) % len(ring)
                     faces.append((member.material, np.array([one[i], one[j], two[j], two[i]])))
@@ -64,29 +68,34 @@ def polygons(structure: Structure) -> list[tuple[str, Array]]:
 def picture(structure: Structure) -> str:
     """Return the picture as SVG."""
     mpl.rcParams["svg.hashsalt"] = "truths"
-    figure = Figure(figsize=(6.4, 4.8))
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d", computed_zorder=False)
+    figure = Figure(figsize=(8.0, 8.0))
+    axes: Any = figure.add_axes((0.0, 0.0, 1.0, 1.0), projection="3d", computed_zorder=False)
     faces = polygons(structure)
-    tones = dict(zip(structure.materials, ("#9db4c8", "#d8b98a", "#b5cfa8", "#c9a7c7"), strict=False))
+    tones = dict(
+        zip(structure.materials, ("#9db4c8", "#d8b98a", "#b5cfa8", "#c9a7c7"), strict=False)
+    )
     solids = Poly3DCollection(
         [points for _, points in faces],
         facecolors=[tones.get(material, "#cccccc") for material, _ in faces],
         edgecolors="#37474f",
         linewidths=0.25,
+        clip_on=False,
     )
     axes.add_collection3d(solids)
     dots = [structure.warped(structure.point(at)[:, None])[:, 0] for at, _ in structure.sensors]
-    axes.scatter(*np.array(dots).T, color="#c62828", s=9, depthshade=False, zorder=5)
+    axes.scatter(*np.array(dots).T, color="#c62828", s=9, depthshade=False, zorder=5, clip_on=False)
     corners = np.concatenate([points for _, points in faces])
     low, high = corners.min(axis=0), corners.max(axis=0)
     size = np.maximum(high - low, 0.08 * (high - low).max())
     middle = (high + low) / 2
     for axis, centre, half in zip("xyz", middle, size / 2, strict=True):
         getattr(axes, f"set_{axis}lim")(centre - half, centre + half)
-    axes.set_box_aspect(size, zoom=1.25)
+    axes.set_box_aspect(size, zoom=1.0)
     axes.view_init(elev=24, azim=-58)
     axes.set_axis_off()
     stream = io.StringIO()
-    figure.savefig(stream, format="svg", metadata={"Date": None})
+    figure.savefig(
+        stream, format="svg", metadata={"Date": None}, bbox_inches="tight", pad_inches=0.05
+    )
     # Two decimals of a point are finer than any screen, and a third of the size.
     return re.sub(r"(\d+\.\d{2})\d+", r"\1", stream.getvalue())

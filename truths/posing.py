@@ -14,8 +14,8 @@ from truths.truth import TRUTH_FILE, Truth, read_truth
 
 ROOT = Path(__file__).parents[1]
 SUITE = ROOT / "scenarios" / "suite"
-DEFECTS = ROOT / "truths" / "defects"
-FAULTS = ROOT / "truths" / "faults"
+DEFECTS = ROOT / "truths" / "data" / "defects"
+FAULTS = ROOT / "truths" / "data" / "faults"
 CASE_FILE, HEALTHY = "case.toml", "healthy.csv"
 _ABOUT = (".md", ".svg")  # what tells of a structure and is no data
 

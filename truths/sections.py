@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+Drawn = dict[str, str | float]
 Rectangle = tuple[float, float, float, float, bool]  # y0, y1, z0, z1 in m; solid or void
 
 
@@ -36,25 +37,25 @@ def _box(width: float, height: float, solid: bool = True) -> Rectangle:
 def rectangular_tube(width: float, height: float, wall: float) -> Section:
     """Return a rectangular hollow section with sharp corners."""
     inner = _box(width - 2 * wall, height - 2 * wall, False)
-    drawn = {"shape": "rectangular-tube", "width": width, "height": height, "wall": wall}
+    drawn: Drawn = {"shape": "rectangular-tube", "width": width, "height": height, "wall": wall}
     return Section(width, height, (_box(width, height), inner), drawn)
 
 
 def bar(width: float, height: float) -> Section:
     """Return a solid rectangle."""
-    drawn = {"shape": "solid-rectangle", "width": width, "height": height}
+    drawn: Drawn = {"shape": "solid-rectangle", "width": width, "height": height}
     return Section(width, height, (_box(width, height),), drawn)
 
 
 def round_bar(diameter: float) -> Section:
     """Return a solid circle."""
-    drawn = {"shape": "solid-circle", "diameter": diameter}
+    drawn: Drawn = {"shape": "solid-circle", "diameter": diameter}
     return Section(diameter, diameter, (), drawn, (diameter, 0.0))
 
 
 def round_tube(diameter: float, wall: float) -> Section:
     """Return a circular hollow section."""
-    drawn = {"shape": "round-tube", "diameter": diameter, "wall": wall}
+    drawn: Drawn = {"shape": "round-tube", "diameter": diameter, "wall": wall}
     return Section(diameter, diameter, (), drawn, (diameter, diameter - 2 * wall))
 
 
@@ -78,7 +79,7 @@ def thin_walled(parts: tuple[tuple[float, float, float, float], ...], web: float
     y_lines, z_lines = zip(*(((a, b), (c, d)) for a, b, c, d in moved), strict=True)
     width = 2 * max(abs(v) for pair in y_lines for v in pair)
     height = 2 * max(abs(v) for pair in z_lines for v in pair)
-    drawn = {"A": area, "Iy": Iy, "Iz": Iz, "J": J, "Jp": Iy + Iz, "kappa": web / area}
+    drawn: Drawn = {"A": area, "Iy": Iy, "Iz": Iz, "J": J, "Jp": Iy + Iz, "kappa": web / area}
     return Section(width, height, tuple((*p, True) for p in moved), drawn)
 
 

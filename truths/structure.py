@@ -42,7 +42,7 @@ class Member:
         elements: beam elements of the drawn model.
         up: a vector in the local x-z plane; by default global z, or x for an upright.
         extend: lengths in m by which the solid passes its joints, so that walls meet.
-        weld: length in m of the layer at either end that a defect of the joint may change; 0 for none.
+        weld: length in m of the layer at either end that a defect may change; 0 for none.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Lump:
-    """Describe a mass (kg) at a place, at a global offset (m) from it; drawn unless told otherwise."""
+    """Describe a mass (kg) at a global offset (m) from a place, and whether it is drawn."""
 
     at: Place
     mass: float
@@ -83,7 +83,7 @@ class Lump:
 
 @dataclass(frozen=True)
 class Spring:
-    """Describe a spring to ground (N/m, or N m/rad about rx, ry, rz); drawn unless told otherwise."""
+    """Describe a spring to ground (N/m; N m/rad about rx, ry, rz), and whether it is drawn."""
 
     at: Place
     direction: str
@@ -196,6 +196,17 @@ class Structure:
         """Return the seed of the measurement's scatter, made of the name."""
         return int.from_bytes(hashlib.sha256(self.name.encode()).digest()[:4], "big")
 
+    @property
+    def seats(self) -> list[tuple[str, float]]:
+        """Return the places within members where something is measured or attached."""
+        lumps, springs = list(self.lumps), list(self.springs)
+        for change in self.changes:
+            lumps += change.lumps
+            springs += change.springs
+        places = [at for at, _ in self.sensors] + [lump.at for lump in lumps]
+        places += [spring.at for spring in springs] + [item.at for item in self.oscillators]
+        return sorted({at for at in places if not isinstance(at, str)})
+
     def warped(self, points: Array) -> Array:
         """Return points (3, n) of the straight description where they really are."""
         return points if self.warp is None else self.warp(points)
@@ -212,7 +223,7 @@ class Structure:
         return np.asarray(start + place[1] * (end - start))
 
     def axes(self, member: Member) -> tuple[Array, float]:
-        """Return the local axes x, y, z as rows, and the length in m, of the straight description."""
+        """Return local axes x, y, z as rows and the length (m) in the straight description."""
         start, end = (np.array(self.joints[j], dtype=float) for j in member.ends)
         length = float(np.linalg.norm(end - start))
         x = (end - start) / length
@@ -221,6 +232,12 @@ class Structure:
         y = np.cross(up, x)
         y /= np.linalg.norm(y)
         return np.array([x, y, np.cross(x, y)]), length
+
+    @property
+    def solid_members(self) -> list[Member]:
+        """Return the members that the solid has; a drawn link only joins centre lines."""
+        made = {name for name, s in self.sections.items() if s.rectangles or s.round}
+        return [member for member in self.members if member.section in made]
 
     def at_joint(self, joint: str) -> Member:
         """Return the first member that ends at a joint."""

@@ -33,7 +33,7 @@ def structures() -> dict[str, Structure]:
 
 
 @dataclass(frozen=True)
-class Truth:
+class Solved:
     """Hold what the solids say of a structure.
 
     Arguments:
@@ -52,17 +52,21 @@ class Truth:
     seconds: float
 
 
-def truth_of(structure: Structure) -> Truth:
+def solve_structure(structure: Structure) -> Solved:
     """Solve a structure on two meshes, and its changes on the finer one.
 
     Raises:
-        ValueError: where a listed mode differs by more than 0.7 % between the meshes.
+        ValueError: where a listed mode differs by more than 0.7 % between the meshes, the guess is
+            far off, or too few modes were found.
     """
     began, count = time.perf_counter(), structure.used + structure.held_out
     coarse, fine = (assembled(structure, mesh_of(structure, size)) for size in structure.size)
     states = tuple(
         modes_of(structure, fine, count, change) for change in (None, *structure.changes)
     )
+    first = float(states[0].frequencies[0])
+    if not 0.2 < first / structure.guess < 5:
+        raise ValueError(f"{structure.name}: first mode {first:.3g} Hz, guess {structure.guess:g}")
     difference, alike = mesh_difference(modes_of(structure, coarse, count), states[0], count)
     if difference.max() > LARGEST_DIFFERENCE:
         raise ValueError(
@@ -76,37 +80,38 @@ def truth_of(structure: Structure) -> Truth:
     lumps += sum(item.mass for item in structure.oscillators)
     nodes = (coarse.nodes.shape[1], fine.nodes.shape[1])
     mass = fine.total_mass + lumps
-    return Truth(states, difference, alike, nodes, mass, time.perf_counter() - began)
+    return Solved(states, difference, alike, nodes, mass, time.perf_counter() - began)
 
 
-def readme(structure: Structure, truth: Truth) -> str:
+def readme(structure: Structure, solved: Solved) -> str:
     """Return the README of a scenario."""
     count = structure.used + structure.held_out
     rows = [
         f"| {i + 1} | {'used' if i < structure.used else 'held out'} "
-        f"| {truth.states[0].frequencies[i]:.3f} | {100 * truth.differences[i]:.3f} "
-        f"| {truth.alike[i]:.4f} |"
+        f"| {solved.states[0].frequencies[i]:.3f} | {100 * solved.differences[i]:.3f} "
+        f"| {solved.alike[i]:.4f} |"
         for i in range(count)
     ]
     elements = "20-node bricks" if structure.mesher == "bricks" else "10-node tetrahedra"
     changes = "\n".join(
         f"{number}. {change.name}" for number, change in enumerate(structure.changes, 1)
     )
-    return f"""# {structure.name}: {structure.title}
+    return (
+        f"""# {structure.name}: {structure.title}
 
 ![the structure](picture.svg)
 
 {structure.story.strip()}
 
-**Origin.** The measured side is a solid model: {elements} by scikit-fem, {truth.nodes[0]} and
-{truth.nodes[1]} nodes; what is published comes from the finer mesh. `truths/structures` holds the
+**Origin.** The measured side is a solid model: {elements} by scikit-fem, {solved.nodes[0]} and
+{solved.nodes[1]} nodes; what is published comes from the finer mesh. `truths/structures` holds the
 description, `make truths ARGS={structure.name}` computes it again. The nominal model is drawn from
 centre lines and catalogue values and knows nothing else of the solid.
 
 **Scatter of the test** (seed {structure.seed}): frequencies {100 * structure.scatter:g} %, of whose
-variance all modes share {100 * structure.together:g} %; shapes {100 * structure.shape_scatter:g} % of the
-largest component, half of the variance a gain of each sensor. `frequency_std` holds the scatter and the
-difference of the two meshes.
+variance all modes share {100 * structure.together:g} %; shapes {100 * structure.shape_scatter:g} %
+of the largest component, half of the variance a gain of each sensor. `frequency_std` holds the
+scatter and the difference of the two meshes.
 
 **Changes of the design**, solved on the same solid:
 
@@ -114,24 +119,32 @@ difference of the two meshes.
 
 | mode | | frequency of the solid, Hz | difference of the meshes, % | MAC of the meshes |
 |---|---|---|---|---|
-""" + "\n".join(rows) + "\n"
+"""
+        + "\n".join(rows)
+        + "\n"
+    )
 
 
-def files_of(structure: Structure, truth: Truth) -> dict[str, str]:
+def files_of(structure: Structure, solved: Solved) -> dict[str, str]:
     """Return the text of every file of a scenario folder."""
     count = structure.used + structure.held_out
-    mesh = truth.differences
+    mesh = solved.differences
     weighed = np.random.default_rng((structure.seed, 99)).standard_normal() * structure.weighed
     files = {
-        "case.toml": case_text(structure, truth.mass * (1 + weighed)),
+        "case.toml": case_text(structure, solved.mass * (1 + weighed)),
         "sensors.csv": sensors_csv(structure),
-        "README.md": readme(structure, truth),
+        "README.md": readme(structure, solved),
         "picture.svg": picture(structure),
     }
     names = ["modes.csv", *(f"change-{i + 1}.csv" for i in range(len(structure.changes)))]
-    for number, (name, state) in enumerate(zip(names, truth.states, strict=True)):
+    for number, (name, state) in enumerate(zip(names, solved.states, strict=True)):
         recording = record(
-            structure, state.frequencies[:count], state.sensors[:count], mesh, structure.seed, number
+            structure,
+            state.frequencies[:count],
+            state.sensors[:count],
+            mesh,
+            structure.seed,
+            number,
         )
         files[name] = modes_csv(structure, recording)
     return files
@@ -148,9 +161,9 @@ def index_text(all_structures: dict[str, Structure]) -> str:
 
 def write(structure: Structure, folder: Path) -> list[str]:
     """Compute a structure and write its folder; return what differs from what was there."""
-    truth = truth_of(structure)
+    solved = solve_structure(structure)
     target, differences = folder / structure.name, []
-    for name, content in files_of(structure, truth).items():
+    for name, content in files_of(structure, solved).items():
         path = target / name
         old = path.read_text(encoding="utf-8") if path.exists() else None
         if old != content:

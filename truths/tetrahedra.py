@@ -48,7 +48,7 @@ def member_volume(structure: Structure, member: Member) -> list[tuple[int, int]]
 
 
 def tetrahedral_mesh(structure: Structure, size: float) -> Solid:
-    """Mesh a structure with tetrahedra of about `size` (m); what overlaps belongs to the later part.
+    """Mesh with tetrahedra of about `size` (m); what overlaps belongs to the later part.
 
     Raises:
         ValueError: where parts do not hang together.
@@ -76,8 +76,8 @@ def tetrahedral_mesh(structure: Structure, size: float) -> Solid:
 
         add_block(True)
         for member in structure.members:
-            for tag in member_volume(structure, member):
-                volumes.append((member.name, member.material, tag))
+            own = member_volume(structure, member)
+            volumes += [(member.name, member.material, tag) for tag in own]
         add_block(False)
         if cuts:
             kept = []

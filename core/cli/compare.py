@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from femubench.core.cli import options
 from femubench.core.errors import InputError
 from femubench.core.files import write_atomically
-from femubench.core.library.compare import compare as side_by_side, threshold_of
-from femubench.core.library.report import SUFFIXES, rendering
-from femubench.core.score.comparison import Threshold
+
+if TYPE_CHECKING:
+    from femubench.core.score.comparison import Threshold
 
 
 def thresholds_of(
@@ -22,6 +23,10 @@ def thresholds_of(
     Raises:
         BadParameter: for anything but METRIC>NUMBER.
     """
+    if not texts:
+        return ()
+    from femubench.core.library.compare import threshold_of
+
     try:
         return tuple(map(threshold_of, texts))
     except InputError as fault:
@@ -46,7 +51,9 @@ def thresholds_of(
     help="Exit with 1 if a ratio B/A exceeds X: skill, used, higher, modified, seconds; or the "
     "number of lost results: failures. May be repeated. Default: skill>1.01 and failures>0.",
 )  # fmt: skip
-@options.style(*SUFFIXES, dest="form", what="What is printed or written.")
+@options.style(
+    "terminal", "markdown", "html", "json", dest="form", what="What is printed or written."
+)
 @click.option(
     "-o", "--output", type=options.OUTPUT_PATH, metavar="FILE",
     help="Write there instead of the screen.",
@@ -72,6 +79,9 @@ def compare(
     A and B are run ids in the store, their first letters, or files that run --json wrote. With
     --of X --with Y strategy Y of B is set beside strategy X of A, or both are taken from A.
     """
+    from femubench.core.library.compare import compare as side_by_side
+    from femubench.core.library.report import rendering
+
     if (first is None) != (second is None) or (strategies and first is not None):
         raise click.UsageError("--of and --with belong together, without --strategy", ctx)
     if after is None and first is None:

@@ -45,6 +45,9 @@ _HELD = 1e-9
 # Without redundancy rounding leaves some 1e-13 of EA times the misfit strain.
 _NO_FORCE = 1e-10
 _DRAWS = 2
+# The pull of a misfit is far larger than the forces it leaves, so that the balance of these needs
+# the digits of one step of iterative refinement (Higham 2002, chapter 12).
+_REFINED = 2
 
 
 @dataclass(frozen=True)
@@ -81,13 +84,14 @@ class Statics:
     Arguments:
         structure: the frame with the dofs of that plane.
         stiffness: element matrices, (n_elements, 12, 12).
-        factor: of the stiffness on the dofs `free`.
+        factor, matrix: of the stiffness on the dofs `free`.
         free: the dofs but those that stop the rigid motions, where nothing reacts.
     """
 
     structure: MeshedFrame
     stiffness: FloatArray
     factor: Any
+    matrix: SparseArray
     free: IntArray
 
     def state(self, member: str) -> StressState:
@@ -141,7 +145,9 @@ class Statics:
         """Return the displacements under a misfit, (n,)."""
         load = self.structure.gather.T @ misfit.ravel()
         motion = np.zeros(len(load))
-        motion[self.free] = self.factor.solve(load[self.free])
+        for _ in range(_REFINED):
+            left = load[self.free] - self.matrix @ motion[self.free]
+            motion[self.free] += self.factor.solve(left)
         return motion
 
     def _internal(self, motion: FloatArray, misfit: FloatArray) -> FloatArray:
@@ -194,7 +200,7 @@ def _prepare(structure: MeshedFrame) -> Statics:
     except RuntimeError:
         raise ModelError("the frame is a mechanism in its plane") from None
     stiffness = stiffness_matrices(flat_structure.properties)
-    return Statics(flat_structure, stiffness, factor, free)
+    return Statics(flat_structure, stiffness, factor, matrix, free)
 
 
 def _clamps(frame: Frame) -> tuple[Support, ...]:

@@ -33,11 +33,13 @@ over the whole section, and the tabs up to their ends.
     joints={name: (XS[i], YS[j], 0.0) for (i, j), name in NAMES.items()}
     | {f"T{row}1": (-TAB, YS[j], 0.0) for j, row in ((0, "A"), (2, "C"))}
     | {f"T{row}3": (XS[-1] + TAB, YS[j], 0.0) for j, row in ((0, "A"), (2, "C"))},
-    types={name: "crossing" for name in NAMES.values()}
+    types=dict.fromkeys(NAMES.values(), "crossing")
     | {f"T{row}{i}": "support" for row in "AC" for i in (1, 3)},
     members=(
         *(
-            Member(f"cross-{i + 1}{a}", (NAMES[i, j], NAMES[i, j + 1]), "cross", "steel", 3, weld=0.004)
+            Member(
+                f"cross-{i + 1}{a}", (NAMES[i, j], NAMES[i, j + 1]), "cross", "steel", 3, weld=0.004
+            )
             for i in range(3)
             for j, a in ((0, "A"), (1, "B"))
         ),

@@ -1,6 +1,5 @@
 """A planar truss of flat bars on gusset plates, clamped at one end."""
 
-from itertools import pairwise
 
 from truths.sections import bar
 from truths.structure import STEEL, Block, Change, Clamp, Lump, Member, Spring, Structure
@@ -13,11 +12,13 @@ JOINTS = {f"L{i}": (i * BAY, 0.0, 0.0) for i in range(BAYS + 1)} | {
 
 def _gusset(name: str) -> Block:
     x, _, z = JOINTS[name]
-    low, high = (z - 0.02, z + 0.06) if name[0] == "L" else (z - 0.06, z + 0.02)
+    low, high = (z - 0.015, z + 0.06) if name[0] == "L" else (z - 0.06, z + 0.015)
     return Block(f"gusset-{name}", (x - 0.06, -0.006, low), (x + 0.06, 0.006, high), "steel")
 
 
-CHORDS = [(f"L{i}", f"L{i + 1}") for i in range(BAYS)] + [(f"U{i}", f"U{i + 1}") for i in range(BAYS)]
+CHORDS = [(f"L{i}", f"L{i + 1}") for i in range(BAYS)] + [
+    (f"U{i}", f"U{i + 1}") for i in range(BAYS)
+]
 POSTS = [(f"L{i}", f"U{i}") for i in range(1, BAYS + 1)]
 DIAGONALS = [(f"U{i}", f"L{i + 1}") for i in range(BAYS)]
 
@@ -26,7 +27,7 @@ STRUCTURE = Structure(
     title="Cantilever truss of flat bars on gusset plates",
     classes=("truss", "gussets", "clamped", "solid sections"),
     story="""
-Chords 30 x 12 mm, posts and diagonals 20 x 12 mm, welded to gusset plates of 120 x 80 x 12 mm, which no
+Chords 30 x 12 mm, posts and diagonals 20 x 12 mm, welded to gusset plates of 120 x 75 x 12 mm, which no
 drawing of centre lines shows. Both chords are clamped at the wall.
 """,
     materials={"steel": STEEL},
@@ -39,7 +40,11 @@ drawing of centre lines shows. Both chords are clamped at the wall.
     ),
     blocks=tuple(_gusset(name) for name in JOINTS),
     clamps=tuple(
-        Clamp(f"{c}0", (-0.061, -0.1, JOINTS[f"{c}0"][2] - 0.07), (0.0, 0.1, JOINTS[f"{c}0"][2] + 0.07))
+        Clamp(
+            f"{c}0",
+            (-0.061, -0.1, JOINTS[f"{c}0"][2] - 0.07),
+            (0.0, 0.1, JOINTS[f"{c}0"][2] + 0.07),
+        )
         for c in "LU"
     ),
     plane="in-plane",
@@ -51,6 +56,6 @@ drawing of centre lines shows. Both chords are clamped at the wall.
     mesher="tetrahedra",
     used=4,
     held_out=4,
-    size=(0.02, 0.014),
+    size=(0.024, 0.017),
     guess=120.0,
 )

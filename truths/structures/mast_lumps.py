@@ -17,7 +17,10 @@ instruments, of which one hangs on the arm. The holders of the two others stick 
 held along a strip alone, so that the foot is softer one way than the other. The two planes of bending differ by little.
 """,
     materials={"aluminium": ALUMINIUM, "steel": STEEL},
-    sections={"mast": rectangular_tube(2 * HALF, 2 * HALF, 0.005), "arm": rectangular_tube(0.03, 0.04, 0.005)},
+    sections={
+        "mast": rectangular_tube(2 * HALF, 2 * HALF, 0.005),
+        "arm": rectangular_tube(0.03, 0.04, 0.005),
+    },
     joints={
         "A": (0.0, 0.0, 0.0),
         "B": (0.0, 0.0, 0.75),

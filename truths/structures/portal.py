@@ -10,9 +10,9 @@ STRUCTURE = Structure(
     title="Portal of rectangular hollow sections with a stub, free",
     classes=("planar frame", "hollow sections", "free"),
     story="""
-Two posts 60 x 40 x 3 mm, a beam of the same tube and a stub of 40 x 40 x 3 mm, welded all around. The beam
-lies on the posts, whose walls end at its lower face: the tubes meet as plates, so the corners are far
-softer across the plane than in it. Open tube ends are closed by 3 mm plates.
+Two posts 60 x 40 x 3 mm, a beam of the same tube, a stub 40 x 40 x 3 mm, welded all around. The
+beam lies on the posts, whose walls end at its lower face: the tubes meet as plates, so the corners
+are far softer across the plane than in it. Open tube ends are closed by 3 mm plates.
 """,
     materials={"steel": STEEL},
     sections={

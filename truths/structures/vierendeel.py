@@ -25,7 +25,9 @@ the posts and rigid joints.
         "post": rectangular_tube(0.042, 0.042, 0.004),
     },
     joints={
-        f"{chord}{i}": (STATIONS[i], 0.0, z) for chord, z in (("L", 0.0), ("U", DEPTH)) for i in POSTS
+        f"{chord}{i}": (STATIONS[i], 0.0, z)
+        for chord, z in (("L", 0.0), ("U", DEPTH))
+        for i in POSTS
     },
     types={
         f"{chord}{i}": "end" if i in (0, POSTS[-1]) else "inner" for chord in "LU" for i in POSTS

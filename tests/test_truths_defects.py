@@ -1,0 +1,61 @@
+"""The committed defects of solids: complete, drawn over kinds and sizes, posable as cases."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from femubench import read_case
+from truths.posing import DEFECTS, pose
+from truths.truth import read_truth
+
+FOLDERS = sorted(path.parent for path in DEFECTS.glob("*/truth.toml"))
+TRUTHS = [read_truth(folder) for folder in FOLDERS]
+FEWEST = {"defect": 100, "pair": 15, "clean": 20, "outside": 20}
+
+
+def test_there_are_enough_of_each_kind() -> None:
+    counts = Counter(truth.kind for truth in TRUTHS)
+    assert all(counts[kind] >= number for kind, number in FEWEST.items()), counts
+
+
+def test_they_spread_over_structures_and_sizes() -> None:
+    """No structure has a sixth of them, and sizes run from hidden in the scatter to gross."""
+    structures = Counter(truth.structure for truth in TRUTHS)
+    assert len(structures) >= 10
+    assert max(structures.values()) < len(TRUTHS) / 6
+    chi2 = np.array([truth.chi2 for truth in TRUTHS if truth.kind == "defect"])
+    assert (chi2 < 9).sum() >= 5
+    assert (chi2 > 1000).sum() >= 5
+    assert ((chi2 > 9) & (chi2 < 1000)).sum() >= len(chi2) / 3
+
+
+def test_about_half_of_them_is_held() -> None:
+    share = np.mean([truth.held for truth in TRUTHS])
+    assert 0.35 < share < 0.65
+
+
+def test_a_clean_case_is_clean() -> None:
+    for truth in TRUTHS:
+        if truth.kind == "clean":
+            assert truth.chi2 == 0.0
+            assert not truth.causes
+        else:
+            assert truth.causes
+            assert truth.chi2 is not None
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
+def test_a_defect_is_a_case(folder: Path, tmp_path: Path) -> None:
+    """Both states have the same sensors, other scatter, and a case can be read of them."""
+    pose(folder, tmp_path / "case")
+    case = read_case(tmp_path / "case")
+    assert not case.modifications
+    present, healthy = (pd.read_csv(folder / name) for name in ("modes.csv", "healthy.csv"))
+    assert list(present.columns) == list(healthy.columns)
+    assert len(present) == len(healthy) == len(case.used) + len(case.held_out)
+    assert not np.allclose(present["frequency"], healthy["frequency"], rtol=1e-9)

@@ -1,0 +1,107 @@
+"""Make the truths again: ``python -m truths [NAME ...] [--only suite|defects|faults]``.
+
+Structures that have not changed since the last run are left out, so that a run goes on where it
+was cut.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import importlib.util
+import json
+import sys
+import time
+from pathlib import Path
+
+HERE = Path(__file__).parent
+STATE = HERE.parent / "build" / "truths.json"
+NEEDED = {"gmsh": "gmsh", "skfem": "scikit-fem", "matplotlib": "matplotlib"}
+STEPS = ("suite", "defects", "faults")
+# What a solid's figures follow from, besides the structure's own file.
+SOLVER = (
+    "bricks",
+    "elasticity",
+    "eigenmodes",
+    "measurement",
+    "modes_of",
+    "seats",
+    "solid",
+    "suite",
+)
+
+
+def digest(name: str) -> str:
+    """Return a digest of what a structure's files are made from."""
+    files = [HERE / f"{part}.py" for part in (*SOLVER, "drawing", "sections", "structure")]
+    files += [HERE / "tetrahedra.py", HERE / "structures" / f"{name.replace('-', '_')}.py"]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
+
+
+def made_before() -> dict[str, str]:
+    """Return the digests of the structures that were made."""
+    found: dict[str, str] = json.loads(STATE.read_text()) if STATE.exists() else {}
+    return found
+
+
+def make_suite(names: list[str], again: bool) -> bool:
+    """Write the folders of the structures; tell whether all could be made."""
+    from truths.suite import SUITE, index_text, structures, write
+
+    known = structures()
+    sound = True
+    for number, name in enumerate(names or known, 1):
+        if not again and not names and made_before().get(name) == digest(name):
+            continue
+        began = time.perf_counter()
+        try:
+            differences = write(known[name], SUITE)
+        except ValueError as error:
+            print(f"{name}: {error}", file=sys.stderr)
+            sound = False
+            continue
+        seconds = time.perf_counter() - began
+        print(f"{number}/{len(names or known)} {name}: {seconds:.0f} s", file=sys.stderr)
+        print("\n".join(differences) or f"{name}: as it was", flush=True)
+        STATE.parent.mkdir(exist_ok=True)
+        STATE.write_text(json.dumps({**made_before(), name: digest(name)}, indent=1))
+    made = {name: item for name, item in known.items() if (SUITE / name).is_dir()}
+    (SUITE / "suite.toml").write_text(index_text(made), encoding="utf-8")
+    return sound
+
+
+def main() -> int:
+    """Run the steps that are asked for; return the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m truths", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help="structures; all by default")
+    parser.add_argument("--only", choices=STEPS, help="one step; all by default")
+    parser.add_argument("--again", action="store_true", help="also what has not changed")
+    options = parser.parse_args()
+    lacking = [pip for module, pip in NEEDED.items() if importlib.util.find_spec(module) is None]
+    if lacking:
+        print(f"the truths need {', '.join(lacking)}: pip install -e '.[truths]'", file=sys.stderr)
+        return 2
+    from truths.suite import structures
+
+    unknown = [name for name in options.names if name not in structures()]
+    if unknown:
+        known = ", ".join(structures())
+        print(f"no structure {', '.join(unknown)}; there are {known}", file=sys.stderr)
+        return 2
+    sound = True
+    if options.only in (None, "suite"):
+        sound = make_suite(options.names, options.again)
+    if options.only in (None, "defects"):
+        from truths.defect_cases import write_all
+
+        for line in write_all(options.names):
+            print(line, flush=True)
+    if options.only in (None, "faults") and not options.names:
+        from truths.faults import write_faults
+
+        print(*write_faults(), sep="\n")
+    return 0 if sound else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

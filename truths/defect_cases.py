@@ -1,0 +1,267 @@
+"""Draw defects over the structures, solve them beside the healthy solids, write their folders."""
+
+from __future__ import annotations
+
+import shutil
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from scipy import sparse
+from scipy.sparse import linalg
+
+from truths.defects import ATTACHED, KINDS, OUTSIDE, Defect, local
+from truths.eigenmodes import attach
+from truths.elasticity import Matrices
+from truths.measurement import modes_csv, paired, record, scaled
+from truths.modes_of import Observed, assembled, mesh_of, modes_of
+from truths.posing import DEFECTS
+from truths.prestress import with_misfit
+from truths.seats import rigid_fit
+from truths.solid import Solid
+from truths.structure import Place, Structure
+from truths.suite import structures
+from truths.truth import TrueCause, Truth, rounded, truth_text
+
+Array = npt.NDArray[np.float64]
+SEED = 26_000
+SINGLES, PAIRS, CLEAN, OUTSIDE_KINDS = 104, 15, 20, 20
+LARGEST_MESH = 30_000  # nodes; larger solids carry no defects
+ALL = {**KINDS, **OUTSIDE}
+TRIES = 40  # draws of a place and a size before a kind passes to another structure
+
+
+@dataclass(frozen=True)
+class Draw:
+    """Hold what one case hides."""
+
+    name: str
+    kind: str
+    structure: str
+    seed: int
+    defects: tuple[Defect, ...]
+
+
+@dataclass(frozen=True)
+class Healthy:
+    """Hold a structure's coarse solid, its matrices and modes."""
+
+    structure: Structure
+    solid: Solid
+    matrices: Matrices
+    modes: Observed
+
+
+@lru_cache(maxsize=2)
+def healthy(name: str) -> Healthy:
+    """Return the healthy solid of a structure, on the coarse mesh."""
+    structure = structures()[name]
+    solid = mesh_of(structure, structure.size[0])
+    matrices = assembled(structure, solid)
+    count = structure.used + structure.held_out
+    return Healthy(structure, solid, matrices, modes_of(structure, matrices, count))
+
+
+def draws() -> list[Draw]:
+    """Return all cases, the same ones each time: kinds in turn, the least used structure first."""
+    solids = {}
+    for name, structure in structures().items():
+        solid = mesh_of(structure, structure.size[0])
+        # A brick of 20 nodes has about seven of its own, a tetrahedron of ten one and a half.
+        nodes = solid.cells.shape[1] * (7 if solid.cells.shape[0] == 8 else 1.6)
+        if nodes < LARGEST_MESH:
+            solids[name] = (structure, solid)
+    able = {
+        kind: [n for n, (s, m) in solids.items() if _make(s, m, kind, np.random.default_rng(0))]
+        for kind in ALL
+    }
+    found: list[Draw] = []
+    used: Counter[tuple[str, str]] = Counter()
+    load: Counter[str] = Counter()
+
+    def draw(label: str, kinds: Iterable[str], number: int) -> None:
+        wanted = [kind for kind in kinds if able[kind]]
+        for i in range(number):
+            seed = SEED + len(found)
+            rng = np.random.default_rng(seed)
+            kind = wanted[i % len(wanted)]
+            name = min(able[kind], key=lambda n: (used[kind, n], load[n], rng.random()))
+            hidden = _draw_defects(*solids[name], kind, label == "pair", rng)
+            used[kind, name] += 1
+            load[name] += 1
+            words = "-".join((name, *(d.kind for d in hidden)))
+            count = 1 + sum(other.name.startswith(f"{words}-") for other in found)
+            found.append(Draw(f"{words}-{count}", label, name, seed, hidden))
+
+    draw("defect", KINDS, SINGLES)
+    draw("pair", (kind for kind in KINDS if kind != "unfit-member"), PAIRS)
+    draw("outside", OUTSIDE, OUTSIDE_KINDS)
+    for i in range(CLEAN):
+        name = sorted(solids)[i % len(solids)]
+        number = i // len(solids) + 1
+        found.append(Draw(f"{name}-clean-{number}", "clean", name, SEED + len(found), ()))
+    return found
+
+
+def _make(structure: Structure, solid: Solid, kind: str, rng: np.random.Generator) -> Defect | None:
+    for _ in range(TRIES):
+        defect = ALL[kind](structure, solid, rng)
+        if defect is not None:
+            return defect
+    return None
+
+
+def _draw_defects(
+    structure: Structure, solid: Solid, kind: str, pair: bool, rng: np.random.Generator
+) -> tuple[Defect, ...]:
+    """Return a defect of a kind, for a pair with another that only hangs something on.
+
+    Raises:
+        ValueError: where no place can be found.
+    """
+    first = _make(structure, solid, kind, rng)
+    if first is None:
+        raise ValueError(f"{structure.name} has no place for {kind}")
+    if not pair:
+        return (first,)
+    for _ in range(TRIES):
+        second = _make(structure, solid, str(rng.choice(ATTACHED)), rng)
+        if second is not None and second.kind != kind and second.place != first.place:
+            return first, second
+    raise ValueError(f"{structure.name} has no second place beside {kind}")
+
+
+def damaged(base: Healthy, defects: tuple[Defect, ...]) -> tuple[Observed, list[TrueCause]]:
+    """Return the modes of a structure with defects, and the causes as a truth file states them."""
+    structure, solid, matrices = base.structure, base.solid, base.matrices
+    for defect in defects:
+        structure, solid = defect.edit(structure, solid)
+    if solid is not base.solid:
+        matrices = assembled(structure, solid)
+    causes = []
+    for defect in defects:
+        size = defect.size
+        if defect.preload is not None:
+            matrices, size = preloaded(structure, solid, matrices, *defect.preload)
+        if defect.turns is not None:
+            size = turning_stiffness(base, matrices, *defect.turns)
+        unit = "N m/rad" if defect.turns else defect.unit
+        causes.append(TrueCause(defect.what, defect.effect, defect.place, defect.also, size, unit))
+    return modes_of(structure, matrices, structure.used + structure.held_out), causes
+
+
+def preloaded(
+    structure: Structure, solid: Solid, matrices: Matrices, name: str, strain: float
+) -> tuple[Matrices, float]:
+    """Return the matrices with a misfit member, and its axial force in N, tension positive."""
+    member = structure.member(name)
+    axes, length = structure.axes(member)
+    along = np.abs(axes[0])
+    system = attach(structure, matrices, structure.lumps, structure.springs)
+    cells = solid.of_part(name)
+    stressed, stress = with_misfit(solid, matrices, system, cells, strain * along)
+    x = local(structure, solid, member)[0]
+    middle = cells & (np.abs(x - length / 2) < length / 4)
+    axis = int(along.argmax())
+    corners = solid.points[:, solid.cells]
+    volume = np.ptp(corners, axis=1).prod(axis=0)
+    span = float(np.ptp(solid.points[axis, solid.cells[:, middle]]))
+    force = float((stress[axis, axis].mean(axis=1) * volume)[middle].sum() / span)
+    return stressed, force
+
+
+def turning_stiffness(base: Healthy, matrices: Matrices, name: str, joint: str) -> float:
+    """Return the spring (N m/rad) that turns as much as a defect adds, about the softer axis.
+
+    A couple acts between the joint and the member a quarter of its length away; what both states
+    turn differently is the spring's.
+    """
+    structure = base.structure
+    member = structure.member(name)
+    place: Place = (name, 0.25 if member.ends[0] == joint else 0.75)
+    axes, _ = structure.axes(member)
+
+    def flexibility(state: Matrices) -> Array:
+        ends = [rigid_fit(structure, state, at)[3:].toarray() for at in (joint, place)]
+        couple = axes[1:] @ (ends[1] - ends[0])
+        system = attach(structure, state, (), structure.springs)
+        held = system.stiffness + 1e-9 * sparse.diags_array(system.stiffness.diagonal())
+        load = system.observe.T @ couple.T
+        solver = linalg.splu(
+            sparse.csc_matrix(held),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+        return np.asarray(np.einsum("ij,ij->j", load, solver.solve(load)))
+
+    added = flexibility(matrices) - flexibility(base.matrices)
+    return float(1 / added.max())
+
+
+def visible(base: Healthy, state: Observed) -> tuple[float, float]:
+    """Return chi-square of the noise-free change in the used modes, and the frequencies' part."""
+    structure, used = base.structure, base.structure.used
+    before = base.modes.chosen(np.arange(used))
+    partner = paired((before.frequencies, before.stations), (state.frequencies, state.stations))
+    after = state.chosen(partner)
+    drift = (after.frequencies / before.frequencies - 1) / structure.scatter
+    one, two = scaled(before.sensors), after.sensors
+    # Every shape has a scale of its own: the one that fits best.
+    two = two * ((one * two).sum(axis=1) / (two**2).sum(axis=1))[:, None]
+    turned = (two - one) / structure.shape_scatter
+    return float((drift**2).sum() + (turned**2).sum()), float((drift**2).sum())
+
+
+def files_of(draw: Draw) -> dict[str, str]:
+    """Return the text of every file of a case."""
+    base = healthy(draw.structure)
+    structure, count = base.structure, base.structure.used + base.structure.held_out
+    state, causes = damaged(base, draw.defects) if draw.defects else (base.modes, [])
+    chi2 = visible(base, state)
+    truth = Truth(
+        draw.name,
+        draw.structure,
+        draw.kind,
+        draw.seed,
+        tuple(replace(c, size=None if c.size is None else rounded(c.size)) for c in causes),
+        *chi2,
+    )
+    files = {"truth.toml": truth_text(truth)}
+    mesh = np.zeros(count)
+    for name, modes, number in (("modes.csv", state, 1), ("healthy.csv", base.modes, 2)):
+        # The same sensors in both states, so the gains are shared; all other scatter is not.
+        recording = record(
+            structure,
+            modes.frequencies[:count],
+            modes.sensors[:count],
+            mesh,
+            structure.seed,
+            draw.seed,
+            number,
+        )
+        files[name] = modes_csv(structure, recording)
+    return files
+
+
+def write_all(names: list[str], folder: Path = DEFECTS) -> Iterator[str]:
+    """Write the cases of some structures, of all where none is named; yield what differs."""
+    drawn = [d for d in draws() if not names or d.structure in names]
+    drawn.sort(key=lambda d: d.structure)
+    for number, draw in enumerate(drawn, 1):
+        target = folder / draw.name
+        for name, content in files_of(draw).items():
+            path = target / name
+            old = path.read_text(encoding="utf-8") if path.exists() else None
+            if old != content:
+                target.mkdir(parents=True, exist_ok=True)
+                path.write_text(content, encoding="utf-8")
+                yield f"{number}/{len(drawn)} {draw.name}/{name}: {'changed' if old else 'new'}"
+    if not names and folder.exists():
+        for stale in sorted({p.name for p in folder.iterdir()} - {d.name for d in drawn}):
+            shutil.rmtree(folder / stale)
+            yield f"{stale}: removed"

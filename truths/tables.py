@@ -1,0 +1,60 @@
+"""The table of the suite in docs/suite.md: ``python -m truths.tables``."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+from femubench import rank
+from truths.posing import ROOT, SUITE
+
+PAGE = ROOT / "docs" / "suite.md"
+MARK = "<!-- suite -->"
+NODES = re.compile(r"scikit-fem, (\d+) and\s+(\d+) nodes")
+ROW = re.compile(r"^\| \d+ \| (used|held out) \| ([\d.]+) \| ([\d.]+) \|", re.MULTILINE)
+
+
+def suite_rows() -> list[str]:
+    """Return one row of Markdown a structure: classes, meshes, how far the drawing is off."""
+    table = tomllib.loads((SUITE / "suite.toml").read_text(encoding="utf-8"))
+    results = rank(["suite"], ["unchanged"]).results
+    errors = {result.case: result for result in results}
+    rows = []
+    for name, item in table.items():
+        text = (SUITE / name / "README.md").read_text(encoding="utf-8")
+        nodes = NODES.search(text)
+        modes = ROW.findall(text)
+        if nodes is None or not modes:
+            raise ValueError(f"{name}: its README holds no meshes or no modes")
+        used = sum(kind == "used" for kind, *_ in modes)
+        worst = max(float(difference) for *_, difference in modes)
+        error = errors[f"suite/{name}"].blocks["used"].rms_percent
+        rows.append(
+            f"| [`{name}`](../scenarios/suite/{name}/README.md) | {', '.join(item['classes'])} "
+            f"| {used} + {len(modes) - used} | {nodes[1]}, {nodes[2]} | {worst:.2f} | {error:.1f} |"
+        )
+    return rows
+
+
+def write_table(page: Path = PAGE) -> None:
+    """Replace what stands behind the mark of the page."""
+    rows = suite_rows()
+    errors = np.array([float(row.split("|")[-2]) for row in rows])
+    head = (
+        "| structure | classes | modes used + held out | nodes of the two meshes "
+        "| largest difference of the meshes, % | error of the drawing in the used modes, rms % |\n"
+        "| :--- | :--- | ---: | ---: | ---: | ---: |\n"
+    )
+    foot = (
+        f"\n{len(rows)} structures; the drawing misses the used modes by {errors.min():.1f} to "
+        f"{errors.max():.1f} %, {np.median(errors):.1f} % in the median.\n"
+    )
+    before, _, _ = page.read_text(encoding="utf-8").partition(MARK)
+    page.write_text(before + MARK + "\n\n" + head + "\n".join(rows) + "\n" + foot, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write_table()
