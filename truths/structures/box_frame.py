@@ -9,6 +9,7 @@ PEG = 0.04  # m, from a cube's face into a tube
 BORE = 0.012  # m, half the inner width of a tube
 CORNERS = {"A": (0.0, 0.0), "B": (SIDES[0], 0.0), "C": SIDES, "D": (0.0, SIDES[1])}
 
+
 def _connector(corner: str, level: int) -> list[Block]:
     """Return the cube of a corner and its three pegs, each inside a tube."""
     x, y = CORNERS[corner]
