@@ -35,7 +35,7 @@ STRUCTURE = Structure(
     classes=("planar frame", "hollow sections", "leaning members", "soft feet"),
     story="""
 Two legs of tube 50 x 50 x 3 mm lean inwards and carry a beam of the same tube; a narrower tie of
-40 x 40 x 3 mm joins them below. The feet are plates on thin rubber: the drawing has their stiffness across
+44 x 44 x 3 mm joins them below. The feet are plates on thin rubber: the drawing has their stiffness across
 and along the floor as the maker of the rubber states it, and takes the feet as hinges, but the plates
 resist rotation. The tie's ends sit on walls that bend.
 """,
@@ -43,7 +43,7 @@ resist rotation. The tie's ends sit on walls that bend.
     sections={
         "leg": replace(LEG, drawn=DRAWN),
         "beam": rectangular_tube(0.05, 0.05, 0.003),
-        "tie": rectangular_tube(0.04, 0.04, 0.003),
+        "tie": rectangular_tube(0.044, 0.044, 0.003),
     },
     joints={
         "A": (-HALF_BASE, 0.0, 0.0),
@@ -63,7 +63,7 @@ resist rotation. The tie's ends sit on walls that bend.
         Member("beam", ("C", "D"), "beam", "steel", 5, extend=(WIDTH / 2, WIDTH / 2)),
     ),
     blocks=tuple(
-        Block(f"foot-{x:g}", (x - 0.05, -0.05, -0.008), (x + 0.05, 0.05, 0.0), "steel")
+        Block(f"foot-{x:g}", (x - WIDTH / 2, -0.025, -0.008), (x + WIDTH / 2, 0.025, 0.0), "steel")
         for x in (-HALF_BASE, HALF_BASE)
     ),
     lumps=(Lump(("beam", 0.35), 2.5),),
@@ -103,7 +103,7 @@ resist rotation. The tie's ends sit on walls that bend.
     ),
     used=5,
     held_out=3,
-    size=(0.022, 0.015),
+    size=(0.03, 0.021),
     guess=35.0,
     scatter=0.004,
     shape_scatter=0.025,
