@@ -84,7 +84,8 @@ def picture(structure: Structure) -> str:
     middle = (high + low) / 2
     for axis, centre, half in zip("xyz", middle, size / 2, strict=True):
         getattr(axes, f"set_{axis}lim")(centre - half, centre + half)
-    axes.set_box_aspect(size, zoom=1.25)
+    # The figure is wider than high: what stands tall is drawn smaller.
+    axes.set_box_aspect(size, zoom=min(1.25, 0.65 * float(np.linalg.norm(size)) / size[2]))
     axes.view_init(elev=24, azim=-58)
     axes.set_axis_off()
     stream = io.StringIO()

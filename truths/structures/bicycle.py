@@ -9,7 +9,11 @@ from truths.structure import STEEL, Array, Change, Lump, Member, Spring, Structu
 
 REAR, SEAT, HEAD = -0.42, 0.0, 0.56  # m, along the frame
 LOW, HIGH = (0.06, 0.0, 0.34), (0.14, 0.5, 0.52)  # m, heights of both runs of tubes there
-EVEN, FLAT, LEAN = 0.5, 0.026, 0.3  # m; half the depth of what keeps its shape; slope of the seat tube
+EVEN, FLAT, LEAN = (
+    0.5,
+    0.026,
+    0.3,
+)  # m; half the depth of what keeps its shape; slope of the seat tube
 TUBE, WALL, STAY = 0.03, 0.002, 0.018  # m
 COSINES = {
     name: float(np.cos(np.arctan2(rise, run)))
@@ -96,8 +100,8 @@ slanting angles and reach into each other's depth, which centre lines do not sho
             springs=(Spring("drop-low", "y", 2e5),),
         ),
     ),
-    used=5,
-    held_out=4,
+    used=4,
+    held_out=3,
     size=(0.028, 0.02),
     graded=False,
     guess=80.0,

@@ -17,7 +17,9 @@ def _gusset(name: str) -> Block:
     return Block(f"gusset-{name}", (x - 0.06, -0.006, low), (x + 0.06, 0.006, high), "steel")
 
 
-CHORDS = [(f"L{i}", f"L{i + 1}") for i in range(BAYS)] + [(f"U{i}", f"U{i + 1}") for i in range(BAYS)]
+CHORDS = [(f"L{i}", f"L{i + 1}") for i in range(BAYS)] + [
+    (f"U{i}", f"U{i + 1}") for i in range(BAYS)
+]
 POSTS = [(f"L{i}", f"U{i}") for i in range(1, BAYS + 1)]
 DIAGONALS = [(f"U{i}", f"L{i + 1}") for i in range(BAYS)]
 
@@ -39,7 +41,11 @@ drawing of centre lines shows. Both chords are clamped at the wall.
     ),
     blocks=tuple(_gusset(name) for name in JOINTS),
     clamps=tuple(
-        Clamp(f"{c}0", (-0.061, -0.1, JOINTS[f"{c}0"][2] - 0.07), (0.0, 0.1, JOINTS[f"{c}0"][2] + 0.07))
+        Clamp(
+            f"{c}0",
+            (-0.061, -0.1, JOINTS[f"{c}0"][2] - 0.07),
+            (0.0, 0.1, JOINTS[f"{c}0"][2] + 0.07),
+        )
         for c in "LU"
     ),
     plane="in-plane",

@@ -21,7 +21,9 @@ SHEARS = tuple(
 )
 CROSS = tuple(Member(f"rib-{i}", (f"R{i}", f"L{i}"), "rib", "iron", 2) for i in range(len(RIBS)))
 LEGS = tuple(
-    Member(f"leg-{s}{i}", (f"foot-{s}{i}", f"{s}{i}"), "leg", "iron", 3) for i in (0, 4) for s in SIDES
+    Member(f"leg-{s}{i}", (f"foot-{s}{i}", f"{s}{i}"), "leg", "iron", 3)
+    for i in (0, 4)
+    for s in SIDES
 )
 PADS = tuple((f"foot-{s}{i}", direction) for s in SIDES for i in (0, 4) for direction in "xyz")
 STIFFNESS = {"x": 1.5e6, "y": 1.5e6, "z": 8e6}  # N/m of a pad
