@@ -22,7 +22,7 @@ STRUCTURE = Structure(
     classes=("tower", "soft feet", "hollow sections", "two materials"),
     story="""
 An aluminium tube 60 x 40 x 3 mm, welded to a steel plate 160 x 120 x 12 mm, which is bonded to a rubber layer
-of 10 mm. Half way up a yard of 30 x 30 x 2 mm pierces nothing: its two halves are welded to the sides. The
+of 10 mm. Half way up a yard of 60 x 30 x 2 mm, as wide as the mast, is welded to its sides in two halves. The
 drawing clamps the mast at the plate and knows nothing of the rubber.
 """,
     materials={
@@ -32,7 +32,7 @@ drawing clamps the mast at the plate and knows nothing of the rubber.
     },
     sections={
         "mast": rectangular_tube(0.04, 0.06, 0.003),
-        "yard": rectangular_tube(0.03, 0.03, 0.002),
+        "yard": rectangular_tube(0.06, 0.03, 0.002),
     },
     joints={
         "base": (0.0, 0.0, 0.0),
@@ -74,10 +74,9 @@ drawing clamps the mast at the plate and knows nothing of the rubber.
             springs=(Spring("cross", "x", 2e4),),
         ),
     ),
-    used=6,
-    held_out=4,
-    size=(0.04, 0.028),
-    graded=False,
+    used=5,
+    held_out=3,
+    size=(0.022, 0.0155),
     guess=8.0,
     scatter=0.007,
     shape_scatter=0.03,

@@ -9,7 +9,7 @@ from truths.structure import ALUMINIUM, Array, Change, Clamp, Lump, Member, Spri
 
 LENGTH, TIP, SWEEP = 1.5, 0.55, 0.18  # m; share of the root's section; m at the tip
 STATIONS = (0.0, 0.35, 0.7, 1.05, LENGTH)  # m
-NOSE, TAIL, RIB, HEIGHT = 0.1, 0.2, 0.012, 0.06  # m, reach of the ribs; their section
+NOSE, TAIL, RIB, HEIGHT = 0.1, 0.2, 0.012, 0.068  # m, reach of the ribs; their section
 DEPTH, WIDTH, WEB, FLANGE = 0.08, 0.05, 0.005, 0.006  # m, at the root
 
 
@@ -96,7 +96,8 @@ one section each, taken at the middle of a bay, and takes the ribs at the scale 
     ),
     used=5,
     held_out=4,
-    size=(0.03, 0.02),
+    size=(0.03, 0.021),
+    graded=False,
     guess=20.0,
     scatter=0.004,
     shape_scatter=0.03,
