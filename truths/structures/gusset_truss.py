@@ -1,6 +1,5 @@
 """A planar truss of flat bars on gusset plates, clamped at one end."""
 
-
 from truths.sections import bar
 from truths.structure import STEEL, Block, Change, Clamp, Lump, Member, Spring, Structure
 
