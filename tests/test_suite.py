@@ -12,6 +12,7 @@ import pytest
 
 from femubench import read_case
 from femubench.core.score.scoring import reference_of
+from truths.published import write_garteur
 
 ROOT = Path(__file__).parents[1]
 SUITE = ROOT / "scenarios" / "suite"
@@ -39,6 +40,13 @@ def test_a_structure_is_complete(name: str) -> None:
     assert max(float(difference) for *_, difference, _ in modes) < 0.7
     assert re.search(r"\(seed \d+\)", text)
     assert "<svg" in (SUITE / name / "picture.svg").read_text(encoding="utf-8")
+
+
+def test_garteur_has_the_published_frequencies_and_the_solid_s_shapes(tmp_path: Path) -> None:
+    write_garteur(tmp_path / "garteur")
+    for name in ("modes.csv", "sensors.csv"):
+        stored = (ROOT / "scenarios" / "garteur" / name).read_text(encoding="utf-8")
+        assert (tmp_path / "garteur" / name).read_text(encoding="utf-8") == stored
 
 
 @pytest.mark.parametrize("name", NAMES)

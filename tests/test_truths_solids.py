@@ -25,7 +25,10 @@ from truths.structure import STEEL, Change, Clamp, Lump, Member, Oscillator, Spr
 
 TRUTHS = Path(__file__).parents[1] / "truths"
 # What turns solids into cases knows the project; what makes the solids does not.
-POSING = {"truth.py", "posing.py", "faults.py", "defect_cases.py", "__main__.py"}
+POSING = {
+    *("truth.py", "posing.py", "faults.py", "defect_cases.py"),
+    *("published.py", "tables.py", "__main__.py"),
+}
 
 
 def beam(section: Section, length: float = 1.0, clamped: bool = False, **more: object) -> Structure:

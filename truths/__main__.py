@@ -46,6 +46,7 @@ def made_before() -> dict[str, str]:
 
 def make_suite(names: list[str], again: bool) -> bool:
     """Write the folders of the structures; tell whether all could be made."""
+    from truths.published import write_garteur
     from truths.suite import SUITE, index_text, structures, write
 
     known = structures()
@@ -67,6 +68,8 @@ def make_suite(names: list[str], again: bool) -> bool:
         STATE.write_text(json.dumps({**made_before(), name: digest(name)}, indent=1))
     made = {name: item for name, item in known.items() if (SUITE / name).is_dir()}
     (SUITE / "suite.toml").write_text(index_text(made), encoding="utf-8")
+    if "garteur" in (names or known):
+        write_garteur()
     return sound
 
 
