@@ -96,7 +96,7 @@ one section each, taken at the middle of a bay, and takes the ribs at the scale 
     ),
     used=5,
     held_out=4,
-    size=(0.03, 0.021),
+    size=(0.018, 0.0128),
     graded=False,
     guess=20.0,
     scatter=0.004,
