@@ -266,6 +266,8 @@ def cut_flange(structure: Structure, solid: Solid, rng: Generator) -> Defect | N
     x, y, z = local(structure, solid, member)
     part = solid.of_part(member.name)
     flange = part & (z > z[part].max() - 1e-6) & (y > 0)
+    if not flange.any():
+        return None
     near = np.abs(x - share * length)
     cut = flange & (near < max(long / 2, near[flange].min() + 1e-4))
     share = float(x[cut].mean() / length)

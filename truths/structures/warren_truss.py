@@ -25,7 +25,8 @@ def _along(x: Array, chord: str) -> Array:
     before = np.sort(np.concatenate([EVEN - WEB / 2, EVEN + WEB / 2]))
     after = np.sort(np.concatenate([MEET[chord] - WEB / 2, MEET[chord] + WEB / 2]))
     moved = np.interp(x, before, after)
-    return moved + np.minimum(x - before[0], 0.0) + np.maximum(x - before[-1], 0.0)
+    outside = np.minimum(x - before[0], 0.0) + np.maximum(x - before[-1], 0.0)
+    return np.asarray(moved + outside)
 
 
 def leaning(points: Array) -> Array:
