@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from femubench import read_case, solve_modes
+from truths.__main__ import main
 from truths.bricks import brick_mesh
 from truths.defect_cases import visible
 from truths.defects import KINDS, OUTSIDE
@@ -235,3 +236,29 @@ def test_the_solids_know_nothing_of_the_project() -> None:
             assert not roots & {"femubench", "core", "plugins", "scenarios"}, path
             inner = {name.split(".")[1] + ".py" for name in names if name.startswith("truths.")}
             assert not inner & POSING, path
+
+
+def test_what_lacks_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["truths"])
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "gmsh" else name)
+    assert main() == 2
+    assert capsys.readouterr().err == "the truths need gmsh: pip install -e '.[truths]'\n"
+
+
+def test_a_structure_that_is_not_there_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["truths", "potral"])
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: name)
+    assert main() == 2
+    error = capsys.readouterr().err
+    assert error.startswith("no structure potral; there are a-frame, ")
+    assert error.count("\n") == 1
+
+
+def test_a_member_that_no_brick_fits_is_named() -> None:
+    askew = beam(bar(0.02, 0.02), joints={"A": (0.0, 0.0, 0.0), "B": (1.0, 0.0, 0.5)})
+    with pytest.raises(ValueError, match="member m of beam runs askew"):
+        brick_mesh(askew, 0.05)
