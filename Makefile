@@ -20,7 +20,7 @@ NUMERICAL := $(addprefix tests/test_,advice*.py assembly.py asymmetric_frame.py 
 	beam_elements.py challenge.py close_modes.py condensation.py diagnos*.py effects_*.py eigen.py \
 	element_strategies.py exhibits.py expansion.py frame_extensions.py frf.py kernels.py \
 	localisation.py look*.py matrix_strategies.py pairing.py papers_*.py preload.py rigid_modes.py \
-	scenarios.py scoring.py sections.py sensitiv*.py sparse_eigen.py)
+	scenarios.py scoring.py sections.py sensitiv*.py sparse_eigen.py suite.py truths_*.py)
 ON_ALL_CORES := -n 2 -p no:benchmark
 
 .PHONY: run test docs kernels bench sweep fuzz truths format clean

@@ -31,9 +31,13 @@ SOLVER = (
 )
 
 
-def digest(name: str) -> str:
+DEFECTS = ("defects", "defect_cases", "prestress")  # what those of a defect follow from as well
+
+
+def digest(name: str, *more: str) -> str:
     """Return a digest of what a structure's files are made from."""
-    files = [HERE / f"{part}.py" for part in (*SOLVER, "drawing", "sections", "structure")]
+    parts = (*SOLVER, "drawing", "sections", "structure", *more)
+    files = [HERE / f"{part}.py" for part in parts]
     files += [HERE / "tetrahedra.py", HERE / "structures" / f"{name.replace('-', '_')}.py"]
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
 
@@ -42,6 +46,23 @@ def made_before() -> dict[str, str]:
     """Return the digests of the structures that were made."""
     found: dict[str, str] = json.loads(STATE.read_text()) if STATE.exists() else {}
     return found
+
+
+def note(name: str, what: str) -> None:
+    """Write down that something was made, and from what."""
+    STATE.parent.mkdir(exist_ok=True)
+    STATE.write_text(json.dumps({**made_before(), name: what}, indent=1))
+
+
+def make_defects(names: list[str], again: bool) -> None:
+    """Write the cases of defects."""
+    from truths.defect_cases import write_all
+
+    before = {} if again else made_before()
+    cases = write_all(names, lambda d: before.get(d.name) == digest(d.structure, *DEFECTS))
+    for draw, differences in cases:
+        print("\n".join(differences) or f"{draw.name}: as it was", flush=True)
+        note(draw.name, digest(draw.structure, *DEFECTS))
 
 
 def make_suite(names: list[str], again: bool) -> bool:
@@ -64,8 +85,7 @@ def make_suite(names: list[str], again: bool) -> bool:
         seconds = time.perf_counter() - began
         print(f"{number}/{len(names or known)} {name}: {seconds:.0f} s", file=sys.stderr)
         print("\n".join(differences) or f"{name}: as it was", flush=True)
-        STATE.parent.mkdir(exist_ok=True)
-        STATE.write_text(json.dumps({**made_before(), name: digest(name)}, indent=1))
+        note(name, digest(name))
     made = {name: item for name, item in known.items() if (SUITE / name).is_dir()}
     (SUITE / "suite.toml").write_text(index_text(made), encoding="utf-8")
     if "garteur" in (names or known):
@@ -95,10 +115,7 @@ def main() -> int:
     if options.only in (None, "suite"):
         sound = make_suite(options.names, options.again)
     if options.only in (None, "defects"):
-        from truths.defect_cases import write_all
-
-        for line in write_all(options.names):
-            print(line, flush=True)
+        make_defects(options.names, options.again)
     if options.only in (None, "faults") and not options.names:
         from truths.faults import write_faults
 

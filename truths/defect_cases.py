@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -151,7 +151,8 @@ def damaged(base: Healthy, defects: tuple[Defect, ...]) -> tuple[Observed, list[
             size = turning_stiffness(base, matrices, *defect.turns)
         unit = "N m/rad" if defect.turns else defect.unit
         causes.append(TrueCause(defect.what, defect.effect, defect.place, defect.also, size, unit))
-    return modes_of(structure, matrices, structure.used + structure.held_out), causes
+    count = structure.used + structure.held_out
+    return modes_of(structure, matrices, count, mixed=True), causes
 
 
 def preloaded(
@@ -248,20 +249,26 @@ def files_of(draw: Draw) -> dict[str, str]:
     return files
 
 
-def write_all(names: list[str], folder: Path = DEFECTS) -> Iterator[str]:
-    """Write the cases of some structures, of all where none is named; yield what differs."""
-    drawn = [d for d in draws() if not names or d.structure in names]
-    drawn.sort(key=lambda d: d.structure)
-    for number, draw in enumerate(drawn, 1):
-        target = folder / draw.name
+def write_all(
+    names: list[str], made: Callable[[Draw], bool], folder: Path = DEFECTS
+) -> Iterator[tuple[Draw, list[str]]]:
+    """Write the cases of some structures, of all where none is named; yield what differs in each.
+
+    Arguments:
+        made: tells which cases a run before this one has made.
+    """
+    drawn = draws()
+    stale = {p.name for p in folder.glob("*/")} - {d.name for d in drawn}
+    for name in sorted(stale):
+        shutil.rmtree(folder / name)
+    wanted = [d for d in drawn if (not names or d.structure in names) and not made(d)]
+    for draw in sorted(wanted, key=lambda d: d.structure):
+        differences = []
         for name, content in files_of(draw).items():
-            path = target / name
+            path = folder / draw.name / name
             old = path.read_text(encoding="utf-8") if path.exists() else None
             if old != content:
-                target.mkdir(parents=True, exist_ok=True)
+                path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_text(content, encoding="utf-8")
-                yield f"{number}/{len(drawn)} {draw.name}/{name}: {'changed' if old else 'new'}"
-    if not names and folder.exists():
-        for stale in sorted({p.name for p in folder.iterdir()} - {d.name for d in drawn}):
-            shutil.rmtree(folder / stale)
-            yield f"{stale}: removed"
+                differences.append(f"{draw.name}/{name}: {'changed' if old else 'new'}")
+        yield draw, differences

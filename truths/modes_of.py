@@ -61,11 +61,11 @@ def stations(structure: Structure) -> tuple[tuple[Place, str], ...]:
     return tuple(((m.name, share), "xyz") for m in made for share in SHARES)
 
 
-def in_plane(structure: Structure, modes: Observed) -> Observed:
-    """Leave out the modes that the sensors of a planar drawing do not see.
+def in_plane(structure: Structure, modes: Observed, mixed: bool) -> Observed:
+    """Leave out the modes that move mostly where the sensors of a planar drawing do not look.
 
     Raises:
-        ValueError: where a mode moves both in and across the plane.
+        ValueError: where a mode moves both in and across the plane, unless `mixed` ones may.
     """
     if structure.plane == "3d":
         return modes
@@ -73,7 +73,7 @@ def in_plane(structure: Structure, modes: Observed) -> Observed:
     across = motion[:, 1] if structure.plane == "in-plane" else motion[:, :2].sum(axis=1)
     share = across / motion.sum(axis=1)
     seen, torn = share < 0.5, (share > 0.1) & (share < 0.9)
-    if torn[: structure.used + structure.held_out].any():
+    if not mixed and torn[: structure.used + structure.held_out].any():
         raise ValueError(f"{structure.name}: a mode moves in and across the plane")
     return modes.chosen(seen)
 
@@ -83,8 +83,12 @@ def modes_of(
     matrices: Matrices,
     count: int,
     change: Change | None = None,
+    mixed: bool = False,
 ) -> Observed:
     """Return the lowest elastic modes of a structure, after a change of its design if given.
+
+    Arguments:
+        mixed: whether modes may move both in and across the plane, as those of a defect do.
 
     Raises:
         ValueError: where a free structure has not six rigid modes.
@@ -99,7 +103,8 @@ def modes_of(
         raise ValueError(f"{structure.name}: {modes.rigid} rigid modes, 6 expected")
     read = observed(structure, matrices, structure.sensors) @ modes.shapes
     everywhere = observed(structure, matrices, stations(structure)) @ modes.shapes
-    return in_plane(structure, Observed(modes.frequencies, read.T, everywhere.T, modes.rigid))
+    found = Observed(modes.frequencies, read.T, everywhere.T, modes.rigid)
+    return in_plane(structure, found, mixed)
 
 
 def mesh_difference(coarse: Observed, fine: Observed, count: int) -> tuple[Array, Array]:
