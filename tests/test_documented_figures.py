@@ -24,7 +24,7 @@ from femubench.core.plugin.loader import load_plugins
 from femubench.results import JobResult, leaderboard, run_jobs
 
 sys.path.insert(0, str(Path(__file__).parent))
-from printed_boards import ROOT, as_printed, assert_board_is_that_of, text_of
+from printed_boards import ROOT, TWO_STRUCTURES, as_printed, assert_board_is_that_of, text_of
 
 PAGES = ("README.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md"))))
 NUMBERS = {"eleven": 11, "twelve": 12, "sixteen": 16}
@@ -97,8 +97,12 @@ def test_what_few_parameters_leave(rows: dict[str, dict[str, Any]]) -> None:
     assert own == as_printed("0.1", spare=0.0)
 
 
-def test_the_variants_of_diagnosed(rows: dict[str, dict[str, Any]]) -> None:
-    page = "docs/strategies-diagnosed.md"
+@pytest.mark.sweep
+def test_the_variants_of_diagnosed() -> None:
+    page, plugins = "docs/strategies-diagnosed.md", load_plugins()
+    chosen = [plugins.strategies[name] for name in ("unchanged", "berman", "local", "diagnosed")]
+    two = run_jobs(read_cases(TWO_STRUCTURES, plugins), chosen, jobs=2)
+    rows = {row["strategy"]: row for row in leaderboard(two).to_dict("records")}
     best, second = only(r"have (\d\.\d+) \(`berman`\) and (\d\.\d+) \(`local`\)", page)
     assert rows["berman"]["skill"] == as_printed(best)
     assert rows["local"]["skill_unseen"] == as_printed(second)

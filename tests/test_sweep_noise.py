@@ -12,7 +12,7 @@ from femubench.core.plugin.loader import load_plugins
 from femubench.results import Run, leaderboard, run_jobs
 
 sys.path.insert(0, str(Path(__file__).parent))
-from printed_boards import assert_board_is_that_of
+from printed_boards import TWO_STRUCTURES, assert_board_is_that_of
 
 pytestmark = pytest.mark.sweep
 SEEDS = tuple(range(1, 11))
@@ -21,7 +21,7 @@ SEEDS = tuple(range(1, 11))
 @pytest.fixture(scope="module")
 def noisy() -> Run:
     plugins = load_plugins()
-    cases = read_cases((), plugins)
+    cases = read_cases(TWO_STRUCTURES, plugins)
     return run_jobs(cases, list(plugins.strategies.values()), seeds=SEEDS)
 
 
