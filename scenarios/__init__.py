@@ -12,8 +12,6 @@ SUITE = HERE / "suite"
 
 _TUBES = ("planar frame", "hollow sections", "free")
 _TESTED, _COMPUTED = (*_TUBES, "published test"), (*_TUBES, "computed truth")
-# The truth of the others is made of beams, or repeats these.
-_DEFAULT = ("frame", "hframe", "frame-solid", "hframe-solid")
 # Name: title, classes.
 _OWN = {
     "frame": ("Ladder frame of Ahmadian et al., published test", _TESTED),
@@ -70,10 +68,7 @@ def _footbridge() -> Path:
 @hookimpl
 def femubench_scenarios() -> list[Scenario]:
     """Return the built-in scenarios."""
-    own = [
-        Scenario(name, title, _cases(name), kinds, name in _DEFAULT)
-        for name, (title, kinds) in _OWN.items()
-    ]
+    own = [Scenario(name, title, _cases(name), kinds) for name, (title, kinds) in _OWN.items()]
     footbridge = Scenario(
         "footbridge",
         "Steel pedestrian bridge, published test; needs FEMUBENCH_FOOTBRIDGE",

@@ -54,15 +54,24 @@ def note(name: str, what: str) -> None:
     STATE.write_text(json.dumps({**made_before(), name: what}, indent=1))
 
 
-def make_defects(names: list[str], again: bool) -> None:
-    """Write the cases of defects."""
-    from truths.defect_cases import write_all
+def make_defects(names: list[str], again: bool) -> bool:
+    """Write the cases of defects; tell whether all could be made."""
+    from truths.defect_cases import Draw, write_all
 
-    before = {} if again else made_before()
-    cases = write_all(names, lambda d: before.get(d.name) == digest(d.structure, *DEFECTS))
-    for draw, differences in cases:
-        print("\n".join(differences) or f"{draw.name}: as it was", flush=True)
-        note(draw.name, digest(draw.structure, *DEFECTS))
+    def made_from(draw: Draw) -> str:
+        hidden = [(d.kind, d.what, d.place, d.also, d.size, d.preload) for d in draw.defects]
+        words = f"{digest(draw.structure, *DEFECTS)} {draw.seed} {hidden}"
+        return hashlib.sha256(words.encode()).hexdigest()
+
+    before, sound = {} if again else made_before(), True
+    for draw, result in write_all(names, lambda d: before.get(d.name) == made_from(d)):
+        if isinstance(result, str):
+            print(f"{draw.name}: {result}", file=sys.stderr)
+            sound = False
+            continue
+        print("\n".join(result) or f"{draw.name}: as it was", flush=True)
+        note(draw.name, made_from(draw))
+    return sound
 
 
 def make_suite(names: list[str], again: bool) -> bool:
@@ -115,7 +124,7 @@ def main() -> int:
     if options.only in (None, "suite"):
         sound = make_suite(options.names, options.again)
     if options.only in (None, "defects"):
-        make_defects(options.names, options.again)
+        sound = make_defects(options.names, options.again) and sound
     if options.only in (None, "faults") and not options.names:
         from truths.faults import write_faults
 

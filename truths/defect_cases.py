@@ -16,15 +16,15 @@ from scipy.sparse import linalg
 
 from truths.defects import ATTACHED, KINDS, OUTSIDE, Defect, local
 from truths.eigenmodes import attach
-from truths.elasticity import Matrices
-from truths.measurement import modes_csv, paired, record, scaled
+from truths.elasticity import Matrices, basis_of
+from truths.measurement import mac, modes_csv, paired, record, scaled
 from truths.modes_of import Observed, assembled, mesh_of, modes_of
 from truths.posing import DEFECTS
 from truths.prestress import with_misfit
 from truths.seats import rigid_fit
 from truths.solid import Solid
 from truths.structure import Place, Structure
-from truths.suite import structures
+from truths.suite import mesh_differences, structures
 from truths.truth import TrueCause, Truth, rounded, truth_text
 
 Array = npt.NDArray[np.float64]
@@ -32,6 +32,8 @@ SEED = 26_000
 SINGLES, PAIRS, CLEAN, OUTSIDE_KINDS = 104, 15, 20, 20
 LARGEST_MESH = 30_000  # nodes; larger solids carry no defects
 ALL = {**KINDS, **OUTSIDE}
+CLOSENESS = 2.0  # weight of frequencies where a defect's modes are paired with healthy ones
+NEW_MODE = 0.5  # MAC below which no healthy mode is the partner
 TRIES = 40  # draws of a place and a size before a kind passes to another structure
 
 
@@ -71,9 +73,7 @@ def draws() -> list[Draw]:
     solids = {}
     for name, structure in structures().items():
         solid = mesh_of(structure, structure.size[0])
-        # A brick of 20 nodes has about seven of its own, a tetrahedron of ten one and a half.
-        nodes = solid.cells.shape[1] * (7 if solid.cells.shape[0] == 8 else 1.6)
-        if nodes < LARGEST_MESH:
+        if basis_of(solid, solid.points).N < LARGEST_MESH:
             solids[name] = (structure, solid)
     able = {
         kind: [n for n, (s, m) in solids.items() if _make(s, m, kind, np.random.default_rng(0))]
@@ -135,8 +135,8 @@ def _draw_defects(
     raise ValueError(f"{structure.name} has no second place beside {kind}")
 
 
-def damaged(base: Healthy, defects: tuple[Defect, ...]) -> tuple[Observed, list[TrueCause]]:
-    """Return the modes of a structure with defects, and the causes as a truth file states them."""
+def damaged(base: Healthy, defects: tuple[Defect, ...]) -> tuple[Observed, list[TrueCause], float]:
+    """Return the modes of a structure with defects, the causes as stated, and its mass in kg."""
     structure, solid, matrices = base.structure, base.solid, base.matrices
     for defect in defects:
         structure, solid = defect.edit(structure, solid)
@@ -152,7 +152,8 @@ def damaged(base: Healthy, defects: tuple[Defect, ...]) -> tuple[Observed, list[
         unit = "N m/rad" if defect.turns else defect.unit
         causes.append(TrueCause(defect.what, defect.effect, defect.place, defect.also, size, unit))
     count = structure.used + structure.held_out
-    return modes_of(structure, matrices, count, mixed=True), causes
+    mass = matrices.total_mass + hung_mass(structure)
+    return modes_of(structure, matrices, count, mixed=True), causes, mass
 
 
 def preloaded(
@@ -184,11 +185,18 @@ def turning_stiffness(base: Healthy, matrices: Matrices, name: str, joint: str) 
     structure = base.structure
     member = structure.member(name)
     place: Place = (name, 0.25 if member.ends[0] == joint else 0.75)
-    axes, _ = structure.axes(member)
+    ends = np.array([structure.joints[j] for j in member.ends], dtype=float).T
+    along = np.diff(structure.warped(ends), axis=1)[:, 0]
+    # The two axes across the member as it really lies, those alone that the drawing turns about.
+    across = np.linalg.svd(along[None, :])[2][1:]
+    if structure.plane != "3d":
+        normal = np.array([0.0, 1.0, 0.0] if structure.plane == "in-plane" else [0.0, 0.0, 1.0])
+        turned = np.cross(normal, along) / np.linalg.norm(along)
+        across = np.array([normal if structure.plane == "in-plane" else turned])
 
     def flexibility(state: Matrices) -> Array:
-        ends = [rigid_fit(structure, state, at)[3:].toarray() for at in (joint, place)]
-        couple = axes[1:] @ (ends[1] - ends[0])
+        seats = [rigid_fit(structure, state, at)[3:].toarray() for at in (joint, place)]
+        couple = across @ (seats[1] - seats[0])
         system = attach(structure, state, (), structure.springs)
         held = system.stiffness + 1e-9 * sparse.diags_array(system.stiffness.diagonal())
         load = system.observe.T @ couple.T
@@ -204,43 +212,77 @@ def turning_stiffness(base: Healthy, matrices: Matrices, name: str, joint: str) 
     return float(1 / added.max())
 
 
-def visible(base: Healthy, state: Observed) -> tuple[float, float]:
-    """Return chi-square of the noise-free change in the used modes, and the frequencies' part."""
+def visible(base: Healthy, state: Observed) -> tuple[float, float, int]:
+    """Return how a noise-free change shows in the used modes.
+
+    Returns:
+        Chi-square of frequencies and shapes of the healthy modes' partners, its part of the
+        frequencies, and how many of the modes that are posed as used have no healthy partner.
+    """
     structure, used = base.structure, base.structure.used
     before = base.modes.chosen(np.arange(used))
-    partner = paired((before.frequencies, before.stations), (state.frequencies, state.stations))
+    partner = paired(
+        (before.frequencies, before.stations), (state.frequencies, state.stations), CLOSENESS
+    )
     after = state.chosen(partner)
-    drift = (after.frequencies / before.frequencies - 1) / structure.scatter
+    std = np.hypot(structure.scatter, mesh_differences(structure.name)[:used])
+    drift = (after.frequencies / before.frequencies - 1) / std
     one, two = scaled(before.sensors), after.sensors
     # Every shape has a scale of its own: the one that fits best.
     two = two * ((one * two).sum(axis=1) / (two**2).sum(axis=1))[:, None]
     turned = (two - one) / structure.shape_scatter
-    return float((drift**2).sum() + (turned**2).sum()), float((drift**2).sum())
+    alike = mac(state.stations[:used], base.modes.stations).max(axis=1)
+    chi2_frequencies = float((drift**2).sum())
+    appears = int((alike < NEW_MODE).sum())
+    return chi2_frequencies + float((turned**2).sum()), chi2_frequencies, appears
+
+
+def hung_mass(structure: Structure) -> float:
+    """Return the mass of what is attached to a structure, kg."""
+    hung = sum(item.mass for item in structure.lumps)
+    hung += sum(item.mass for item in structure.struts)
+    return hung + sum(item.mass for item in structure.oscillators)
+
+
+def weighed(structure: Structure, mass: float, seed: int) -> tuple[float, float] | None:
+    """Return what a balance reads of a mass (kg), and its deviation; None where nobody weighs."""
+    if not structure.weighed:
+        return None
+    read = 1 + structure.weighed * np.random.default_rng((seed, 3)).standard_normal()
+    return float(f"{mass * read:.5g}"), float(f"{mass * structure.weighed:.2g}")
 
 
 def files_of(draw: Draw) -> dict[str, str]:
     """Return the text of every file of a case."""
     base = healthy(draw.structure)
     structure, count = base.structure, base.structure.used + base.structure.held_out
-    state, causes = damaged(base, draw.defects) if draw.defects else (base.modes, [])
-    chi2 = visible(base, state)
+    causes: list[TrueCause] = []
+    state, mass = base.modes, base.matrices.total_mass + hung_mass(structure)
+    if draw.defects:
+        state, causes, mass = damaged(base, draw.defects)
+    if min(len(state.frequencies), len(base.modes.frequencies)) < count:
+        raise ValueError(f"fewer than {count} modes were found")
+    chi2, chi2_frequencies, appears = visible(base, state) if draw.defects else (0.0, 0.0, 0)
     truth = Truth(
         draw.name,
         draw.structure,
         draw.kind,
         draw.seed,
         tuple(replace(c, size=None if c.size is None else rounded(c.size)) for c in causes),
-        *chi2,
+        chi2,
+        chi2_frequencies,
+        appears,
+        weighed(structure, mass, draw.seed),
     )
     files = {"truth.toml": truth_text(truth)}
-    mesh = np.zeros(count)
+    differences = mesh_differences(structure.name)
     for name, modes, number in (("modes.csv", state, 1), ("healthy.csv", base.modes, 2)):
         # The same sensors in both states, so the gains are shared; all other scatter is not.
         recording = record(
             structure,
             modes.frequencies[:count],
             modes.sensors[:count],
-            mesh,
+            differences,
             structure.seed,
             draw.seed,
             number,
@@ -251,8 +293,8 @@ def files_of(draw: Draw) -> dict[str, str]:
 
 def write_all(
     names: list[str], made: Callable[[Draw], bool], folder: Path = DEFECTS
-) -> Iterator[tuple[Draw, list[str]]]:
-    """Write the cases of some structures, of all where none is named; yield what differs in each.
+) -> Iterator[tuple[Draw, list[str] | str]]:
+    """Write the cases of some structures, of all without names; yield what differs, or why not.
 
     Arguments:
         made: tells which cases a run before this one has made.
@@ -264,7 +306,12 @@ def write_all(
     wanted = [d for d in drawn if (not names or d.structure in names) and not made(d)]
     for draw in sorted(wanted, key=lambda d: d.structure):
         differences = []
-        for name, content in files_of(draw).items():
+        try:
+            files = files_of(draw)
+        except ValueError as error:
+            yield draw, str(error)
+            continue
+        for name, content in files.items():
             path = folder / draw.name / name
             old = path.read_text(encoding="utf-8") if path.exists() else None
             if old != content:

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from truths.bricks import brick_mesh, face_of, weld_reach
+from truths.bricks import brick_mesh, weld_reach
+from truths.drawing import DOFS
 from truths.solid import Solid
 from truths.structure import (
     Block,
@@ -82,6 +83,18 @@ def element_at(member: Member, share: float) -> int:
     return min(int(share * member.elements) + 1, member.elements)
 
 
+def cut_elements(structure: Structure, solid: Solid, member: Member, cut: Cells) -> list[str]:
+    """Return the drawn elements that a cut touches, as places, the most cut one first."""
+    axes, length = structure.axes(member)
+    start = structure.point(member.ends[0])[:, None]
+    along = (axes[0] @ (solid.points - start))[solid.cells[:, cut]] / length
+    low, high = along.min(), along.max()
+    edges = np.linspace(0.0, 1.0, member.elements + 1)
+    share = np.minimum(edges[1:], high) - np.maximum(edges[:-1], low)
+    order = [int(k) for k in np.argsort(-share) if share[k] > 1e-6]
+    return [f"{member.name}/{k + 1}" for k in order]
+
+
 def nodes_at(member: Member, share: float) -> tuple[str, ...]:
     """Return the drawn nodes on both sides of a share of a member, as places."""
     low = element_at(member, share) - 1
@@ -117,6 +130,19 @@ def weld_cells(structure: Structure, solid: Solid, member: Member, end: int) -> 
     return np.asarray(solid.of_part(member.name) & (from_joint > low) & (from_joint < high))
 
 
+def runs_up_to(structure: Structure, member: Member, end: int) -> bool:
+    """Tell whether a member ends at the face of another, which is painted later."""
+    order = {other.name: i for i, other in enumerate(structure.members)}
+    crossing = [
+        other
+        for other in structure.members
+        if other is not member
+        and member.ends[end] in other.ends
+        and abs(structure.axes(other)[0][0] @ structure.axes(member)[0][0]) < 0.5
+    ]
+    return any(order[other.name] > order[member.name] for other in crossing)
+
+
 def welded(structure: Structure, solid: Solid) -> list[tuple[Member, int]]:
     """Return the member ends that have a layer of weld between them and a crossing member."""
     return [
@@ -124,7 +150,7 @@ def welded(structure: Structure, solid: Solid) -> list[tuple[Member, int]]:
         for member in structure.members
         for end in (0, 1)
         if member.weld
-        and face_of(structure, member, end) > 0
+        and runs_up_to(structure, member, end)
         and weld_cells(structure, solid, member, end).any()
     ]
 
@@ -156,7 +182,7 @@ def missing_weld(structure: Structure, solid: Solid, rng: Generator) -> Defect |
     across = [y, -y, z, -z]
     reach = [across[i][layer].max() for i in range(4)]
     cut = layer & np.any([across[i] > reach[i] - 1e-6 for i in sides], axis=0)
-    if cut.sum() == layer.sum():
+    if cut.sum() == layer.sum() or solid.without(cut).pieces > 1:
         return None
     joint = member.ends[end]
     return Defect(
@@ -190,25 +216,41 @@ def loose_joint(structure: Structure, solid: Solid, rng: Generator) -> Defect | 
     )
 
 
+def middle_of(block: Block) -> Array:
+    """Return the centre of a block, m."""
+    return np.asarray((np.array(block.low) + np.array(block.high)) / 2)
+
+
 def thin_wall(structure: Structure, solid: Solid, rng: Generator) -> Defect | None:
     """Make the wall of one hollow member thinner, outside unchanged."""
     member = pick(rng, [m for m in structure.solid_members if is_tube(structure, m)])
     if member is None or structure.mesher != "bricks":
         return None
-    section = structure.sections[member.section]
+    section, (axes, length) = structure.sections[member.section], structure.axes(member)
     less = between(rng, 0.02, 0.3)
     outer, inner = section.rectangles
-    wall = outer[1] - inner[1]
-    y, z = inner[1] + less * wall, inner[3] + less * wall
-    thin = replace(section, rectangles=(outer, (-y, y, -z, z, False)))
+    wall, start = outer[1] - inner[1], structure.point(member.ends[0])[:, None]
+    filled = [
+        block
+        for block in structure.blocks
+        if block.material
+        and (
+            np.abs((axes @ (middle_of(block)[:, None] - start))[1:, 0]) < [inner[1], inner[3]]
+        ).all()
+        and 0 < (axes @ (middle_of(block)[:, None] - start))[0, 0] < length
+    ]
+    if filled:
+        return None
 
     def edit(s: Structure, mesh: Solid) -> State:
-        changed = replace(
-            s,
-            sections={**s.sections, "thin": thin},
-            members=tuple(replace(m, section="thin") if m == member else m for m in s.members),
-        )
-        return s, brick_mesh(changed, s.size[0])
+        x, y, z = axes @ (mesh.points - start)
+        own = np.zeros(mesh.points.shape[1], dtype=bool)
+        own[mesh.cells[:, mesh.of_part(member.name)].ravel()] = True
+        own[mesh.cells[:, ~mesh.of_part(member.name)].ravel()] = False
+        own &= (np.abs(y) < inner[1] + 1e-6) & (np.abs(z) < inner[3] + 1e-6)
+        y = np.where(own & (np.abs(y) > inner[1] - 1e-6), y + np.sign(y) * less * wall, y)
+        z = np.where(own & (np.abs(z) > inner[3] - 1e-6), z + np.sign(z) * less * wall, z)
+        return s, mesh.moved(axes.T @ np.array([x, y, z]) + start)
 
     return Defect(
         "thin-wall",
@@ -235,19 +277,18 @@ def slot(structure: Structure, solid: Solid, rng: Generator) -> Defect | None:
         band = solid.of_part(member.name) & (near < near[solid.of_part(member.name)].min() + 1e-4)
     side = [y, -y, z, -z][int(rng.integers(4))]
     cut = band & (side > side[band].max() - 1e-6)
-    if cut.sum() >= band.sum():
+    if cut.sum() >= band.sum() or solid.without(cut).pieces > 1:
         return None
     long = float(np.ptp(solid.points[:, solid.cells[:, cut]], axis=(1, 2)).max())
     share = float(x[cut].mean() / length)
-    k = element_at(member, share)
-    near = {element_at(member, max(0.0, share - 0.02)), element_at(member, share + 0.02)} - {k}
+    first, *others = cut_elements(structure, solid, member, cut)
     return Defect(
         "slot",
         f"slot of {1000 * long:.3g} mm in one side of {member.name} at {share:.2f} of its length",
         "local-stiffness-loss",
-        f"{member.name}/{k}",
+        first,
         lambda s, mesh: (s, mesh.without(cut)),
-        tuple(f"local-stiffness-loss@{member.name}/{other}" for other in sorted(near)),
+        tuple(f"local-stiffness-loss@{other}" for other in others),
     )
 
 
@@ -270,14 +311,17 @@ def cut_flange(structure: Structure, solid: Solid, rng: Generator) -> Defect | N
         return None
     near = np.abs(x - share * length)
     cut = flange & (near < max(long / 2, near[flange].min() + 1e-4))
+    if solid.without(cut).pieces > 1:
+        return None
     share = float(x[cut].mean() / length)
+    first, *others = cut_elements(structure, solid, member, cut)
     return Defect(
         "cut-flange",
         f"half a flange of {member.name} cut away around {share:.2f} of its length",
         "local-stiffness-loss",
-        f"{member.name}/{element_at(member, share)}",
+        first,
         lambda s, mesh: (s, mesh.without(cut)),
-        (f"member-stiffness@{member.name}",),
+        tuple(f"local-stiffness-loss@{other}" for other in others),
     )
 
 
@@ -336,7 +380,11 @@ def soft_foot(structure: Structure, solid: Solid, rng: Generator) -> Defect | No
             "support-flexibility",
             f"support:{clamp.at}",
             lambda s, mesh: (s, mesh.scaled(layer, 1 / softer)),
-            (f"local-stiffness-loss@{member.name}/{k}", f"joint-rotation@{member.name}@{clamp.at}"),
+            (
+                *(f"support-flexibility@support:{clamp.at}:{d}" for d in DOFS[structure.plane]),
+                f"local-stiffness-loss@{member.name}/{k}",
+                f"joint-rotation@{member.name}@{clamp.at}",
+            ),
         )
     if not sprung:
         return None
@@ -356,7 +404,11 @@ def soft_foot(structure: Structure, solid: Solid, rng: Generator) -> Defect | No
             ),
             mesh,
         ),
-        (f"grounding-spring@{foot}",),
+        tuple(
+            f"support-flexibility@support:{foot}:{p.direction}"
+            for p in structure.springs
+            if p.at == foot and p.drawn
+        ),
         size=left - 1,
     )
 
@@ -420,7 +472,8 @@ def strut(structure: Structure, solid: Solid, rng: Generator) -> Defect | None:
     if not chords or structure.plane == "out-of-plane":
         return None
     a, b = chords[int(rng.integers(len(chords)))]
-    distance = float(np.linalg.norm(structure.point(b) - structure.point(a)))
+    ends = structure.warped(np.column_stack([structure.point(a), structure.point(b)]))
+    distance = float(np.linalg.norm(ends[:, 1] - ends[:, 0]))
     diameter = between(rng, 0.0007, 0.005)
     area = np.pi / 4 * diameter**2
     stiffness = float(f"{210e9 * area / distance:.4g}")
@@ -493,10 +546,10 @@ def warm(structure: Structure, solid: Solid, rng: Generator) -> Defect | None:
     return Defect(
         "warm",
         f"modulus of everything lower by {100 * less:.3g} %",
-        "temperature",
+        "youngs-modulus",
         "all",
         lambda s, mesh: (s, mesh.scaled(np.ones(len(mesh.part), dtype=bool), 1 - less)),
-        ("youngs-modulus@all",),
+        ("temperature@all",),
         size=-less,
     )
 
@@ -514,12 +567,25 @@ def in_a_loop(structure: Structure, member: Member) -> bool:
 
 def unfit_member(structure: Structure, solid: Solid, rng: Generator) -> Defect | None:
     """Weld a member in that is too long or too short."""
-    if structure.mesher != "bricks" or structure.plane == "out-of-plane":
+    straight = structure.mesher == "bricks" and structure.warp is None
+    if not straight or structure.plane == "out-of-plane":
         return None
-    member = pick(rng, [m for m in structure.solid_members if in_a_loop(structure, m)])
+    member = pick(
+        rng,
+        [
+            m
+            for m in structure.solid_members
+            if in_a_loop(structure, m) and "shape" in structure.sections[m.section].drawn
+        ],
+    )
     if member is None:
         return None
-    strain = between(rng, 2e-4, 4e-3) * (1 if rng.random() < 0.5 else -1)
+    drawn = structure.sections[member.section].drawn
+    size = min(float(drawn[k]) for k in ("width", "height", "diameter") if k in drawn)
+    _, length = structure.axes(member)
+    # In parts of the strain at which a hinged bar of that depth buckles (Euler 1744).
+    strain = between(rng, 0.02, 0.6) * np.pi**2 / 12 * (size / length) ** 2
+    strain *= 1 if rng.random() < 0.5 else -1
     word = "long" if strain > 0 else "short"
     return Defect(
         "unfit-member",

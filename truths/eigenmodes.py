@@ -112,7 +112,7 @@ def solve(system: System, count: int, guess: float) -> Modes:
         guess: a frequency near the first elastic one, Hz.
 
     Raises:
-        ValueError: where an eigenpair leaves a residual over 1e-5.
+        ValueError: where an eigenpair leaves a residual over 1e-5, or an eigenvalue is negative.
     """
     shift = (2 * np.pi * guess) ** 2
     factor = linalg.splu(
@@ -133,6 +133,8 @@ def solve(system: System, count: int, guess: float) -> Modes:
     worst = float((np.linalg.norm(left, axis=0) / scale).max())
     if worst > 1e-5:
         raise ValueError(f"an eigenpair leaves {worst:.1e} of its own norm")
+    if values[0] < -((2 * np.pi * RIGID * guess) ** 2):
+        raise ValueError(f"the structure buckles: an eigenvalue of {values[0]:.3g} 1/s2")
     hertz = np.sqrt(np.maximum(values, 0.0)) / (2 * np.pi)
     rigid = int((hertz < RIGID * guess).sum())
     return Modes(hertz[rigid:], (system.observe @ vectors)[:, rigid:], rigid)

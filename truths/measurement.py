@@ -14,7 +14,8 @@ from truths.structure import Structure
 
 Array = npt.NDArray[np.float64]
 DAMPING = (0.001, 0.01)  # drawn between, log-uniform
-GAIN_SHARE = 0.5  # of a shape's variance: a sensor's gain, the same in every mode
+GAIN_SHARE = 0.5  # of the variance of the largest reading: a sensor's gain, alike in every mode
+GAINS = 7919  # keeps the draw of the gains apart from those of single states
 
 
 @dataclass(frozen=True)
@@ -63,14 +64,16 @@ def record(
         mesh: (modes,) relative difference of two meshes; part of the stated deviation, not drawn.
         seed: numbers that make the draw; the sensors' gains come from the first alone.
     """
-    rng, gains = np.random.default_rng(seed), np.random.default_rng(seed[0])
+    rng, gains = np.random.default_rng(seed), np.random.default_rng((seed[0], GAINS))
     modes, sensors = shapes.shape
     shared, own = np.sqrt(structure.together), np.sqrt(1 - structure.together)
     scatter = structure.scatter * (
         shared * rng.standard_normal() + own * rng.standard_normal(modes)
     )
     gain = 1 + structure.shape_scatter * np.sqrt(GAIN_SHARE) * gains.standard_normal(sensors)
-    noise = structure.shape_scatter * np.sqrt(1 - GAIN_SHARE) * rng.standard_normal(shapes.shape)
+    # What the gain leaves of the stated variance, so that every reading scatters as stated.
+    own_share = np.sqrt(1 - GAIN_SHARE * scaled(shapes) ** 2)
+    noise = structure.shape_scatter * own_share * rng.standard_normal(shapes.shape)
     return Recording(
         frequencies=frequencies * (1 + scatter),
         frequency_std=frequencies * np.hypot(structure.scatter, mesh),
@@ -98,13 +101,16 @@ def mac(first: Array, second: Array) -> Array:
     return np.asarray(cross / np.outer((first**2).sum(axis=1), (second**2).sum(axis=1)))
 
 
-def paired(first: tuple[Array, Array], second: tuple[Array, Array]) -> npt.NDArray[np.int64]:
+def paired(
+    first: tuple[Array, Array], second: tuple[Array, Array], closeness: float = 20.0
+) -> npt.NDArray[np.int64]:
     """Return for each mode of the first set the one of the second that it is.
 
     Arguments:
         first, second: frequencies (modes,) and shapes (modes, stations) each.
+        closeness: weight of frequencies; two meshes differ in them by far less than two states.
     """
     apart = np.abs(np.log(second[0][None, :] / first[0][:, None]))
-    # Shapes of close modes turn into each other: a difference of 5 % counts as much as shape alone.
-    cost = 1 - mac(first[1], second[1]) + 20 * apart
+    # Shapes of close modes turn into each other: by 20, 5 % count as much as shape alone.
+    cost = 1 - mac(first[1], second[1]) + closeness * apart
     return np.asarray(optimize.linear_sum_assignment(cost)[1])

@@ -73,7 +73,8 @@ def in_plane(structure: Structure, modes: Observed, mixed: bool) -> Observed:
     across = motion[:, 1] if structure.plane == "in-plane" else motion[:, :2].sum(axis=1)
     share = across / motion.sum(axis=1)
     seen, torn = share < 0.5, (share > 0.1) & (share < 0.9)
-    if not mixed and torn[: structure.used + structure.held_out].any():
+    listed = np.flatnonzero(seen)[: structure.used + structure.held_out]
+    if not mixed and torn[listed].any():
         raise ValueError(f"{structure.name}: a mode moves in and across the plane")
     return modes.chosen(seen)
 

@@ -40,14 +40,21 @@ def pose(
         file = truth_folder / TRUTH_FILE
         what, expected = f"no structure {truth.structure!r}", f"a folder in {suite}"
         raise InputError(what, file=file, key="structure", expected=expected)
-    overlay(structure, truth_folder, target, reference)
+    overlay(structure, truth_folder, target, reference, truth.mass)
     return truth
 
 
-def overlay(structure: Path, truth_folder: Path, target: Path, reference: bool = False) -> None:
+def overlay(
+    structure: Path,
+    truth_folder: Path,
+    target: Path,
+    reference: bool = False,
+    mass: tuple[float, float] | None = None,
+) -> None:
     """Write the case of a structure with the files of a truth over its own.
 
-    Modifications are dropped: those of the structure were computed on the healthy one.
+    Modifications are dropped: those of the structure were computed on the healthy one. `mass` is
+    what a balance reads of the structure as it is, and its deviation, in kg.
 
     Raises:
         InputError: when the target is not empty, or the reference is not there.
@@ -69,6 +76,8 @@ def overlay(structure: Path, truth_folder: Path, target: Path, reference: bool =
         for path in sorted(folder.iterdir()):
             if path.is_file() and path.name not in left_out and path.suffix not in _ABOUT:
                 shutil.copyfile(path, target / path.name)
+    if mass is not None:
+        document["measurement"]["mass"] = {"value": mass[0], "std": mass[1]}
     if reference:
         document["reference"] = {"modes": HEALTHY}
     text = tomlkit.dumps(document).rstrip("\n") + "\n"

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy import sparse
+from scipy.sparse import csgraph
 
 from truths.structure import Material
 
@@ -81,6 +83,14 @@ class Solid:
             poisson=self.poisson[keep],
             density=self.density[keep],
         )
+
+    @property
+    def pieces(self) -> int:
+        """Return how many pieces the cells form that share no corner."""
+        count, cells = self.points.shape[1], self.cells
+        ends = (np.repeat(cells[0], cells.shape[0]), cells.T.ravel())
+        links = sparse.coo_array((np.ones(cells.size), ends), shape=(count, count))
+        return int(csgraph.connected_components(links, directed=False)[0])
 
     def moved(self, points: Array) -> Solid:
         """Return the solid with its corners elsewhere."""

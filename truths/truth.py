@@ -68,6 +68,9 @@ class Truth:
         chi2: of the noise-free change of the used modes, in stated deviations; None where nothing
             that was measured or predicted changes.
         chi2_frequencies: the part of the frequencies.
+        appears: how many of the used modes no healthy mode is the partner of.
+        mass: that a balance reads of the structure as it is, and its deviation, kg; None where
+            that of the structure's folder holds.
     """
 
     name: str
@@ -77,6 +80,8 @@ class Truth:
     causes: tuple[TrueCause, ...] = ()
     chi2: float | None = None
     chi2_frequencies: float | None = None
+    appears: int = 0
+    mass: tuple[float, float] | None = None
 
     @property
     def held(self) -> bool:
@@ -130,7 +135,7 @@ def read_truth(folder: Path) -> Truth:
         table = _Table(file, "", tomllib.loads(read_text(file, MIB)))
     except tomllib.TOMLDecodeError as error:
         raise InputError(str(error), file=file, expected="valid TOML") from None
-    table.only("structure", "kind", "held", "seed", "visible", "cause")
+    table.only("structure", "kind", "held", "seed", "mass", "visible", "cause")
     kind = table.take("kind", str, f"one of {', '.join(KINDS)}")
     if kind not in KINDS:
         raise table.error("kind", f"unknown kind {kind!r}", f"one of {', '.join(KINDS)}")
@@ -146,21 +151,29 @@ def read_truth(folder: Path) -> Truth:
     if seed < 0:
         raise table.error("seed", f"{seed}", "a whole number >= 0")
     structure = table.take("structure", str, "a folder of the suite")
-    chi2 = _visible(table)
-    return Truth(folder.name, structure, kind, seed, causes, *chi2)
+    return Truth(folder.name, structure, kind, seed, causes, *_visible(table), _mass(table))
 
 
-def _visible(table: _Table) -> tuple[float | None, float | None]:
+def _mass(table: _Table) -> tuple[float, float] | None:
+    if "mass" not in table.content:
+        return None
+    mass = table.below("mass", table.content["mass"])
+    mass.only("value", "std")
+    return mass.take("value", float, "a mass in kg"), mass.take("std", float, "a mass in kg")
+
+
+def _visible(table: _Table) -> tuple[float | None, float | None, int]:
     if "visible" not in table.content:
-        return None, None
+        return None, None, 0
     visible = table.below("visible", table.content["visible"])
-    visible.only("chi2", "chi2_frequencies")
+    visible.only("chi2", "chi2_frequencies", "appears")
     whole = visible.take("chi2", float, "a number >= 0")
     part = visible.take("chi2_frequencies", float, "a number >= 0")
     for key, value in (("chi2", whole), ("chi2_frequencies", part)):
         if value < 0.0:
             raise visible.error(key, f"{value:g}", "a number >= 0")
-    return whole, part
+    new = visible.take("appears", int, "a number of modes") if "appears" in visible.content else 0
+    return whole, part, new
 
 
 def _cause(table: _Table) -> TrueCause:
@@ -191,10 +204,16 @@ def truth_text(truth: Truth) -> str:
     document.update(
         {"structure": truth.structure, "kind": truth.kind, "held": truth.held, "seed": truth.seed}
     )
+    if truth.mass is not None:
+        mass = tomlkit.inline_table()
+        mass.update({"value": truth.mass[0], "std": truth.mass[1]})
+        document["mass"] = mass
     if truth.chi2 is not None and truth.chi2_frequencies is not None:
         visible = tomlkit.table()
         visible["chi2"] = rounded(truth.chi2)
         visible["chi2_frequencies"] = rounded(truth.chi2_frequencies)
+        if truth.appears:
+            visible["appears"] = truth.appears
         document["visible"] = visible
     causes = tomlkit.aot()
     for cause in truth.causes:

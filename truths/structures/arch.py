@@ -31,7 +31,7 @@ drawing is a polygon of eight straight pieces between points on the circle.
     materials={"steel": STEEL},
     sections={"tube": rectangular_tube(0.05, 0.08, 0.004)},
     joints={f"P{i}": (x, 0.0, 0.0) for i, x in enumerate(STATIONS)},
-    types={"P0": "foot", f"P{PIECES}": "foot", f"P{PIECES // 2}": "splice"}
+    types={"P0": "foot", f"P{PIECES}": "foot", f"P{PIECES // 2}": "bend"}
     | {f"P{i}": "bend" for i in range(1, PIECES) if i != PIECES // 2},
     members=tuple(
         Member(
@@ -79,5 +79,4 @@ drawing is a polygon of eight straight pieces between points on the circle.
     guess=50.0,
     scatter=0.004,
     shape_scatter=0.03,
-    default=True,
 )

@@ -12,7 +12,7 @@ JOINTS = {f"L{i}": (i * BAY, 0.0, 0.0) for i in range(BAYS + 1)} | {
 def _gusset(name: str) -> Block:
     x, _, z = JOINTS[name]
     low, high = (z - 0.015, z + 0.06) if name[0] == "L" else (z - 0.06, z + 0.015)
-    return Block(f"gusset-{name}", (x - 0.06, -0.006, low), (x + 0.06, 0.006, high), "steel")
+    return Block(f"gusset-{name}", (x - 0.06, -0.007, low), (x + 0.06, 0.007, high), "steel")
 
 
 CHORDS = [(f"L{i}", f"L{i + 1}") for i in range(BAYS)] + [
@@ -26,11 +26,11 @@ STRUCTURE = Structure(
     title="Cantilever truss of flat bars on gusset plates",
     classes=("truss", "gussets", "clamped", "solid sections"),
     story="""
-Chords 30 x 12 mm, posts and diagonals 20 x 12 mm, welded to gusset plates of 120 x 75 x 12 mm, which no
+Chords 30 x 14 mm, posts and diagonals 20 x 14 mm, welded to gusset plates of 120 x 75 x 14 mm, which no
 drawing of centre lines shows. Both chords are clamped at the wall.
 """,
     materials={"steel": STEEL},
-    sections={"chord": bar(0.012, 0.03), "web": bar(0.012, 0.02)},
+    sections={"chord": bar(0.014, 0.03), "web": bar(0.014, 0.02)},
     joints=JOINTS,
     members=(
         *(Member(f"chord-{a}-{b}", (a, b), "chord", "steel", 3) for a, b in CHORDS),

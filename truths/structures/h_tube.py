@@ -70,5 +70,4 @@ joints; it knows the 0.9 kg block at the short leg's end.
     scatter=0.002,
     shape_scatter=0.02,
     together=0.4,
-    default=True,
 )

@@ -33,7 +33,7 @@ STRUCTURE = Structure(
     title="Bed of a small lathe with stubby ribs and a headstock, on pads",
     classes=("machine frame", "stubby members", "solid sections", "on feet"),
     story="""
-Two shears 30 x 80 mm of cast iron are tied by five cross ribs, as short as they are deep, and stand on four
+Two shears 30 x 80 mm of cast iron are tied by five short cross ribs, and stand on four
 legs of 60 x 60 x 8 mm on rubber pads. A chip tray of 5 mm closes the bed between the second and the fourth rib from below;
 the drawing leaves it out. Headstock and tailstock are drawn as lumps above the shears.
 """,

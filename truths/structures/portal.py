@@ -12,7 +12,7 @@ STRUCTURE = Structure(
     story="""
 Two posts 60 x 40 x 3 mm, a beam of the same tube, a stub 40 x 40 x 3 mm, welded all around. The
 beam lies on the posts, whose walls end at its lower face: the tubes meet as plates, so the corners
-are far softer across the plane than in it. Open tube ends are closed by 3 mm plates.
+are far softer across the plane than in it. The beam's ends are closed by 3 mm plates, the others stay open.
 """,
     materials={"steel": STEEL},
     sections={
@@ -63,5 +63,4 @@ are far softer across the plane than in it. Open tube ends are closed by 3 mm pl
     held_out=5,
     size=(0.015, 0.01),
     guess=60.0,
-    default=True,
 )

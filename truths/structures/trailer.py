@@ -14,7 +14,7 @@ STRUCTURE = Structure(
     title="Trailer frame of tubes on axle springs and hitch",
     classes=("ladder", "hollow sections", "solid sections", "torsion", "on springs"),
     story="""
-Two rails of tube 40 x 60 x 4 mm, two cross tubes 40 x 44 x 3 mm between them, a solid axle 40 x 40 mm that
+Two rails of tube 40 x 60 x 4 mm, two cross tubes 40 x 44 x 3 mm between them, a solid axle 40 x 44 mm that
 passes through both rails, and a drawbar of tube 60 x 60 x 4 mm welded to the front cross tube with a 6 mm
 plate above and below. The wheels hang on springs and weigh 5 kg each, the hitch rests on a spring: all of
 these are drawn. The drawing has centre lines and rigid joints without the plates.
