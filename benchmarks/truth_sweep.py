@@ -34,7 +34,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # the truths are not install
 
 from femubench import read_case
 from femubench.core.challenge.answer import Answer
-from femubench.core.challenge.score import Parts, candidates
+from femubench.core.challenge.score import LARGEST_GROUP, Parts, candidates
 from femubench.core.challenge.sweep import Record, wilson
 from femubench.core.effect.places import match
 from femubench.core.fem.frame import Frame
@@ -227,6 +227,12 @@ def _holds(truth: Truth, parts: Parts, same: Same) -> bool:
     )
 
 
+def _only(truth: Truth, parts: Parts, same: Same) -> bool:
+    """Tell whether every part is a finding of some cause: one cause may show as two, a thinner
+    wall as less stiffness and less mass."""
+    return all(any(_names(part, cause, same) for cause in truth.causes) for part in parts)
+
+
 def _half(truth: Truth, parts: Parts, same: Same) -> bool:
     """Tell whether parts are just one of two causes."""
     if len(truth.causes) != 2 or len(parts) != 1:
@@ -260,11 +266,13 @@ def outcome(truth: Truth, record: Record, same: Same) -> str:
     if not any(sets):
         return "none"
     if not truth.causes:
-        return "wrong"
-    exact = [parts for parts in sets if len(parts) == len(truth.causes)]
+        return "none" if verdict == "ambiguous" and () in sets else "wrong"
+    if verdict == "ambiguous" and len(sets) > LARGEST_GROUP:
+        return "unknown"
+    exact = [parts for parts in sets if _only(truth, parts, same)]
     if any(_holds(truth, parts, same) for parts in exact):
         return "right" if verdict == "named" else "in the group"
-    if any(_holds(truth, parts, anywhere) for parts in exact):
+    if any(_holds(truth, parts, anywhere) for parts in sets if _only(truth, parts, anywhere)):
         return "other place"
     if any(_holds(truth, parts, same) for parts in sets):
         return "with others"
@@ -280,9 +288,14 @@ def counts_as_right(truth: Truth, said: str) -> bool:
 
 
 def reach(truth: Truth) -> str:
-    """Return the range of the visibility of a truth; a dash where it has none."""
+    """Return the range of the visibility of a truth; a dash where it has none.
+
+    A mode that appears among the used ones cannot be overlooked, whatever the others do.
+    """
     if truth.chi2 is None:
         return "-"
+    if truth.appears:
+        return RANGES[-1]
     return next(word for word, edge in zip(RANGES, EDGES, strict=True) if truth.chi2 < edge)
 
 

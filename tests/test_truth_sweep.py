@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import sys
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +90,24 @@ def test_outcome_of_a_pair(same: sweep.Same) -> None:
     assert sweep.outcome(twice, said("named", "joint-rotation@J1"), same) == "one of two"
 
 
+def test_one_cause_may_show_as_two_findings(same: sweep.Same) -> None:
+    """A thinner wall is less stiffness and less mass of one member."""
+    also = ("member-stiffness@rung-middle", "member-mass@rung-middle")
+    thin = truth("defect", TrueCause("thin", "wall-thickness", "rung-middle", also))
+    both = ("member-stiffness@rung-middle", "member-mass@rung-middle")
+    assert sweep.outcome(thin, said("named", *both), same) == "right"
+    assert sweep.outcome(thin, said("ambiguous", " + ".join(both)), same) == "in the group"
+    elsewhere = ("member-stiffness@rung-middle", "member-mass@rung-left")
+    assert sweep.outcome(thin, said("named", *elsewhere), same) != "right"
+
+
+def test_a_group_of_many_says_nothing(same: sweep.Same) -> None:
+    group = [f"added-mass@J{i}" for i in (3, 5, 7, 9, 11)] + ["joint-rotation@J1"]
+    assert sweep.outcome(truth("defect", LOOSE), said("ambiguous", *group), same) == "in the group"
+    more = said("ambiguous", *group, "density@all")
+    assert sweep.outcome(truth("defect", LOOSE), more, same) == "unknown"
+
+
 def test_textbook_values_are_no_finding(same: sweep.Same) -> None:
     defect, clean = truth("defect", LOOSE), truth("clean")
     record = said("named", "joint-rotation@J1", "shear-deformation@all")
@@ -122,6 +141,10 @@ def test_swapped_sensors_have_no_order(same: sweep.Same) -> None:
     words = sweep.same_place(None)
     assert words("sensor:a+b", "sensor:b+a")
     assert not words("J1", "J9")
+
+
+def test_a_mode_that_appears_is_visible() -> None:
+    assert sweep.reach(replace(truth("defect", LOOSE, chi2=1.0), appears=1)) == "> 1000"
 
 
 def test_ranges_of_visibility() -> None:
