@@ -40,7 +40,10 @@ author = "The femubench developers"
 version = release = femubench.__version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 root_doc = "docs/index"
-include_patterns = ["*.md", "docs/*.md", "docs/api/*.rst", "scenarios/*/README.md"]
+include_patterns = [
+    *("*.md", "docs/*.md", "docs/api/*.rst"),
+    *("scenarios/*/README.md", "scenarios/suite/*/README.md"),
+]
 exclude_patterns = ["build", "femubench", ".*"]
 
 myst_heading_anchors = 4
@@ -118,9 +121,9 @@ def add_navigation(app: Sphinx, docname: str, source: list[str]) -> None:
     if docname == root_doc:
         api = "".join(f"[{name}](api/{name}.rst)\n" for name in MODULES)
         sections = f"{source[0]}\n## API reference\n{api}".split("\n## ")[1:]
-    elif docname == "docs/scenarios":
+    elif docname in ("docs/scenarios", "docs/suite"):
         links = re.findall(r"\[[^\]]+\]\(\.\./scenarios/[^)]+\)", source[0])
-        sections = ["\n".join(["Scenarios", *links])]
+        sections = ["\n".join([docname.partition("/")[2].capitalize(), *links])]
     else:
         return
     for section in sections:
