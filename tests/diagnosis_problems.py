@@ -78,8 +78,6 @@ def measured(
     frequencies = modes.natural_frequencies
     sensors = sensors_on_joints(frame) if shapes else NO_SENSORS
     seen = np.asarray(model.observe(sensors) @ modes.shapes) if shapes else np.zeros((0, count))
-    # A shape has no sign of its own; of two equally large components rounding would choose one.
-    seen = seen * np.where(np.cos(np.arange(len(seen))) @ seen < 0.0, -1.0, 1.0)
     seen = seen / np.abs(seen).max(axis=0, initial=1e-300)
     mass = total_mass(model)
     if rng is not None:

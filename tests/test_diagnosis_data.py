@@ -182,6 +182,9 @@ def scatters(ladder: FrameBuilder) -> tuple[Data, Noise, FloatArray, FloatArray]
     rows = []
     for _ in range(SCATTERS):
         test = measured(scatter(model.frame_structure, rng), frame, rng=rng)
+        # A shape has no sign of its own: rounding would choose one, and the residuals follow it.
+        turned = np.nansum(test.shapes * clean.data.measurement.shapes, axis=0) < 0.0
+        test = replace(test, shapes=np.where(turned, -test.shapes, test.shapes))
         drawn = replace(clean, data=Data(test, NOTHING))
         rows.append(state_at(drawn, (), NOTHING).raw)
     problem, slopes = posed(model, measured(model, frame), (), TOLERANCE)
