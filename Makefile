@@ -21,6 +21,9 @@ NUMERICAL := $(addprefix tests/test_,advice*.py assembly.py asymmetric_frame.py 
 	element_strategies.py exhibits.py expansion.py frame_extensions.py frf.py kernels.py \
 	localisation.py look*.py matrix_strategies.py pairing.py papers_*.py preload.py rigid_modes.py \
 	scenarios.py scoring.py sections.py sensitiv*.py sparse_eigen.py suite.py truths_*.py)
+# These too need no other process and no quiet machine.
+SIDE_BY_SIDE := $(NUMERICAL) $(addprefix tests/test_,architecture.py default_set.py \
+	examples.py matlab_footbridge.py truth_sweep.py)
 ON_ALL_CORES := -n 2 -p no:benchmark
 
 .PHONY: run test docs kernels bench sweep fuzz truths format clean
@@ -37,8 +40,8 @@ test: $(VENV)/.installed-test
 	$(BIN)/mypy truths
 	$(BIN)/pyright --pythonpath $(BIN)/python
 ifeq ($(ARGS),)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest $(ON_ALL_CORES) $(NUMERICAL)
-	$(BIN)/pytest $(addprefix --ignore=,$(wildcard $(NUMERICAL)))
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest $(ON_ALL_CORES) $(SIDE_BY_SIDE)
+	$(BIN)/pytest $(addprefix --ignore=,$(wildcard $(SIDE_BY_SIDE)))
 else
 	$(BIN)/pytest $(ARGS)
 endif
