@@ -27,14 +27,12 @@ def member_boxes(structure: Structure, member: Member) -> Iterator[Box]:
     """Yield the boxes of a member's section, drawn along its axis.
 
     Raises:
-        ValueError: where a member does not run along an axis, or has a round section.
+        ValueError: where a member does not run along an axis.
     """
     axes, length = structure.axes(member)
     if np.abs(np.abs(axes).max(axis=1) - 1).max() > 1e-9:
         raise ValueError(f"member {member.name} of {structure.name} runs askew: no bricks fit it")
     section = structure.sections[member.section]
-    if section.round is not None:
-        raise ValueError(f"section {member.section} of {structure.name} is round: no bricks fit it")
     start = structure.point(member.ends[0])
     for y0, y1, z0, z1, solid in section.rectangles:
         local = np.array([[-member.extend[0], y0, z0], [length + member.extend[1], y1, z1]])

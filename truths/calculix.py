@@ -63,8 +63,7 @@ def input_deck(structure: Structure, solid: Solid, modes: int) -> str:
         lines += [f"*MATERIAL, NAME=M{k}", "*ELASTIC", f"{modulus:.9e},{poisson:.9e}"]
         lines += ["*DENSITY", f"{density:.9e}", f"*SOLID SECTION, ELSET=E{k}, MATERIAL=M{k}"]
     for clamp in structure.clamps:
-        low, high = np.array(clamp.low)[:, None] - 1e-6, np.array(clamp.high)[:, None] + 1e-6
-        fixed = np.flatnonzero(((points >= low) & (points <= high)).all(axis=0)) + 1
+        fixed = np.flatnonzero(clamp.holds(points)) + 1
         lines += ["*BOUNDARY", *(f"{node},1,3" for node in fixed)]
     lines += ["*STEP", "*FREQUENCY", str(modes), "*END STEP", ""]
     return "\n".join(lines)

@@ -11,11 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from scipy import sparse
-from scipy.sparse import linalg
 
 from truths.defects import ATTACHED, KINDS, OUTSIDE, Defect, local
-from truths.eigenmodes import attach
+from truths.eigenmodes import attach, statics
 from truths.elasticity import Matrices, basis_of
 from truths.measurement import mac, modes_csv, paired, record, scaled
 from truths.modes_of import Observed, assembled, mesh_of, modes_of
@@ -24,7 +22,7 @@ from truths.prestress import with_misfit
 from truths.seats import rigid_fit
 from truths.solid import Solid
 from truths.structure import Place, Structure
-from truths.suite import mesh_differences, structures
+from truths.suite import mesh_differences, structures, write_files
 from truths.truth import TrueCause, Truth, rounded, truth_text
 
 Array = npt.NDArray[np.float64]
@@ -152,7 +150,7 @@ def damaged(base: Healthy, defects: tuple[Defect, ...]) -> tuple[Observed, list[
         unit = "N m/rad" if defect.turns else defect.unit
         causes.append(TrueCause(defect.what, defect.effect, defect.place, defect.also, size, unit))
     count = structure.used + structure.held_out
-    mass = matrices.total_mass + hung_mass(structure)
+    mass = matrices.total_mass + structure.hung_mass
     return modes_of(structure, matrices, count, mixed=True), causes, mass
 
 
@@ -198,15 +196,8 @@ def turning_stiffness(base: Healthy, matrices: Matrices, name: str, joint: str) 
         seats = [rigid_fit(structure, state, at)[3:].toarray() for at in (joint, place)]
         couple = across @ (seats[1] - seats[0])
         system = attach(structure, state, (), structure.springs)
-        held = system.stiffness + 1e-9 * sparse.diags_array(system.stiffness.diagonal())
         load = system.observe.T @ couple.T
-        solver = linalg.splu(
-            sparse.csc_matrix(held),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-        return np.asarray(np.einsum("ij,ij->j", load, solver.solve(load)))
+        return np.asarray(np.einsum("ij,ij->j", load, statics(system).solve(load)))
 
     added = flexibility(matrices) - flexibility(base.matrices)
     return float(1 / added.max())
@@ -237,13 +228,6 @@ def visible(base: Healthy, state: Observed) -> tuple[float, float, int]:
     return chi2_frequencies + float((turned**2).sum()), chi2_frequencies, appears
 
 
-def hung_mass(structure: Structure) -> float:
-    """Return the mass of what is attached to a structure, kg."""
-    hung = sum(item.mass for item in structure.lumps)
-    hung += sum(item.mass for item in structure.struts)
-    return hung + sum(item.mass for item in structure.oscillators)
-
-
 def weighed(structure: Structure, mass: float, seed: int) -> tuple[float, float] | None:
     """Return what a balance reads of a mass (kg), and its deviation; None where nobody weighs."""
     if not structure.weighed:
@@ -257,7 +241,7 @@ def files_of(draw: Draw) -> dict[str, str]:
     base = healthy(draw.structure)
     structure, count = base.structure, base.structure.used + base.structure.held_out
     causes: list[TrueCause] = []
-    state, mass = base.modes, base.matrices.total_mass + hung_mass(structure)
+    state, mass = base.modes, base.matrices.total_mass + structure.hung_mass
     if draw.defects:
         state, causes, mass = damaged(base, draw.defects)
     if min(len(state.frequencies), len(base.modes.frequencies)) < count:
@@ -305,17 +289,9 @@ def write_all(
         shutil.rmtree(folder / name)
     wanted = [d for d in drawn if (not names or d.structure in names) and not made(d)]
     for draw in sorted(wanted, key=lambda d: d.structure):
-        differences = []
         try:
             files = files_of(draw)
         except ValueError as error:
             yield draw, str(error)
             continue
-        for name, content in files.items():
-            path = folder / draw.name / name
-            old = path.read_text(encoding="utf-8") if path.exists() else None
-            if old != content:
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_text(content, encoding="utf-8")
-                differences.append(f"{draw.name}/{name}: {'changed' if old else 'new'}")
-        yield draw, differences
+        yield draw, write_files(folder / draw.name, files)

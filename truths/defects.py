@@ -118,8 +118,7 @@ def between(rng: Generator, low: float, high: float) -> float:
 def is_tube(structure: Structure, member: Member) -> bool:
     """Tell whether a member is hollow."""
     section = structure.sections[member.section]
-    hollow = any(not solid for *_, solid in section.rectangles)
-    return hollow or (section.round is not None and section.round[1] > 0)
+    return any(not solid for *_, solid in section.rectangles)
 
 
 def weld_cells(structure: Structure, solid: Solid, member: Member, end: int) -> Cells:
@@ -216,11 +215,6 @@ def loose_joint(structure: Structure, solid: Solid, rng: Generator) -> Defect | 
     )
 
 
-def middle_of(block: Block) -> Array:
-    """Return the centre of a block, m."""
-    return np.asarray((np.array(block.low) + np.array(block.high)) / 2)
-
-
 def thin_wall(structure: Structure, solid: Solid, rng: Generator) -> Defect | None:
     """Make the wall of one hollow member thinner, outside unchanged."""
     member = pick(rng, [m for m in structure.solid_members if is_tube(structure, m)])
@@ -230,14 +224,17 @@ def thin_wall(structure: Structure, solid: Solid, rng: Generator) -> Defect | No
     less = between(rng, 0.02, 0.3)
     outer, inner = section.rectangles
     wall, start = outer[1] - inner[1], structure.point(member.ends[0])[:, None]
+
+    def place_of(block: Block) -> Array:
+        middle = (np.array(block.low) + np.array(block.high)) / 2
+        return np.asarray(axes @ (middle - start[:, 0]))
+
     filled = [
         block
         for block in structure.blocks
         if block.material
-        and (
-            np.abs((axes @ (middle_of(block)[:, None] - start))[1:, 0]) < [inner[1], inner[3]]
-        ).all()
-        and 0 < (axes @ (middle_of(block)[:, None] - start))[0, 0] < length
+        and (np.abs(place_of(block)[1:]) < [inner[1], inner[3]]).all()
+        and 0 < place_of(block)[0] < length
     ]
     if filled:
         return None
@@ -367,10 +364,7 @@ def soft_foot(structure: Structure, solid: Solid, rng: Generator) -> Defect | No
     sprung = sorted({s.at for s in structure.springs if s.drawn and isinstance(s.at, str)})
     if feet:
         clamp = structure.clamps[int(rng.integers(len(feet)))]
-        low, high = np.array(clamp.low)[:, None], np.array(clamp.high)[:, None]
-        corners = solid.points[:, solid.cells]
-        held = ((corners >= low[:, None] - 1e-6) & (corners <= high[:, None] + 1e-6)).all(axis=0)
-        layer: Cells = np.asarray(held.any(axis=0))
+        layer: Cells = np.asarray(clamp.holds(solid.points)[solid.cells].any(axis=0))
         softer = between(rng, 2, 300)
         member = next(m for m in structure.members if clamp.at in m.ends)
         k = 1 if member.ends[0] == clamp.at else member.elements
@@ -439,13 +433,8 @@ def water(structure: Structure, solid: Solid, rng: Generator) -> Defect | None:
         return None
     _, length = structure.axes(member)
     section = structure.sections[member.section]
-    if section.round is not None:
-        bore = np.pi / 4 * section.round[1] ** 2
-        metal = np.pi / 4 * section.round[0] ** 2 - bore
-    else:
-        outer, inner = ((r[1] - r[0]) * (r[3] - r[2]) for r in section.rectangles)
-        bore, metal = inner, outer - inner
-    relative = WATER * bore / (structure.materials[member.material].rho * metal)
+    outer, bore = ((r[1] - r[0]) * (r[3] - r[2]) for r in section.rectangles)
+    relative = WATER * bore / (structure.materials[member.material].rho * (outer - bore))
     shares = (np.arange(8) + 0.5) / 8
     each = WATER * bore * length / len(shares)
     lumps = tuple(Lump((member.name, float(s)), float(each), drawn=False) for s in shares)
@@ -497,11 +486,11 @@ def _on_a_line(structure: Structure, a: str, b: str) -> bool:
 
 def stiff_cord(structure: Structure, solid: Solid, rng: Generator) -> Defect | None:
     """Hold a joint by a spring to ground that nobody drew."""
-    seen = {"3d": "xyz", "in-plane": "xz", "out-of-plane": "z"}[structure.plane]
+    seen = [d for d in DOFS[structure.plane] if d in "xyz"]
     clamped = {clamp.at for clamp in structure.clamps}
     joints = [j for j in structure.joints if j not in clamped]
     joint = joints[int(rng.integers(len(joints)))]
-    direction = str(rng.choice(list(seen)))
+    direction = str(rng.choice(seen))
     scale = total_mass(solid) * (2 * np.pi * structure.guess) ** 2
     stiffness = float(f"{between(rng, 0.01, 0.5) * scale:.3g}")
     spring = Spring(joint, direction, stiffness, drawn=False)
@@ -581,7 +570,7 @@ def unfit_member(structure: Structure, solid: Solid, rng: Generator) -> Defect |
     if member is None:
         return None
     drawn = structure.sections[member.section].drawn
-    size = min(float(drawn[k]) for k in ("width", "height", "diameter") if k in drawn)
+    size = min(float(drawn[k]) for k in ("width", "height") if k in drawn)
     _, length = structure.axes(member)
     # In parts of the strain at which a hinged bar of that depth buckles (Euler 1744).
     strain = between(rng, 0.02, 0.6) * np.pi**2 / 12 * (size / length) ** 2

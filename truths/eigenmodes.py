@@ -15,6 +15,7 @@ from truths.seats import DIRECTIONS, rigid_fit
 from truths.structure import Lump, Oscillator, Spring, Structure, Strut
 
 Array = npt.NDArray[np.float64]
+HOLD = 1e-9  # of the stiffness' size: what keeps a free structure in place under a static load
 RIGID = 0.02  # of the first elastic frequency; slower modes are rigid
 
 
@@ -90,10 +91,7 @@ def attach(
             M = M + item.mass * (fit[[across]].T @ fit[[across]])
     free = np.ones(n + extra, dtype=bool)
     for clamp in structure.clamps:
-        low, high = np.array(clamp.low)[:, None] - 1e-6, np.array(clamp.high)[:, None] + 1e-6
-        nodes = np.flatnonzero(
-            ((matrices.straight >= low) & (matrices.straight <= high)).all(axis=0)
-        )
+        nodes = np.flatnonzero(clamp.holds(matrices.straight))
         if not len(nodes):
             raise ValueError(f"{structure.name}: the clamp at {clamp.at} holds no node")
         free[(3 * nodes[:, None] + np.arange(3)).ravel()] = False
@@ -102,6 +100,21 @@ def attach(
         (np.ones(len(keep)), (keep, np.arange(len(keep)))), shape=(n + extra, len(keep))
     )
     return System(sparse.csc_array(K[keep][:, keep]), sparse.csc_array(M[keep][:, keep]), back[:n])
+
+
+def factorised(matrix: sparse.csc_array) -> linalg.SuperLU:
+    """Factorise a symmetric positive definite matrix."""
+    return linalg.splu(
+        sparse.csc_matrix(matrix),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
+
+
+def statics(system: System) -> linalg.SuperLU:
+    """Factorise the stiffness for loads in balance, a free structure held by next to nothing."""
+    return factorised(system.stiffness + HOLD * sparse.diags_array(system.stiffness.diagonal()))
 
 
 def solve(system: System, count: int, guess: float) -> Modes:
@@ -115,12 +128,7 @@ def solve(system: System, count: int, guess: float) -> Modes:
         ValueError: where an eigenpair leaves a residual over 1e-5, or an eigenvalue is negative.
     """
     shift = (2 * np.pi * guess) ** 2
-    factor = linalg.splu(
-        sparse.csc_matrix(system.stiffness + shift * system.mass),
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
+    factor = factorised(system.stiffness + shift * system.mass)
     inverse = linalg.LinearOperator(system.stiffness.shape, matvec=factor.solve)
     start = np.random.default_rng(0).standard_normal(system.mass.shape[0])
     values, vectors = linalg.eigsh(

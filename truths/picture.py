@@ -17,7 +17,6 @@ from truths.structure import Structure
 
 Array = npt.NDArray[np.float64]
 PIECES = 6  # of a member along its length, so that a warp shows
-ROUND = 10  # sides by which a round section is drawn
 BOX = np.array(
     [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
 )
@@ -27,9 +26,6 @@ FACES = [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (
 def outline(structure: Structure, name: str) -> list[Array]:
     """Return rings of points (corners, 2) in local y and z that a section is drawn by."""
     section = structure.sections[structure.member(name).section]
-    if section.round is not None:
-        angle = np.linspace(0, 2 * np.pi, ROUND, endpoint=False)
-        return [section.round[0] / 2 * np.column_stack([np.cos(angle), np.sin(angle)])]
     return [
         np.array([(a, c), (b, c), (b, d), (a, d)])
         for a, b, c, d, solid in section.rectangles

@@ -9,14 +9,12 @@ import numpy as np
 import numpy.typing as npt
 import skfem
 from scipy import sparse
-from scipy.sparse import linalg
 
-from truths.eigenmodes import System
+from truths.eigenmodes import System, statics
 from truths.elasticity import Matrices, basis_of, interleaved
 from truths.solid import Solid
 
 Array = npt.NDArray[np.float64]
-HOLD = 1e-9  # of the stiffness' size: what keeps a free structure in place while it is stressed
 
 
 def with_misfit(
@@ -48,15 +46,8 @@ def with_misfit(
             return w["stress"] * v.grad[a]
 
         load[a::3] = push.assemble(basis, stress=stress)
-    held = system.stiffness + HOLD * sparse.diags_array(system.stiffness.diagonal())
     back = system.observe
-    solver = linalg.splu(
-        sparse.csc_matrix(held),
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
-    moved = back @ solver.solve(back.T @ load)
+    moved = back @ statics(system).solve(back.T @ load)
     slope = np.array([np.asarray(basis.interpolate(moved[a::3]).grad) for a in range(3)])
     strains = (slope + slope.transpose(1, 0, 2, 3)) / 2
     for a in range(3):

@@ -27,10 +27,7 @@ def seat_nodes(structure: Structure, matrices: Matrices, place: Place) -> npt.ND
     section = structure.sections[member.section]
     local = axes @ (matrices.straight - structure.point(place)[:, None])
     half = np.array([section.width, section.height]) / 2 + 1e-6
-    if section.round is not None:
-        near = np.hypot(local[1], local[2]) < half[0] * 1.02
-    else:
-        near = (np.abs(local[1]) < half[0]) & (np.abs(local[2]) < half[1])
+    near = (np.abs(local[1]) < half[0]) & (np.abs(local[2]) < half[1])
     for thickness in SLAB * 1.5 ** np.arange(8):
         nodes = np.flatnonzero(near & (np.abs(local[0]) < thickness))
         if len(nodes) >= FEWEST:

@@ -20,14 +20,12 @@ class Section:
         width, height: outer sizes along local y and z, m.
         rectangles: painted one after the other, later ones over earlier ones.
         drawn: keys of the section in `case.toml`, as a catalogue gives them.
-        round: diameter and bore of a round bar or tube, m; only tetrahedra fill one.
     """
 
     width: float
     height: float
     rectangles: tuple[Rectangle, ...]
     drawn: Mapping[str, str | float] = field(default_factory=dict)
-    round: tuple[float, float] | None = None
 
 
 def _box(width: float, height: float, solid: bool = True) -> Rectangle:
@@ -45,18 +43,6 @@ def bar(width: float, height: float) -> Section:
     """Return a solid rectangle."""
     drawn: Drawn = {"shape": "solid-rectangle", "width": width, "height": height}
     return Section(width, height, (_box(width, height),), drawn)
-
-
-def round_bar(diameter: float) -> Section:
-    """Return a solid circle."""
-    drawn: Drawn = {"shape": "solid-circle", "diameter": diameter}
-    return Section(diameter, diameter, (), drawn, (diameter, 0.0))
-
-
-def round_tube(diameter: float, wall: float) -> Section:
-    """Return a circular hollow section."""
-    drawn: Drawn = {"shape": "round-tube", "diameter": diameter, "wall": wall}
-    return Section(diameter, diameter, (), drawn, (diameter, diameter - 2 * wall))
 
 
 def thin_walled(parts: tuple[tuple[float, float, float, float], ...], web: float) -> Section:

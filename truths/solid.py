@@ -44,13 +44,6 @@ class Solid:
         wanted = [i for i, part in enumerate(self.parts) if part in names]
         return np.isin(self.part, wanted)
 
-    def inside(
-        self, low: tuple[float, float, float], high: tuple[float, float, float]
-    ) -> npt.NDArray[np.bool_]:
-        """Return which cells have their centre in a box of the straight description."""
-        c, a, b = self.centres, np.array(low)[:, None], np.array(high)[:, None]
-        return np.asarray(((c > a) & (c < b)).all(axis=0))
-
     def scaled(
         self, cells: npt.NDArray[np.bool_], stiffness: float = 1.0, mass: float = 1.0
     ) -> Solid:

@@ -122,6 +122,12 @@ class Clamp:
     low: Point
     high: Point
 
+    def holds(self, points: Array) -> npt.NDArray[np.bool_]:
+        """Return which points (3, ...) of the straight description are fixed, (...)."""
+        shape = (3, *(1,) * (points.ndim - 1))
+        low, high = (np.array(corner).reshape(shape) for corner in (self.low, self.high))
+        return np.asarray(((points >= low - 1e-6) & (points <= high + 1e-6)).all(axis=0))
+
 
 @dataclass(frozen=True)
 class Change:
@@ -207,6 +213,13 @@ class Structure:
         places += [spring.at for spring in springs] + [item.at for item in self.oscillators]
         return sorted({at for at in places if not isinstance(at, str)})
 
+    @property
+    def hung_mass(self) -> float:
+        """Return the mass of what is attached, kg."""
+        hung = sum(item.mass for item in self.lumps)
+        hung += sum(item.mass for item in self.struts)
+        return hung + sum(item.mass for item in self.oscillators)
+
     def warped(self, points: Array) -> Array:
         """Return points (3, n) of the straight description where they really are."""
         return points if self.warp is None else self.warp(points)
@@ -236,7 +249,7 @@ class Structure:
     @property
     def solid_members(self) -> list[Member]:
         """Return the members that the solid has; a drawn link only joins centre lines."""
-        made = {name for name, s in self.sections.items() if s.rectangles or s.round}
+        made = {name for name, s in self.sections.items() if s.rectangles}
         return [member for member in self.members if member.section in made]
 
     def at_joint(self, joint: str) -> Member:

@@ -74,21 +74,23 @@ def solve_structure(structure: Structure) -> Solved:
         )
     if min(len(state.frequencies) for state in states) < count:
         raise ValueError(f"{structure.name}: fewer than {count} modes were found")
-    lumps = sum(lump.mass for lump in structure.lumps)
-    lumps += sum(strut.mass for strut in structure.struts)
-    lumps += sum(item.mass for item in structure.oscillators)
     nodes = (coarse.nodes.shape[1], fine.nodes.shape[1])
-    mass = fine.total_mass + lumps
+    mass = fine.total_mass + structure.hung_mass
     return Solved(states, difference, alike, nodes, mass)
 
 
-ROW = re.compile(r"^\| \d+ \| (?:used|held out) \| [\d.]+ \| ([\d.]+) \|", re.MULTILINE)
+ROW = re.compile(r"^\| \d+ \| (used|held out) \| [\d.]+ \| ([\d.]+) \|", re.MULTILINE)
+
+
+def listed_modes(readme: str) -> list[tuple[str, float]]:
+    """Return use and difference of the two meshes (%) of each mode that a README lists."""
+    return [(use, float(difference)) for use, difference in ROW.findall(readme)]
 
 
 def mesh_differences(name: str) -> Array:
     """Return the relative differences of the meshes that a structure's README lists."""
     text = (SUITE / name / "README.md").read_text(encoding="utf-8")
-    return np.array([float(value) / 100 for value in ROW.findall(text)])
+    return np.array([difference / 100 for _, difference in listed_modes(text)])
 
 
 def readme(structure: Structure, solved: Solved) -> str:
@@ -167,15 +169,19 @@ def index_text(all_structures: dict[str, Structure]) -> str:
     return "# Written by `make truths`.\n\n" + "\n".join(tables)
 
 
-def write(structure: Structure, folder: Path) -> list[str]:
-    """Compute a structure and write its folder; return what differs from what was there."""
-    solved = solve_structure(structure)
-    target, differences = folder / structure.name, []
-    for name, content in files_of(structure, solved).items():
-        path = target / name
+def write_files(folder: Path, files: dict[str, str]) -> list[str]:
+    """Write files into a folder; return what differs from what was there."""
+    differences = []
+    for name, content in files.items():
+        path = folder / name
         old = path.read_text(encoding="utf-8") if path.exists() else None
         if old != content:
-            differences.append(f"{structure.name}/{name}: {'new' if old is None else 'changed'}")
-            target.mkdir(parents=True, exist_ok=True)
+            differences.append(f"{folder.name}/{name}: {'new' if old is None else 'changed'}")
+            folder.mkdir(parents=True, exist_ok=True)
             path.write_text(content, encoding="utf-8")
     return differences
+
+
+def write(structure: Structure, folder: Path) -> list[str]:
+    """Compute a structure and write its folder; return what differs from what was there."""
+    return write_files(folder / structure.name, files_of(structure, solve_structure(structure)))

@@ -10,11 +10,11 @@ import numpy as np
 
 from femubench import rank
 from truths.posing import ROOT, SUITE
+from truths.suite import listed_modes
 
 PAGE = ROOT / "docs" / "suite.md"
 MARK = "<!-- suite -->"
 NODES = re.compile(r"scikit-fem, (\d+) and\s+(\d+) nodes")
-ROW = re.compile(r"^\| \d+ \| (used|held out) \| ([\d.]+) \| ([\d.]+) \|", re.MULTILINE)
 
 
 def suite_rows() -> list[str]:
@@ -26,11 +26,11 @@ def suite_rows() -> list[str]:
     for name, item in table.items():
         text = (SUITE / name / "README.md").read_text(encoding="utf-8")
         nodes = NODES.search(text)
-        modes = ROW.findall(text)
+        modes = listed_modes(text)
         if nodes is None or not modes:
             raise ValueError(f"{name}: its README holds no meshes or no modes")
-        used = sum(kind == "used" for kind, *_ in modes)
-        worst = max(float(difference) for *_, difference in modes)
+        used = sum(use == "used" for use, _ in modes)
+        worst = max(difference for _, difference in modes)
         error = errors[f"suite/{name}"].blocks["used"].rms_percent
         rows.append(
             f"| [`{name}`](../scenarios/suite/{name}/README.md) | {', '.join(item['classes'])} "

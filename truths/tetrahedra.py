@@ -30,15 +30,7 @@ def member_volume(structure: Structure, member: Member) -> list[tuple[int, int]]
     axes, length = structure.axes(member)
     start, section = structure.point(member.ends[0]), structure.sections[member.section]
     before, after = member.extend
-    if section.round is not None:
-        outer, bore = section.round
-        low, axis = start - before * axes[0], (length + before + after) * axes[0]
-        body = [(3, gmsh.model.occ.addCylinder(*low, *axis, outer / 2))]
-        if bore:
-            hole = [(3, gmsh.model.occ.addCylinder(*low, *axis, bore / 2))]
-            body, _ = gmsh.model.occ.cut(body, hole)
-        return list(body)
-    body = []
+    body: list[tuple[int, int]] = []
     for y0, y1, z0, z1, solid in section.rectangles:
         low = np.array([-before, y0, z0])
         size = np.array([length + before + after, y1 - y0, z1 - z0])
