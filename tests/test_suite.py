@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 import tomllib
 from itertools import combinations
 from pathlib import Path
@@ -11,8 +12,14 @@ import numpy as np
 import pytest
 
 from femubench import read_case
+from femubench.core.library.cases import read_cases
+from femubench.core.plugin.loader import load_plugins
 from femubench.core.score.scoring import reference_of
+from femubench.results import run_jobs
 from truths.published import write_garteur
+
+sys.path.insert(0, str(Path(__file__).parent))
+from printed_boards import assert_board_is_that_of
 
 ROOT = Path(__file__).parents[1]
 SUITE = ROOT / "scenarios" / "suite"
@@ -71,3 +78,10 @@ def test_no_two_structures_share_their_geometry() -> None:
     for one, two in combinations(NAMES, 2):
         alike = shapes[one].shape == shapes[two].shape and len(shapes[one]) > 4
         assert not alike or np.abs(shapes[one] - shapes[two]).max() > 0.01, (one, two)
+
+
+@pytest.mark.sweep
+def test_the_board_of_all_structures() -> None:
+    plugins = load_plugins()
+    run = run_jobs(read_cases(["suite"], plugins), list(plugins.strategies.values()), jobs=2)
+    assert_board_is_that_of(run, "docs/suite.md")

@@ -79,4 +79,5 @@ drawing is a polygon of eight straight pieces between points on the circle.
     guess=50.0,
     scatter=0.004,
     shape_scatter=0.03,
+    default=True,
 )

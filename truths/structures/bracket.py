@@ -70,4 +70,5 @@ lug's axis and is not drawn. The drawing has centre lines of Timoshenko beams fr
     scatter=0.006,
     shape_scatter=0.04,
     together=0.3,
+    default=True,
 )

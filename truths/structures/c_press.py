@@ -68,5 +68,4 @@ upper arm, welded to its lower face. The drawing shows centre lines and no steps
     guess=200.0,
     beam="timoshenko",
     scatter=0.002,
-    default=False,
 )

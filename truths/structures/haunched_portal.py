@@ -82,4 +82,5 @@ drawing shows centre lines and rigid clamps alone.
     scatter=0.004,
     shape_scatter=0.03,
     together=0.3,
+    default=True,
 )

@@ -81,4 +81,5 @@ drawing clamps the mast at the plate and knows nothing of the rubber.
     scatter=0.007,
     shape_scatter=0.03,
     together=0.7,
+    default=True,
 )

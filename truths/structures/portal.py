@@ -63,4 +63,5 @@ are far softer across the plane than in it. The beam's ends are closed by 3 mm p
     held_out=5,
     size=(0.015, 0.01),
     guess=60.0,
+    default=True,
 )

@@ -92,4 +92,5 @@ twisting in both. The drawing has the block, centre lines and rigid joints.
     scatter=0.003,
     shape_scatter=0.025,
     together=0.6,
+    default=True,
 )
