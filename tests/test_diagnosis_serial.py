@@ -192,6 +192,17 @@ class TestTerminal:
         assert -1 not in found, parts[found.index(-1)]
         assert found == sorted(found)
 
+    def test_name_and_place_have_probabilities_of_their_own(self) -> None:
+        places = (("type:T", 0.25), ("type:L", 0.25), ("J1", 0.25), ("J9", 0.25))
+        cause = replace(
+            toys.SOFT, place_probability=0.25, places=places, mirrors=("type:L", "J1", "J9")
+        )
+        told = (
+            "probability 94.2 %; at this place 25.0 %, one of 4 mirror places; "
+            "else at type:L 25.0 %, J1 25.0 %, J9 25.0 %; the joints rotate"
+        )
+        assert told in words(toys.made(causes=(cause,)))
+
     def test_headings_tell_findings_from_guesses(self) -> None:
         assert "What is missing" in words(toys.made("named"))
         for verdict in ("unknown", "not-confirmed"):

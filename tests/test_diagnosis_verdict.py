@@ -17,7 +17,6 @@ from femubench.core.case.modes import NO_SENSORS
 from femubench.core.challenge.structures import structure_named
 from femubench.core.diagnosis.verdict import (
     angle_between,
-    causes_of,
     decide,
     inseparable,
     mostly_common,
@@ -224,17 +223,6 @@ def test_an_angle_is_between_subspaces_and_takes_no_units() -> None:
     assert np.isnan(angle_between(one, explained((), 0.5)))
     still = explained(("c",), 0.5, direction=(0.0, 0.0, 0.0))
     assert np.isnan(angle_between(one, still))
-
-
-def test_places_of_a_name_share_its_probability() -> None:
-    found = posterior(
-        explained(("a",), 0.5, place="x"),
-        explained(("a",), 0.25, place="y"),
-        explained(("a",), 0.25, place="x"),
-    )
-    ((best, share),) = causes_of(found, (("a",),))
-    assert best.place == "x"
-    assert share == pytest.approx(0.75)
 
 
 # --- whole diagnoses --------------------------------------------------------------------------

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from femubench.core.challenge.sealed import read_small
 from femubench.core.diagnosis.result import Diagnosis
@@ -46,6 +47,22 @@ class AnswerCause(_Part):
     place: Word = ""
     parameters: tuple[AnswerParameter, ...] = Field((), max_length=20)
     probability: Probability | None = None
+    # The name alone, where it says nothing of the place.
+    place_probability: Probability | None = None
+
+    @field_validator("place_probability", mode="before")
+    @classmethod
+    def _known(cls, value: object) -> object:
+        return None if isinstance(value, float) and math.isnan(value) else value
+
+    @property
+    def claim(self) -> float | None:
+        """Return the probability of the effect at its place, None where it is not stated."""
+        if self.probability is None:
+            return None
+        return self.probability * (
+            1.0 if self.place_probability is None else self.place_probability
+        )
 
     @property
     def parts(self) -> tuple[tuple[str, str], ...]:
@@ -82,7 +99,7 @@ class Answer(_Part):
         A group claims the sum over its members, several causes together the smallest of theirs;
         ``unknown`` and ``not-confirmed`` claim none.
         """
-        stated = [cause.probability for cause in self.causes if cause.probability is not None]
+        stated = [cause.claim for cause in self.causes if cause.claim is not None]
         if self.verdict == "none":
             return self.nothing
         if self.verdict not in ("named", "ambiguous") or not stated:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,18 +21,19 @@ from femubench.core.diagnosis.proof import (
 )
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.tables import (
-    causes_in,
     evidence_rows,
+    placed_causes,
     residual_rows,
     rivals_of,
     smallest_visible,
+    tied_places,
 )
-from femubench.core.diagnosis.verdict import Decision, causes_of, decide
+from femubench.core.diagnosis.verdict import Decision, decide, elsewhere
 from femubench.core.diagnosis.words import sentence_of
 from femubench.core.fem.model import Model
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.extended_model import departure
-from femubench.core.inference.posterior import Explanation, Posterior
+from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.static_response import LargeProblem
 from femubench.core.look.localisation import locate
 from femubench.core.look.look import look
@@ -40,7 +41,9 @@ from femubench.core.plugin.loader import registered_effects
 from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning
 from femubench.core.score.scoring import score_model
-from femubench.core.ties import alike, in_order
+from femubench.core.ties import in_order
+
+_MOST_ADVISED = 8  # explanations that advice parts from each other
 
 
 @dataclass(frozen=True)
@@ -117,10 +120,10 @@ def _written(
     begin: float,
 ) -> Diagnosis:
     best, posterior = examination.best, examination.posterior
-    group = causes_of(posterior, decision.group)
+    group = [posterior.best(key) for key in decision.group]
     shown = group if decision.verdict == "ambiguous" else group[:1]
-    options = [causes_in(explanation, share, posterior.earned) for explanation, share in shown]
-    causes = _group_causes(posterior, options)
+    options = [placed_causes(examination, explanation) for explanation in shown]
+    causes = _group_causes(options)
     top = posterior.names[decision.group[0]] if decision.group else decision.nothing
     named = bool(decision.group)
     after = best.fit.state if named else examination.nominal
@@ -132,7 +135,7 @@ def _written(
         causes=tuple(causes),
         rivals=rivals_of(examination, best if named else None),
         reason=_reason(decision),
-        advice=_advice(examination, [e for e, _ in group]),
+        advice=_advice(examination, group),
         smallest_visible=smallest_visible(examination.found[0]),
         residuals=residual_rows(examination.nominal, after),
         gain=proof.gain,
@@ -144,24 +147,21 @@ def _written(
         locations=(*evidence_rows(examination), *locate(case.model, used)),
         base=best.base.names if named else (),
         extended=model if named else case.model,
-        notes=_notes(examination, proof, best, [e for e, _ in shown]),
+        notes=_notes(examination, proof, best, shown),
         seconds=time.perf_counter() - begin,
         subject=case,
     )
 
 
-def _group_causes(posterior: Posterior, options: Iterable[Iterable[Cause]]) -> list[Cause]:
-    """Return every effect of a group once, with the probability that it is part of the name.
+def _group_causes(options: Iterable[Iterable[Cause]]) -> list[Cause]:
+    """Return every effect of a group once, as in the most probable explanation that has it.
 
     Arguments:
-        posterior: what the group was weighed in.
-        options: causes of every explanation with the probability of their places, most probable
-            explanation first.
+        options: causes of every explanation, most probable explanation first.
     """
     found: dict[str, Cause] = {}
     for cause in (cause for option in options for cause in option):
-        likely = cause.probability * posterior.inclusion(cause.effect)
-        found.setdefault(cause.effect, replace(cause, probability=likely))
+        found.setdefault(cause.effect, cause)
     return in_order(found.values(), lambda cause: 1.0 - cause.probability, 1e-9)
 
 
@@ -180,10 +180,13 @@ def _reason(decision: Decision) -> str:
 
 
 def _advice(examination: Examination, group: Sequence[Explanation]) -> tuple[Advice, ...]:
-    if len(group) < 2:
+    """Return what parts the names of a group, and each name's places, from each other."""
+    others = (e for found in group for e in elsewhere(examination.posterior, found))
+    told = [*group, *others][:_MOST_ADVISED]
+    if len(told) < 2:
         return ()
-    problems = [examination.problem_of(e) for e in group]
-    fits = [e.fit for e in group]
+    problems = [examination.problem_of(e) for e in told]
+    fits = [e.fit for e in told]
     return advise(examination.model, problems, fits, tolerance=examination.tolerance)
 
 
@@ -215,17 +218,6 @@ def _notes(
             f"{departure(best.fit):.1g} standard deviations of all data together from the fit."
         )
     return tuple(notes)
-
-
-def tied_places(posterior: Posterior, best: Explanation) -> tuple[str, ...]:
-    """Return the other places at which the causes of an explanation are exactly as probable."""
-    tied = (
-        e.place
-        for e in posterior.explanations
-        if (e.base.names, e.searched) == (best.base.names, best.searched)
-        and alike(e.log_weight, best.log_weight)
-    )
-    return tuple(dict.fromkeys(place for place in tied if place != best.place))
 
 
 __all__ = ["diagnose", "extended_by"]

@@ -103,7 +103,7 @@ def _json_type(kind: Any) -> Any:  # noqa: ANN401 - any type of a field
     inside = tuple(_json_type(part) for part in get_args(kind) if part is not Ellipsis)
     size = len(inside)
     if get_origin(kind) is tuple:
-        entries = list[inside[0]]  # type: ignore[valid-type]
+        entries = list[Union[inside]]  # type: ignore[valid-type]  # noqa: UP007
         several = Ellipsis in get_args(kind)
         return entries if several else Annotated[entries, Field(min_length=size, max_length=size)]
     if get_origin(kind) in (Union, UnionType):

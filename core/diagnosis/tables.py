@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from femubench.core.diagnosis.verdict import angle_between
+from femubench.core.diagnosis.symmetry import mirror_places
+from femubench.core.diagnosis.verdict import angle_between, credible, places_of
 from femubench.core.inference.examine import Examination
 from femubench.core.inference.fit import State
-from femubench.core.inference.posterior import Explanation
+from femubench.core.inference.posterior import Explanation, Posterior
 from femubench.core.inference.search import Found
 from femubench.core.roles import EffectParameter
 from femubench.core.schema.diagnosis import (
@@ -50,7 +53,7 @@ def causes_in(explanation: Explanation, share: float, earned: frozenset[str]) ->
 
     Arguments:
         explanation: fitted.
-        share: probability of the name and, within it, of these places.
+        share: probability of each.
         earned: textbook effects that are part of the name.
 
     Examples:
@@ -83,6 +86,55 @@ def causes_in(explanation: Explanation, share: float, earned: frozenset[str]) ->
         start += len(h.parameters)
         causes.append(Cause(h.name, h.place, tuple(fitted), share, _summary(h.effect)))
     return causes
+
+
+def placed_causes(examination: Examination, explanation: Explanation) -> list[Cause]:
+    """Return the causes of an explanation, each with the probability of its name and of its place.
+
+    Arguments:
+        examination: what the explanation was weighed in.
+        explanation: one of its explanations.
+    """
+    posterior = examination.posterior
+    causes = causes_in(explanation, 1.0, posterior.earned)
+    first = len(causes) - len(explanation.parts)
+    tied = _tied(posterior, explanation)
+    found = []
+    for k, cause in enumerate(causes):
+        shares = places_of(posterior, explanation, k - first) if k >= first else {cause.place: 1.0}
+        alike_at = {
+            part.hypothesis.place
+            for other in tied
+            for part in other.parts
+            if part.hypothesis.name == cause.effect
+        }
+        others = [place for place in shares if place in alike_at and place != cause.place]
+        found.append(
+            replace(
+                cause,
+                probability=posterior.inclusion(cause.effect),
+                place_probability=shares[cause.place],
+                places=credible(shares),
+                mirrors=mirror_places(examination.model, cause.place, others) if others else (),
+            )
+        )
+    return found
+
+
+def _tied(posterior: Posterior, best: Explanation) -> list[Explanation]:
+    """Return the explanations with the same causes elsewhere that are exactly as probable."""
+    return [
+        e
+        for e in posterior.explanations
+        if (e.base.names, e.searched) == (best.base.names, best.searched)
+        and e.place != best.place
+        and alike(e.log_weight, best.log_weight)
+    ]
+
+
+def tied_places(posterior: Posterior, best: Explanation) -> tuple[str, ...]:
+    """Return the other places at which the causes of an explanation are exactly as probable."""
+    return tuple(dict.fromkeys(e.place for e in _tied(posterior, best)))
 
 
 def _parameter(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ import scipy.linalg as la
 
 from femubench.core.inference.posterior import LIKELY_NOTHING, Explanation, Key, Posterior
 from femubench.core.schema.diagnosis import Verdict
+from femubench.core.ties import alike, by_probability
 
 # Rivals at least this probable, or nearly parallel and not yet excluded, stay in the group.
 _RIVAL, _PARALLEL_RIVAL = 0.05, 0.005
@@ -20,6 +21,7 @@ _SURE = 0.98
 _COMMON, _MOST = 0.92, 0.8
 _NOISE = 1e-3
 _LARGEST_GROUP = 6
+_CREDIBLE = 0.95
 
 
 @dataclass(frozen=True)
@@ -125,15 +127,56 @@ def inseparable(posterior: Posterior) -> tuple[tuple[Key, ...], tuple[float, ...
     return tuple(group), tuple(angles)
 
 
-def causes_of(posterior: Posterior, group: Sequence[Key]) -> list[tuple[Explanation, float]]:
-    """Return the best explanation of every name in a group with the probability of its place."""
-    result = []
-    for key in group:
-        members = posterior.members(key)
-        places: dict[str, float] = {}
-        for explanation, p in members:
-            places[explanation.place] = places.get(explanation.place, 0.0) + p
-        best = members[0][0]
-        total = sum(places.values())
-        result.append((best, places[best.place] / total if total > 0.0 else 0.0))
-    return result
+def places_of(posterior: Posterior, explanation: Explanation, part: int) -> dict[str, float]:
+    """Return where one cause of an explanation sits, most probable place first.
+
+    All explanations of the same name count, whatever is beside the cause; where the effect is in
+    them several times, what sits where the others of it sit here is left to those.
+
+    Arguments:
+        posterior: what the explanation was weighed in.
+        explanation: one of its explanations.
+        part: position of the cause among its parts.
+    """
+    own = explanation.parts[part].hypothesis
+    taken = [p.hypothesis.place for p in explanation.parts if p.hypothesis.name == own.name]
+    taken.remove(own.place)
+    shares: dict[str, float] = {}
+    for other, p in posterior.members(posterior.key(explanation)):
+        places = [q.hypothesis.place for q in other.parts if q.hypothesis.name == own.name]
+        free = [place for place in places if place not in taken] or places
+        for place in free:
+            shares[place] = shares.get(place, 0.0) + p / len(free)
+    total = sum(shares.values())
+    return {place: shares[place] / total for place in by_probability(shares)}
+
+
+def credible(shares: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
+    """Return the fewest places with 95 % of the probability, and all that tie with the last.
+
+    Arguments:
+        shares: probability of every place, most probable first.
+    """
+    found: list[tuple[str, float]] = []
+    covered = 0.0
+    for place, share in shares.items():
+        if covered >= _CREDIBLE and not alike(share, found[-1][1]):
+            break
+        found.append((place, share))
+        covered += share
+    return tuple(found)
+
+
+def elsewhere(posterior: Posterior, explanation: Explanation) -> list[Explanation]:
+    """Return the same name at other places that the data do not exclude, most probable first."""
+    sets = [
+        {place for place, _ in credible(places_of(posterior, explanation, k))}
+        for k in range(len(explanation.parts))
+    ]
+    found: dict[str, Explanation] = {}
+    for other, _ in posterior.members(posterior.key(explanation)):
+        if len(other.parts) == len(explanation.parts) and other.place != explanation.place:
+            within = all(p.hypothesis.place in set().union(*sets) for p in other.parts)
+            if within:
+                found.setdefault(other.place, other)
+    return list(found.values())

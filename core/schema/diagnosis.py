@@ -30,13 +30,25 @@ class CauseParameter:
 
 @dataclass(frozen=True)
 class Cause:
-    """An effect at a place, with what it takes; `summary` says it as a clause."""
+    """An effect at a place, with what it takes; `summary` says it as a clause.
+
+    Arguments:
+        probability: that the effect is part of what is missing, wherever it sits.
+        place_probability: that it sits at this place, given that it is; nan where not known.
+        places: the credible set, with the probability of each: the most probable places, 95 % or
+            more together.
+        mirrors: the other places that fit exactly as well, as images of this one by a symmetry
+            of the structure that the data do not break.
+    """
 
     effect: str
     place: str
     parameters: tuple[CauseParameter, ...]
     probability: float
     summary: str = ""
+    place_probability: float = float("nan")
+    places: tuple[tuple[str, float], ...] = ()
+    mirrors: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
