@@ -118,6 +118,8 @@ def explained(
         effects=frozenset({*book, *names}),
         place=place,
         chi2=chi2,
+        log_likelihood=-0.5 * chi2,
+        unknowns=len(names),
         log_weight=float(np.log(probability)),
         fit=SimpleNamespace(
             state=SimpleNamespace(jacobian=columns), log_evidence=float(np.log(probability))
@@ -171,12 +173,47 @@ def test_a_rival_of_little_probability_stays_only_where_it_is_nearly_parallel() 
     for direction, expected in ((ALONG, "ambiguous"), (ACROSS, "named")):
         found = posterior(
             explained(("a",), 0.985),
-            explained(("b",), 0.014, direction=direction),
+            explained(("b",), 0.014, chi2=70.0, direction=direction),
             explained((), 0.001),
         )
         assert decide(found, 0.5, confirmed=True).verdict == expected
-    gone = posterior(explained(("a",), 0.999), explained(("b",), 0.001, direction=ALONG))
+    gone = posterior(explained(("a",), 0.999), explained(("b",), 0.001, chi2=74.0, direction=ALONG))
     assert decide(gone, 0.5, confirmed=True).verdict == "named"
+
+
+@pytest.mark.parametrize(
+    ("names", "chi2", "expected"),
+    [
+        (("b",), 60.1, True),
+        (("b",), 65.9, True),
+        (("b",), 66.1, False),
+        (("b", "c"), 60.1, True),
+        (("b", "c", "d", "e"), 60.1, False),
+        (("a", "b"), 57.0, False),
+    ],
+)
+def test_a_rival_that_only_its_prior_excludes_is_in_the_group(
+    names: Names, chi2: float, expected: bool
+) -> None:
+    """A name that merely adds to the best one is left to its evidence."""
+    found = posterior(
+        explained(("a",), 0.9999),
+        explained(names, 1e-5, chi2=chi2, direction=ACROSS),
+        explained((), 1e-6, chi2=200.0),
+    )
+    group, _ = inseparable(found)
+    assert (names in group) is expected
+
+
+def test_textbook_physics_that_the_data_hardly_notice_is_no_part_of_a_name() -> None:
+    """Whatever the prior of sizes makes of it, and where nobody tried without it."""
+    for chi2, expected in ((60.1, ()), (200.0, ("b",))):
+        with_b = explained(("a",), 0.9, chi2=60.0, book=("b",))
+        without = explained(("a",), 1e-3, chi2=chi2)
+        assert posterior(with_b, without).key(with_b) == (*("a",), *expected)
+        alone = explained((), 1e-20, chi2=460.0, book=("b",))
+        plain = explained((), 1e-24, chi2=400.0 + chi2)
+        assert posterior(with_b, alone, plain).key(with_b) == (*("a",), *expected)
 
 
 def test_groups_are_probable_first_and_not_endless() -> None:

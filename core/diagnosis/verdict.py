@@ -8,7 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.inference.posterior import LIKELY_NOTHING, Explanation, Key, Posterior
+from femubench.core.inference.posterior import (
+    LIKELY_NOTHING,
+    Explanation,
+    Key,
+    Posterior,
+    fits_better,
+)
 from femubench.core.schema.diagnosis import Verdict
 from femubench.core.ties import alike, by_probability
 
@@ -21,6 +27,9 @@ _SURE = 0.98
 _COMMON, _MOST = 0.92, 0.8
 _NOISE = 1e-3
 _LARGEST_GROUP = 6
+# A rival this near in ln likelihood, with hardly more or fewer values fitted, is excluded by its
+# prior alone: 6 of chi-square.
+_AS_WELL, _MORE_VALUES = 3.0, 2
 _CREDIBLE = 0.95
 
 
@@ -109,22 +118,41 @@ def _says_as_much(posterior: Posterior, best: Explanation, first: Key, key: Key)
 
 
 def inseparable(posterior: Posterior) -> tuple[tuple[Key, ...], tuple[float, ...]]:
-    """Return the best name with all that these data cannot exclude, and their angles to it."""
+    """Return the best name with all that these data cannot exclude, and their angles to it.
+
+    Not excluded is what is probable enough, and what fits about as well, whatever its prior says.
+    """
     names = {key: p for key, p in posterior.names.items() if key}
     something = sum(names.values())
     ranked = list(names)
     best = posterior.best(ranked[0])
     group, angles, covered = [ranked[0]], [0.0], names[ranked[0]] / something
     for key in ranked[1:]:
-        share = names[key] / something
-        if share < _PARALLEL_RIVAL or len(group) == _LARGEST_GROUP:
+        if len(group) == _LARGEST_GROUP:
             break
+        share = names[key] / something
         angle = angle_between(best, posterior.best(key))
-        if share >= _RIVAL or angle < _PARALLEL or covered < _SURE:
+        likely = share >= _PARALLEL_RIVAL
+        likely = likely and (share >= _RIVAL or angle < _PARALLEL or covered < _SURE)
+        if likely or fits_as_well(posterior, best, key):
             group.append(key)
             angles.append(angle)
             covered += share
     return tuple(group), tuple(angles)
+
+
+def fits_as_well(posterior: Posterior, best: Explanation, key: Key) -> bool:
+    """Tell whether a name explains the data about as well as the best explanation does.
+
+    A name that only adds to the best one always does, and is left to its evidence.
+    """
+    if set(posterior.key(best)) <= set(key):
+        return False
+    return any(
+        fits_better(best, other) <= _AS_WELL
+        and abs(best.unknowns - other.unknowns) <= _MORE_VALUES
+        for other, _ in posterior.members(key)
+    )
 
 
 def places_of(posterior: Posterior, explanation: Explanation, part: int) -> dict[str, float]:
