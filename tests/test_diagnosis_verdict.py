@@ -16,9 +16,11 @@ from femubench import Case, Diagnosis, InputError, Measurement, Model, diagnose
 from femubench.core.case.modes import NO_SENSORS
 from femubench.core.challenge.structures import structure_named
 from femubench.core.diagnosis.verdict import (
+    Decision,
     angle_between,
     decide,
     inseparable,
+    most_believed,
     mostly_common,
 )
 from femubench.core.inference.posterior import Posterior
@@ -131,15 +133,21 @@ def posterior(*explanations: Any) -> Posterior:
     return Posterior.of(explanations)
 
 
+def decided(found: Posterior, adequate: float, confirmed: bool) -> Decision:
+    """Return the decision on the most probable explanation."""
+    key = next((key for key in found.names if key), ())
+    return decide(found, adequate, found.best(key), 0.0, confirmed)
+
+
 ACROSS, ALONG = (0.0, 1.0, 0.0), (1.0, 0.1, 0.0)
 
 
 def test_nothing_is_said_where_nothing_is_likelier_than_not() -> None:
     found = posterior(explained((), 0.6), explained(("a",), 0.4))
-    assert decide(found, 0.5, confirmed=True).verdict == "none"
-    assert decide(found, 0.5, confirmed=False).verdict == "none"
-    assert decide(found, 1e-5, confirmed=True).verdict == "unknown"
-    assert decide(found, 0.5, confirmed=True).nothing == pytest.approx(0.6)
+    assert decided(found, 0.5, True).verdict == "none"
+    assert decided(found, 0.5, False).verdict == "none"
+    assert decided(found, 1e-5, True).verdict == "unknown"
+    assert decided(found, 0.5, True).nothing == pytest.approx(0.6)
 
 
 @pytest.mark.parametrize(
@@ -155,15 +163,38 @@ def test_a_name_needs_an_adequate_fit_and_a_gain_on_unseen_data(
     adequate: float, confirmed: bool, expected: str
 ) -> None:
     found = posterior(explained(("a",), 0.99), explained((), 0.01, chi2=200.0))
-    decision = decide(found, adequate, confirmed=confirmed)
+    decision = decided(found, adequate, confirmed)
     assert (decision.verdict, decision.group) == (expected, (("a",),))
+
+
+def test_a_guess_is_believed_no_more_than_the_data_allow() -> None:
+    """What is left, or unseen data, may speak against all that is known."""
+    found = posterior(explained(("a",), 0.9999), explained((), 1e-4, chi2=200.0))
+    assert decided(found, 0.5, True).held == 1.0
+    assert decided(found, 1e-4, True).held == most_believed(1e-4) < 0.003
+    assert decided(found, 0.0, True).held == 0.0
+    refuted = decide(found, 0.5, found.best(("a",)), -5.0, confirmed=False)
+    assert refuted.held == pytest.approx(1.0 / (1.0 + np.exp(5.0)))
+    assert decide(found, 0.5, found.best(("a",)), 4.0, confirmed=False).held == 0.5
+    clean = posterior(explained((), 0.999), explained(("a",), 0.001))
+    assert decided(clean, 0.5, True).nothing == pytest.approx(0.999)
+    assert decided(clean, 1e-9, True).nothing < 1e-6
+
+
+def test_what_unseen_data_bear_out_stands_first() -> None:
+    found = posterior(
+        explained(("a",), 0.7), explained(("b",), 0.29, direction=ACROSS), explained((), 0.01)
+    )
+    decision = decide(found, 0.5, found.best(("b",)), 1.0, confirmed=True)
+    assert decision.group == (("b",), ("a",))
+    assert decision.angles == pytest.approx((0.0, 90.0))
 
 
 def test_rivals_that_the_data_do_not_exclude_are_one_group() -> None:
     close = posterior(
         explained(("a",), 0.7), explained(("b",), 0.29, direction=ACROSS), explained((), 0.01)
     )
-    decision = decide(close, 0.5, confirmed=True)
+    decision = decided(close, 0.5, True)
     assert decision.verdict == "ambiguous"
     assert decision.group == (("a",), ("b",))
     assert decision.angles[1] == pytest.approx(90.0)
@@ -176,9 +207,9 @@ def test_a_rival_of_little_probability_stays_only_where_it_is_nearly_parallel() 
             explained(("b",), 0.014, chi2=70.0, direction=direction),
             explained((), 0.001),
         )
-        assert decide(found, 0.5, confirmed=True).verdict == expected
+        assert decided(found, 0.5, True).verdict == expected
     gone = posterior(explained(("a",), 0.999), explained(("b",), 0.001, chi2=74.0, direction=ALONG))
-    assert decide(gone, 0.5, confirmed=True).verdict == "named"
+    assert decided(gone, 0.5, True).verdict == "named"
 
 
 @pytest.mark.parametrize(
@@ -232,7 +263,7 @@ def test_textbook_physics_in_all_that_is_left_is_named_whatever_is_beside_it() -
     group, _ = inseparable(found)
     assert len(group) == 3
     assert mostly_common(found, group)
-    decision = decide(found, 0.5, confirmed=True)
+    decision = decided(found, 0.5, True)
     assert (decision.verdict, decision.group[0]) == ("named", ("a",))
 
 
@@ -251,7 +282,7 @@ def test_a_cause_that_some_names_lack_is_not_named_for_sure() -> None:
     )
     for found in (apart, weak, more):
         assert not mostly_common(found, inseparable(found)[0])
-        assert decide(found, 0.5, confirmed=True).verdict == "ambiguous"
+        assert decided(found, 0.5, True).verdict == "ambiguous"
 
 
 def test_an_angle_is_between_subspaces_and_takes_no_units() -> None:

@@ -12,11 +12,10 @@ from femubench.core.advise.advice import advise
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.proof import (
     Unseen,
-    another_stands,
+    borne_out,
     extended_by,
     gain_of,
     left_out,
-    stands,
     unseen_of,
 )
 from femubench.core.diagnosis.result import Diagnosis
@@ -34,6 +33,7 @@ from femubench.core.fem.model import Model
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.extended_model import departure
 from femubench.core.inference.posterior import Explanation
+from femubench.core.inference.search import adequacy
 from femubench.core.inference.static_response import LargeProblem
 from femubench.core.look.localisation import locate
 from femubench.core.look.look import look
@@ -48,11 +48,28 @@ _MOST_ADVISED = 8  # explanations that advice parts from each other
 
 @dataclass(frozen=True)
 class _Proof:
-    """Data that did not name the cause."""
+    """What data that did not name the cause say of it.
 
+    Arguments:
+        leader: the best guess, or what unseen data bear out where they refute that.
+        model: the extended model.
+        unseen: errors of the unseen data.
+        gain: before and after.
+        crossed: whether used modes were left out in turn, for want of unseen ones.
+        confirmed: whether unseen data bear the leader out.
+    """
+
+    leader: Explanation
+    model: Model
     unseen: tuple[Unseen, ...]
     gain: Gain
     crossed: bool
+    confirmed: bool
+
+    @property
+    def log_bayes(self) -> float:
+        """Return ln of the Bayes factor of the leader against nothing added, on unseen data."""
+        return sum(part.log_bayes for part in self.unseen)
 
 
 def diagnose(
@@ -82,47 +99,48 @@ def diagnose(
     registered = registered_effects()
     known = registered if effects is None else tuple(effects)
     examination = examine(case.model, used, known, tolerance=scatter, pairs=pairs)
-    best = examination.best
-    model = extended_by(case.model, best)
-    proof = _proof(case, examination, best, model)
-    if proof.crossed:
-        confirmed = all(part.confirms(len(best.parts)) for part in proof.unseen)
-    else:
-        confirmed = stands(case, examination, best, model, proof.unseen)
-        confirmed = confirmed or another_stands(case, examination)
-    decision = decide(examination.posterior, examination.adequacy, confirmed=confirmed)
+    proof = _proof(case, examination, known)
+    leader = proof.leader
+    adequate = adequacy(leader.fit.state, leader.unknowns)
+    decision = decide(examination.posterior, adequate, leader, proof.log_bayes, proof.confirmed)
     # The look is no part of the search: whatever is sought, every effect may have its say.
     all_known = {effect.name: effect for effect in (*registered, *known)}
     looks = look(case.model, used, effects=all_known.values())
-    return _written(case, examination, decision, model, proof, looks, begin)
+    return _written(case, examination, decision, adequate, proof, looks, begin)
 
 
-def _proof(case: Case, examination: Examination, best: Explanation, model: Model) -> _Proof:
+def _proof(case: Case, examination: Examination, effects: Sequence[Effect]) -> _Proof:
+    best = examination.best
+    model = extended_by(case.model, best)
     unseen = unseen_of(case, examination, best, model)
     crossed = None
-    if not any(len(part.before) for part in unseen):
-        nominal, slopes = examination.problem, examination.slopes
-        problem = examination.problem_of(best)
-        crossed = left_out(
-            nominal, problem, best.fit, slopes, examination.tolerance, examination.scatter
-        )
+    if any(len(part.before) for part in unseen):
+        found = borne_out(case, examination)
+        confirmed = found is not None
+        if found is not None and found is not best:
+            best, model = found, extended_by(case.model, found)
+            unseen = unseen_of(case, examination, best, model)
+    else:
+        crossed = left_out(examination, effects)
+        unseen = (crossed,)
+        confirmed = crossed.confirms(len(best.parts))
     gain = gain_of(score_model(case, case.model), score_model(case, model), crossed)
-    return _Proof(unseen if crossed is None else (crossed,), gain, crossed is not None)
+    return _Proof(best, model, unseen, gain, crossed is not None, confirmed)
 
 
 def _written(
     case: Case,
     examination: Examination,
     decision: Decision,
-    model: Model,
+    adequate: float,
     proof: _Proof,
     looks: tuple[LookWarning, ...],
     begin: float,
 ) -> Diagnosis:
-    best, posterior = examination.best, examination.posterior
-    group = [posterior.best(key) for key in decision.group]
+    best, posterior = proof.leader, examination.posterior
+    group = [best, *(posterior.best(key) for key in decision.group[1:])] if decision.group else []
     shown = group if decision.verdict == "ambiguous" else group[:1]
-    options = [placed_causes(examination, explanation) for explanation in shown]
+    options = [placed_causes(examination, explanation, decision.held) for explanation in shown]
     causes = _group_causes(options)
     top = posterior.names[decision.group[0]] if decision.group else decision.nothing
     named = bool(decision.group)
@@ -141,12 +159,12 @@ def _written(
         gain=proof.gain,
         chi2=(examination.nominal.chi2, after.chi2),
         data_count=len(examination.problem.data),
-        adequacy_p=examination.adequacy,
+        adequacy_p=adequate,
         nothing=decision.nothing,
         looks=looks,
         locations=(*evidence_rows(examination), *locate(case.model, used)),
         base=best.base.names if named else (),
-        extended=model if named else case.model,
+        extended=proof.model if named else case.model,
         notes=_notes(examination, proof, best, shown),
         seconds=time.perf_counter() - begin,
         subject=case,
@@ -200,6 +218,12 @@ def _notes(
         )
     elif best.parts and not any(part.visible for part in proof.unseen):
         notes.append("The unseen data hardly change with the cause, so they cannot confirm it.")
+    if best is not examination.best:
+        first = examination.best
+        names = " + ".join(examination.posterior.key(first))
+        notes.append(
+            f"{names} at {first.place} is likelier by the used data, but unseen data refute it."
+        )
     unearned = [name for name in best.base.names if name not in examination.posterior.earned]
     if unearned:
         notes.append(

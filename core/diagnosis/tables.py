@@ -88,12 +88,15 @@ def causes_in(explanation: Explanation, share: float, earned: frozenset[str]) ->
     return causes
 
 
-def placed_causes(examination: Examination, explanation: Explanation) -> list[Cause]:
+def placed_causes(
+    examination: Examination, explanation: Explanation, held: float = 1.0
+) -> list[Cause]:
     """Return the causes of an explanation, each with the probability of its name and of its place.
 
     Arguments:
         examination: what the explanation was weighed in.
         explanation: one of its explanations.
+        held: probability that any of them holds, at most.
     """
     posterior = examination.posterior
     causes = causes_in(explanation, 1.0, posterior.earned)
@@ -112,7 +115,7 @@ def placed_causes(examination: Examination, explanation: Explanation) -> list[Ca
         found.append(
             replace(
                 cause,
-                probability=posterior.inclusion(cause.effect),
+                probability=held * posterior.inclusion(cause.effect),
                 place_probability=shares[cause.place],
                 places=credible(shares),
                 mirrors=mirror_places(examination.model, cause.place, others) if others else (),

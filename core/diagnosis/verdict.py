@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
+from scipy.special import expit
 
 from femubench.core.inference.posterior import (
     LIKELY_NOTHING,
@@ -42,12 +43,15 @@ class Decision:
         group: the names that stay, most probable first; the first one is the best guess.
         nothing: probability that nothing is missing.
         angles: of every name of the group to the first one, degrees.
+        held: probability that any known explanation holds, at most; below 1 where what is left, or
+            unseen data, speak against all of them.
     """
 
     verdict: Verdict
     group: tuple[Key, ...]
     nothing: float
     angles: tuple[float, ...]
+    held: float = 1.0
 
 
 def angle_between(first: Explanation, second: Explanation) -> float:
@@ -63,26 +67,46 @@ def angle_between(first: Explanation, second: Explanation) -> float:
     return float(np.degrees(la.subspace_angles(one, two)[0]))
 
 
-def decide(posterior: Posterior, adequate: float, *, confirmed: bool) -> Decision:
+def decide(
+    posterior: Posterior, adequate: float, leader: Explanation, log_bayes: float, confirmed: bool
+) -> Decision:
     """Return the verdict.
 
     Arguments:
         posterior: all explanations.
-        adequate: probability of what the best explanation leaves, were it noise.
-        confirmed: whether unseen data bear the best explanation out.
+        adequate: probability of what the leading explanation leaves, were it noise.
+        leader: the most probable explanation, or what unseen data bear out in its place.
+        log_bayes: ln of its Bayes factor on unseen data against nothing added.
+        confirmed: whether unseen data bear it out.
     """
     nothing = posterior.names.get((), 0.0)
     if nothing >= LIKELY_NOTHING:
+        held = 1.0 if adequate > _NOISE else most_believed(adequate)
         verdict: Verdict = "none" if adequate > _NOISE else "unknown"
-        return Decision(verdict, (), nothing, ())
-    group, angles = inseparable(posterior)
+        return Decision(verdict, (), nothing * held, (), held)
+    group, angles = inseparable(posterior, leader)
+    held = 1.0
     if adequate <= _NOISE:
-        verdict = "unknown"
+        verdict, held = "unknown", most_believed(adequate)
+        nothing *= held
     elif not confirmed:
-        verdict = "not-confirmed"
+        verdict, held = "not-confirmed", float(expit(min(log_bayes, 0.0)))
     else:
         verdict = "ambiguous" if len(group) > 1 and not mostly_common(posterior, group) else "named"
-    return Decision(verdict, group, nothing, angles)
+    return Decision(verdict, group, nothing, angles, held)
+
+
+def most_believed(p: float) -> float:
+    """Return the most that can be believed of a hypothesis that data contradict, at even odds.
+
+    Arguments:
+        p: probability of data as far off, were it true; below 1 / e.
+
+    Source: Sellke, Bayarri & Berger (2001), Am. Stat. 55, 62-71: the least Bayes factor
+    -e p ln p.
+    """
+    factor = -np.e * p * np.log(p) if p > 0.0 else 0.0
+    return float(factor / (1.0 + factor))
 
 
 def mostly_common(posterior: Posterior, group: Sequence[Key]) -> bool:
@@ -117,10 +141,16 @@ def _says_as_much(posterior: Posterior, best: Explanation, first: Key, key: Key)
     return angle_between(best, posterior.best(key)) < _PARALLEL
 
 
-def inseparable(posterior: Posterior) -> tuple[tuple[Key, ...], tuple[float, ...]]:
+def inseparable(
+    posterior: Posterior, leader: Explanation | None = None
+) -> tuple[tuple[Key, ...], tuple[float, ...]]:
     """Return the best name with all that these data cannot exclude, and their angles to it.
 
     Not excluded is what is probable enough, and what fits about as well, whatever its prior says.
+
+    Arguments:
+        posterior: all explanations.
+        leader: what stands first, and the angles are to; the most probable one by default.
     """
     names = {key: p for key, p in posterior.names.items() if key}
     something = sum(names.values())
@@ -138,7 +168,11 @@ def inseparable(posterior: Posterior) -> tuple[tuple[Key, ...], tuple[float, ...
             group.append(key)
             angles.append(angle)
             covered += share
-    return tuple(group), tuple(angles)
+    if leader is None or posterior.key(leader) == group[0]:
+        return tuple(group), tuple(angles)
+    first = posterior.key(leader)
+    keys = (first, *(key for key in group if key != first))
+    return keys, (0.0, *(angle_between(leader, posterior.best(key)) for key in keys[1:]))
 
 
 def fits_as_well(posterior: Posterior, best: Explanation, key: Key) -> bool:
@@ -149,8 +183,7 @@ def fits_as_well(posterior: Posterior, best: Explanation, key: Key) -> bool:
     if set(posterior.key(best)) <= set(key):
         return False
     return any(
-        fits_better(best, other) <= _AS_WELL
-        and abs(best.unknowns - other.unknowns) <= _MORE_VALUES
+        fits_better(best, other) <= _AS_WELL and abs(best.unknowns - other.unknowns) <= _MORE_VALUES
         for other, _ in posterior.members(key)
     )
 

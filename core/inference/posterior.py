@@ -48,7 +48,7 @@ class Explanation:
 
     @property
     def log_likelihood(self) -> float:
-        """Return ln of the probability of the data at the best fit, up to a constant of the data."""
+        """Return ln of the probability of the data at the best fit, up to a constant of them."""
         return -0.5 * self.chi2
 
     @property
