@@ -22,6 +22,7 @@ from femubench.core.diagnosis.verdict import (
     inseparable,
     most_believed,
     mostly_common,
+    overstatement,
 )
 from femubench.core.inference.posterior import Posterior
 from femubench.core.inference.residuals import Data
@@ -99,6 +100,18 @@ def test_fitted_values_count_as_spent(data: Data) -> None:
     assert many < few
 
 
+@pytest.mark.parametrize("factor", [1.0, 3.0, 4.0])
+def test_deviations_that_are_far_too_large_are_seen_with_their_factor(
+    data: Data, factor: float
+) -> None:
+    rng = np.random.default_rng(2)
+    residual = noise(data, rng) / factor
+    state = left(residual, data)
+    state.chi2, state.x = float(residual @ residual), np.zeros(0)
+    found = overstatement(state)
+    assert found == (1.0 if factor == 1.0 else pytest.approx(factor, rel=0.15))
+
+
 # --- decisions --------------------------------------------------------------------------------
 
 
@@ -110,6 +123,7 @@ def explained(
     direction: Sequence[float] = (1.0, 0.0, 0.0),
     place: str = "all",
     book: Names = (),
+    data: int = 60,
 ) -> Any:
     """Return an explanation as far as a verdict looks at it."""
     columns = np.array(direction, dtype=float)[:, None] if names else np.zeros((3, 0))
@@ -124,7 +138,14 @@ def explained(
         unknowns=len(names),
         log_weight=float(np.log(probability)),
         fit=SimpleNamespace(
-            state=SimpleNamespace(jacobian=columns), log_evidence=float(np.log(probability))
+            state=SimpleNamespace(
+                jacobian=columns,
+                chi2=chi2,
+                x=np.zeros(len(names)),
+                residual=np.zeros(data),
+                problem=SimpleNamespace(data=SimpleNamespace(scale_count=0)),
+            ),
+            log_evidence=float(np.log(probability)),
         ),
     )
 
@@ -234,6 +255,15 @@ def test_a_rival_that_only_its_prior_excludes_is_in_the_group(
     )
     group, _ = inseparable(found)
     assert (names in group) is expected
+
+
+def test_where_deviations_are_too_large_likelihoods_count_for_more() -> None:
+    """A chi-square of 60 for 600 data: differences are ten times what they seem."""
+    found = posterior(
+        explained(("a",), 0.9999, data=600),
+        explained(("b",), 1e-5, chi2=64.0, direction=ACROSS),
+    )
+    assert inseparable(found)[0] == (("a",),)
 
 
 def test_textbook_physics_that_the_data_hardly_notice_is_no_part_of_a_name() -> None:
@@ -347,6 +377,18 @@ def test_without_a_tolerance_the_same_data_count_for_more() -> None:
     assert two.std < one.std
     given = diagnosed(replace(case, tolerance=0.0), pairs=False)
     assert given.chi2 == strict.chi2
+
+
+@pytest.mark.parametrize(("factor", "said"), [(1.0, False), (5.0, True)])
+def test_a_stated_scatter_that_is_far_too_large_is_said(factor: float, said: bool) -> None:
+    case = trial("member-mass", "rung-middle", 0.2)
+    m = case.measurement
+    loose = replace(m, frequency_std=factor * m.frequency_std, shape_std=factor * m.shape_std)
+    found = diagnosed(replace(case, measurement=loose), pairs=False, tolerance=0.0)
+    notes = [note for note in found.notes if "times too large" in note]
+    assert bool(notes) is said
+    if said:
+        assert "about 5" in notes[0] or "about 4" in notes[0]
 
 
 @pytest.mark.parametrize("size", [0.01, 0.03, 0.05])

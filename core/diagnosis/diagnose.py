@@ -27,7 +27,7 @@ from femubench.core.diagnosis.tables import (
     smallest_visible,
     tied_places,
 )
-from femubench.core.diagnosis.verdict import Decision, decide, elsewhere
+from femubench.core.diagnosis.verdict import Decision, decide, elsewhere, overstatement
 from femubench.core.diagnosis.words import sentence_of
 from femubench.core.fem.model import Model
 from femubench.core.inference.examine import Examination, examine
@@ -212,6 +212,12 @@ def _notes(
     examination: Examination, proof: _Proof, best: Explanation, shown: Sequence[Explanation]
 ) -> tuple[str, ...]:
     notes = []
+    if (factor := overstatement(best.fit.state)) > 1.0:
+        notes.append(
+            f"What is left is far less than the stated scatter leaves by chance: the standard "
+            f"deviations (or the tolerance) seem about {factor:.2g} times too large, which hides "
+            "causes and widens every margin."
+        )
     if proof.crossed:
         notes.append(
             "The case holds nothing back: the gain is that on used modes left out in turn."

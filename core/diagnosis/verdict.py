@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
-from scipy.special import expit
+from scipy.special import chdtr, expit
 
+from femubench.core.inference.fit import State
 from femubench.core.inference.posterior import (
     LIKELY_NOTHING,
     Explanation,
@@ -31,6 +32,7 @@ _LARGEST_GROUP = 6
 # A rival this near in ln likelihood, with hardly more or fewer values fitted, is excluded by its
 # prior alone: 6 of chi-square.
 _AS_WELL, _MORE_VALUES = 3.0, 2
+_LEAST = 1e-9  # of chi-square, for simulated data without scatter
 _CREDIBLE = 0.95
 
 
@@ -175,15 +177,28 @@ def inseparable(
     return keys, (0.0, *(angle_between(leader, posterior.best(key)) for key in keys[1:]))
 
 
+def overstatement(state: State) -> float:
+    """Return by what factor the stated deviations seem too large; 1 where chance may have done it.
+
+    Source: the lower tail of chi-square, as its upper tail is used for what is left.
+    """
+    dof = len(state.residual) - len(state.x) - state.problem.data.scale_count
+    if dof < 1 or chdtr(dof, state.chi2) >= _NOISE:
+        return 1.0
+    return float(np.sqrt(dof / max(state.chi2, _LEAST)))
+
+
 def fits_as_well(posterior: Posterior, best: Explanation, key: Key) -> bool:
     """Tell whether a name explains the data about as well as the best explanation does.
 
-    A name that only adds to the best one always does, and is left to its evidence.
+    A name that only adds to the best one always does, and is left to its evidence. Where the
+    stated deviations are too large, so are those of the likelihoods.
     """
     if set(posterior.key(best)) <= set(key):
         return False
+    limit = _AS_WELL / overstatement(best.fit.state) ** 2
     return any(
-        fits_better(best, other) <= _AS_WELL and abs(best.unknowns - other.unknowns) <= _MORE_VALUES
+        fits_better(best, other) <= limit and abs(best.unknowns - other.unknowns) <= _MORE_VALUES
         for other, _ in posterior.members(key)
     )
 
