@@ -212,12 +212,13 @@ def _notes(
     examination: Examination, proof: _Proof, best: Explanation, shown: Sequence[Explanation]
 ) -> tuple[str, ...]:
     notes = []
-    if (factor := overstatement(best.fit.state)) > 1.0:
-        notes.append(
-            f"What is left is far less than the stated scatter leaves by chance: the standard "
-            f"deviations (or the tolerance) seem about {factor:.2g} times too large, which hides "
-            "causes and widens every margin."
-        )
+    for kind in ("frequencies", "shapes"):
+        if (factor := overstatement(best.fit.state, kind)) > 1.0:
+            notes.append(
+                f"What is left of the {kind} is far less than their stated scatter leaves by "
+                f"chance: their standard deviations (or the tolerance) seem about {factor:.2g} "
+                "times too large, which hides causes and widens every margin."
+            )
     if proof.crossed:
         notes.append(
             "The case holds nothing back: the gain is that on used modes left out in turn."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import scipy.linalg as la
@@ -177,15 +178,24 @@ def inseparable(
     return keys, (0.0, *(angle_between(leader, posterior.best(key)) for key in keys[1:]))
 
 
-def overstatement(state: State) -> float:
-    """Return by what factor the stated deviations seem too large; 1 where chance may have done it.
+def overstatement(state: State, kind: Literal["all", "frequencies", "shapes"] = "all") -> float:
+    """Return by what factor stated deviations seem too large; 1 where chance may have done it.
 
-    Source: the lower tail of chi-square, as its upper tail is used for what is left.
+    The lower tail of chi-square, as its upper tail is used for what is left.
+
+    Arguments:
+        state: after the fit.
+        kind: of the data.
     """
-    dof = len(state.residual) - len(state.x) - state.problem.data.scale_count
-    if dof < 1 or chdtr(dof, state.chi2) >= _NOISE:
+    data = state.problem.data
+    first, last = len(data.measurement), len(data.measurement) + len(data.shape_rows[0])
+    rows = {"all": slice(None), "frequencies": slice(first), "shapes": slice(first, last)}[kind]
+    rest = state.residual[rows]
+    scales = 0 if kind == "frequencies" else data.scale_count
+    dof, chi2 = len(rest) - len(state.x) - scales, float(rest @ rest)
+    if dof < 1 or chdtr(dof, chi2) >= _NOISE:
         return 1.0
-    return float(np.sqrt(dof / max(state.chi2, _LEAST)))
+    return float(np.sqrt(dof / max(chi2, _LEAST)))
 
 
 def fits_as_well(posterior: Posterior, best: Explanation, key: Key) -> bool:
