@@ -87,6 +87,15 @@ def place_at(place: str) -> str:
     return "everywhere" if place == "all" else place
 
 
+def weight(row: Data) -> str:
+    """Return what data and prior say for the first explanation against another one."""
+    against = "no cause at all" if row["against"] == "nothing" else plain(row["against"])
+    return (
+        f"against {against}, the data add {signed(row['data'])} to the logarithm of the odds, "
+        f"the prior {signed(row['prior'])}"
+    )
+
+
 def sits(cause: Data) -> str:
     """Return how sure the place of a cause is, and where else it may sit."""
     if cause["place"] == "all" or cause["place_probability"] is None:

@@ -440,6 +440,33 @@ def test_three_times_the_smallest_visible_size_is_found(clean: Diagnosis, effect
     assert effect in {cause.effect for cause in found.causes}
 
 
+def test_what_the_data_say_and_what_the_prior_adds_make_up_the_odds() -> None:
+    found = diagnosed(trial("density", "all", 0.08, weighed=False), pairs=False)
+    nothing, rival = found.evidence
+    assert nothing.against == "nothing"
+    assert nothing.data == pytest.approx(0.5 * (found.chi2[0] - found.chi2[1]))
+    assert nothing.data > 20.0
+    assert nothing.prior < 0.0
+    # Modulus or density: the same data, and so does the prior say.
+    assert rival.against.split(" at ")[0] in ("youngs-modulus", "density")
+    assert abs(rival.data) < 1.0
+    first, second = (cause.probability for cause in found.causes)
+    assert rival.data + rival.prior == pytest.approx(np.log(first / second), abs=0.05)
+
+
+def test_a_guess_that_does_not_explain_the_data_is_not_stated_as_sure() -> None:
+    """Two sensors swapped: no effect does that, whatever fits best."""
+    case = trial("member-mass", "rung-middle", 0.2)
+    shapes = case.measurement.shapes.copy()
+    shapes[[0, 3]] = shapes[[3, 0]]
+    swapped = replace(case, measurement=replace(case.measurement, shapes=shapes))
+    found = diagnosed(swapped, pairs=False)
+    assert found.verdict == "unknown"
+    assert found.causes
+    assert all(cause.probability < 0.02 for cause in found.causes)
+    assert found.nothing < 0.02
+
+
 # --- what cannot be diagnosed, and what can all the same --------------------------------------
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from femubench.core.diagnosis.proof import (
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.tables import (
     evidence_rows,
+    odds_rows,
     placed_causes,
     residual_rows,
     rivals_of,
@@ -151,7 +153,7 @@ def _written(
         verdict=decision.verdict,
         sentence=sentence_of(decision, causes, options, top, proof.gain),
         causes=tuple(causes),
-        rivals=rivals_of(examination, best if named else None),
+        rivals=rivals_of(examination, best if named else None, group),
         reason=_reason(decision),
         advice=_advice(examination, group),
         smallest_visible=smallest_visible(examination.found[0]),
@@ -167,6 +169,7 @@ def _written(
         extended=proof.model if named else case.model,
         notes=_notes(examination, proof, best, shown),
         seconds=time.perf_counter() - begin,
+        evidence=odds_rows(posterior, best) if named else (),
         subject=case,
     )
 
@@ -208,17 +211,23 @@ def _advice(examination: Examination, group: Sequence[Explanation]) -> tuple[Adv
     return advise(examination.model, problems, fits, tolerance=examination.tolerance)
 
 
+def _overstated(best: Explanation) -> list[str]:
+    """Return a note on every kind of data whose stated deviations are far too large."""
+    kinds: tuple[Literal["frequencies", "shapes"], ...] = ("frequencies", "shapes")
+    factors = {kind: overstatement(best.fit.state, kind) for kind in kinds}
+    return [
+        f"What is left of the {kind} is far less than their stated scatter leaves by chance: "
+        f"their standard deviations (or the tolerance) seem about {factor:.2g} times too large, "
+        "which hides causes and widens every margin."
+        for kind, factor in factors.items()
+        if factor > 1.0
+    ]
+
+
 def _notes(
     examination: Examination, proof: _Proof, best: Explanation, shown: Sequence[Explanation]
 ) -> tuple[str, ...]:
-    notes = []
-    for kind in ("frequencies", "shapes"):
-        if (factor := overstatement(best.fit.state, kind)) > 1.0:
-            notes.append(
-                f"What is left of the {kind} is far less than their stated scatter leaves by "
-                f"chance: their standard deviations (or the tolerance) seem about {factor:.2g} "
-                "times too large, which hides causes and widens every margin."
-            )
+    notes = _overstated(best)
     if proof.crossed:
         notes.append(
             "The case holds nothing back: the gain is that on used modes left out in turn."

@@ -12,6 +12,7 @@ from femubench.core.fem.model import Model
 from femubench.core.schema.diagnosis import (
     Advice,
     Cause,
+    Evidence,
     Gain,
     LocationRow,
     LookWarning,
@@ -51,6 +52,7 @@ class Diagnosis(Shown):
         extended: the model with the causes in it; the nominal one where none was named.
         notes: further remarks, one sentence each.
         seconds: spent.
+        evidence: what the data say for the first explanation, and what the prior adds.
         subject: the case itself, for drawings of its structure.
     """
 
@@ -74,6 +76,7 @@ class Diagnosis(Shown):
     extended: Model = field(repr=False)
     notes: tuple[str, ...] = ()
     seconds: float = 0.0
+    evidence: tuple[Evidence, ...] = ()
     subject: Case | None = field(default=None, repr=False)
 
     def rows(self) -> Sequence[tuple[str, str]]:
@@ -96,8 +99,8 @@ class Diagnosis(Shown):
         """Return one of the tables as a data frame.
 
         Arguments:
-            table: ``causes``, ``rivals``, ``advice``, ``smallest_visible``, ``residuals``,
-                ``looks`` or ``locations``.
+            table: ``causes``, ``rivals``, ``evidence``, ``advice``, ``smallest_visible``,
+                ``residuals``, ``looks`` or ``locations``.
 
         Raises:
             KeyError: when there is no such table.
@@ -114,6 +117,7 @@ class Diagnosis(Shown):
 _TABLES: dict[str, Any] = {
     "causes": Cause,
     "rivals": Rival,
+    "evidence": Evidence,
     "advice": Advice,
     "smallest_visible": SmallestVisible,
     "residuals": ResidualRow,

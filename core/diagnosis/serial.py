@@ -20,6 +20,7 @@ from femubench.core.schema.diagnosis import (
     Advice,
     Cause,
     CauseParameter,
+    Evidence,
     Gain,
     LocationRow,
     LookWarning,
@@ -132,7 +133,8 @@ def _record(kind: type, **more: tuple[Any, Any]) -> type[BaseModel]:
 _UNTOLD = ("extended", "subject")
 # What older versions did not write, by the data class; a type goes with what is no field of it.
 _OPTIONAL: dict[Any, dict[str, Any]] = {
-    **{k: {} for k in (Advice, Cause, CauseParameter, Gain, LocationRow, ResidualRow, Rival)},
+    **{k: {} for k in (Advice, Cause, CauseParameter, Evidence, Gain)},
+    **{k: {} for k in (LocationRow, ResidualRow, Rival)},
     SmallestVisible: {"place": ""},
     LookWarning: {"changes": (list[_Change], [])},
     Diagnosis: {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -10,12 +11,13 @@ from femubench.core.diagnosis.symmetry import mirror_places
 from femubench.core.diagnosis.verdict import angle_between, credible, places_of
 from femubench.core.inference.examine import Examination
 from femubench.core.inference.fit import State
-from femubench.core.inference.posterior import Explanation, Posterior
+from femubench.core.inference.posterior import Explanation, Posterior, fits_better
 from femubench.core.inference.search import Found
 from femubench.core.roles import EffectParameter
 from femubench.core.schema.diagnosis import (
     Cause,
     CauseParameter,
+    Evidence,
     LocationRow,
     ResidualRow,
     Rival,
@@ -157,8 +159,16 @@ def _slope(parameter: EffectParameter, x: float) -> float:
     return abs(ends[1] - ends[0]) / max(high - low, 1e-12)
 
 
-def rivals_of(examination: Examination, best: Explanation | None) -> tuple[Rival, ...]:
-    """Return other explanations by probability, one row a name and place."""
+def rivals_of(
+    examination: Examination, best: Explanation | None, group: Iterable[Explanation] = ()
+) -> tuple[Rival, ...]:
+    """Return other explanations by probability, one row a name and place.
+
+    Arguments:
+        examination: all explanations.
+        best: the one that is no rival of itself.
+        group: what must not be missing, however improbable.
+    """
     nothing = examination.nominal.chi2
     posterior = examination.posterior
     totals: dict[tuple[str, str], float] = {}
@@ -171,6 +181,8 @@ def rivals_of(examination: Examination, best: Explanation | None) -> tuple[Rival
         first.setdefault(label, explanation)
     own = (" + ".join(best.searched), best.place) if best is not None else ("", "")
     ranked = [label for label in by_probability(totals) if label != own]
+    inside = [(" + ".join(e.searched), e.place) for e in group]
+    ranked = [*ranked[:_LISTED], *(label for label in ranked[_LISTED:] if label in inside)]
     return tuple(
         Rival(
             *label,
@@ -178,8 +190,27 @@ def rivals_of(examination: Examination, best: Explanation | None) -> tuple[Rival
             probability=totals[label],
             angle=angle_between(best, first[label]) if best is not None else float("nan"),
         )
-        for label in ranked[:_LISTED]
+        for label in ranked
     )
+
+
+def odds_rows(posterior: Posterior, best: Explanation) -> tuple[Evidence, ...]:
+    """Return what data and prior say for an explanation, against nothing and the best rival.
+
+    A rival that only adds to the explanation fits better in any case, and is none.
+    """
+    name = posterior.key(best)
+    nothing = next(e for e in posterior.explanations if not e.parts and not e.base.parts)
+    rivals = [key for key in posterior.names if key and not set(name) <= set(key)]
+    others = [("nothing", nothing)]
+    for key in rivals[:1]:
+        rival = posterior.best(key)
+        others.append((f"{' + '.join(key)} at {rival.place or 'all'}", rival))
+    rows = []
+    for label, other in others:
+        data = fits_better(best, other)
+        rows.append(Evidence(label, data, best.log_weight - other.log_weight - data))
+    return tuple(rows)
 
 
 def smallest_visible(found: Found) -> tuple[SmallestVisible, ...]:

@@ -70,6 +70,22 @@ class Rival:
 
 
 @dataclass(frozen=True)
+class Evidence:
+    """What speaks for the first explanation against another one, in ln of the odds.
+
+    Arguments:
+        against: ``nothing``, or a rival with its place.
+        data: ln of the likelihood ratio at the best fits: what the data say.
+        prior: what the prior adds: how many causes, effects, places, and how wide a range of
+            sizes was open to each.
+    """
+
+    against: str
+    data: float
+    prior: float
+
+
+@dataclass(frozen=True)
 class Advice:
     """A measurement that one could make, and the distance in squared sigmas (d2) it creates."""
 
