@@ -28,7 +28,7 @@ from femubench.core.inference.posterior import Posterior
 from femubench.core.inference.residuals import Data
 from femubench.core.inference.search import adequacy
 from femubench.effect import Effect
-from femubench.fem import Frame
+from femubench.fem import Frame, Joint, Material, Member, Place, Section, Support
 
 sys.path.insert(0, str(Path(__file__).parent))
 from diagnosis_problems import case_of, catalogue, effects_named, measured
@@ -541,6 +541,57 @@ def test_matrices_are_diagnosed_by_what_applies_to_them() -> None:
     assert found.verdict in ("named", "ambiguous")
     assert "youngs-modulus" in {cause.effect for cause in found.causes}
     assert found.extended.size == MODEL.size
+
+
+def beam(elements: int, section: Section, *, clamped: bool = False) -> Frame:
+    """Return a beam of 1 m in the x-z plane, held at one end or at both."""
+    joints = Joint("A", (0.0, 0.0, 0.0), "E"), Joint("B", (1.0, 0.0, 0.0), "E")
+    member = Member("beam", ("A", "B"), elements, section, Material(2.1e11, 0.3, 7850.0))
+    held = ("A", "B") if clamped else ("A",)
+    supports = tuple(Support(Place(joint=name), ("x", "z", "ry")) for name in held)
+    return Frame("in-plane", "euler-bernoulli", joints, (member,), supports=supports)
+
+
+WHOLE = Section(1e-4, 1e-9, 1e-9, 2e-9, 2e-9)
+PLANE = Section(1e-4, 1e-9, 0.0, 0.0, 0.0)  # A and Iy alone, which is all that a plane needs
+
+
+@pytest.mark.parametrize("used", [2, 4, 5])
+@pytest.mark.parametrize("shapes", [0, 3])
+def test_fewer_modes_in_the_model_than_in_the_data_are_one_clear_error(
+    used: int, shapes: int
+) -> None:
+    frame = beam(1, WHOLE)
+    test = measured(Model.of(beam(12, WHOLE)), frame, count=5, shapes=shapes)
+    with pytest.raises(InputError, match=r"the model has 3 modes, the data have [45]") as caught:
+        diagnosed(case_of(Model.of(frame), test, used))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_section_of_a_plane_frame_needs_its_area_and_iy_alone() -> None:
+    frame = beam(6, PLANE, clamped=True)
+    model = Model.of(frame)
+    truth = catalogue()["youngs-modulus"].extend(model, "all", (-0.1,))
+    test = measured(truth, frame, count=6, shapes=3)
+    found = diagnose(case_of(model, test, 4), effects_named("youngs-modulus", "axial-preload"))
+    assert "youngs-modulus" in {cause.effect for cause in found.causes}
+    (preload,) = catalogue()["axial-preload"].parameters(model, "beam")
+    assert preload.scale == pytest.approx(0.15 * np.pi**2 * 2.1e11 * 1e-9)
+
+
+@pytest.mark.parametrize("missing", [False, True])
+def test_a_mode_that_the_band_should_hold_and_does_not_is_said(missing: bool) -> None:
+    case = trial("member-mass", "rung-middle", 0.05)
+    m = case.measurement
+    band = 0.5 * float(m.frequencies[0]), 1.02 * float(m.frequencies[-1])
+    kept = replace(case, band=band)
+    if missing:
+        kept = replace(kept, measurement=m.select([n for n in m.numbers if n != 8]))
+        kept = replace(kept, held_out=tuple(n for n in case.held_out if n != 8))
+    said = [look.what for look in diagnosed(kept, pairs=False).looks if "band" in look.what]
+    assert len(said) == int(missing)
+    if missing:
+        assert "without a partner: mode 8" in said[0]
 
 
 @pytest.mark.parametrize("effects", [(), effects_named("amplitude-dependent-stiffness")])

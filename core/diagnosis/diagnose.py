@@ -39,6 +39,8 @@ from femubench.core.inference.search import adequacy
 from femubench.core.inference.static_response import LargeProblem
 from femubench.core.look.localisation import locate
 from femubench.core.look.look import look
+from femubench.core.look.modes import Seen
+from femubench.core.look.readings import look_at_band
 from femubench.core.plugin.loader import registered_effects
 from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning
@@ -108,6 +110,9 @@ def diagnose(
     # The look is no part of the search: whatever is sought, every effect may have its say.
     all_known = {effect.name: effect for effect in (*registered, *known)}
     looks = look(case.model, used, effects=all_known.values())
+    if case.band is not None:
+        # All modes that were found, used or not: what is not among them is not in the structure.
+        looks += tuple(look_at_band(Seen(case.model, case.measurement), case.band))
     return _written(case, examination, decision, adequate, proof, looks, begin)
 
 
@@ -167,7 +172,7 @@ def _written(
         locations=(*evidence_rows(examination), *locate(case.model, used)),
         base=best.base.names if named else (),
         extended=proof.model if named else case.model,
-        notes=_notes(examination, proof, best, shown),
+        notes=_notes(case, examination, proof, shown),
         seconds=time.perf_counter() - begin,
         evidence=odds_rows(posterior, best) if named else (),
         subject=case,
@@ -225,9 +230,13 @@ def _overstated(best: Explanation) -> list[str]:
 
 
 def _notes(
-    examination: Examination, proof: _Proof, best: Explanation, shown: Sequence[Explanation]
+    case: Case, examination: Examination, proof: _Proof, shown: Sequence[Explanation]
 ) -> tuple[str, ...]:
+    best = proof.leader
     notes = _overstated(best)
+    if case.band is not None and best.parts:
+        found = look_at_band(Seen(proof.model, case.measurement), case.band)
+        notes += [f"With the causes in it: {warning.what}" for warning in found]
     if proof.crossed:
         notes.append(
             "The case holds nothing back: the gain is that on used modes left out in turn."

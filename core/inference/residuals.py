@@ -76,8 +76,14 @@ class Data:
         Arguments:
             frequencies: predicted, Hz, (g, q).
             readings: predicted shapes at the sensors, (g, n_sensors, q).
+
+        Raises:
+            NotApplicable: when there are fewer predicted modes than measured ones.
         """
         measured = self.measurement.frequencies
+        if frequencies.shape[1] < len(measured):
+            what = f"the model has {frequencies.shape[1]} modes, the data have {len(measured)}"
+            raise NotApplicable(f"{what}; expected a finer mesh, or fewer modes in the data")
         label = np.hypot(self.measurement.frequency_std / measured, _LABEL)
         gap = frequencies[:, None, :] / measured[:, None] - 1.0
         cost = np.square(gap / label[:, None])
