@@ -370,6 +370,15 @@ def test_stiffness_and_density_part_when_the_structure_is_weighed() -> None:
     assert abs(size.value - 0.08) < 4.0 * size.std
 
 
+def test_a_deviation_is_that_of_the_value_in_its_unit() -> None:
+    """Six frequencies to 0.2 % give a density to 2 * 0.2 % / sqrt(6) of the structure's mass."""
+    truth = catalogue()["density"].extend(MODEL, "all", (0.08,))
+    test = measured(truth, FRAME, count=6, shapes=0, weighed=False)
+    found = diagnosed(case_of(MODEL, test, 6), names=("density",), tolerance=0.0)
+    ((size,),) = (cause.parameters for cause in found.causes)
+    assert size.std == pytest.approx(1.08 * 2.0 * 0.002 / np.sqrt(6.0), rel=0.05)
+
+
 def test_without_a_tolerance_the_same_data_count_for_more() -> None:
     case = trial("member-stiffness", "rung-middle", 0.15)
     loose = diagnosed(case, pairs=False)
