@@ -299,7 +299,7 @@ def test_thin_timoshenko_beam_is_an_euler_bernoulli_beam() -> None:
 
 @pytest.mark.parametrize("direction", ["y", "z"])
 def test_shear_along_each_axis_has_its_own_coefficient(direction: str) -> None:
-    """Deflection of a cantilever: bending, and P L / (kappa G A) with the kappa of its direction."""
+    """Deflection of a cantilever: bending, and P L / (kappa G A) with the kappa along it."""
     section = Section(4e-4, 2e-8, 5e-8, 3e-8, 7e-8, kappa=lambda nu: (0.2, 0.7))
     joints = Joint("A", (0.0, 0.0, 0.0), "E"), Joint("B", (0.05, 0.0, 0.0), "E")
     member = Member("beam", ("A", "B"), 2, section, MATERIAL, up=(0.0, 0.0, 1.0))

@@ -12,8 +12,10 @@ import pytest
 from femubench import Case, Diagnosis, Measurement, Model, diagnose
 from femubench.core.case.case import Modification
 from femubench.core.challenge.structures import structure_named
-from femubench.core.diagnosis.proof import Unseen, gain_of, left_out, modified
-from femubench.core.inference.examine import examine
+from femubench.core.diagnosis.proof import Unseen, gain_of, held_out, left_out, modified
+from femubench.core.inference.examine import examine, posed
+from femubench.core.inference.fit import Fit, state_at
+from femubench.core.inference.hypothesis import hypotheses_of
 from femubench.core.inference.mesh_error import refined
 from femubench.core.schema.diagnosis import Cause
 from femubench.core.schema.results import Block, PairedMode
@@ -21,7 +23,7 @@ from femubench.core.score.scoring import score_model
 from femubench.fem import GroundSpring, Place, PointMass
 
 sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import case_of, effects_named, measured
+from diagnosis_problems import case_of, coordinates, effects_named, measured, part_at
 
 FRAME = structure_named("ladder").frame
 MODEL = Model.of(FRAME)
@@ -260,7 +262,7 @@ def test_modes_without_partner_are_no_errors_of_a_hundred_percent() -> None:
 
 def test_the_mesh_is_corrected_mode_by_mode_whatever_mode_a_cause_adds() -> None:
     """Truth: a fine mesh with an oscillator. By index every mode above it would be off."""
-    coarse = Model.of(replace(FRAME, members=tuple(replace(m, elements=1) for m in FRAME.members)))
+    coarse = Model.of(replace(FRAME, members=tuple(replace(m, elements=2) for m in FRAME.members)))
     (effect,) = effects_named("attached-oscillator")
     values = (0.3, 150.0)
     extended = effect.extend(coarse, "J1", values)
@@ -268,7 +270,14 @@ def test_the_mesh_is_corrected_mode_by_mode_whatever_mode_a_cause_adds() -> None
     truth = effect.extend(fine, "J1", values)
     after = measured(truth.attach(*CHANGE), FRAME, count=8, weighed=False)
     change = Modification("mass and spring", *CHANGE, after)
-    test = measured(truth, FRAME, count=8)
+    test = measured(truth, FRAME, count=8, shapes=8)
     case = case_of(coarse, test, 4, modifications=(change,))
     errors = modified(case, extended, 0.0)
     assert np.abs(errors.after).max() < 1e-3
+    place = next(p for p in effect.places(coarse) if p.startswith("J1"))
+    problem, _ = posed(coarse, test.select(case.used), hypotheses_of(coarse, [effect]), 0.0)
+    part = part_at(problem, effect.name, place)
+    state = state_at(problem, (part,), coordinates(part, values))
+    hidden = held_out(case, problem, problem, Fit(state, 0.0), extended, 0.0)
+    assert len(hidden.after) == 4
+    assert np.abs(hidden.after).max() < 1e-3

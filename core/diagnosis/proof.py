@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import log
 
 import numpy as np
 from scipy.special import chdtrc, logsumexp
@@ -32,9 +33,11 @@ _SEES = 0.5  # deviations by which a mode must change to say anything of a cause
 _IDEAL = 0.05
 _INADEQUATE, _GOOD = 2e-3, 0.05
 _FEW = 2
-# Odds of 150 to 1. Where errors stay more than noise, as on every real structure, a fitted cause
-# must be so much likelier than nothing added; textbook physics need not be all that is missing.
-_DECISIVE, _LIKELIER = 5.0, 1.0
+_DECISIVE = 5.0  # odds of 150 to 1
+# By what factor errors must fall at least, in the mean of their logarithms, where they stay more
+# than noise: no real structure is a beam. Physics from the textbook need not be all that is
+# missing; a fitted cause must carry further.
+_HALVED, _FOURFOLD = 2.0, 4.0
 # What a beam model gets wrong of an unseen frequency: nothing as often as not, else log-normal.
 _MODEL_ERROR, _SPREAD = 0.003, 1.5
 # A mode farther off than any model error and than five times what is usual was not measured, or
@@ -76,6 +79,12 @@ class Unseen:
     def _of(self, rows: BoolArray) -> Unseen:
         return Unseen(self.before[rows], self.after[rows], self.std[rows])
 
+    @cached_property
+    def seeing(self) -> Unseen:
+        """Return those of the sound ones that the causes change."""
+        sound = self.sound
+        return sound._of(np.abs(sound.before - sound.after) > _SEES * sound.std)
+
     @property
     def size(self) -> float:
         """Return by how many deviations in all the causes change the unseen modes."""
@@ -94,8 +103,7 @@ class Unseen:
 
         Source: Kass & Raftery (1995), JASA 90, 773-795.
         """
-        sound = self.sound
-        seeing = sound._of(np.abs(sound.before - sound.after) > _SEES * sound.std)
+        seeing = self.seeing
         after = np.hypot(seeing.std, _IDEAL * (seeing.before - seeing.after))
         return _log_likelihood(seeing.after, after) - _log_likelihood(seeing.before, seeing.std)
 
@@ -125,7 +133,7 @@ class Unseen:
             return False
         if fitted > _FEW:
             return self.probability > _GOOD
-        enough = _DECISIVE if fitted else _LIKELIER
+        enough = len(self.seeing.before) * log(_FOURFOLD if fitted else _HALVED)
         return self.probability > _INADEQUATE or log_bayes > enough
 
 
@@ -352,34 +360,36 @@ def stands(
 def borne_out(case: Case, examination: Examination) -> Explanation | None:
     """Return what unseen data bear out of all that the used data cannot tell from the best guess.
 
-    That is the most probable name of the group that unseen data neither refute nor find much
-    less likely than another one; where they refute all names, the same name at a place about as
-    likely; None where they refute these too.
+    That is the best guess, unless all data together, used and unseen, speak for another name of
+    the group: decisively, or at all where unseen data refute the best guess. Where no name is
+    borne out, it is the same name at a place about as likely, or None.
     """
     posterior, best = examination.posterior, examination.best
+    first = _judged(case, examination, best)
     name = posterior.key(best)
-    group = inseparable(posterior)[0][1:] if name else ()
-    stand: list[tuple[Explanation, float]] = []
-    for found in (best, *(posterior.best(key) for key in group)):
-        stand += _standing(case, examination, found)
-    if stand:
-        most = max(log_bayes for _, log_bayes in stand)
-        return next(found for found, log_bayes in stand if log_bayes >= most - _DECISIVE)
+    others = inseparable(posterior)[0][1:] if name else ()
+    rivals = []
+    for key in others:
+        stands, log_bayes = _judged(case, examination, posterior.best(key))
+        gain = log_bayes - first[1] + log(posterior.names[key] / posterior.names[name])
+        if stands and gain > (_DECISIVE if first[0] else 0.0):
+            rivals.append((gain, posterior.best(key)))
+    if rivals:
+        return max(rivals, key=lambda pair: pair[0])[1]
+    if first[0]:
+        return best
     for found in _other_places(posterior, name) if name else ():
-        if _standing(case, examination, found):
+        if _judged(case, examination, found)[0]:
             return found
     return None
 
 
-def _standing(
-    case: Case, examination: Examination, found: Explanation
-) -> list[tuple[Explanation, float]]:
-    """Return an explanation with its ln Bayes factor where unseen data bear it out, else none."""
+def _judged(case: Case, examination: Examination, found: Explanation) -> tuple[bool, float]:
+    """Tell whether unseen data bear an explanation out, and its ln Bayes factor on them."""
     model = extended_by(case.model, found)
     unseen = unseen_of(case, examination, found, model)
-    if not stands(case, examination, found, model, unseen):
-        return []
-    return [(found, sum(part.log_bayes for part in unseen))]
+    log_bayes = sum(part.log_bayes for part in unseen)
+    return stands(case, examination, found, model, unseen), log_bayes
 
 
 def _other_places(posterior: Posterior, key: Key) -> list[Explanation]:
