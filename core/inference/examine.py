@@ -27,6 +27,8 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect
 from femubench.core.typing import FloatArray
 
+_TURNED = 1e-9
+
 
 @dataclass(frozen=True)
 class Examination:
@@ -141,9 +143,11 @@ def _scatter_slopes(problem: Problem, structure: Structure, modes: Modes) -> Flo
     space: Space = problem.space
     nominal = state_at(problem, (), np.zeros(0))
     shapes = modes.take(np.argsort(~modes.rigid, kind="stable")).shapes
-    top = int(nominal.partner.max()) + 1
+    # Close modes are turned to the measured ones, and their forces with them.
+    turned = nominal.vectors[:, nominal.partner]
+    top = int(np.flatnonzero(np.abs(turned).max(axis=1) > _TURNED)[-1]) + 1
     forces = scatter_terms(structure, shapes, space.eigenvalues[:top])
-    near = np.moveaxis(forces[:, nominal.partner, :], 0, 2)
+    near = np.einsum("piN,im->mNp", forces, turned[:top])
     element = structure.properties
     own = element.rhoA * (element.length - element.rigid_mass_1 - element.rigid_mass_2)
     masses = np.concatenate([np.zeros(len(element)), own])

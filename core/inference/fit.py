@@ -118,6 +118,8 @@ class State:
         gap = values - self.eigenvalues[:, None]
         least = _CLOSE * np.abs(values)
         gap = np.where(np.abs(gap) < least, np.copysign(least, gap), gap)
+        # Close modes are turned to what was seen: how they mix is no datum.
+        gap[np.abs(gap) <= 2.0 * self.problem.data.closeness * np.abs(values)] = np.inf
         gap[self.partner, np.arange(len(values))] = np.inf
         still = self.problem.space.still(self.eigenvalues)
         gap[np.logical_and.outer(still, still[self.partner])] = np.inf
@@ -146,7 +148,11 @@ def state_at(problem: Problem, parts: Sequence[Projection], x: FloatArray) -> St
     data = problem.data
     count = min(len(values), problem.space.rigid + 2 * len(data.measurement) + 8)
     seen = problem.space.padded_readings(len(vectors)) @ vectors[:, :count]
-    hertz, seen = data.predicted(signed_hz(values[None, :count]), seen[None], problem.space.zero)
+    hertz = signed_hz(values[:count])
+    for group, turn in data.turns(hertz, seen, problem.space.zero) if data.closeness else ():
+        vectors[:, group] = vectors[:, group] @ turn
+        seen[:, group] = seen[:, group] @ turn
+    hertz, seen = data.predicted(hertz[None], seen[None], problem.space.zero)
     partner = data.pair(hertz, seen)[0]
     raw = data.residual(hertz[:, partner], seen[:, :, partner], np.array([weight]))[0]
     raw = raw + problem.offset

@@ -225,6 +225,7 @@ def _residuals(problem: Problem, projections: Sequence[Projection], top: int) ->
         rows = np.concatenate([np.arange(first[i], first[i + 1]) for i in members])
         own = [projections[i] for i in members]
         hertz[rows], seen[rows] = _modes(space, own, chosen, low)
+    seen = data.aligned(hertz, seen, space.zero)
     hertz, seen = data.predicted(hertz, seen, space.zero)
     partner = data.pair(hertz, seen)
     mass = [space.mass + p.hypothesis.grid_factors @ p.weights for p in projections]
