@@ -15,6 +15,7 @@ from femubench.core.schema.diagnosis import Verdict
 
 _LARGEST = 4 * 2**20  # bytes
 _AND = " + "
+_ROUNDING = 1e-6
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 # Sums of probabilities may round to a little more than 1.
@@ -96,15 +97,19 @@ class Answer(_Part):
     def probability(self) -> float | None:
         """Return the probability that the answer claims for what it says; None where it does not.
 
-        A group claims the sum over its members, several causes together the smallest of theirs;
-        ``unknown`` and ``not-confirmed`` claim none.
+        A group claims the sum over its members, or the largest of theirs where several of them
+        stand together; several causes together claim the smallest of theirs; ``unknown`` and
+        ``not-confirmed`` claim none.
         """
         stated = [cause.claim for cause in self.causes if cause.claim is not None]
         if self.verdict == "none":
             return self.nothing
         if self.verdict not in ("named", "ambiguous") or not stated:
             return None
-        return min(1.0, sum(stated)) if self.verdict == "ambiguous" else min(stated)
+        if self.verdict == "named":
+            return min(stated)
+        named = sum(cause.probability or 0.0 for cause in self.causes)
+        return min(1.0, sum(stated)) if named <= 1.0 + _ROUNDING else max(stated)
 
 
 def read_answer(path: Path) -> Answer:
