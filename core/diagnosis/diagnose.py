@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -102,7 +102,16 @@ def diagnose(
     scatter = case.tolerance if tolerance is None else tolerance
     registered = registered_effects()
     known = registered if effects is None else tuple(effects)
-    examination = examine(case.model, used, known, tolerance=scatter, pairs=pairs)
+    examination = examine(
+        case.model,
+        used,
+        known,
+        tolerance=scatter,
+        pairs=pairs,
+        reference=case.used_reference,
+        width=case.error_width,
+        beam=case.beam_share,
+    )
     proof = _proof(case, examination, known)
     leader = proof.leader
     adequate = adequacy(leader.fit.state, leader.unknowns)
@@ -151,7 +160,11 @@ def _written(
     causes = _group_causes(options)
     top = posterior.names[decision.group[0]] if decision.group else decision.nothing
     named = bool(decision.group)
-    after = best.fit.state if named else examination.nominal
+    nothing = examination.nominal
+    # Both in units of one noise: that of an explanation holds what it takes for model error.
+    noise = (best if named else posterior.best(())).fit.state.problem.noise
+    before = replace(nothing, problem=replace(nothing.problem, noise=noise))
+    after = best.fit.state if named else before
     used = case.measurement.select(case.used)
     return Diagnosis(
         case=case.name,
@@ -162,9 +175,9 @@ def _written(
         reason=_reason(decision),
         advice=_advice(examination, group),
         smallest_visible=smallest_visible(examination.found[0]),
-        residuals=residual_rows(examination.nominal, after),
+        residuals=residual_rows(before, after),
         gain=proof.gain,
-        chi2=(examination.nominal.chi2, after.chi2),
+        chi2=(before.chi2, after.chi2),
         data_count=len(examination.problem.data),
         adequacy_p=adequate,
         nothing=decision.nothing,

@@ -15,7 +15,7 @@ from femubench.core.diagnosis.verdict import inseparable
 from femubench.core.fem.model import Model
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.extended_model import extended, raw_residual
-from femubench.core.inference.fit import Fit, Problem, bounds_of, state_at
+from femubench.core.inference.fit import Problem, bounds_of, state_at
 from femubench.core.inference.mesh_error import mesh_bias, mesh_corrections
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.posterior import Explanation, Key, Posterior
@@ -63,11 +63,14 @@ class Unseen:
     Arguments:
         before, after: f_measured / f_predicted - 1 or alike, (k,).
         std: of a datum: measurement, scatter, and the uncertainty of the causes, (k,).
+        plain_std: the same without the causes where it is another, since what either takes for
+            model error has a size of its own; that is then known, and no more is granted.
     """
 
     before: FloatArray
     after: FloatArray
     std: FloatArray
+    plain_std: FloatArray | None = None
 
     @cached_property
     def sound(self) -> Unseen:
@@ -77,7 +80,8 @@ class Unseen:
         return self._of(miss <= _UNUSUAL * usual)
 
     def _of(self, rows: BoolArray) -> Unseen:
-        return Unseen(self.before[rows], self.after[rows], self.std[rows])
+        plain = None if self.plain_std is None else self.plain_std[rows]
+        return Unseen(self.before[rows], self.after[rows], self.std[rows], plain)
 
     @cached_property
     def seeing(self) -> Unseen:
@@ -105,7 +109,8 @@ class Unseen:
         """
         seeing = self.seeing
         after = np.hypot(seeing.std, _IDEAL * (seeing.before - seeing.after))
-        return _log_likelihood(seeing.after, after) - _log_likelihood(seeing.before, seeing.std)
+        plain = seeing.std if seeing.plain_std is None else seeing.plain_std
+        return _log_likelihood(seeing.after, after) - _log_likelihood(seeing.before, plain)
 
     @property
     def probability(self) -> float:
@@ -129,8 +134,8 @@ class Unseen:
         if not self.visible:
             return True
         log_bayes = self.log_bayes
-        if log_bayes < -_DECISIVE:
-            return False
+        if log_bayes < -_DECISIVE or self.plain_std is not None:
+            return log_bayes >= -_DECISIVE
         if fitted > _FEW:
             return self.probability > _GOOD
         enough = len(self.seeing.before) * log(_FOURFOLD if fitted else _HALVED)
@@ -138,17 +143,18 @@ class Unseen:
 
 
 def held_out(
-    case: Case, nominal: Problem, best: Problem, found: Fit, extended: Model, scatter: float
+    case: Case, examination: Examination, explanation: Explanation, extended: Model
 ) -> Unseen:
     """Return the errors of the held-out modes.
 
     Arguments:
         case: with its held-out modes.
-        nominal, best: data and modal coordinates without and with textbook effects.
-        found: the causes, in the coordinates of `best`.
-        extended: the model with the causes.
-        scatter: relative standard deviation of a frequency by ordinary tolerances.
+        examination: of the used modes.
+        explanation: textbook effects and causes.
+        extended: the model with them.
     """
+    nominal, best = examination.problem, examination.problem_of(explanation)
+    found, scatter = explanation.fit, examination.scatter
     used, hidden = len(case.used), len(case.held_out)
     if hidden == 0:
         return Unseen(np.zeros(0), np.zeros(0), np.zeros(0))
@@ -168,8 +174,17 @@ def held_out(
     relative = everything.frequency_std[rows] / everything.frequencies[rows]
     spread = after.jacobian[rows]
     own = np.einsum("ik,kl,il->i", spread, found.covariance, spread) if spread.shape[1] else 0.0
-    std = np.sqrt(np.square(relative) * (1.0 + own) + scatter**2)
-    return Unseen(before.raw[rows] * relative, exact[rows] * relative, std)
+    # What the model gets wrong of the used modes says what it gets wrong of the others.
+    first = examination.posterior.nothing.fit.state
+    plain, spared = examination.foreseen(first, before.raw, data, case.reference)
+    mean, error = examination.foreseen(found.state, exact, data, case.reference)
+    errors = (before.raw[rows] - plain) * relative, (exact[rows] - mean) * relative
+    std = np.sqrt(np.square(relative) * (1.0 + own + np.square(error)) + scatter**2)
+    if found.state.problem.noise.beam:
+        return Unseen(*errors, std)
+    return Unseen(
+        *errors, std, np.sqrt(np.square(relative) * (1.0 + np.square(spared)) + scatter**2)
+    )
 
 
 def modified(
@@ -244,7 +259,14 @@ def left_out(examination: Examination, effects: Iterable[Effect]) -> Unseen:
         if len(kept) == 0:
             break
         again = examine(
-            examination.model, kept, effects, tolerance=examination.tolerance, pairs=several
+            examination.model,
+            kept,
+            effects,
+            tolerance=examination.tolerance,
+            pairs=several,
+            reference=examination.reference,
+            width=examination.width,
+            beam=examination.beam,
         )
         found, problem = again.best.fit, again.problem_of(again.best)
         point = state_at(replace(problem, data=data, noise=noise), found.parts, found.state.x)
@@ -311,10 +333,9 @@ def unseen_of(
         sharply: take the sizes of the causes for certain on the modified structures, which saves
             a solution a size; held-out modes know their uncertainty anyway.
     """
-    nominal, problem = examination.problem, examination.problem_of(explanation)
     near = () if sharply else _neighbours(case.model, explanation)
     return (
-        held_out(case, nominal, problem, explanation.fit, model, examination.scatter),
+        held_out(case, examination, explanation, model),
         modified(case, model, examination.scatter, near),
     )
 

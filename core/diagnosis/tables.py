@@ -169,8 +169,8 @@ def rivals_of(
         best: the one that is no rival of itself.
         group: what must not be missing, however improbable.
     """
-    nothing = examination.nominal.chi2
     posterior = examination.posterior
+    nothing = posterior.nothing
     totals: dict[tuple[str, str], float] = {}
     first: dict[tuple[str, str], Explanation] = {}
     for explanation, p in zip(posterior.explanations, posterior.probabilities, strict=True):
@@ -186,7 +186,7 @@ def rivals_of(
     return tuple(
         Rival(
             *label,
-            delta_chi2=nothing - first[label].chi2,
+            delta_chi2=2.0 * (first[label].log_likelihood - nothing.log_likelihood),
             probability=totals[label],
             angle=angle_between(best, first[label]) if best is not None else float("nan"),
         )

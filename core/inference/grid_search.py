@@ -232,7 +232,7 @@ def _residuals(problem: Problem, projections: Sequence[Projection], top: int) ->
     each = np.arange(len(partner))[:, None]
     paired = np.moveaxis(np.moveaxis(seen, 2, 1)[each, partner], 1, 2)
     raw = data.residual(hertz[each, partner], paired, np.concatenate(mass))
-    return problem.noise.whiten(raw + problem.offset)
+    return problem.noise.residual(raw + problem.offset)
 
 
 def _responses(

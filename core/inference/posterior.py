@@ -49,7 +49,7 @@ class Explanation:
     @property
     def log_likelihood(self) -> float:
         """Return ln of the probability of the data at the best fit, up to a constant of them."""
-        return -0.5 * self.chi2
+        return self.fit.state.problem.noise.log_density - 0.5 * self.chi2
 
     @property
     def unknowns(self) -> int:
@@ -173,6 +173,11 @@ class Posterior:
     def best(self, key: Key) -> Explanation:
         """Return the most probable explanation of that name."""
         return next(e for e in self.explanations if self.key(e) == key)
+
+    @property
+    def nothing(self) -> Explanation:
+        """Return the most probable explanation without a cause or textbook physics."""
+        return next(e for e in self.explanations if not e.parts and not e.base.parts)
 
     def members(self, key: Key) -> list[tuple[Explanation, float]]:
         """Return the explanations of that name with their probabilities."""
