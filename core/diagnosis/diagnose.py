@@ -21,6 +21,7 @@ from femubench.core.diagnosis.proof import (
 )
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.tables import (
+    error_scales,
     evidence_rows,
     odds_rows,
     placed_causes,
@@ -34,6 +35,7 @@ from femubench.core.diagnosis.words import sentence_of
 from femubench.core.fem.model import Model
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.extended_model import departure
+from femubench.core.inference.model_error import WIDTHS
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.search import adequacy
 from femubench.core.inference.static_response import LargeProblem
@@ -48,6 +50,7 @@ from femubench.core.score.scoring import score_model
 from femubench.core.ties import in_order
 
 _MOST_ADVISED = 8  # explanations that advice parts from each other
+_CLASSES = 3  # of model error that are told
 
 
 @dataclass(frozen=True)
@@ -162,7 +165,8 @@ def _written(
     named = bool(decision.group)
     nothing = examination.nominal
     # Both in units of one noise: that of an explanation holds what it takes for model error.
-    noise = (best if named else posterior.best(())).fit.state.problem.noise
+    leader = best if named else posterior.best(())
+    noise = leader.fit.state.problem.noise
     before = replace(nothing, problem=replace(nothing.problem, noise=noise))
     after = best.fit.state if named else before
     used = case.measurement.select(case.used)
@@ -185,9 +189,11 @@ def _written(
         locations=(*evidence_rows(examination), *locate(case.model, used)),
         base=best.base.names if named else (),
         extended=proof.model if named else case.model,
-        notes=_notes(case, examination, proof, shown),
+        notes=(*_notes(case, examination, proof, shown), *_error_notes(examination, leader)),
         seconds=time.perf_counter() - begin,
         evidence=odds_rows(posterior, best) if named else (),
+        model_error=error_scales(examination, leader),
+        like_a_beam=examination.like_a_beam,
         subject=case,
     )
 
@@ -280,6 +286,21 @@ def _notes(
             f"{departure(best.fit):.1g} standard deviations of all data together from the fit."
         )
     return tuple(notes)
+
+
+def _error_notes(examination: Examination, leader: Explanation) -> tuple[str, ...]:
+    """Return what the drawing itself gets wrong, the largest classes by name."""
+    ratios = [row for row in error_scales(examination, leader) if not row.unit]
+    if not ratios:
+        return ()
+    wide = {row.name: row.scale / WIDTHS.get(row.name, np.inf) for row in ratios}
+    largest = sorted(ratios, key=lambda row: -wide[row.name])[:_CLASSES]
+    told = ", ".join(f"{row.name} {100.0 * row.scale:.2g} %" for row in largest)
+    return (
+        f"What the drawing itself gets wrong, above all: {told} (standard deviations). That the "
+        "structure is a beam model but for ordinary scatter has probability "
+        f"{examination.like_a_beam:.2g}.",
+    )
 
 
 __all__ = ["diagnose", "extended_by"]

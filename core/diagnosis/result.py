@@ -12,6 +12,7 @@ from femubench.core.fem.model import Model
 from femubench.core.schema.diagnosis import (
     Advice,
     Cause,
+    ErrorScale,
     Evidence,
     Gain,
     LocationRow,
@@ -53,6 +54,9 @@ class Diagnosis(Shown):
         notes: further remarks, one sentence each.
         seconds: spent.
         evidence: what the data say for the first explanation, and what the prior adds.
+        model_error: what the drawing gets wrong, beside the first explanation; empty where the
+            structure is taken for a beam model.
+        like_a_beam: probability that it is one, but for ordinary scatter.
         subject: the case itself, for drawings of its structure.
     """
 
@@ -77,6 +81,8 @@ class Diagnosis(Shown):
     notes: tuple[str, ...] = ()
     seconds: float = 0.0
     evidence: tuple[Evidence, ...] = ()
+    model_error: tuple[ErrorScale, ...] = ()
+    like_a_beam: float = 1.0
     subject: Case | None = field(default=None, repr=False)
 
     def rows(self) -> Sequence[tuple[str, str]]:
@@ -99,8 +105,8 @@ class Diagnosis(Shown):
         """Return one of the tables as a data frame.
 
         Arguments:
-            table: ``causes``, ``rivals``, ``evidence``, ``advice``, ``smallest_visible``,
-                ``residuals``, ``looks`` or ``locations``.
+            table: ``causes``, ``rivals``, ``evidence``, ``model_error``, ``advice``,
+                ``smallest_visible``, ``residuals``, ``looks`` or ``locations``.
 
         Raises:
             KeyError: when there is no such table.
@@ -118,6 +124,7 @@ _TABLES: dict[str, Any] = {
     "causes": Cause,
     "rivals": Rival,
     "evidence": Evidence,
+    "model_error": ErrorScale,
     "advice": Advice,
     "smallest_visible": SmallestVisible,
     "residuals": ResidualRow,

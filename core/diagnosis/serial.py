@@ -46,6 +46,7 @@ def diagnosis_to_json(
     tables = {name: _plain(getattr(diagnosis, name)) for name in names}
     for look in tables["looks"]:
         look["changes"] = [{"mode": mode, "percent": change} for mode, change in look["changes"]]
+    tables["model_error"] = [{"class": row.pop("name"), **row} for row in tables["model_error"]]
     return {
         **tables,
         "structure": None if case is None else _plain(placed_wireframe(case, _words(diagnosis))),
@@ -90,6 +91,14 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 - data of any form
 
 
 _CONFIG = ConfigDict(extra="ignore", allow_inf_nan=False, strict=True)
+
+
+class _Scale(BaseModel):
+    model_config = _CONFIG | ConfigDict(serialize_by_alias=True)
+
+    name: str = Field(alias="class")
+    scale: float | None
+    unit: str
 
 
 class _Change(BaseModel):
@@ -141,6 +150,7 @@ _OPTIONAL: dict[Any, dict[str, Any]] = {
         **dict.fromkeys(("case", "sentence", "reason"), ""),
         **{"chi2": [None, None], "data_count": 0, "nothing": None, "seconds": None},
         **{name: [] for name in ("looks", "locations", "base")},
+        "model_error": (list[_Scale], []),
     },
 }
 _DiagnosisRecord = _record(

@@ -17,6 +17,7 @@ from femubench.core.roles import EffectParameter
 from femubench.core.schema.diagnosis import (
     Cause,
     CauseParameter,
+    ErrorScale,
     Evidence,
     LocationRow,
     ResidualRow,
@@ -29,6 +30,14 @@ from femubench.core.typing import FloatArray
 TOO_SMALL = 12.0  # of chi-square: an effect below is too small to see
 _LISTED = 12
 _STEP = 1e-4
+
+
+def error_scales(examination: Examination, explanation: Explanation) -> tuple[ErrorScale, ...]:
+    """Return what an explanation takes for model error, one row a class."""
+    scales = explanation.fit.state.problem.noise.scales
+    if examination.error is None or scales is None:
+        return ()
+    return tuple(ErrorScale(*row) for row in examination.error.scales(scales))
 
 
 def residual_rows(before: State, after: State) -> tuple[ResidualRow, ...]:

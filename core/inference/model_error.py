@@ -351,6 +351,16 @@ class ModelError:
         free[r:, r:] = state.slopes @ state.slopes.T
         return y, free
 
+    def scales(self, v: FloatArray) -> list[tuple[str, float, str]]:
+        """Return name, standard deviation and unit of every class, at definite scales."""
+        tau, unshared = self._variances(v)
+        rows = zip(self.names, np.sqrt(tau), strict=True)
+        found = [(n, float(s), "deviations" if kind(n) == "shapes" else "") for n, s in rows]
+        return [
+            *found,
+            *([("unshared", float(np.sqrt(unshared)), "")] if len(self.residual) else []),
+        ]
+
     def foreseen(
         self,
         scales: FloatArray,

@@ -105,6 +105,21 @@ class SmallestVisible:
 
 
 @dataclass(frozen=True)
+class ErrorScale:
+    """How large a class of model error is beside the first explanation, standard deviation.
+
+    Arguments:
+        name: of the class.
+        scale: of the perturbations of the class.
+        unit: empty for a ratio.
+    """
+
+    name: str
+    scale: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class ResidualRow:
     """One datum before and after, in standard deviations of the measurement.
 
