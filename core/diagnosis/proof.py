@@ -15,7 +15,7 @@ from femubench.core.diagnosis.verdict import inseparable
 from femubench.core.fem.model import Model
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.extended_model import extended, raw_residual
-from femubench.core.inference.fit import Problem, bounds_of, state_at
+from femubench.core.inference.fit import Fit, Problem, bounds_of, state_at
 from femubench.core.inference.mesh_error import mesh_bias, mesh_corrections
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.posterior import Explanation, Key, Posterior
@@ -143,18 +143,25 @@ class Unseen:
 
 
 def held_out(
-    case: Case, examination: Examination, explanation: Explanation, extended: Model
+    case: Case,
+    nominal: Problem,
+    best: Problem,
+    found: Fit,
+    extended: Model,
+    scatter: float,
+    examination: Examination | None = None,
 ) -> Unseen:
     """Return the errors of the held-out modes.
 
     Arguments:
         case: with its held-out modes.
-        examination: of the used modes.
-        explanation: textbook effects and causes.
-        extended: the model with them.
+        nominal, best: data and modal coordinates without and with textbook effects.
+        found: the causes, in the coordinates of `best`.
+        extended: the model with the causes.
+        scatter: relative standard deviation of a frequency by ordinary tolerances.
+        examination: where what the model gets wrong of the used modes says what it gets wrong of
+            the others.
     """
-    nominal, best = examination.problem, examination.problem_of(explanation)
-    found, scatter = explanation.fit, examination.scatter
     used, hidden = len(case.used), len(case.held_out)
     if hidden == 0:
         return Unseen(np.zeros(0), np.zeros(0), np.zeros(0))
@@ -174,16 +181,18 @@ def held_out(
     relative = everything.frequency_std[rows] / everything.frequencies[rows]
     spread = after.jacobian[rows]
     own = np.einsum("ik,kl,il->i", spread, found.covariance, spread) if spread.shape[1] else 0.0
-    # What the model gets wrong of the used modes says what it gets wrong of the others.
-    first = examination.posterior.nothing.fit.state
-    plain, spared = examination.foreseen(first, before.raw, data, case.reference)
+    std = np.sqrt(np.square(relative) * (1.0 + own) + scatter**2)
+    first, last = before.raw[rows], exact[rows]
+    if examination is None or found.state.problem.noise.beam:
+        return Unseen(first * relative, last * relative, std)
+    nothing = examination.posterior.nothing.fit.state
+    plain, spared = examination.foreseen(nothing, before.raw, data, case.reference)
     mean, error = examination.foreseen(found.state, exact, data, case.reference)
-    errors = (before.raw[rows] - plain) * relative, (exact[rows] - mean) * relative
-    std = np.sqrt(np.square(relative) * (1.0 + own + np.square(error)) + scatter**2)
-    if found.state.problem.noise.beam:
-        return Unseen(*errors, std)
     return Unseen(
-        *errors, std, np.sqrt(np.square(relative) * (1.0 + np.square(spared)) + scatter**2)
+        (first - plain) * relative,
+        (last - mean) * relative,
+        np.hypot(std, relative * error),
+        np.hypot(np.hypot(relative, scatter), relative * spared),
     )
 
 
@@ -335,7 +344,15 @@ def unseen_of(
     """
     near = () if sharply else _neighbours(case.model, explanation)
     return (
-        held_out(case, examination, explanation, model),
+        held_out(
+            case,
+            examination.problem,
+            examination.problem_of(explanation),
+            explanation.fit,
+            model,
+            examination.scatter,
+            examination,
+        ),
         modified(case, model, examination.scatter, near),
     )
 

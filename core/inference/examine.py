@@ -181,29 +181,21 @@ def examine(
         >>> seen.best.base.names == (torsion.name,)
         True
     """
-    known = tuple(effects)
     # Thousands of small matrices: threads would wait for each other most of the time.
     with threadpool_limits(1):
-        hypotheses = hypotheses_of(model, known)
+        hypotheses = hypotheses_of(model, effects)
         if reference is not None:
-            # What is there from the first day is in both states, as is all else of the model error.
-            hypotheses = tuple(
-                h for h in hypotheses if not getattr(h.effect, "innate", h.textbook is not None)
-            )
-            known = tuple(dict.fromkeys(h.effect for h in hypotheses))
+            hypotheses = tuple(h for h in hypotheses if not is_innate(h))
+        known = tuple(dict.fromkeys(h.effect for h in hypotheses))
         basis = Basis.of(model, measurement)
         problem, slopes = posed(model, measurement, hypotheses, tolerance, basis)
         before = None if reference is None else before_of(problem, reference)
-        earlier, residual = np.zeros((0, slopes.shape[1])), np.zeros(0)
-        if before is not None:
-            earlier = scatter_slopes(before.problem, basis.modes)[:, : slopes.shape[1]]
-            residual = before.raw
         explanations: list[Explanation] = []
         error: ModelError | None = None
         if width > 0.0:
             error = model_error_of(problem, basis, before, width, log(1.0 - beam))
             explanations = searched(problem, error, known, pairs)
-        noise = beam_noise(slopes, earlier, residual, tolerance, log(beam))
+        noise = beam_noise(basis, slopes, before, tolerance, log(beam))
         own = replace(problem, noise=noise)
         floor = max((e.log_weight for e in explanations), default=-np.inf) - _HOPELESS
         more, atlas = Search(own, known, pairs=pairs, floor=floor).run()
@@ -211,6 +203,11 @@ def examine(
     return Examination(
         *(model, own, slopes, tolerance, posterior, tuple(atlas)), error, reference, width, beam
     )
+
+
+def is_innate(hypothesis: Hypothesis) -> bool:
+    """Tell whether an effect is there from the first day, and so in a reference too."""
+    return bool(getattr(hypothesis.effect, "innate", hypothesis.textbook is not None))
 
 
 def before_of(problem: Problem, reference: Measurement) -> State:
@@ -274,19 +271,23 @@ def model_error_of(
 
 
 def beam_noise(
-    slopes: FloatArray, before: FloatArray, known: FloatArray, tolerance: float, weight: float
+    basis: Basis, slopes: FloatArray, before: State | None, tolerance: float, weight: float
 ) -> Noise:
     """Return the noise of a structure that is a beam model but for the scatter of its elements.
 
     Arguments:
+        basis: of the nominal model.
         slopes: sensitivities of the data to the scatter, (n_data, n_scatter).
-        before: those of the reference, (r, n_scatter).
-        known: residuals of the reference, (r,).
+        before: the nominal model beside the reference, if there is one.
         tolerance: standard deviation of the scatter.
         weight: ln of the probability.
     """
-    rows = tolerance * np.vstack([before, slopes])
-    return conditioned(np.eye(len(rows)) + rows @ rows.T, known, weight, beam=True)
+    rows, known = slopes, np.zeros(0)
+    if before is not None:
+        earlier = scatter_slopes(before.problem, basis.modes)[:, : slopes.shape[1]]
+        rows, known = np.vstack([earlier, slopes]), before.raw
+    covariance = np.eye(len(rows)) + tolerance**2 * rows @ rows.T
+    return conditioned(covariance, known, weight, beam=True)
 
 
 def posed(

@@ -7,7 +7,7 @@ ones to it (Fox & Kapoor 1968), so that thousands of candidates cost one batched
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import log_ndtr
@@ -173,7 +173,11 @@ def screen(
     residuals, still = _residuals(problem, projections, top), base.residual
     if yielding is not None:
         residuals, still = marginal(residuals, yielding), marginal(still, yielding)
-    return interpolated(projections, residuals, still)
+    density = problem.noise.log_density
+    return [
+        replace(item, log_evidence=item.log_evidence + density)
+        for item in interpolated(projections, residuals, still)
+    ]
 
 
 def likely(
