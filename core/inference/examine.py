@@ -183,10 +183,11 @@ def examine(
     """
     # Thousands of small matrices: threads would wait for each other most of the time.
     with threadpool_limits(1):
-        hypotheses = hypotheses_of(model, effects)
+        known = tuple(effects)
+        hypotheses = hypotheses_of(model, known)
         if reference is not None:
             hypotheses = tuple(h for h in hypotheses if not is_innate(h))
-        known = tuple(dict.fromkeys(h.effect for h in hypotheses))
+            known = tuple({id(h.effect): h.effect for h in hypotheses}.values())
         basis = Basis.of(model, measurement)
         problem, slopes = posed(model, measurement, hypotheses, tolerance, basis)
         before = None if reference is None else before_of(problem, reference)
