@@ -281,3 +281,17 @@ def test_the_mesh_is_corrected_mode_by_mode_whatever_mode_a_cause_adds() -> None
     hidden = held_out(case, problem, problem, Fit(state, 0.0), extended, 0.0)
     assert len(hidden.after) == 4
     assert np.abs(hidden.after).max() < 1e-3
+
+
+def test_a_spring_that_holds_a_free_frame_leaves_the_corrections_where_they_were() -> None:
+    """A rigid mode gets a frequency; the elastic ones keep their numbers and corrections."""
+    coarse = Model.of(replace(FRAME, members=tuple(replace(m, elements=2) for m in FRAME.members)))
+    (effect,) = effects_named("grounding-spring")
+    place = next(p for p in effect.places(coarse) if p.startswith("J1"))
+    truth = effect.extend(Model.of(refined(coarse.frame_structure)), place, (2e4,))
+    test = measured(truth, FRAME, count=8, shapes=8)
+    problem, _ = posed(coarse, test, hypotheses_of(coarse, [effect]), 0.0)
+    part = part_at(problem, effect.name, place)
+    state = state_at(problem, (part,), coordinates(part, (2e4,)))
+    assert np.abs(problem.data.bias[:8]).max() > 0.002
+    assert np.abs(state.raw[:8]).max() < 0.5

@@ -168,7 +168,7 @@ def held_out(
     everything = case.measurement.select([*case.used, *case.held_out])
     std = _relative_std(everything) * everything.frequencies
     everything = replace(everything, frequency_std=std)
-    data = Data(everything, nominal.data.bias)
+    data = Data(everything, nominal.data.bias, nominal.data.still)
     noise = Noise.of(np.zeros((len(data), 0)), 0.0)
     rows = slice(used, used + hidden)
     before = state_at(Problem(nominal.model, nominal.space, data, noise), (), np.zeros(0))

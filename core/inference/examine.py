@@ -31,6 +31,7 @@ from femubench.core.inference.residuals import Data
 from femubench.core.inference.screening import with_shortlist
 from femubench.core.inference.search import Found, Search, adequacy
 from femubench.core.inference.static_response import Basis, placed
+from femubench.core.modal.eigen import zero_tolerance
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect
 from femubench.core.typing import FloatArray
@@ -219,7 +220,7 @@ def before_of(problem: Problem, reference: Measurement) -> State:
     """
     if reference.sensors.labels != problem.data.measurement.sensors.labels:
         raise NotApplicable("the reference was measured with other sensors")
-    data = Data(reference, problem.data.bias)
+    data = Data(reference, problem.data.bias, problem.data.still)
     return state_at(replace(problem, data=data, noise=Noise(np.eye(len(data)))), (), np.zeros(0))
 
 
@@ -304,7 +305,8 @@ def posed(
     if basis is None:
         basis = Basis.of(model, measurement)
     bias = mesh_bias(model, 2 * len(measurement) + 8)
-    data = Data(measurement, np.zeros(0) if bias is None else bias)
+    still = basis.modes.rigid | (basis.modes.eigenvalues <= zero_tolerance(basis.modes))
+    data = Data(measurement, np.zeros(0) if bias is None else bias, int(still.sum()))
     plain = placed(basis, data, Noise(np.eye(len(data))), tuple(hypotheses))
     slopes = scatter_slopes(plain, basis.modes) if tolerance else np.zeros((len(data), 0))
     return with_shortlist(replace(plain, noise=Noise.of(slopes, tolerance))), slopes

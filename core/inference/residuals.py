@@ -25,10 +25,14 @@ class Data:
     Arguments:
         measurement: the used modes.
         bias: relative corrections of predicted frequencies by elastic mode, for the mesh, (k,).
+        still: number of modes of zero frequency of the model that they were found on, which come
+            first there; what gives these a frequency moves no other mode on in the list. None
+            where every candidate counts its own.
     """
 
     measurement: Measurement
     bias: FloatArray
+    still: int | None = None
 
     def __post_init__(self) -> None:
         std = self.measurement.frequency_std
@@ -236,11 +240,16 @@ class Data:
     def corrected(self, frequencies: FloatArray, rigid: float) -> FloatArray:
         """Return frequencies with the correction for the mesh, counted from the first elastic one.
 
+        The first elastic one is that of the model on which the corrections were found.
+
         Arguments:
             frequencies: predicted, ascending, (g, q).
             rigid: what counts as zero in Hz.
         """
-        order = np.cumsum(frequencies > rigid, axis=1) - 1
+        if self.still is None:
+            order = np.cumsum(frequencies > rigid, axis=1) - 1
+        else:
+            order = np.broadcast_to(np.arange(frequencies.shape[1]), frequencies.shape) - self.still
         known = (order >= 0) & (order < len(self.bias))
         if len(self.bias) == 0:
             return frequencies
