@@ -73,7 +73,7 @@ class State:
     @cached_property
     def residual(self) -> FloatArray:
         """Return the residuals in units of the noise, (n_data,)."""
-        return self.problem.noise.whiten(self.raw)
+        return self.problem.noise.residual(self.raw)
 
     @property
     def chi2(self) -> float:
@@ -98,13 +98,17 @@ class State:
         return np.where(space.still(self.eigenvalues[self.partner]), 0.0, seen)
 
     @cached_property
-    def jacobian(self) -> FloatArray:
-        """Return d prediction / d x in units of the noise, (n_data, k)."""
+    def slopes(self) -> FloatArray:
+        """Return d prediction / d x in standard deviations of the measurement, (n_data, k)."""
         if not self.parts:
             return np.zeros((len(self.raw), 0))
         near, values = self.vectors[:, self.partner], self.eigenvalues[self.partner]
-        forces, masses = self.problem.space.forces(self.parts, self.x, near, values)
-        return self.problem.noise.whiten(self.rows(forces, masses).T).T
+        return self.rows(*self.problem.space.forces(self.parts, self.x, near, values))
+
+    @cached_property
+    def jacobian(self) -> FloatArray:
+        """Return d prediction / d x in units of the noise, (n_data, k)."""
+        return self.problem.noise.whiten(self.slopes.T).T
 
     def rows(self, forces: FloatArray, masses: FloatArray) -> FloatArray:
         """Return d prediction / d x in standard deviations from modal forces, (n_data, p).
@@ -118,6 +122,8 @@ class State:
         gap = values - self.eigenvalues[:, None]
         least = _CLOSE * np.abs(values)
         gap = np.where(np.abs(gap) < least, np.copysign(least, gap), gap)
+        # Close modes are turned to what was seen: how they mix is no datum.
+        gap[np.abs(gap) <= 2.0 * self.problem.data.closeness * np.abs(values)] = np.inf
         gap[self.partner, np.arange(len(values))] = np.inf
         still = self.problem.space.still(self.eigenvalues)
         gap[np.logical_and.outer(still, still[self.partner])] = np.inf
@@ -146,7 +152,11 @@ def state_at(problem: Problem, parts: Sequence[Projection], x: FloatArray) -> St
     data = problem.data
     count = min(len(values), problem.space.rigid + 2 * len(data.measurement) + 8)
     seen = problem.space.padded_readings(len(vectors)) @ vectors[:, :count]
-    hertz, seen = data.predicted(signed_hz(values[None, :count]), seen[None], problem.space.zero)
+    hertz = signed_hz(values[:count])
+    for group, turn in data.turns(hertz, seen, problem.space.zero) if data.closeness else ():
+        vectors[:, group] = vectors[:, group] @ turn
+        seen[:, group] = seen[:, group] @ turn
+    hertz, seen = data.predicted(hertz[None], seen[None], problem.space.zero)
     partner = data.pair(hertz, seen)[0]
     raw = data.residual(hertz[:, partner], seen[:, :, partner], np.array([weight]))[0]
     raw = raw + problem.offset
@@ -272,7 +282,7 @@ def log_evidence(point: State) -> float:
     jacobian, x = point.jacobian, point.x
     curvature = jacobian.T @ jacobian + np.eye(len(x))
     gradient = x - jacobian.T @ point.residual
-    result = -0.5 * point.cost
+    result = -0.5 * point.cost + point.problem.noise.log_density
     if len(x) == 0:
         return result
     result -= float(np.log(la.cholesky(curvature).diagonal()).sum())
