@@ -21,10 +21,11 @@ NUMERICAL := $(addprefix tests/test_,advice*.py assembly.py asymmetric_frame.py 
 	element_strategies.py exhibits.py expansion.py frame_extensions.py frf.py kernels.py \
 	localisation.py look*.py matrix_strategies.py pairing.py papers_*.py preload.py rigid_modes.py \
 	scenarios.py scoring.py sections.py sensitiv*.py sparse_eigen.py suite.py truths_*.py)
-# These too need no other process and no quiet machine.
-SIDE_BY_SIDE := $(NUMERICAL) $(addprefix tests/test_,architecture.py default_set.py \
-	examples.py matlab_footbridge.py truth_sweep.py)
-ON_ALL_CORES := -n 2 -p no:benchmark
+# What counts processes, memory or seconds, or writes where others read, has the machine to itself.
+ALONE := $(addprefix tests/,browser $(addprefix test_,docs_site.py harness_*.py install.py \
+	notebooks.py packaging.py plugins_new.py resume.py start_up.py tutorial.py untrusted.py))
+# A file stays on one worker, and with it what its tests share.
+ON_ALL_CORES := -n 2 --dist loadfile -p no:benchmark
 
 .PHONY: run test docs kernels bench sweep fuzz truths format clean
 .DELETE_ON_ERROR:
@@ -40,8 +41,8 @@ test: $(VENV)/.installed-test
 	$(BIN)/mypy truths
 	$(BIN)/pyright --pythonpath $(BIN)/python
 ifeq ($(ARGS),)
-	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest $(ON_ALL_CORES) $(SIDE_BY_SIDE)
-	$(BIN)/pytest $(addprefix --ignore=,$(wildcard $(SIDE_BY_SIDE)))
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest $(ON_ALL_CORES) $(addprefix --ignore=,$(wildcard $(ALONE)))
+	$(BIN)/pytest $(wildcard $(ALONE))
 else
 	$(BIN)/pytest $(ARGS)
 endif
