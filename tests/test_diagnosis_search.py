@@ -148,6 +148,7 @@ def test_several_causes_agree_with_the_model_that_they_make() -> None:
     plain = fit(problem, parts, np.array([0.5, 0.5]))
     assert plain is not None
     better = agreed(plain)
+    assert better is not None
     gaps = []
     for found in (plain, better):
         exact = raw_residual(problem, extended(MODEL, parts, found.state.x))
@@ -225,3 +226,15 @@ def test_every_effect_at_every_place_is_a_hypothesis() -> None:
         assert {h.places for h in found if h.name == effect.name} <= {len(places)}
     state = state_at(problem_of(MODEL, measured(MODEL, FRAME), ()), (), NOTHING)
     assert state.chi2 < 1e-8
+
+
+def test_causes_that_do_not_go_together_are_no_explanation() -> None:
+    """Two rigid lengths at one end, each as long as may be, are longer than the element."""
+    problem = problem_of(MODEL, measured(MODEL, FRAME), effects_named("joint-offset"))
+    places = [p.hypothesis.place for p in problem.space.projections]
+    end = next(place for place in places if place.rpartition("@")[2] in places and "@" in place)
+    parts = tuple(part_at(problem, "joint-offset", at) for at in (end, end.rpartition("@")[2]))
+    high = np.concatenate([part.hypothesis.bounds[1] for part in parts])
+    found = fit(problem, parts, high, steps=0)
+    assert found is not None
+    assert agreed(found) is None

@@ -175,6 +175,9 @@ def test_tables_count_both_halves_apart() -> None:
         sweep.scored({**records, kept[0]: said("none")}, truths, ROOT / "scenarios"), truths
     )
     assert development in everything
+    beside = sweep.tables(sweep.scored(records, truths, ROOT / "scenarios"), truths, reference=True)
+    assert "## Held half with reference" in beside
+    assert "visible" not in beside
     assert "| defect | 1 | 0 | 0 | 0 | 0 | 0 | 1 " in " ".join(everything.split())
 
 
@@ -183,6 +186,7 @@ def test_the_page_keeps_its_words() -> None:
     once = sweep.filled(page, "a table")
     assert once.startswith(page.split("<!-- truth-sweep -->")[0])
     assert sweep.filled(once, "a table") == once
+    assert sweep.filled(once, "another", "truth-sweep-reference").count("a table") == 1
     assert "No case was diagnosed" not in once
 
 

@@ -76,4 +76,5 @@ def _chi2(problem: Problem, causes: Sequence[TrueCause]) -> float:
     found = fit(problem, parts, np.array(start))
     if found is None:
         raise ModelError("the hidden causes make the mass indefinite")
-    return (agreed(found) if len(parts) > 1 else found).state.chi2
+    borne = agreed(found) if len(parts) > 1 else found
+    return (found if borne is None else borne).state.chi2

@@ -55,8 +55,10 @@ def raw_residual(problem: Problem, model: Model) -> FloatArray:
     return np.asarray(residual[0])
 
 
-def agreed(found: Fit) -> Fit:
-    """Return a fit of several causes that its own model bears out.
+def agreed(found: Fit) -> Fit | None:
+    """Return a fit of several causes that its own model bears out; None where there is no such.
+
+    Each cause may be possible and all together not: two rigid ends that fill an element.
 
     In modal coordinates the changes of several causes add up; in a model the second one changes
     what the first one left. The difference at the best fit is taken as constant nearby and the
@@ -68,7 +70,7 @@ def agreed(found: Fit) -> Fit:
         try:
             exact = raw_residual(problem, extended(problem.model, best.parts, state.x))
         except FemubenchError:
-            return found
+            return None
         offset = exact - (state.raw - state.problem.offset)
         if not np.isfinite(offset).all():
             return found

@@ -133,7 +133,8 @@ class Search:
         if not best.parts:
             return explanations
         others = [e for e in explanations if e is not best]
-        return [*others, replace(best, fit=agreed(best.fit))]
+        borne = agreed(best.fit)
+        return others if borne is None else [*others, replace(best, fit=borne)]
 
     def promising(self, bare: Sequence[Explanation], plain: Found) -> list[Base]:
         """Return the textbook sets that come nearer to the data than the model as drawn."""
