@@ -5,10 +5,11 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from femubench import InputError, read_case
-from truths.posing import pose
+from truths.posing import DEFECTS, SUITE, pose
 from truths.truth import TrueCause, Truth, held, read_truth, truth_text
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -112,3 +113,17 @@ def test_what_cannot_be_posed_is_one_line(tmp_path: Path, suite: Path) -> None:
         pose(room, tmp_path / "case", suite=tmp_path)
     with pytest.raises(InputError, match="is not empty"):
         pose(room, room, suite=suite)
+
+
+def test_a_defect_is_a_case_with_the_healthy_structure_beside_it(tmp_path: Path) -> None:
+    case_folder = tmp_path / "case"
+    pose(DEFECTS / "portal-loose-joint-1", case_folder, reference=True)
+    case, healthy = read_case(case_folder), read_case(SUITE / "portal")
+    assert case.reference is not None
+    assert case.reference_used == case.used
+    # Measured once more: other noise, and the mass that was weighed.
+    assert case.reference.total_mass == healthy.measurement.total_mass
+    np.testing.assert_allclose(
+        case.reference.frequencies, healthy.measurement.frequencies, rtol=0.03
+    )
+    assert not np.array_equal(case.reference.frequencies, healthy.measurement.frequencies)
