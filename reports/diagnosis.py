@@ -149,8 +149,9 @@ def _mode_row(mode: int, rows: Iterable[Data], shapes: bool) -> list[str]:
 
 def _chi_square(data: Data) -> str:
     before, after = data["chi2"]
+    noise = "ordinary scatter of the elements" + (" and model error" if data["model_error"] else "")
     text = (
-        "Chi-square, ordinary scatter of the elements counted as noise: "
+        f"Chi-square, {noise} counted as noise: "
         f"{figure(before)} before, {figure(after)} after, {data['data_count']} data"
     )
     if data["adequacy_p"] is None:

@@ -71,6 +71,10 @@ def test_the_difference_is_named_where_the_drawing_is_wrong(damaged: tuple[Frame
     built, broken = damaged
     found = diagnose(case_with(broken, 1, built))
     assert found.verdict in ("named", "ambiguous")
+    assert "from the reference" in found.sentence
+    assert found.like_a_beam < 0.5
+    assert {row.name for row in found.model_error} >= {"element stiffness", "unshared"}
+    assert any("What the drawing itself gets wrong" in note for note in found.notes)
     best = found.causes[0]
     assert (best.effect, best.place) == ("local-stiffness-loss", "floor/2")
     (parameter,) = best.parameters

@@ -173,7 +173,9 @@ def _written(
     return Diagnosis(
         case=case.name,
         verdict=decision.verdict,
-        sentence=sentence_of(decision, causes, options, top, proof.gain),
+        sentence=sentence_of(
+            decision, causes, options, top, proof.gain, reference=case.reference is not None
+        ),
         causes=tuple(causes),
         rivals=rivals_of(examination, best if named else None, group),
         reason=_reason(decision),

@@ -10,6 +10,9 @@ from femubench.core.schema.diagnosis import Cause, Gain
 
 _NUMBERS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight"}
 
+_LACKS, _NOTHING = "The model lacks", "nothing that the model lacks"
+_DIFFERS = "What differs from the reference is"
+
 
 def percent(probability: float) -> str:
     """Return a probability as a percentage that never claims certainty."""
@@ -53,6 +56,8 @@ def sentence_of(
     options: Sequence[Sequence[Cause]],
     probability: float,
     gain: Gain,
+    *,
+    reference: bool = False,
 ) -> str:
     """Return the verdict in one sentence.
 
@@ -62,18 +67,21 @@ def sentence_of(
         options: the causes of every explanation that stands.
         probability: of the first name.
         gain: before and after.
+        reference: whether it is what differs from a reference that was sought.
     """
     names = listed(named(cause) for cause in causes)
     if decision.verdict == "none":
-        sure = percent(decision.nothing)
-        return f"The data show nothing that the model lacks (probability {sure})."
+        nothing = "nothing that differs from the reference" if reference else _NOTHING
+        return f"The data show {nothing} (probability {percent(decision.nothing)})."
     if decision.verdict == "named":
-        return f"The model lacks {names} ({_sure(probability, causes)}){_gain(gain)}."
+        lacks = _DIFFERS if reference else _LACKS
+        return f"{lacks} {names} ({_sure(probability, causes)}){_gain(gain)}."
     if decision.verdict == "ambiguous":
-        return _either(options)
+        return _either(options, reference)
     guess = f"; the nearest is {names}" if causes else ""
     if decision.verdict == "unknown":
-        return f"No known effect explains what the model gets wrong{guess}."
+        wrong = "what differs from the reference" if reference else "what the model gets wrong"
+        return f"No known effect explains {wrong}{guess}."
     return f"What fits the used data best does not hold on data that it has not seen{guess}."
 
 
@@ -88,7 +96,7 @@ def _sure(probability: float, causes: Sequence[Cause]) -> str:
     return "; ".join([f"probability {percent(probability)}", *words])
 
 
-def _either(options: Sequence[Sequence[Cause]]) -> str:
+def _either(options: Sequence[Sequence[Cause]], reference: bool) -> str:
     """Return what all options share, and what they leave open."""
     sets = [dict.fromkeys(named(cause) for cause in option) for option in options]
     common = [name for name in sets[0] if all(name in other for other in sets)]
@@ -97,8 +105,10 @@ def _either(options: Sequence[Sequence[Cause]]) -> str:
     open_ = listed((words or "nothing more" for words in rest), "or")
     if common:
         shared = listed(f"{name}{mirrored[name]}" for name in common)
-        return f"The model lacks {shared}, and these data cannot tell what else: {open_}."
-    return f"The model lacks something, and these data cannot tell which: {open_}."
+        lacks = _DIFFERS if reference else _LACKS
+        return f"{lacks} {shared}, and these data cannot tell what else: {open_}."
+    something = "Something differs from the reference" if reference else f"{_LACKS} something"
+    return f"{something}, and these data cannot tell which: {open_}."
 
 
 def _gain(gain: Gain) -> str:
