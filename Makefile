@@ -23,7 +23,8 @@ NUMERICAL := $(addprefix tests/test_,advice*.py assembly.py asymmetric_frame.py 
 	scenarios.py scoring.py sections.py sensitiv*.py sparse_eigen.py suite.py truths_*.py)
 # What counts processes, memory or seconds, or writes where others read, has the machine to itself.
 ALONE := $(addprefix tests/,browser $(addprefix test_,docs_site.py harness_*.py install.py \
-	notebooks.py packaging.py plugins_new.py resume.py start_up.py tutorial.py untrusted.py))
+	notebooks.py packaging.py plugins_new.py report_robust.py resume.py start_up.py tutorial.py \
+	untrusted.py))
 # A file stays on one worker, and with it what its tests share.
 ON_ALL_CORES := -n 2 --dist loadfile -p no:benchmark
 

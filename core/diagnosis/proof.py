@@ -188,6 +188,7 @@ def held_out(
     nothing = examination.posterior.nothing.fit.state
     plain, spared = examination.foreseen(nothing, before.raw, data, case.reference)
     mean, error = examination.foreseen(found.state, exact, data, case.reference)
+    error = np.hypot(error, examination.own_share(found.state) * (first - last))
     return Unseen(
         (first - plain) * relative,
         (last - mean) * relative,

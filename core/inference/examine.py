@@ -104,6 +104,11 @@ class Examination:
         pairs = zip(self.posterior.explanations, self.posterior.probabilities, strict=True)
         return sum(p for e, p in pairs if e.fit.state.problem.noise.beam)
 
+    def own_share(self, state: State) -> float:
+        """Return which share of what an explanation changes is its own error."""
+        scales = state.problem.noise.scales
+        return 0.0 if self.error is None or scales is None else self.error.own_share(scales)
+
     def foreseen(
         self, state: State, raw: FloatArray, data: Data, reference: Measurement | None
     ) -> tuple[FloatArray, FloatArray]:
@@ -232,7 +237,8 @@ def searched(
     Scales that leave room for no cause hide it, those of a good explanation do not: what leads is
     sought with its own.
     """
-    scales = error.fitted(state_at(problem, (), np.zeros(0)))
+    nothing = state_at(problem, (), np.zeros(0))
+    scales = error.fitted(nothing)
     explanations: list[Explanation] = []
     for _ in range(_ROUNDS):
         own = replace(problem, noise=error.noise(scales))
@@ -242,13 +248,22 @@ def searched(
         if error.log_density(best, scales.v) - error.log_density(best, before.v) < _WORTH:
             break
     ranked = by_weight(explanations)
-    near = [e for e in ranked[:_REFINED] if e.log_weight > ranked[0].log_weight - _NEAR]
-    return [*(with_scales(error, e, scales) for e in near), *ranked[len(near) :]]
+    close = [i for i, e in enumerate(ranked) if e.log_weight > ranked[0].log_weight - _NEAR]
+    # One cause and its own error may do what otherwise takes a second one.
+    single = [i for i, e in enumerate(ranked) if len(e.parts) < 2]
+    near = {*close[:_REFINED], *single[:_REFINED]}
+    return [
+        with_scales(error, e, scales, nothing) if i in near else e for i, e in enumerate(ranked)
+    ]
 
 
-def with_scales(error: ModelError, explanation: Explanation, near: Fitted) -> Explanation:
+def with_scales(
+    error: ModelError, explanation: Explanation, near: Fitted, nothing: State
+) -> Explanation:
     """Return an explanation with the scales of model error that suit it best."""
     state = explanation.fit.state
+    if state.parts:
+        error = error.beside(nothing, state)
     problem = replace(state.problem, noise=error.noise(error.fitted(state, near)))
     found: Fit | None
     if state.parts:

@@ -12,7 +12,7 @@ for scales that the evidence sets.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -41,6 +41,7 @@ WIDTHS: Mapping[str, float] = {
     "sensor gains": 0.01,
     "shapes": 1.0,
 }
+CHANGE = 0.3  # of what an explanation moves: width of its own error
 UNSHARED = 0.02  # of the scale, median: what the states do not share
 _MEDIAN, _SPREAD = 0.3, 1.0  # of u, log-normal
 _LEAST, _MOST = 0.01, 10.0  # of u
@@ -216,7 +217,9 @@ class ModelError:
         cross: between reference and data, (n_classes, r, n).
         residual: of the reference at the nominal model, in deviations, (r,).
         unshared: width of the scale of what the states do not share.
-        share: ln of the prior probability that the structure is no beam model.
+        log_prior: ln of the prior probability that the structure is no beam model.
+        change: by how much an explanation moves each datum, in deviations, (n,); a share of that
+            is its own error. Empty where there is none.
     """
 
     names: tuple[str, ...]
@@ -227,6 +230,7 @@ class ModelError:
     residual: FloatArray
     unshared: float
     log_prior: float
+    change: FloatArray = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def of(
@@ -255,11 +259,43 @@ class ModelError:
             log_prior,
         )
 
+    def beside(self, nothing: State, state: State) -> ModelError:
+        """Return the model error where part of what an explanation changes is its own error.
+
+        An effect at a place is an idealisation, and the beams that carry it to the sensors are.
+
+        Arguments:
+            nothing: the model as drawn.
+            state: the explanation.
+        """
+        data = state.problem.data
+        moved = np.abs(nothing.raw - state.raw)
+        mode, _ = data.shape_rows
+        rows = len(data.measurement) + np.arange(len(mode))
+        for j in np.unique(mode):
+            own = rows[mode == j]
+            moved[own] = np.sqrt(np.mean(np.square(moved[own])))
+        return replace(self, change=moved)
+
+    @property
+    def _count(self) -> int:
+        """Return the number of scales besides that of an explanation's own error."""
+        return len(self.names) + (len(self.residual) > 0)
+
     def _variances(self, v: FloatArray) -> tuple[FloatArray, float]:
         """Return tau^2 of the classes, and the unshared share, of standard normal v."""
         u = _MEDIAN * np.exp(_SPREAD * v)
         tau = np.square(self.widths * u[: len(self.names)])
-        return tau, (self.unshared * u[-1] / _MEDIAN) ** 2 if len(self.residual) else 0.0
+        shared = (self.unshared * u[len(self.names)] / _MEDIAN) ** 2 if len(self.residual) else 0.0
+        return tau, shared
+
+    def _own(self, v: FloatArray) -> FloatArray:
+        """Return the variances of an explanation's own error, (r + n,)."""
+        found = np.zeros(len(self.residual) + self.present.shape[1])
+        if len(self.change):
+            size = CHANGE * _MEDIAN * np.exp(_SPREAD * v[self._count])
+            found[len(self.residual) :] = np.square(size * self.change)
+        return found
 
     @cached_property
     def _blocks(self) -> tuple[FloatArray, FloatArray]:
@@ -278,7 +314,7 @@ class ModelError:
         size = len(self.residual) + self.present.shape[1]
         tau, unshared = self._variances(v)
         total = tau @ joint + (unshared * tau @ apart if len(apart) else 0.0)
-        return np.asarray(np.eye(size) + total.reshape(size, size))
+        return np.asarray(np.diag(1.0 + self._own(v)) + total.reshape(size, size))
 
     def _slopes(self, v: FloatArray, weight: FloatArray) -> FloatArray:
         """Return the sum of the covariance's derivatives by v, entry by entry times a weight."""
@@ -289,6 +325,8 @@ class ModelError:
         found = tau * (both + unshared * within)
         if len(apart):
             found = np.append(found, unshared * float(tau @ within))
+        if len(self.change):
+            found = np.append(found, float(self._own(v) @ weight.diagonal()))
         return np.asarray(2.0 * _SPREAD * found)
 
     def fitted(self, state: State, near: Fitted | None = None) -> Fitted:
@@ -299,7 +337,9 @@ class ModelError:
             near: scales of a similar one, from where a few steps do, and about which there is as
                 much room.
         """
-        first = np.zeros(len(self.names) + (len(self.residual) > 0)) if near is None else near.v
+        first = np.zeros(self._count + (len(self.change) > 0))
+        if near is not None:
+            first[: self._count] = near.v[: self._count]
         y, free = self._linear(state)
 
         def cost(v: FloatArray) -> tuple[float, FloatArray]:
@@ -318,9 +358,11 @@ class ModelError:
             options={"maxiter": _STEPS if near is None else _FEW_STEPS, "ftol": _SETTLED},
         )
         v = np.asarray(found.x)
-        if near is not None:
-            return Fitted(v, near.log_volume)
         inverse, _ = _inverse(self.covariance(v) + free)
+        if near is not None:
+            own = self._own(v)
+            known = 0.5 * (2.0 * _SPREAD) ** 2 * float(own @ np.square(inverse) @ own)
+            return Fitted(v, near.log_volume - 0.5 * float(np.log1p(known)))
         fisher = np.eye(len(v)) + self._fisher(v, inverse)
         return Fitted(v, -0.5 * float(np.linalg.slogdet(fisher)[1]))
 
@@ -351,15 +393,20 @@ class ModelError:
         free[r:, r:] = state.slopes @ state.slopes.T
         return y, free
 
+    def own_share(self, v: FloatArray) -> float:
+        """Return which share of what an explanation changes is its own error."""
+        return float(CHANGE * _MEDIAN * np.exp(_SPREAD * v[-1])) if len(v) > self._count else 0.0
+
     def scales(self, v: FloatArray) -> list[tuple[str, float, str]]:
         """Return name, standard deviation and unit of every class, at definite scales."""
         tau, unshared = self._variances(v)
         rows = zip(self.names, np.sqrt(tau), strict=True)
         found = [(n, float(s), "deviations" if kind(n) == "shapes" else "") for n, s in rows]
-        return [
-            *found,
-            *([("unshared", float(np.sqrt(unshared)), "")] if len(self.residual) else []),
-        ]
+        if len(self.residual):
+            found.append(("unshared", float(np.sqrt(unshared)), ""))
+        if len(v) > self._count:
+            found.append(("change by the causes", self.own_share(v), ""))
+        return found
 
     def foreseen(
         self,
