@@ -230,3 +230,34 @@ def test_a_cause_beside_a_model_error_keeps_its_size(
 
 def test_shapes_share_a_width_whatever_their_mode(slopes: dict[str, FloatArray]) -> None:
     assert {kind(name) for name in slopes} == set(WIDTHS)
+
+
+def test_what_a_cause_changes_may_be_off_by_a_share_of_it(
+    problem: Problem, slopes: dict[str, FloatArray]
+) -> None:
+    """A third of every change is another than the effect says; the reference fits to the digit."""
+    part = part_at(problem, "added-mass", JOINT)
+    nothing = state_at(problem, (), NOTHING)
+    point = state_at(problem, (part,), np.array([4.0]))
+    moved = nothing.raw - point.raw
+    rng = np.random.default_rng(9)
+    reference, noise = rng.standard_normal((2, len(moved)))
+    error = 0.3 * np.abs(moved) * rng.standard_normal(len(moved))
+    model = ModelError.of(slopes, slopes, reference, WIDTHS, 0.02, 0.0)
+    near = model.fitted(replace(nothing, raw=noise + moved))
+    shares = []
+    for off in (0.0, 1.0):
+        explained = replace(point, raw=noise + off * error)
+        seeing = model.beside(replace(nothing, raw=explained.raw + moved), explained)
+        blind, own = model.fitted(explained, near), seeing.fitted(explained, near)
+        shares.append(seeing.own_share(own.v))
+        assert model.own_share(blind.v) == 0.0
+        assert len(own.v) == len(blind.v) + 1
+    assert shares[1] > 2.0 * shares[0]
+    density = [
+        noise.log_density - 0.5 * np.square(noise.residual(explained.raw)).sum()
+        for noise in (model.noise(blind), seeing.noise(own))
+    ]
+    assert density[1] > density[0] + 3.0
+    # Nothing changes nothing: it has no error of its own.
+    assert model.beside(nothing, nothing).change.max() == 0.0
