@@ -114,6 +114,25 @@ def test_what_is_there_from_the_first_day_is_no_difference(damaged: tuple[Frame,
     assert 0.0 <= seen.like_a_beam <= 1.0
 
 
+def test_a_reference_of_frequencies_alone_will_do() -> None:
+    test = measured(MODEL, FRAME, count=8, shapes=0)
+    case = replace(case_of(MODEL, test, 6), reference=test, reference_used=test.numbers[:6])
+    assert diagnose(case).verdict == "none"
+
+
+def test_a_model_from_matrices_has_fewer_classes_of_error(tmp_path: Path) -> None:
+    frame = read_case(ROOT / "scenarios" / "frame")
+    model = replace(frame.model, stiffness=1.02 * frame.model.stiffness)
+    write_case(tmp_path / "matrices", frame, model)
+    case = read_case(tmp_path / "matrices")
+    assert case.model.structure is None
+    found = diagnose(replace(case, reference=case.measurement, reference_used=case.used))
+    assert found.verdict == "none"
+    classes = {row.name for row in found.model_error}
+    assert "general" in classes
+    assert "element stiffness" not in classes
+
+
 def test_a_reference_on_other_sensors_is_refused(damaged: tuple[Frame, Frame]) -> None:
     built, broken = damaged
     case = case_with(broken, 1, built)
