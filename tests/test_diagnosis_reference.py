@@ -15,6 +15,7 @@ from femubench.core.case.writing import write_case
 from femubench.core.challenge.structures import structure_named
 from femubench.core.fem.frame import Factor, JointSpring, RigidEnd
 from femubench.core.inference.examine import examine
+from femubench.core.modal.eigen import DENSE_LIMIT
 from femubench.fem import Frame
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -214,3 +215,15 @@ class TestCaseFolder:
             read_case(folder(f"\n{lines}\n"))
         assert says in str(fault.value)
         assert len(str(fault.value).splitlines()) == 1
+
+
+def test_a_large_model_foresees_what_it_holds_out(damaged: tuple[Frame, Frame]) -> None:
+    """Of a large model some modes are solved, more of them for more data."""
+    fine = replace(FRAME, members=tuple(replace(m, elements=30) for m in FRAME.members))
+    built, _ = damaged
+    case = replace(case_with(built, 3, built), model=Model.of(fine))
+    assert case.model.size > DENSE_LIMIT
+    found = diagnose(case, effects=["grounding-spring"], pairs=False)
+    assert found.like_a_beam < 0.5
+    assert found.verdict == "none"
+    assert found.gain.held_out_percent is not None

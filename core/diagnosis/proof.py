@@ -186,8 +186,9 @@ def held_out(
     if examination is None or found.state.problem.noise.beam:
         return Unseen(first * relative, last * relative, std)
     nothing = examination.posterior.nothing.fit.state
-    plain, spared = examination.foreseen(nothing, before.raw, data, case.reference)
-    mean, error = examination.foreseen(found.state, exact, data, case.reference)
+    (plain, spared), (mean, error) = examination.foreseen(
+        [(nothing, before.raw), (found.state, exact)], data, case.reference
+    )
     error = np.hypot(error, examination.own_share(found.state) * (first - last))
     return Unseen(
         (first - plain) * relative,

@@ -31,7 +31,7 @@ from femubench.core.inference.residuals import Data
 from femubench.core.inference.screening import with_shortlist
 from femubench.core.inference.search import Found, Search, adequacy
 from femubench.core.inference.static_response import Basis, placed
-from femubench.core.modal.eigen import zero_tolerance
+from femubench.core.modal.eigen import Modes, zero_tolerance
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect
 from femubench.core.typing import FloatArray
@@ -54,6 +54,7 @@ class Examination:
         tolerance: standard deviation of that scatter.
         posterior: all explanations.
         found: the atlas of every textbook set that was searched.
+        modes: of the model, in the coordinates of the problem.
         error: what a beam model gets wrong, where that was asked.
         reference, width, beam: as in `examine`.
     """
@@ -64,6 +65,7 @@ class Examination:
     tolerance: float
     posterior: Posterior
     found: tuple[Found, ...]
+    modes: Modes
     error: ModelError | None = None
     reference: Measurement | None = None
     width: float = 0.0
@@ -110,44 +112,50 @@ class Examination:
         return 0.0 if self.error is None or scales is None else self.error.own_share(scales)
 
     def foreseen(
-        self, state: State, raw: FloatArray, data: Data, reference: Measurement | None
-    ) -> tuple[FloatArray, FloatArray]:
+        self,
+        explained: Iterable[tuple[State, FloatArray]],
+        data: Data,
+        reference: Measurement | None,
+    ) -> list[tuple[FloatArray, FloatArray]]:
         """Return mean and deviation of what the model error makes of unseen frequencies.
 
-        In standard deviations of their measurement; nothing where the structure is taken for a
-        beam model.
+        One pair an explanation, in standard deviations of their measurement; nothing where it
+        takes the structure for a beam model.
 
         Arguments:
-            state: an explanation.
-            raw: residuals of used and unseen modes beside it, (n,).
+            explained: explanations, and the residuals of used and unseen modes beside each, (n,).
             data: used modes, then unseen ones.
             reference: used and unseen modes of the structure as it was.
         """
         used, count = len(self.problem.data.measurement), len(data.measurement)
-        scales = state.problem.noise.scales
-        if self.error is None or scales is None:
-            return np.zeros(count - used), np.zeros(count - used)
-        modes = Basis.of(self.model, data.measurement).modes
+        assert self.error is not None
         mode, _ = data.shape_rows
         # Shapes of unseen modes are not asked for, and would say what is sought.
         kept = np.flatnonzero(
             np.concatenate([np.ones(count), mode < used, np.ones(1)])[: len(data)]
         )
         problem, structure = replace(self.problem, data=data), self.model.structure
-        slopes = {k: s[kept] for k, s in error_slopes(problem, structure, modes).items()}
-        raw, earlier = raw[kept], np.zeros(len(kept), dtype=bool)
+        slopes = {k: s[kept] for k, s in error_slopes(problem, structure, self.modes).items()}
+        before = np.zeros(0)
         if reference is not None:
-            before = before_of(self.problem, reference)
-            more = error_slopes(before.problem, structure, modes)
+            state = before_of(self.problem, reference)
+            before, more = state.raw, error_slopes(state.problem, structure, self.modes)
             slopes = {
                 k: np.vstack(
-                    [rows_of(k, slopes, more, len(raw)), rows_of(k, more, slopes, len(before.raw))]
+                    [rows_of(k, slopes, more, len(kept)), rows_of(k, more, slopes, len(before))]
                 )
                 for k in dict.fromkeys((*slopes, *more))
             }
-            earlier = np.append(earlier, np.ones(len(before.raw), dtype=bool))
-            raw = np.append(raw, before.raw)
-        return self.error.foreseen(scales, slopes, earlier, raw, np.arange(used, count))
+        earlier, unseen = np.arange(len(kept) + len(before)) >= len(kept), np.arange(used, count)
+        found = []
+        for state, raw in explained:
+            scales, together = state.problem.noise.scales, np.concatenate([raw[kept], before])
+            found.append(
+                (np.zeros(len(unseen)), np.zeros(len(unseen)))
+                if scales is None
+                else self.error.foreseen(scales, slopes, earlier, together, unseen)
+            )
+        return found
 
     def problem_of(self, explanation: Explanation) -> Problem:
         """Return the data in the coordinates of an explanation's textbook effects."""
@@ -208,7 +216,8 @@ def examine(
         more, atlas = Search(own, known, pairs=pairs, floor=floor).run()
     posterior = Posterior.of([*explanations, *more])
     return Examination(
-        *(model, own, slopes, tolerance, posterior, tuple(atlas)), error, reference, width, beam
+        *(model, own, slopes, tolerance, posterior, tuple(atlas), basis.modes),
+        *(error, reference, width, beam),
     )
 
 
