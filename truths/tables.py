@@ -53,7 +53,7 @@ def write_table(page: Path = PAGE) -> None:
         f"{errors.max():.1f} %, {np.median(errors):.1f} % in the median.\n"
     )
     before, _, rest = page.read_text(encoding="utf-8").partition(MARK)
-    table = f"{MARK}\n\n{head}{chr(10).join(rows)}\n{foot}\n{END}"
+    table = MARK + "\n\n" + head + "\n".join(rows) + "\n" + foot + "\n" + END
     page.write_text(before + table + rest.partition(END)[2], encoding="utf-8")
 
 

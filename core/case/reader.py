@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
@@ -209,7 +209,12 @@ class _Building:
         if from_plugin:
             measured = measured_only(sensors, measurement.shapes)
             measurement = self.modes(("measurement", "modes"), spec.modes, measured)
-        self.check_labels(measurement)
+        listed = [
+            (("measurement", key, i), number)
+            for key, numbers in (("used", spec.used), ("held_out", spec.held_out))
+            for i, number in enumerate(numbers)
+        ]
+        check_labels(listed, measurement, spec.modes)
         if spec.mass is None:
             return measurement
         return replace(measurement, total_mass=(spec.mass.value, spec.mass.std))
@@ -229,13 +234,8 @@ class _Building:
             return None
         found = self.modes(("reference", "modes"), spec.modes, sensors)
         key = "modes" if spec.used is None else "used"
-        for number in self.reference_used:
-            if number not in found.numbers:
-                there = ", ".join(map(str, found.numbers[:20]))
-                what = f"mode {number} has no data in {spec.modes}"
-                raise Fault(("reference", key), what, f"one of {there}")
-        if len(set(self.reference_used)) < len(self.reference_used):
-            raise Fault(("reference", key), "a mode is listed twice", "every mode once")
+        listed = [(("reference", key), number) for number in self.reference_used]
+        check_labels(listed, found, spec.modes)
         mass = None if spec.mass is None else (spec.mass.value, spec.mass.std)
         return replace(found, total_mass=mass)
 
@@ -256,20 +256,6 @@ class _Building:
         if read is None:
             return read_modes(path, sensors, share)
         return fitted_modes(read, path, sensors, share)
-
-    def check_labels(self, measurement: Measurement) -> None:
-        spec = self.spec.measurement
-        seen: set[int] = set()
-        for key, numbers in (("used", spec.used), ("held_out", spec.held_out)):
-            for i, number in enumerate(numbers):
-                path = ("measurement", key, i)
-                if number in seen:
-                    raise Fault(path, f"mode {number} is listed twice", "every mode once")
-                if number not in measurement.numbers:
-                    there = ", ".join(map(str, measurement.numbers[:20]))
-                    what = f"mode {number} has no data in {spec.modes}"
-                    raise Fault(path, what, f"one of {there}")
-                seen.add(number)
 
     def modifications(self, model: Model, site: Site, sensors: Sensors) -> tuple[Modification, ...]:
         specs = self.spec.modification
@@ -295,6 +281,29 @@ class _Building:
                 raise Fault((), str(error), "a change that the model can take") from None
         measurement = self.modes(("modification", i, "modes"), spec.modes, sensors)
         return Modification(spec.name, masses, springs, measurement)
+
+
+def check_labels(
+    listed: Iterable[tuple[KeyPath, int]], measurement: Measurement, file: str
+) -> None:
+    """Check that modes are listed once, and that a measurement has them.
+
+    Arguments:
+        listed: the key of every label, and the label.
+        measurement: what was read.
+        file: where, as `case.toml` names it.
+
+    Raises:
+        Fault: at the key of the first label that is wrong.
+    """
+    seen: set[int] = set()
+    for path, number in listed:
+        if number in seen:
+            raise Fault(path, f"mode {number} is listed twice", "every mode once")
+        if number not in measurement.numbers:
+            there = ", ".join(map(str, measurement.numbers[:20]))
+            raise Fault(path, f"mode {number} has no data in {file}", f"one of {there}")
+        seen.add(number)
 
 
 def _key_of(item: object, frame: Frame) -> tuple[KeyPath, str]:

@@ -103,19 +103,18 @@ def check_written(fresh: Path, folder: Path, wanted: Case) -> None:
         if getattr(back, part) != getattr(wanted, part):
             what = f"{getattr(wanted, part)!r} does not read back"
             raise refused(folder, what, part, f"not {getattr(back, part)!r}")
-    first, second = (
-        [
-            case.measurement,
-            *(change.measurement for change in case.modifications),
-            *([] if case.reference is None else [case.reference]),
-        ]
-        for case in (wanted, back)
-    )
+    first, second = (_measurements(case) for case in (wanted, back))
     for one, other in zip(first, second, strict=True):
         column = _differing(one, other)
         if column is not None:
             what = f"the {column.replace('_', ' ')} of a measurement does not read back"
             raise refused(folder, what, "measurement", "finite numbers within their bounds")
+
+
+def _measurements(case: Case) -> list[Measurement]:
+    """Return all that was measured: the structure, its modifications, the reference."""
+    changed = [change.measurement for change in case.modifications]
+    return [case.measurement, *changed, *([] if case.reference is None else [case.reference])]
 
 
 def _differing(one: Measurement, other: Measurement) -> str | None:
@@ -209,14 +208,7 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
         Fault: for what no case folder can say.
     """
     keys, files, modifications = _model_part(case, known)
-    share = common_share(
-        [
-            case.measurement,
-            *(m.measurement for m in modifications),
-            *([] if case.reference is None else [case.reference]),
-        ],
-        known.shape_std,
-    )
+    share = common_share(_measurements(case), known.shape_std)
     measurement: Keys = {"modes": "modes.csv", "shape_std": share}
     if len(case.measurement.sensors):
         measurement = {"sensors": "sensors.csv", **measurement}

@@ -74,8 +74,9 @@ def error_slopes(
         rows = scatter_slopes(problem, modes)
         count = len(structure.properties)
         found["element stiffness"], found["element mass"] = rows[:, :count], rows[:, count:]
-        found["mass of joints"] = _joint_masses(nominal, structure, shapes)
-        stiff, heavy, types = _end_moments(structure, shapes)
+        local = (structure.gather @ shapes).reshape(len(structure.mesh.ends), 12, -1)
+        found["mass of joints"] = _joint_masses(nominal, structure, local)
+        stiff, heavy, types = _end_moments(structure, local)
         values = nominal.eigenvalues[nominal.partner]
         ends = stiff - values[:, None, None] * heavy  # (m, p, N)
         own = np.einsum("mpN,Nm->mp", ends, nominal.vectors[: ends.shape[2], nominal.partner])
@@ -149,10 +150,15 @@ def _shapes(nominal: State) -> dict[str, FloatArray]:
     return found
 
 
-def _joint_masses(nominal: State, structure: Structure, shapes: FloatArray) -> FloatArray:
-    """Return the slopes of a mass at every joint, as a share of the structure, (n_data, n)."""
+def _joint_masses(nominal: State, structure: Structure, local: FloatArray) -> FloatArray:
+    """Return the slopes of a mass at every joint, as a share of the structure, (n_data, n).
+
+    Arguments:
+        nominal: the model as drawn.
+        structure: its frame.
+        local: displacements of the elements in all modes, (n_elements, 12, N).
+    """
     mesh, frame = structure.mesh, structure.frame
-    local = (structure.gather @ shapes).reshape(len(mesh.ends), 12, -1)
     moved: dict[int, FloatArray] = {}
     for element, ends in enumerate(mesh.ends):
         for node, part in zip(ends, (slice(0, 3), slice(6, 9)), strict=True):
@@ -166,19 +172,22 @@ def _joint_masses(nominal: State, structure: Structure, shapes: FloatArray) -> F
 
 
 def _end_moments(
-    structure: Structure, shapes: FloatArray
+    structure: Structure, local: FloatArray
 ) -> tuple[FloatArray, FloatArray, IntArray]:
     """Return the end moments of all members by all modes, scaled, and the class of each.
 
     A compliance c at an end lowers the energy by c M^2 / 2, to first order, M with the inertia of
     the end's own rotation. Unit compliances are L/4EI in bending and L/GJ in torsion.
 
+    Arguments:
+        structure: the frame as drawn.
+        local: displacements of the elements in all modes, (n_elements, 12, N).
+
     Returns:
         elastic moments and, at unit eigenvalue, those of inertia, both times the root of the unit
         compliance, (p, N) each; joint type and direction, (p,).
     """
     frame, mesh = structure.frame, structure.mesh
-    local = (structure.gather @ shapes).reshape(len(mesh.ends), 12, -1)
     matrices = stiffness_matrices(structure.properties), mass_matrices(structure.properties)
     kind = {joint.name: joint.type or joint.name for joint in frame.joints}
     active = [d for d, word in enumerate(("rx", "ry", "rz")) if word in ACTIVE[frame.plane]]
@@ -293,8 +302,7 @@ class ModelError:
         """Return the variances of an explanation's own error, (r + n,)."""
         found = np.zeros(len(self.residual) + self.present.shape[1])
         if len(self.change):
-            size = CHANGE * _MEDIAN * np.exp(_SPREAD * v[self._count])
-            found[len(self.residual) :] = np.square(size * self.change)
+            found[len(self.residual) :] = np.square(self.own_share(v) * self.change)
         return found
 
     @cached_property
