@@ -74,6 +74,18 @@ def test_what_goes_in_comes_out_with_scores_and_ranks(tmp_path: Path) -> None:
     assert run.meta["notes"] == []
 
 
+def test_results_stand_in_the_order_of_the_jobs_whichever_ended_first(tmp_path: Path) -> None:
+    meta = {**META, "cases": {"b": {}, "a": {}}, "strategies": ["z", "y"], "seeds": [1, 0]}
+    jobs = [(c, seed, s) for c in ("b", "a") for seed in (1, 0) for s in ("z", "y")]
+    unknown = ("c", 0, "z")
+    store = Store(tmp_path)
+    store.begin(meta)
+    for case, seed, strategy in [unknown, *reversed(jobs)]:
+        store.append(META["run"], replace(GOOD, case=case, seed=seed, strategy=strategy))
+    loaded = store.load().results
+    assert [(r.case, r.seed, r.strategy) for r in loaded] == [*jobs, unknown]
+
+
 def test_the_latest_run_is_the_default_and_others_go_by_id(tmp_path: Path) -> None:
     stored(tmp_path, "20260101T000000Z-aaaaaa")
     store = stored(tmp_path, "20260102T000000Z-bbbbbb", [GOOD])

@@ -6,7 +6,7 @@ import errno
 import fcntl
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -148,7 +148,7 @@ class Store:
         return tuple(line.record["run"] for line in self._of("run"))
 
     def load(self, run_id: str | None = None, *, lenient: bool = False) -> Run:
-        """Return a run with scores and ranks.
+        """Return a run with scores and ranks, its results in the order of its jobs.
 
         A last line that was cut short (a crash while writing) is left out and told about in
         ``meta["notes"]``; a run that never ended has ``meta["finished"]`` None.
@@ -178,8 +178,8 @@ class Store:
                 else:
                     meta.update(self._meta(line))
         reference = meta.get("reference") or None
-        listed = tuple(results.values())
-        check_extent(meta, listed, file=self.path)
+        check_extent(meta, tuple(results.values()), file=self.path)
+        listed = in_order_of_jobs(meta, results.values())
         notes = [*notes, *damage.notes(self.path)]
         return Run({**meta, "notes": notes}, rank_results(listed, reference, meta.get("baseline")))
 
@@ -333,6 +333,22 @@ def _mend(descriptor: int) -> int:
         return size + 1
     os.ftruncate(descriptor, size - len(last))
     return size - len(last)
+
+
+def in_order_of_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> list[JobResult]:
+    """Return results as a run lists its jobs, since workers end in an order that differs each time.
+
+    Arguments:
+        meta: ``cases``, ``seeds`` and ``strategies`` of the run; what they lack comes last.
+    """
+    listed = meta.get("cases") or (), meta.get("seeds") or (), meta.get("strategies") or ()
+    places = [{name: place for place, name in enumerate(names)} for names in listed]
+
+    def place(result: JobResult) -> list[int]:
+        words = result.case, result.seed, result.strategy
+        return [known.get(word, len(known)) for known, word in zip(places, words, strict=True)]
+
+    return sorted(results, key=place)
 
 
 def _is_json(text: bytes) -> bool:
