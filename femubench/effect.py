@@ -27,6 +27,7 @@ from femubench.core.effect.change import (
     sparse_term,
 )
 from femubench.core.effect.flexible_ends import end_arm, flexible_ends_change, rate_nodes
+from femubench.core.effect.flexible_supports import flexible_supports_change, softened_supports
 from femubench.core.effect.frame_effect import EffectParameter, FrameEffect
 from femubench.core.effect.places import (
     branch_places,
@@ -39,10 +40,13 @@ from femubench.core.effect.places import (
     joints_with_members,
     member_labels,
     member_length,
+    members_at,
     pair_of,
     point_of,
     point_places,
     split_direction,
+    support_places,
+    supports_of,
     type_place,
     type_places,
 )
@@ -80,6 +84,7 @@ __all__ = [
     "end_places",
     "ends_of",
     "flexible_ends_change",
+    "flexible_supports_change",
     "free_translations",
     "joint_types",
     "joints_of",
@@ -87,6 +92,7 @@ __all__ = [
     "mass_term",
     "member_labels",
     "member_length",
+    "members_at",
     "once_for",
     "pair_of",
     "point_in",
@@ -95,8 +101,11 @@ __all__ = [
     "point_places",
     "proportional",
     "rate_nodes",
+    "softened_supports",
     "sparse_term",
     "split_direction",
+    "support_places",
+    "supports_of",
     "total_mass",
     "translation_rows",
     "type_place",

@@ -28,6 +28,7 @@ from femubench.core.fem.frame import (
     RigidEnd,
     Support,
 )
+from femubench.core.fem.mesh import member_axes
 from femubench.core.fem.model import LowRank
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.preload import preload_stiffness, preload_stiffnesses, redundant_members
@@ -75,6 +76,7 @@ __all__ = [
     "coupling_matrices",
     "eccentric_mass_parts",
     "mass_matrices",
+    "member_axes",
     "preload_stiffness",
     "preload_stiffnesses",
     "rectangular_tube",

@@ -3,7 +3,14 @@
 from __future__ import annotations
 
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.effect.places import elements_of, joints_of, pair_of, point_of, split_direction
+from femubench.core.effect.places import (
+    elements_of,
+    joints_of,
+    pair_of,
+    point_of,
+    split_direction,
+    supports_of,
+)
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
@@ -28,6 +35,7 @@ def _in_frame(structure: Structure, place: str) -> bool:
         lambda: elements_of(structure, place),
         lambda: point_of(frame, place),
         lambda: pair_of(frame, place),
+        lambda: supports_of(frame, place),
     )
     for read in reads:
         try:

@@ -2,18 +2,19 @@
 
 ``all``; a joint type (``type:L`` where it equals a joint's name); a joint; a member; ``member/k``,
 element k from 1; ``member@joint``, an end; ``member@0.25``, a point; ``A-E``, a pair of joints; a
-suffix ``:z`` names a direction.
+suffix ``:z`` names a direction; ``support:A``, what holds a point to ground.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 
 import numpy as np
 
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.errors import ModelError
-from femubench.core.fem.frame import Frame, Place
+from femubench.core.fem.frame import ACTIVE, Frame, Member, Place
 from femubench.core.fem.joints import joint_groups
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import DIRECTIONS
@@ -21,7 +22,7 @@ from femubench.core.fem.structure import Structure
 from femubench.core.typing import IntArray
 
 ALL = "all"
-_TYPE, _BRANCH = "type:", ":branch"
+_TYPE, _BRANCH, _SUPPORT = "type:", ":branch", "support:"
 # Stations are written with six digits, mesh nodes have more.
 _SAME = 1e-5
 _FEW = 4
@@ -58,6 +59,24 @@ def elements_of(structure: Structure, place: str, *, arms: bool = False) -> IntA
     if not len(rows):
         raise ModelError(f"there is no place {place!r}")
     return rows
+
+
+def members_at(frame: Frame, place: str) -> tuple[Member, ...]:
+    """Return the members that a place names or lies on, or that end at the joints it names.
+
+    All members where it names none.
+
+    Examples:
+        >>> [member.name for member in effect.members_at(frame, "J5")]
+        ['front-right', 'front-left', 'rung-middle']
+    """
+    points = [place]
+    if place.startswith(_SUPPORT):
+        points = list(supports_of(frame, place))
+    heads = {p.partition(":")[0].partition("@")[0].partition("/")[0] for p in points}
+    joints = {joint.name for joint in frame.joints if heads & {joint.name, joint.type}}
+    found = (m for m in frame.members if m.name in heads or joints & set(m.ends))
+    return tuple(found) or frame.members
 
 
 def member_labels(frame: Frame) -> tuple[str, ...]:
@@ -207,6 +226,64 @@ def ends_of(frame: Frame, place: str) -> tuple[str, ...]:
     raise ModelError(f"no member ends at {place!r}")
 
 
+def support_places(frame: Frame) -> tuple[str, ...]:
+    """Return ``support:A`` of what holds the frame to ground, ``support:A:z`` of each direction.
+
+    One that holds one direction alone has the latter only; ``support:all`` are all of several.
+
+    Examples:
+        >>> spring = fem.GroundSpring(fem.Place(joint="J1"), "z", 1e4)
+        >>> effect.support_places(frame.with_attachments((), (spring,)))
+        ('support:J1:z',)
+    """
+    held = _held(frame)
+    places = [_SUPPORT + ALL] if len(held) > 1 else []
+    for word, directions in held.items():
+        places += [_SUPPORT + word] if len(directions) > 1 else []
+        places += [f"{_SUPPORT}{word}:{direction}" for direction in directions]
+    return tuple(places)
+
+
+def supports_of(frame: Frame, place: str) -> Mapping[str, Mapping[str, float]]:
+    """Return what holds the frame to ground at a place: by point, from direction to stiffness.
+
+    Supports are infinitely stiff, springs to ground as stiff as they are, N/m and N m/rad;
+    directions that the plane does not have are left out.
+
+    Raises:
+        ModelError: when nothing is held there.
+
+    Examples:
+        >>> spring = fem.GroundSpring(fem.Place(joint="J1"), "z", 1e4)
+        >>> effect.supports_of(frame.with_attachments((), (spring,)), "support:J1")
+        {'J1': {'z': 10000.0}}
+    """
+    word, direction = split_direction(place)
+    held, word = _held(frame), word.removeprefix(_SUPPORT)
+    found = {
+        at: {d: k for d, k in own.items() if direction in (None, d)}
+        for at, own in held.items()
+        if word in (ALL, at)
+    }
+    if not place.startswith(_SUPPORT) or not any(found.values()):
+        raise ModelError(f"there is no support {place!r}")
+    return found
+
+
+def _held(frame: Frame) -> dict[str, dict[str, float]]:
+    held: dict[str, dict[str, float]] = {}
+    listed = [(s.at, s.direction, s.stiffness) for s in frame.springs if s.stiffness]
+    listed += [(support.at, d, np.inf) for support in frame.supports for d in support.fixed]
+    for at, name, stiffness in listed:
+        direction = name.lstrip("+-")
+        if direction in ACTIVE[frame.plane]:
+            own = held.setdefault(str(point_of(frame, str(at))), {})
+            own[direction] = own.get(direction, 0.0) + stiffness
+    return {
+        word: {d: own[d] for d in ACTIVE[frame.plane] if d in own} for word, own in held.items()
+    }
+
+
 def split_direction(place: str) -> tuple[str, str | None]:
     """Return a place without its suffix ``:z``, and the direction; None where it has none.
 
@@ -216,7 +293,7 @@ def split_direction(place: str) -> tuple[str, str | None]:
     """
     head, _, tail = place.rpartition(":")
     # "type:x" is the joint type x.
-    if head and head != _TYPE[:-1] and tail.lstrip("+-") in DIRECTIONS:
+    if head and f"{head}:" not in (_TYPE, _SUPPORT) and tail.lstrip("+-") in DIRECTIONS:
         return head, tail
     return place, None
 
@@ -289,6 +366,11 @@ def pair_of(frame: Frame, place: str) -> tuple[str, str]:
 
 def _canonical(frame: Frame, place: str) -> tuple[str, ...]:
     """Return one form for all words that stand for the same place."""
+    if place.startswith(_SUPPORT):
+        with suppress(ModelError):
+            return tuple(
+                f"{word}:{d}" for word, own in supports_of(frame, place).items() for d in own
+            )
     place, direction = split_direction(place)
     suffix = () if direction is None else (direction.lstrip("+-"),)
     joints = joints_of(frame, place)

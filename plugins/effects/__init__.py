@@ -14,6 +14,7 @@ CLASSES = {
     "joint-offset": "joint_offset:JointOffset",
     "joint-mass": "joint_mass:JointMass",
     "added-mass": "added_mass:AddedMass",
+    "support-flexibility": "support_flexibility:SupportFlexibility",
     "grounding-spring": "grounding_spring:GroundingSpring",
     "member-stiffness": "material:MemberStiffness",
     "member-mass": "material:MemberMass",
