@@ -26,10 +26,17 @@ from femubench.core.effect.change import (
     proportional,
     sparse_term,
 )
-from femubench.core.effect.flexible_ends import end_arm, flexible_ends_change, rate_nodes
+from femubench.core.effect.flexible_ends import (
+    end_arm,
+    end_room,
+    flexible_ends_change,
+    free_arm_change,
+    rate_nodes,
+)
 from femubench.core.effect.flexible_supports import flexible_supports_change, softened_supports
 from femubench.core.effect.frame_effect import EffectParameter, FrameEffect
 from femubench.core.effect.places import (
+    APART,
     branch_places,
     element_labels,
     elements_of,
@@ -57,6 +64,7 @@ from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import LookWarning
 
 __all__ = [
+    "APART",
     "Change",
     "Effect",
     "EffectParameter",
@@ -82,9 +90,11 @@ __all__ = [
     "elongation_row",
     "end_arm",
     "end_places",
+    "end_room",
     "ends_of",
     "flexible_ends_change",
     "flexible_supports_change",
+    "free_arm_change",
     "free_translations",
     "joint_types",
     "joints_of",

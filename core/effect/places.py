@@ -2,7 +2,8 @@
 
 ``all``; a joint type (``type:L`` where it equals a joint's name); a joint; a member; ``member/k``,
 element k from 1; ``member@joint``, an end; ``member@0.25``, a point; ``A-E``, a pair of joints; a
-suffix ``:z`` names a direction; ``support:A``, what holds a point to ground.
+suffix ``:z`` names a direction; ``support:A``, what holds a point to ground. ``:apart`` is no other
+place: there an effect has more values, one a direction.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from femubench.core.typing import IntArray
 
 ALL = "all"
 _TYPE, _BRANCH, _SUPPORT = "type:", ":branch", "support:"
+APART = ":apart"
 # Stations are written with six digits, mesh nodes have more.
 _SAME = 1e-5
 _FEW = 4
@@ -211,6 +213,7 @@ def ends_of(frame: Frame, place: str) -> tuple[str, ...]:
         >>> effect.ends_of(frame, "J5")
         ('front-right@J5', 'front-left@J5', 'rung-middle@J5')
     """
+    place = place.removesuffix(APART)
     if place.endswith(_BRANCH):
         kind = place.removesuffix(_BRANCH).removeprefix(_TYPE)
         for group in joint_groups(frame):
@@ -366,6 +369,7 @@ def pair_of(frame: Frame, place: str) -> tuple[str, str]:
 
 def _canonical(frame: Frame, place: str) -> tuple[str, ...]:
     """Return one form for all words that stand for the same place."""
+    place = place.removesuffix(APART)
     if place.startswith(_SUPPORT):
         with suppress(ModelError):
             return tuple(
@@ -397,6 +401,6 @@ def match(frame: Frame, place_a: str, place_b: str) -> bool:
 
     At a joint of two members an end is the joint; a type with one joint is that joint; the member
     of a frame with one member is ``all``; the ends of a member are joints; pairs have no order,
-    directions no sign.
+    directions no sign; a place is the same ``:apart``.
     """
     return _canonical(frame, place_a) == _canonical(frame, place_b)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -17,7 +18,6 @@ from femubench.effect import (
     flexible_supports_change,
     members_at,
     softened_supports,
-    split_direction,
     support_places,
     supports_of,
 )
@@ -27,14 +27,9 @@ _SOFTEST = 1e-3  # of the scale
 _TRANSLATIONS, _ROTATIONS = ("x", "y", "z"), ("rx", "ry", "rz")
 
 
-def _translation(site: Site) -> float:
-    """Return what members at a place resist a motion across them with, 12 EI/L^3 in N/m."""
-    return site.mean(lambda m: 12.0 * m.material.E * m.section.Iy / site.length(m) ** 3)
-
-
-def _first(site: Site) -> float:
-    direction = split_direction(site.place)[1]
-    return site.bending_stiffness() if direction in _ROTATIONS else _translation(site)
+def _unit(number: int, site: Site) -> float:
+    """Return what a stiffness is measured by, that of what is held."""
+    return [_scale(site.frame, held) for held in _parts(site.frame, site.place).values()][number]
 
 
 class SupportFlexibility(FrameEffect):
@@ -47,9 +42,8 @@ class SupportFlexibility(FrameEffect):
     name: ClassVar[str] = "support-flexibility"
     summary: ClassVar[str] = "a support gives"
     softens: ClassVar[bool] = True
-    sizes: ClassVar[Sequence[Size]] = (
-        Size(0.3, 30.0, _first, log=True),
-        Size(0.3, 30.0, Site.bending_stiffness, log=True),
+    sizes: ClassVar[Sequence[Size]] = tuple(
+        Size(0.3, 30.0, partial(_unit, number), log=True) for number in (0, 1)
     )
 
     def places(self, model: Model) -> Sequence[str]:
