@@ -16,6 +16,7 @@ from femubench.core.effect.places import (
     APART,
     ends_of,
     joints_of,
+    members_of,
     pair_of,
     point_of,
     split_direction,
@@ -112,6 +113,9 @@ def _place(wireframe: Wireframe, frame: Frame | None, word: str) -> DrawnPlace:
         return DrawnPlace(word, "joint", points=_points(frame, joints))
     if frame is None or plain.kind in ("all", "member", "element"):
         return plain
+    if frame is not None and (named := members_of(frame, head)):
+        spans = tuple(Span(frame.member_index[name], 0.0, 1.0) for name in named)
+        return DrawnPlace(word, "member", spans)
     with suppress(ModelError):
         held = [point_of(frame, at) for at in supports_of(frame, word)]
         return DrawnPlace(word, "point", points=tuple(to_point(place_xyz(frame, p)) for p in held))

@@ -2,13 +2,14 @@
 
 ``all``; a joint type (``type:L`` where it equals a joint's name); a joint; a member; ``member/k``,
 element k from 1; ``member@joint``, an end; ``member@0.25``, a point; ``A-E``, a pair of joints; a
-suffix ``:z`` names a direction; ``support:A``, what holds a point to ground. ``:apart`` is no other
+suffix ``:z`` names a direction; ``support:A``, what holds a point to ground; ``set:wing``,
+``section:tube``, ``material:steel``, families of members. ``:apart`` is no other
 place: there an effect has more values, one a direction.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 
 import numpy as np
@@ -24,6 +25,7 @@ from femubench.core.typing import IntArray
 
 ALL = "all"
 _TYPE, _BRANCH, _SUPPORT = "type:", ":branch", "support:"
+_SET, _SECTION, _MATERIAL = "set:", "section:", "material:"
 APART = ":apart"
 # Stations are written with six digits, mesh nodes have more.
 _SAME = 1e-5
@@ -31,7 +33,9 @@ _FEW = 4
 
 
 def elements_of(structure: Structure, place: str, *, arms: bool = False) -> IntArray:
-    """Return the rows of the mesh at ``all``, a member or ``member/k``, pieces of split ones too.
+    """Return the rows of the mesh at ``all``, a member, a set of members or ``member/k``.
+
+    Pieces of split elements are there too.
 
     Arguments:
         structure: a meshed frame.
@@ -47,10 +51,9 @@ def elements_of(structure: Structure, place: str, *, arms: bool = False) -> IntA
     """
     mesh, frame = structure.mesh, structure.frame
     plain = np.isnan(mesh.arm_factor)
-    if place in frame.member_index:
-        chosen = mesh.member == frame.member_index[place]
-    elif place == ALL:
-        chosen = np.ones(len(plain), dtype=bool)
+    named = members_of(frame, place)
+    if named:
+        chosen = np.isin(mesh.member, [frame.member_index[name] for name in named])
     else:
         member, _, number = place.rpartition("/")
         if member not in frame.member_index or not number.isdecimal():
@@ -63,6 +66,49 @@ def elements_of(structure: Structure, place: str, *, arms: bool = False) -> IntA
     return rows
 
 
+def members_of(frame: Frame, place: str) -> tuple[str, ...]:
+    """Return the names of the members of ``all``, a member, ``set:``, ``section:``, ``material:``.
+
+    Nothing where the place is none of these.
+
+    Examples:
+        >>> effect.members_of(frame, "rung-middle")
+        ('rung-middle',)
+    """
+    if place in frame.member_index:
+        return (place,)
+    if place == ALL:
+        return member_labels(frame)
+    listed = (*((f"{_SET}{s.name}", s) for s in frame.sets), *((f.name, f) for f in frame.families))
+    return next((found.members for word, found in listed if word == place), ())
+
+
+def set_places(frame: Frame, kinds: Sequence[str] = ("set", "section")) -> tuple[str, ...]:
+    """Return the words of families of two members or more that are not all of the frame.
+
+    Arguments:
+        frame: any frame.
+        kinds: ``set``, ``section``, ``material``; of equal families only the first is there, and
+            none that is a material too where materials are not asked for.
+
+    Examples:
+        >>> effect.set_places(frame)
+        ()
+    """
+    words = [f"{_SET}{s.name}" for s in frame.sets] + [f.name for f in frame.families]
+    known: set[frozenset[str]] = {frozenset(frame.member_index)}
+    if "material" not in kinds:
+        materials = (f for f in frame.families if f.name.startswith(_MATERIAL))
+        known |= {frozenset(family.members) for family in materials}
+    found = []
+    for word in words:
+        members = frozenset(members_of(frame, word))
+        if word.partition(":")[0] in kinds and len(members) > 1 and members not in known:
+            found.append(word)
+            known.add(members)
+    return tuple(found)
+
+
 def members_at(frame: Frame, place: str) -> tuple[Member, ...]:
     """Return the members that a place names or lies on, or that end at the joints it names.
 
@@ -72,9 +118,9 @@ def members_at(frame: Frame, place: str) -> tuple[Member, ...]:
         >>> [member.name for member in effect.members_at(frame, "J5")]
         ['front-right', 'front-left', 'rung-middle']
     """
-    points = [place]
+    points = members_of(frame, place) or (place,)
     if place.startswith(_SUPPORT):
-        points = list(supports_of(frame, place))
+        points = tuple(supports_of(frame, place))
     heads = {p.partition(":")[0].partition("@")[0].partition("/")[0] for p in points}
     joints = {joint.name for joint in frame.joints if heads & {joint.name, joint.type}}
     found = (m for m in frame.members if m.name in heads or joints & set(m.ends))
@@ -296,7 +342,8 @@ def split_direction(place: str) -> tuple[str, str | None]:
     """
     head, _, tail = place.rpartition(":")
     # "type:x" is the joint type x.
-    if head and f"{head}:" not in (_TYPE, _SUPPORT) and tail.lstrip("+-") in DIRECTIONS:
+    kinds = (_TYPE, _SUPPORT, _SET, _SECTION, _MATERIAL)
+    if head and f"{head}:" not in kinds and tail.lstrip("+-") in DIRECTIONS:
         return head, tail
     return place, None
 
@@ -381,10 +428,10 @@ def _canonical(frame: Frame, place: str) -> tuple[str, ...]:
     if joints:
         word = joints[0] if len(joints) == 1 else _TYPE + place.removeprefix(_TYPE)
         return (word, *suffix)
-    if place == ALL or (len(frame.members) == 1 and place in frame.member_index):
+    if len(members_of(frame, place)) == len(frame.members):
         return (ALL, *suffix)
-    if place in frame.member_index:
-        return (place, *suffix)
+    if named := members_of(frame, place):
+        return (*sorted(named), *suffix)
     member, _, end = place.rpartition("@")
     if member in frame.ends_at(end):
         return (end if len(frame.ends_at(end)) <= 2 else place, *suffix)
