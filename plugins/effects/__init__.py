@@ -18,6 +18,7 @@ CLASSES = {
     "grounding-spring": "grounding_spring:GroundingSpring",
     "member-stiffness": "material:MemberStiffness",
     "member-mass": "material:MemberMass",
+    "wall-thickness": "wall_thickness:WallThickness",
     "local-stiffness-loss": "local_stiffness_loss:LocalStiffnessLoss",
     "axial-preload": "axial_preload:AxialPreload",
     "mass-eccentricity": "mass_eccentricity:MassEccentricity",
