@@ -26,9 +26,17 @@ from femubench.core.effect.change import (
     proportional,
     sparse_term,
 )
-from femubench.core.effect.flexible_ends import end_arm, flexible_ends_change, rate_nodes
+from femubench.core.effect.flexible_ends import (
+    end_arm,
+    end_room,
+    flexible_ends_change,
+    free_arm_change,
+    rate_nodes,
+)
+from femubench.core.effect.flexible_supports import flexible_supports_change, softened_supports
 from femubench.core.effect.frame_effect import EffectParameter, FrameEffect
 from femubench.core.effect.places import (
+    APART,
     branch_places,
     element_labels,
     elements_of,
@@ -39,10 +47,15 @@ from femubench.core.effect.places import (
     joints_with_members,
     member_labels,
     member_length,
+    members_at,
+    members_of,
     pair_of,
     point_of,
     point_places,
+    set_places,
     split_direction,
+    support_places,
+    supports_of,
     type_place,
     type_places,
 )
@@ -53,6 +66,7 @@ from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import LookWarning
 
 __all__ = [
+    "APART",
     "Change",
     "Effect",
     "EffectParameter",
@@ -78,8 +92,11 @@ __all__ = [
     "elongation_row",
     "end_arm",
     "end_places",
+    "end_room",
     "ends_of",
     "flexible_ends_change",
+    "flexible_supports_change",
+    "free_arm_change",
     "free_translations",
     "joint_types",
     "joints_of",
@@ -87,6 +104,8 @@ __all__ = [
     "mass_term",
     "member_labels",
     "member_length",
+    "members_at",
+    "members_of",
     "once_for",
     "pair_of",
     "point_in",
@@ -95,8 +114,12 @@ __all__ = [
     "point_places",
     "proportional",
     "rate_nodes",
+    "set_places",
+    "softened_supports",
     "sparse_term",
     "split_direction",
+    "support_places",
+    "supports_of",
     "total_mass",
     "translation_rows",
     "type_place",

@@ -21,6 +21,7 @@ from femubench.core.fem.frame import (
     JointSpring,
     Material,
     Member,
+    MemberSet,
     Oscillator,
     Place,
     PointMass,
@@ -28,6 +29,7 @@ from femubench.core.fem.frame import (
     RigidEnd,
     Support,
 )
+from femubench.core.fem.mesh import member_axes
 from femubench.core.fem.model import LowRank
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.preload import preload_stiffness, preload_stiffnesses, redundant_members
@@ -58,6 +60,7 @@ __all__ = [
     "LowRank",
     "Material",
     "Member",
+    "MemberSet",
     "ModelError",
     "Modification",
     "Oscillator",
@@ -75,6 +78,7 @@ __all__ = [
     "coupling_matrices",
     "eccentric_mass_parts",
     "mass_matrices",
+    "member_axes",
     "preload_stiffness",
     "preload_stiffnesses",
     "rectangular_tube",

@@ -29,6 +29,7 @@ from femubench.core.fem.frame import (
     Frame,
     GroundSpring,
     JointSpring,
+    MemberSet,
     Oscillator,
     Place,
     PointMass,
@@ -67,7 +68,7 @@ def assert_same_section(one: Section, other: Section) -> None:
 
 
 def assert_same_frame(one: Frame, other: Frame) -> None:
-    for f in fields(Frame):
+    for f in (f for f in fields(Frame) if f.compare):
         if f.name != "members":
             assert getattr(one, f.name) == getattr(other, f.name), f.name
     for first, second in zip(one.members, other.members, strict=True):
@@ -197,6 +198,7 @@ def full_frames(ladder: Case, portal: Case, bracket: Case) -> Iterator[tuple[str
             eccentricities=(Eccentricity("front-left", y=0.004),),
             couplings=(Coupling("front-left", -0.1),),
             oscillators=(Oscillator(point, "z", 0.05, 300.0),),
+            sets=(MemberSet("side", ("front-left", "rung-left")),),
         ),
     )
     base = frame_of(portal)

@@ -74,6 +74,9 @@ SINGLES = (
     Blind(2, "temperature"),
     Blind(4, "member-mass", scatter=0.005),
     Blind(0, "joint-mass", structure="portal"),
+    Blind(1, "wall-thickness"),
+    Blind(1, "support-flexibility", structure="portal"),
+    Blind(2, "support-flexibility", structure="table"),
 )
 # Stress by a lack of fit in one side of a cell is that in the other side.
 ALIKE = {"axial-preload"}

@@ -6,7 +6,7 @@ import re
 import sys
 import tomllib
 from collections.abc import Callable, Iterator
-from dataclasses import fields
+from dataclasses import fields, replace
 from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from femubench.core.conformance.checking import findings, subjects
 from femubench.core.inference.hypothesis import hypotheses_of
 from femubench.core.plugin.loader import Plugins, load_plugins
 from femubench.effect import member_length
-from femubench.fem import Frame
+from femubench.fem import Frame, Place, Support
 from femubench.plugins.effects import femubench_effects
 
 TEXT = (Path(__file__).parents[1] / "docs" / "effects.md").read_text(encoding="utf-8")
@@ -39,8 +39,10 @@ def rows_of(heading: str) -> dict[str, list[str]]:
 
 @pytest.fixture(scope="module")
 def models(ladder: FrameBuilder, hframe: FrameBuilder, portal: FrameBuilder) -> list[Model]:
-    """Return a frame of each plane, none with shear deformation."""
-    frames = (ladder(), hframe(mesh=(4, 2, 4)), portal(3, "euler-bernoulli"))
+    """Return a frame of each plane, none with shear deformation, and one on a support."""
+    frames = [ladder(), hframe(mesh=(4, 2, 4)), portal(3, "euler-bernoulli")]
+    clamp = Support(Place(joint="L1"), ("x", "z", "ry"))
+    frames.append(replace(frames[1], supports=(clamp,)))
     return [Model.of(frame) for frame in frames]
 
 
@@ -55,7 +57,7 @@ def changed_keys(frame: Frame, other: Frame) -> set[str]:
 
 
 def test_every_effect_is_in_both_tables() -> None:
-    assert len(EFFECTS) == 20
+    assert len(EFFECTS) == 22
     assert list(rows_of(THERE)) == list(rows_of(WRITES))
     assert set(rows_of(THERE)) == set(EFFECTS)
 

@@ -512,3 +512,37 @@ def test_shear_of_members_of_all_sizes(ladder: FrameBuilder) -> None:
     change = ShearDeformation().change(model, "all")
     assert len(change.terms) == 20
     check_exact(ShearDeformation(), model, "all", [1.3], tolerance=1e-7)
+
+
+def test_directions_apart_and_a_free_arm(
+    models: dict[str, Model], ladder: FrameBuilder, portal: FrameBuilder
+) -> None:
+    """Interpolated between arms, the change is the model's as well as with the arm of the book."""
+    effect = JointRotation()
+    assert effect.finer(models["hframe"], "T:branch") == ()  # numbers: no depth, one direction
+    stiff = (1.0, 0.5, 2.0)
+    for model, place, units in (
+        (models["ladder"], "BE@B:apart", 3),
+        (models["ladder"], "T:branch:apart", 3),
+        (Model.of(ladder(plane="out-of-plane", elements=6)), "L:apart", 3),
+        (Model.of(portal(4)), "m1@J1:apart", 4),
+    ):
+        simple = place.removesuffix(":apart")
+        assert effect.finer(model, simple) == (place,)
+        assert effect.finer(model, place) == ()
+        parameters = effect.parameters(model, place)
+        assert [p.unit for p in parameters] == ["N m/rad"] * (units - 1) + [""]
+        assert (parameters[-1].textbook, parameters[-1].upper) == (1.0, 2.0)
+        own = [factor * p.scale for factor, p in zip(stiff, parameters[:-1], strict=False)]
+        for arm in (0.0, 0.37, 1.0, 1.9):
+            found = compare(effect, model, place, [*own, arm], count=5)
+            assert found.frequency < 1e-3, (place, arm, found)
+        assert compare(effect, model, place, [*own, 1.0], count=5).effect > 0.005
+    frame = models["ladder"].frame_structure.frame
+    (spring,) = effect.frame(frame, "BE@B:apart", [3e3, 4e2, 0.5]).joint_springs
+    assert spring.stiffness == {"ry": 3e3, "rx": 4e2}
+    assert spring.arm == pytest.approx(0.5 * 0.0127)
+    assert match(frame, "BE@B:apart", "BE@B")
+    assert match(frame, "A:apart", "AB@A")
+    assert not match(frame, "BE@B:apart", "BE@E")
+    assert ends_of(frame, "BE@B:apart") == ("BE@B",)

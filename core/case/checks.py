@@ -88,10 +88,20 @@ def check_frame(model: FrameSpec) -> None:
     for key in ("preloads", "eccentricities", "couplings"):
         for i, item in enumerate(getattr(model, key)):
             _check_known("member", item.member, members, (key, i, "member"))
+    _check_sets(model, members)
     _check_factors(model, members)
     _check_eccentricities(model)
     _check_couplings(model)
     _check_braces(model)
+
+
+def _check_sets(model: FrameSpec, members: Collection[str]) -> None:
+    check_unique((("sets", i, "name"), item.name) for i, item in enumerate(model.sets))
+    for i, item in enumerate(model.sets):
+        path = ("sets", i, "members")
+        check_unique(((*path, j), name) for j, name in enumerate(item.members))
+        for j, name in enumerate(item.members):
+            _check_known("member", name, members, (*path, j))
 
 
 def _check_known(

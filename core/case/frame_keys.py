@@ -208,7 +208,7 @@ def frame_keys(frame: Frame, known: Known) -> Keys:
     """
     # A beam without length is no arm, and the reader takes none.
     springs = (replace(s, arm_factor=s.arm_factor if s.arm else None) for s in frame.joint_springs)
-    plain = keys_of(replace(frame, joint_springs=tuple(springs)), without=("members",))
+    plain = keys_of(replace(frame, joint_springs=tuple(springs)), without=("members", "families"))
     sections, section_tables = _sections(frame, known)
     materials, material_tables = _materials(frame, known)
     members = [

@@ -25,6 +25,7 @@ from femubench.core.fem.frame import (
     JointSpring,
     Material,
     Member,
+    MemberSet,
     Oscillator,
     Place,
     Plane,
@@ -161,6 +162,7 @@ _PARTS: dict[str, type] = {
     "eccentricities": Eccentricity,
     "couplings": Coupling,
     "braces": Brace,
+    "sets": MemberSet,
 }
 _ATTACHED: dict[str, type] = {
     "masses": PointMass,
@@ -186,11 +188,20 @@ def frame_of(model: FrameSpec) -> Frame:
         Member(m.name, m.ends, m.elements, sections[m.section], materials[m.material], m.up)
         for m in model.members
     )
-    site = FrameSite(Frame(**parts, members=members))
+    site = FrameSite(Frame(**parts, members=members, families=_families(model)))
     attached: dict[str, Any] = {
         key: attachments(key, getattr(model, key), site) for key in _ATTACHED
     }
     return replace(site.frame, **attached)
+
+
+def _families(model: FrameSpec) -> tuple[MemberSet, ...]:
+    """Return the members of every section and of every material."""
+    found: dict[str, list[str]] = {}
+    for kind in ("section", "material"):
+        for member in model.members:
+            found.setdefault(f"{kind}:{getattr(member, kind)}", []).append(member.name)
+    return tuple(MemberSet(word, tuple(names)) for word, names in found.items())
 
 
 def _made(kind: Any, spec: Table) -> Any:  # noqa: ANN401 - a part of a frame

@@ -260,6 +260,13 @@ class RigidEndSpec(Table):
     mass_length: Number = Field(0.0, description="a length in m")
 
 
+class SetSpec(Table):
+    """`[[model.sets]]`: members that belong together."""
+
+    name: Name = Field(description=NAME)
+    members: Many[Name] = Field(min_length=1, description="a list of names of members")
+
+
 class FrameSpec(Table):
     """`[model]` with ``kind = "frame"``."""
 
@@ -287,6 +294,7 @@ class FrameSpec(Table):
     couplings: Many[CouplingSpec] = _tables("model.couplings")
     braces: Many[BraceSpec] = _tables("model.braces")
     oscillators: Many[OscillatorSpec] = _tables("model.oscillators")
+    sets: Many[SetSpec] = _tables("model.sets")
 
 
 class GroupSpec(Table):

@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.effect.places import elements_of, joints_of, pair_of, point_of, split_direction
+from femubench.core.effect.places import (
+    APART,
+    elements_of,
+    joints_of,
+    pair_of,
+    point_of,
+    split_direction,
+    supports_of,
+)
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
@@ -11,7 +19,7 @@ from femubench.core.fem.structure import Structure
 
 def known_place(model: Model, place: str) -> bool:
     """Tell whether a place, without its direction or role, is in a model."""
-    bare = split_direction(place.removesuffix(":branch"))[0]
+    bare = split_direction(place.removesuffix(APART).removesuffix(":branch"))[0]
     if model.structure is not None:
         return _in_frame(model.structure, bare) or _in_frame(model.structure, place)
     known = set(model.groups) | {"all"}
@@ -28,6 +36,7 @@ def _in_frame(structure: Structure, place: str) -> bool:
         lambda: elements_of(structure, place),
         lambda: point_of(frame, place),
         lambda: pair_of(frame, place),
+        lambda: supports_of(frame, place),
     )
     for read in reads:
         try:

@@ -11,7 +11,17 @@ from pydantic import Field
 
 from femubench.core.case.case import Case
 from femubench.core.drawing.wireframe import Point, Wireframe, check_within, to_point, wireframe_of
-from femubench.core.effect.places import ALL, ends_of, joints_of, pair_of, point_of, split_direction
+from femubench.core.effect.places import (
+    ALL,
+    APART,
+    ends_of,
+    joints_of,
+    members_of,
+    pair_of,
+    point_of,
+    split_direction,
+    supports_of,
+)
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame, Place
 from femubench.core.fem.mesh import place_xyz
@@ -97,12 +107,18 @@ def _plain_place(wireframe: Wireframe, word: str, head: str) -> DrawnPlace:
 
 
 def _place(wireframe: Wireframe, frame: Frame | None, word: str) -> DrawnPlace:
-    head, _ = split_direction(word)
+    head, _ = split_direction(word.removesuffix(APART))
     plain = _plain_place(wireframe, word, head)
     if frame is not None and plain.kind != "all" and (joints := joints_of(frame, head)):
         return DrawnPlace(word, "joint", points=_points(frame, joints))
     if frame is None or plain.kind in ("all", "member", "element"):
         return plain
+    if frame is not None and (named := members_of(frame, head)):
+        spans = tuple(Span(frame.member_index[name], 0.0, 1.0) for name in named)
+        return DrawnPlace(word, "member", spans)
+    with suppress(ModelError):
+        held = [point_of(frame, at) for at in supports_of(frame, word)]
+        return DrawnPlace(word, "point", points=tuple(to_point(place_xyz(frame, p)) for p in held))
     with suppress(ModelError):
         return DrawnPlace(word, "end", _ends(frame, head))
     with suppress(ModelError):

@@ -110,10 +110,18 @@ class MatrixOperator:
 
 @dataclass(frozen=True)
 class Term:
-    """One fixed matrix of a change: what it belongs to and where it acts."""
+    """One fixed matrix of a change: what it belongs to and where it acts.
+
+    Arguments:
+        matrix: what it is added to.
+        operator: the matrix.
+        heavier: whether a mass makes the structure heavier; inertia of dofs that follow others
+            does not, wherever they go.
+    """
 
     matrix: Literal["mass", "stiffness"]
     operator: Operator
+    heavier: bool = True
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,7 @@ from femubench.core.typing import FloatArray, IntArray
 _MOST = 24
 _NODES = 20
 _SAME_RATE = 1e-10
+_ARMS = 6
 
 
 def rate_nodes(rates: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -96,19 +97,53 @@ def end_arm(structure: Structure, end: str) -> float:
         >>> round(effect.end_arm(structure, "rung-middle@J5"), 4)
         0.0127
     """
-    frame = structure.frame
+    return max(0.0, min(half_depth(structure.frame, end), end_room(structure, end)))
+
+
+def end_room(structure: Structure, end: str) -> float:
+    """Return the longest arm in m that a new spring at a ``member@joint`` end may sit behind.
+
+    Examples:
+        >>> round(effect.end_room(structure, "rung-middle@J5"), 4)
+        0.0629
+    """
     member, _, joint = end.rpartition("@")
-    if any((s.member, s.joint) == (member, joint) for s in frame.joint_springs):
+    if any((s.member, s.joint) == (member, joint) for s in structure.frame.joint_springs):
         return 0.0
     element, side = structure.element_ends[end]
     p = structure.properties
     rigid = (p.rigid_1, p.rigid_2)[side][element], (p.rigid_mass_1, p.rigid_mass_2)[side][element]
-    room = available_length(structure, end) - max(0.0, *map(float, rigid))
-    return max(0.0, min(half_depth(frame, end), room))
+    return available_length(structure, end) - max(0.0, *map(float, rigid))
+
+
+def free_arm_change(
+    model: Model, ends: Sequence[str], parts: Sequence[tuple[str, ...]], longest: float
+) -> Change:
+    """Return what rotational springs behind arms of any length do.
+
+    Arguments:
+        model, ends, parts: as in `flexible_ends_change`.
+        longest: the longest arm, as a multiple of `end_arm`, which is the last value. The matrices
+            are interpolated between arms at Chebyshev points.
+
+    Examples:
+        >>> change = effect.free_arm_change(model, ["rung-middle@J5"], [("rx", "ry")], 2.0)
+        >>> change.coefficients(np.array([[1e4, 1.0]])).shape == (1, len(change.terms))
+        True
+    """
+    nodes = chebyshev_nodes(0.0, longest, _ARMS)
+    fixed = [flexible_ends_change(model, ends, parts, float(node)) for node in nodes]
+
+    def coefficients(values: FloatArray) -> FloatArray:
+        shares = barycentric(nodes, values[:, -1]).T
+        own = zip(shares, fixed, strict=True)
+        return np.hstack([share[:, None] * c.coefficients(values[:, :-1]) for share, c in own])
+
+    return Change(tuple(term for change in fixed for term in change.terms), coefficients)
 
 
 def flexible_ends_change(
-    model: Model, ends: Sequence[str], parts: Sequence[tuple[str, ...]]
+    model: Model, ends: Sequence[str], parts: Sequence[tuple[str, ...]], arm: float = 1.0
 ) -> Change:
     """Return what rotational springs at member ends do, in series with those that are there.
 
@@ -117,6 +152,7 @@ def flexible_ends_change(
         ends: ``member@joint``.
         parts: for every value of the change, the local directions of its springs. The values are
             stiffnesses in N m/rad, infinite for rigid connections, of which the arms remain.
+        arm: its length as a multiple of `end_arm`.
 
     Examples:
         >>> change = effect.flexible_ends_change(model, ["rung-middle@J5"], [("rx", "ry")])
@@ -129,7 +165,7 @@ def flexible_ends_change(
     for end in ends:
         element, side = structure.element_ends[end]
         length = once_for(model, ("arm", end), partial(end_arm, structure, end))
-        arms[np.searchsorted(rows, element), side] = length
+        arms[np.searchsorted(rows, element), side] = arm * length
     elements = _Elements.of(model, rows, arms)
     terms, rates, powers, where = elements.arm_terms(model), [], [], []
     fixed = len(terms)

@@ -2,18 +2,21 @@
 
 ``all``; a joint type (``type:L`` where it equals a joint's name); a joint; a member; ``member/k``,
 element k from 1; ``member@joint``, an end; ``member@0.25``, a point; ``A-E``, a pair of joints; a
-suffix ``:z`` names a direction.
+suffix ``:z`` names a direction; ``support:A``, what holds a point to ground; ``set:wing``,
+``section:tube``, ``material:steel``, families of members. ``:apart`` is no other
+place: there an effect has more values, one a direction.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 
 import numpy as np
 
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.errors import ModelError
-from femubench.core.fem.frame import Frame, Place
+from femubench.core.fem.frame import ACTIVE, Frame, Member, Place
 from femubench.core.fem.joints import joint_groups
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import DIRECTIONS
@@ -21,14 +24,18 @@ from femubench.core.fem.structure import Structure
 from femubench.core.typing import IntArray
 
 ALL = "all"
-_TYPE, _BRANCH = "type:", ":branch"
+_TYPE, _BRANCH, _SUPPORT = "type:", ":branch", "support:"
+_SET, _SECTION, _MATERIAL = "set:", "section:", "material:"
+APART = ":apart"
 # Stations are written with six digits, mesh nodes have more.
 _SAME = 1e-5
 _FEW = 4
 
 
 def elements_of(structure: Structure, place: str, *, arms: bool = False) -> IntArray:
-    """Return the rows of the mesh at ``all``, a member or ``member/k``, pieces of split ones too.
+    """Return the rows of the mesh at ``all``, a member, a set of members or ``member/k``.
+
+    Pieces of split elements are there too.
 
     Arguments:
         structure: a meshed frame.
@@ -44,10 +51,9 @@ def elements_of(structure: Structure, place: str, *, arms: bool = False) -> IntA
     """
     mesh, frame = structure.mesh, structure.frame
     plain = np.isnan(mesh.arm_factor)
-    if place in frame.member_index:
-        chosen = mesh.member == frame.member_index[place]
-    elif place == ALL:
-        chosen = np.ones(len(plain), dtype=bool)
+    named = members_of(frame, place)
+    if named:
+        chosen = np.isin(mesh.member, [frame.member_index[name] for name in named])
     else:
         member, _, number = place.rpartition("/")
         if member not in frame.member_index or not number.isdecimal():
@@ -58,6 +64,67 @@ def elements_of(structure: Structure, place: str, *, arms: bool = False) -> IntA
     if not len(rows):
         raise ModelError(f"there is no place {place!r}")
     return rows
+
+
+def members_of(frame: Frame, place: str) -> tuple[str, ...]:
+    """Return the names of the members of ``all``, a member, ``set:``, ``section:``, ``material:``.
+
+    Nothing where the place is none of these.
+
+    Examples:
+        >>> effect.members_of(frame, "rung-middle")
+        ('rung-middle',)
+    """
+    if place in frame.member_index:
+        return (place,)
+    if place == ALL:
+        return member_labels(frame)
+    listed = (*((f"{_SET}{s.name}", s) for s in frame.sets), *((f.name, f) for f in frame.families))
+    return next((found.members for word, found in listed if word == place), ())
+
+
+def set_places(frame: Frame, kinds: Sequence[str] = ("set", "section")) -> tuple[str, ...]:
+    """Return the words of families of two members or more that are not all of the frame.
+
+    Arguments:
+        frame: any frame.
+        kinds: ``set``, ``section``, ``material``; of equal families only the first is there, and
+            none that is a material too where materials are not asked for.
+
+    Examples:
+        >>> effect.set_places(frame)
+        ()
+    """
+    words = [f"{_SET}{s.name}" for s in frame.sets] + [f.name for f in frame.families]
+    known: set[frozenset[str]] = {frozenset(frame.member_index)}
+    if "material" not in kinds:
+        materials = (f for f in frame.families if f.name.startswith(_MATERIAL))
+        known |= {frozenset(family.members) for family in materials}
+    found = []
+    for word in words:
+        members = frozenset(members_of(frame, word))
+        if word.partition(":")[0] in kinds and len(members) > 1 and members not in known:
+            found.append(word)
+            known.add(members)
+    return tuple(found)
+
+
+def members_at(frame: Frame, place: str) -> tuple[Member, ...]:
+    """Return the members that a place names or lies on, or that end at the joints it names.
+
+    All members where it names none.
+
+    Examples:
+        >>> [member.name for member in effect.members_at(frame, "J5")]
+        ['front-right', 'front-left', 'rung-middle']
+    """
+    points = members_of(frame, place) or (place,)
+    if place.startswith(_SUPPORT):
+        points = tuple(supports_of(frame, place))
+    heads = {p.partition(":")[0].partition("@")[0].partition("/")[0] for p in points}
+    joints = {joint.name for joint in frame.joints if heads & {joint.name, joint.type}}
+    found = (m for m in frame.members if m.name in heads or joints & set(m.ends))
+    return tuple(found) or frame.members
 
 
 def member_labels(frame: Frame) -> tuple[str, ...]:
@@ -192,6 +259,7 @@ def ends_of(frame: Frame, place: str) -> tuple[str, ...]:
         >>> effect.ends_of(frame, "J5")
         ('front-right@J5', 'front-left@J5', 'rung-middle@J5')
     """
+    place = place.removesuffix(APART)
     if place.endswith(_BRANCH):
         kind = place.removesuffix(_BRANCH).removeprefix(_TYPE)
         for group in joint_groups(frame):
@@ -207,6 +275,64 @@ def ends_of(frame: Frame, place: str) -> tuple[str, ...]:
     raise ModelError(f"no member ends at {place!r}")
 
 
+def support_places(frame: Frame) -> tuple[str, ...]:
+    """Return ``support:A`` of what holds the frame to ground, ``support:A:z`` of each direction.
+
+    One that holds one direction alone has the latter only; ``support:all`` are all of several.
+
+    Examples:
+        >>> spring = fem.GroundSpring(fem.Place(joint="J1"), "z", 1e4)
+        >>> effect.support_places(frame.with_attachments((), (spring,)))
+        ('support:J1:z',)
+    """
+    held = _held(frame)
+    places = [_SUPPORT + ALL] if len(held) > 1 else []
+    for word, directions in held.items():
+        places += [_SUPPORT + word] if len(directions) > 1 else []
+        places += [f"{_SUPPORT}{word}:{direction}" for direction in directions]
+    return tuple(places)
+
+
+def supports_of(frame: Frame, place: str) -> Mapping[str, Mapping[str, float]]:
+    """Return what holds the frame to ground at a place: by point, from direction to stiffness.
+
+    Supports are infinitely stiff, springs to ground as stiff as they are, N/m and N m/rad;
+    directions that the plane does not have are left out.
+
+    Raises:
+        ModelError: when nothing is held there.
+
+    Examples:
+        >>> spring = fem.GroundSpring(fem.Place(joint="J1"), "z", 1e4)
+        >>> effect.supports_of(frame.with_attachments((), (spring,)), "support:J1")
+        {'J1': {'z': 10000.0}}
+    """
+    word, direction = split_direction(place)
+    held, word = _held(frame), word.removeprefix(_SUPPORT)
+    found = {
+        at: {d: k for d, k in own.items() if direction in (None, d)}
+        for at, own in held.items()
+        if word in (ALL, at)
+    }
+    if not place.startswith(_SUPPORT) or not any(found.values()):
+        raise ModelError(f"there is no support {place!r}")
+    return found
+
+
+def _held(frame: Frame) -> dict[str, dict[str, float]]:
+    held: dict[str, dict[str, float]] = {}
+    listed = [(s.at, s.direction, s.stiffness) for s in frame.springs if s.stiffness]
+    listed += [(support.at, d, np.inf) for support in frame.supports for d in support.fixed]
+    for at, name, stiffness in listed:
+        direction = name.lstrip("+-")
+        if direction in ACTIVE[frame.plane]:
+            own = held.setdefault(str(point_of(frame, str(at))), {})
+            own[direction] = own.get(direction, 0.0) + stiffness
+    return {
+        word: {d: own[d] for d in ACTIVE[frame.plane] if d in own} for word, own in held.items()
+    }
+
+
 def split_direction(place: str) -> tuple[str, str | None]:
     """Return a place without its suffix ``:z``, and the direction; None where it has none.
 
@@ -216,7 +342,8 @@ def split_direction(place: str) -> tuple[str, str | None]:
     """
     head, _, tail = place.rpartition(":")
     # "type:x" is the joint type x.
-    if head and head != _TYPE[:-1] and tail.lstrip("+-") in DIRECTIONS:
+    kinds = (_TYPE, _SUPPORT, _SET, _SECTION, _MATERIAL)
+    if head and f"{head}:" not in kinds and tail.lstrip("+-") in DIRECTIONS:
         return head, tail
     return place, None
 
@@ -289,16 +416,22 @@ def pair_of(frame: Frame, place: str) -> tuple[str, str]:
 
 def _canonical(frame: Frame, place: str) -> tuple[str, ...]:
     """Return one form for all words that stand for the same place."""
+    place = place.removesuffix(APART)
+    if place.startswith(_SUPPORT):
+        with suppress(ModelError):
+            return tuple(
+                f"{word}:{d}" for word, own in supports_of(frame, place).items() for d in own
+            )
     place, direction = split_direction(place)
     suffix = () if direction is None else (direction.lstrip("+-"),)
     joints = joints_of(frame, place)
     if joints:
         word = joints[0] if len(joints) == 1 else _TYPE + place.removeprefix(_TYPE)
         return (word, *suffix)
-    if place == ALL or (len(frame.members) == 1 and place in frame.member_index):
+    if len(members_of(frame, place)) == len(frame.members):
         return (ALL, *suffix)
-    if place in frame.member_index:
-        return (place, *suffix)
+    if named := members_of(frame, place):
+        return (*sorted(named), *suffix)
     member, _, end = place.rpartition("@")
     if member in frame.ends_at(end):
         return (end if len(frame.ends_at(end)) <= 2 else place, *suffix)
@@ -315,6 +448,6 @@ def match(frame: Frame, place_a: str, place_b: str) -> bool:
 
     At a joint of two members an end is the joint; a type with one joint is that joint; the member
     of a frame with one member is ``all``; the ends of a member are joints; pairs have no order,
-    directions no sign.
+    directions no sign; a place is the same ``:apart``.
     """
     return _canonical(frame, place_a) == _canonical(frame, place_b)

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from femubench.core.effect.places import members_at
 from femubench.core.fem.frame import Frame, Member
 from femubench.core.fem.mesh import member_axes
 from femubench.core.typing import FloatArray
@@ -34,10 +35,7 @@ class Site:
     @cached_property
     def members(self) -> tuple[Member, ...]:
         """Return the members that the place names, or that end at the joint it names; else all."""
-        head = self.place.partition(":")[0].partition("@")[0].partition("/")[0]
-        joints = {joint.name for joint in self.frame.joints if head in (joint.name, joint.type)}
-        found = (m for m in self.frame.members if m.name == head or joints & set(m.ends))
-        return tuple(found) or self.frame.members
+        return members_at(self.frame, self.place)
 
     def mean(self, quantity: Callable[[Member], float]) -> float:
         """Return the mean of something over the members at the place."""

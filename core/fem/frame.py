@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -215,6 +215,19 @@ class Oscillator:
 
 
 @dataclass(frozen=True)
+class MemberSet:
+    """Members that belong together: a set of the user's, or all of one section or material.
+
+    Arguments:
+        name: of a set of `[[model.sets]]`; of a family a word of its own, e.g. ``section:tube``.
+        members: their names.
+    """
+
+    name: str
+    members: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Frame:
     """A frame of beams with everything that is attached to it.
 
@@ -223,6 +236,9 @@ class Frame:
             theory.
         bending_mass: ``cubic`` takes Hermite's functions in every theory; ``shear-consistent``
             takes those of the Timoshenko element (Friedman & Kosmatka 1993).
+        sets: named by the user.
+        families: the members of every section and of every material, by the names that these have
+            in the case; empty for a frame that was not read.
     """
 
     plane: Plane
@@ -242,6 +258,8 @@ class Frame:
     couplings: tuple[Coupling, ...] = ()
     braces: tuple[Brace, ...] = ()
     oscillators: tuple[Oscillator, ...] = ()
+    sets: tuple[MemberSet, ...] = ()
+    families: tuple[MemberSet, ...] = field(default=(), compare=False)
 
     @property
     def rotary_share(self) -> float:

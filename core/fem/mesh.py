@@ -95,6 +95,10 @@ def member_axes(frame: Frame, member: Member) -> tuple[FloatArray, float]:
 
     Raises:
         ModelError: when the member has no length, leaves the plane, or `up` lies along it.
+
+    Examples:
+        >>> round(fem.member_axes(frame, frame.members[0])[1], 4)
+        0.2794
     """
     start, stop = (np.array(frame.joint(name).xyz) for name in member.ends)
     length = float(np.linalg.norm(stop - start))

@@ -81,7 +81,7 @@ class Hypothesis:
             second = np.linspace(*parameters[1].range, 14)[1:]
             return np.array(list(product(first, second)))
         sizes = _SINGLE if len(parameters) == 1 else _DOUBLE
-        return np.array(list(product(*(_points(parameter, sizes) for parameter in parameters))))
+        return combined([_points(parameter, sizes) for parameter in parameters])
 
     @cached_property
     def grid_factors(self) -> FloatArray:
@@ -112,6 +112,18 @@ class Hypothesis:
         return np.asarray((self.factors(up) - self.factors(down)) / width[:, None])
 
 
+def combined(points: Sequence[Sequence[float]]) -> FloatArray:
+    """Return points of one parameter after the other in all combinations, (g, k).
+
+    From three parameters on, each alone, the others in the middle of theirs: as many as there are.
+    """
+    if len(points) < 3:
+        return np.array(list(product(*points)))
+    middle = np.array([own[len(own) // 2] for own in points])
+    rows = [[*middle[:i], x, *middle[i + 1 :]] for i, own in enumerate(points) for x in own]
+    return np.unique(rows, axis=0)
+
+
 def _points(parameter: EffectParameter, sizes: Sequence[float]) -> list[float]:
     low, high = parameter.range
     if parameter.scaling == "compliance":
@@ -127,13 +139,17 @@ def hypotheses_of(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, 
     found = []
     for effect in effects:
         places = tuple(dict.fromkeys(effect.places(model)))
-        for place in places:
-            parameters: Sequence[EffectParameter] = tuple(effect.parameters(model, place))
-            change = getattr(effect, "change", None)
-            made = (
-                change(model, place)
-                if callable(change)
-                else tabulated_change(effect, model, place, parameters)
-            )
-            found.append(Hypothesis(effect, place, tuple(parameters), made, len(places)))
+        found += [hypothesis_at(model, effect, place, len(places)) for place in places]
     return tuple(found)
+
+
+def hypothesis_at(model: Model, effect: Effect, place: str, places: int) -> Hypothesis:
+    """Return an effect at one of so many places."""
+    parameters: Sequence[EffectParameter] = tuple(effect.parameters(model, place))
+    change = getattr(effect, "change", None)
+    made = (
+        change(model, place)
+        if callable(change)
+        else tabulated_change(effect, model, place, parameters)
+    )
+    return Hypothesis(effect, place, tuple(parameters), made, places)

@@ -95,7 +95,8 @@ class Projector:
             rows = np.eye(grown.shape[1])
             cores = np.array([term.operator.project(grown) for term in change.terms])
             weights = np.array([self._weight(term, motion) for term in change.terms])
-        return Projection(hypothesis, rows, cores, is_mass, np.where(is_mass, weights, 0.0))
+        heavier = is_mass & np.array([term.heavier for term in change.terms], dtype=bool)
+        return Projection(hypothesis, rows, cores, is_mass, np.where(heavier, weights, 0.0))
 
     def _small(
         self, terms: Sequence[Term], extra: int
@@ -108,14 +109,21 @@ class Projector:
         touched = np.unique(np.concatenate(elements)) if elements else np.zeros(0, dtype=np.int64)
         width = len(self.active) if elements else 0
         last = len(touched) * width
-        count = last + sum(len(operator.core) for operator in points)
+        # Terms of one effect may share their rows.
+        shared = {id(operator.rows): operator.rows for operator in points}
+        count = last + sum(rows.shape[0] for rows in shared.values())
         if count > self.vectors.shape[1] + extra:
             return None
         rows, motion = np.zeros((count, self.vectors.shape[1] + extra)), np.zeros(count)
         if touched.size:
             rows[:last, : self.vectors.shape[1]] = self.local[touched].reshape(last, -1)
             motion[:last] = self.shift[touched].ravel()
-        moved = self._shifted(terms, extra)
+        moved, places = self._shifted(terms, extra), {}
+        for key, found in shared.items():
+            places[key] = slice(last, last + found.shape[0])
+            rows[places[key]] = found @ self._grown(extra)
+            motion[places[key]] = found @ moved
+            last = places[key].stop
         cores = np.zeros((len(terms), count, count))
         for core, term in zip(cores, terms, strict=True):
             operator = term.operator
@@ -123,11 +131,8 @@ class Projector:
                 whole = self._block_diagonal(operator, touched)
                 core[: len(whole), : len(whole)] = whole
             elif isinstance(operator, RowOperator):
-                own = slice(last, last + len(operator.core))
-                rows[own] = operator.rows @ self._grown(extra)
-                motion[own] = operator.rows @ moved
+                own = places[id(operator.rows)]
                 core[own, own] = operator.core
-                last = own.stop
         return rows, cores, motion
 
     def _block_diagonal(self, operator: ElementOperator, touched: IntArray) -> FloatArray:

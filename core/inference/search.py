@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtrc
 
+from femubench.core.errors import ModelError
 from femubench.core.inference.extended_model import agreed, extended
 from femubench.core.inference.fit import Fit, Problem, State, fit, log_evidence, state_at
 from femubench.core.inference.grid_search import Screened, likely, screen
-from femubench.core.inference.hypothesis import hypotheses_of
+from femubench.core.inference.hypothesis import Hypothesis, hypotheses_of, hypothesis_at
 from femubench.core.inference.posterior import Explanation, by_weight
 from femubench.core.inference.prior import Base, selection_cost, textbook_bases
-from femubench.core.inference.projection import Projection
+from femubench.core.inference.projection import Projection, Projector
 from femubench.core.inference.screening import beside, screened, with_shortlist
 from femubench.core.inference.static_response import Basis, LargeProblem, enriched, placed
 from femubench.core.roles import Effect
@@ -59,6 +61,7 @@ _SINGLES_FOR_PAIRS, _PARTNERS = 6, 8
 _PROMISE = 0.3  # of the chi-square that a partner must explain, were effects to add up
 _MOST_CAUSES = 4
 _ADEQUATE = 0.05
+_SPLIT = 4  # single causes that are tried with more values at their places
 
 
 @dataclass(frozen=True)
@@ -105,6 +108,7 @@ class Search:
         places = {p.hypothesis.name: p.hypothesis.places for p in problem.space.projections}
         self.names = len(places)
         self.places = sum(places.values()) / max(self.names, 1)
+        self.coarse: dict[int, int] = {}  # from hypotheses with more values to those with one
 
     def run(self) -> tuple[list[Explanation], list[Found]]:
         """Return all explanations and the atlas of every base that was searched."""
@@ -117,6 +121,7 @@ class Search:
         explanations += [e for e in bare if e.base.names not in searched]
         if self.pairs and self.names and _best(explanations).log_weight > self.floor:
             explanations += self.combined(found)
+            explanations += [e for best in by_weight(explanations)[:2] for e in self.split(best)]
         if isinstance(self.problem, LargeProblem):
             explanations = self.borne_out(explanations)
         return explanations, found
@@ -126,6 +131,27 @@ class Search:
         state = state_at(*enriched(self.problem, base.parts), base.x)
         alone = replace(state, parts=(), x=np.zeros(0))
         return Explanation(base, Fit(alone, log_evidence(alone)), self.names)
+
+    def split(self, explanation: Explanation) -> list[Explanation]:
+        """Return an explanation with more values at one of its places, where the effect has more.
+
+        An effect that has them offers ``finer(model, place)``, further words for a place.
+        """
+        result, problem = [], replace(explanation.fit.state.problem, offset=0.0)
+        for i, part in enumerate(explanation.parts):
+            effect, model = part.hypothesis.effect, problem.model
+            finer = getattr(effect, "finer", None)
+            for place in finer(model, part.hypothesis.place) if callable(finer) else ():
+                # As likely as not there is one value.
+                own = hypothesis_at(model, effect, place, 2 * part.hypothesis.places)
+                basis = Basis.of(model, problem.data.measurement)
+                parts = list(explanation.parts)
+                parts[i] = Projector(model, basis.modes.shapes)(own)
+                fitted = _fit_from_grid(problem, parts, i, explanation.fit)
+                if fitted is not None:
+                    self.coarse[id(own)] = id(part.hypothesis)
+                    result.append(Explanation(explanation.base, fitted, self.names))
+        return result
 
     def borne_out(self, explanations: list[Explanation]) -> list[Explanation]:
         """Return explanations, the best cause fitted until its own model agrees with it."""
@@ -156,6 +182,8 @@ class Search:
         atlas = screened(problem, start.state, problem.space.projections)
         fits = self.refined(problem, start, atlas)
         explanations = [Explanation(base, item, self.names) for item in (start, *fits)]
+        singles = by_weight(explanations[1:])[:_SPLIT]
+        explanations += [e for single in singles for e in self.split(single)]
         return Found(base, problem, tuple(explanations), tuple(atlas))
 
     def grounded(self, base: Base) -> Problem:
@@ -194,7 +222,8 @@ class Search:
         """Return explanations with two causes, then greedily more while that is worth it."""
         by_base = {item.base.names: item for item in found}
         singles = by_weight(e for item in found for e in item.explanations if e.parts)
-        seeds = singles[: _SINGLES_FOR_PAIRS if not self.enough(found) else 1]
+        places = {self.at(e.parts[0].hypothesis): e for e in reversed(singles)}
+        seeds = by_weight(places.values())[: _SINGLES_FOR_PAIRS if not self.enough(found) else 1]
         result: list[Explanation] = []
         tried: set[tuple[object, ...]] = set()
         for seed in seeds:
@@ -211,6 +240,10 @@ class Search:
             if _best(result) is best:
                 return result
 
+    def at(self, hypothesis: Hypothesis) -> int:
+        """Return what is the same for hypotheses that differ in their number of values alone."""
+        return self.coarse.get(id(hypothesis), id(hypothesis))
+
     def enough(self, found: Sequence[Found]) -> bool:
         """Tell whether nothing or one cause leaves no more than noise."""
         return any(self.adequate(e) for item in found for e in item.explanations)
@@ -226,6 +259,7 @@ class Search:
         assert start is not None
         originals = {id(p.hypothesis): p for p in problem.space.projections}
         taken = {id(part.hypothesis) for part in seed.parts}
+        taken |= {self.at(part.hypothesis) for part in seed.parts}
         free = [p for p in above.space.projections if id(p.hypothesis) not in taken]
         ranked = in_order(screen(above, start.state, free, state.jacobian), lambda s: s.cost)
         result = []
@@ -272,6 +306,25 @@ class Search:
                 seed = Explanation(found.base, alone, self.names)
                 result += self.grown(found, seed, tried)
         return result
+
+
+def _fit_from_grid(
+    problem: Problem, parts: Sequence[Projection], new: int, known: Fit
+) -> Fit | None:
+    """Return the fit of causes one of which is new, from the best point of its grid."""
+    first = sum(len(part.hypothesis.parameters) for part in parts[:new])
+    last = first + len(known.parts[new].hypothesis.parameters)
+    x = known.state.x
+    own, parts = enriched(problem, parts)
+    starts = [np.concatenate([x[:first], point, x[last:]]) for point in parts[new].hypothesis.grid]
+    states = []
+    for start in starts:
+        with suppress(ModelError):
+            states.append(state_at(own, parts, start))
+    if not states:
+        return None
+    found = fit(own, parts, in_order(states, lambda state: state.cost)[0].x)
+    return found if found is None or isinstance(own, LargeProblem) else agreed(found)
 
 
 def _best(explanations: Sequence[Explanation]) -> Explanation:

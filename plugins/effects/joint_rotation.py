@@ -10,6 +10,7 @@ import numpy as np
 
 from femubench import Model
 from femubench.effect import (
+    APART,
     Change,
     EffectParameter,
     FrameEffect,
@@ -18,8 +19,10 @@ from femubench.effect import (
     branch_places,
     end_arm,
     end_places,
+    end_room,
     ends_of,
     flexible_ends_change,
+    free_arm_change,
     joints_of,
     joints_with_members,
     member_length,
@@ -29,13 +32,15 @@ from femubench.fem import ACTIVE, Frame, JointSpring, Structure
 
 _SOFTEST = 1e-3  # of the scale
 _TORSION, _BENDING = ("rx",), ("ry", "rz")
+_ARM, _LONGEST = "arm, multiple of half a depth", 2.0
 
 
 class JointRotation(FrameEffect):
     """Connect member ends to their joint by rotational springs at the face of the crossing member.
 
-    One stiffness for a joint or an end; bending and torsion apart for a joint type. Without a fit
-    the springs are rigid, which leaves the arm between axis and face.
+    One stiffness for a joint or an end; bending and torsion apart for a joint type. ``:apart``, a
+    place has a stiffness for each local axis, and the length of the arm between axis and face is
+    free. Without a fit the springs are rigid, which leaves the arm.
     """
 
     name: ClassVar[str] = "joint-rotation"
@@ -54,68 +59,93 @@ class JointRotation(FrameEffect):
         types = (*type_places(frame), *branch_places(frame))
         return (*types, *joints_with_members(frame), *end_places(frame))
 
+    def finer(self, model: Model, place: str) -> Sequence[str]:
+        """Return the place with directions apart and a free arm, where these are more values."""
+        if place.endswith(APART):
+            return ()
+        structure, free = model.frame_structure, f"{place}{APART}"
+        more = len(_parts(structure.frame, free)) > len(_parts(structure.frame, place))
+        return (free,) if more or _longest(structure, place) > 1.0 else ()
+
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
-        """Return the stiffnesses; the scale is the members' own, 4 EI/L and GJ/L."""
-        frame = model.frame_structure.frame
-        bending, torsion = _scales(frame, ends_of(frame, place))
-        scales = {"bending": bending, "torsion": torsion}
-        if len(_parts(frame, place)) == 1:
-            scales = {"stiffness": bending}
-        return tuple(
+        """Return the stiffnesses, with the members' own as scale, 4 EI/L and GJ/L, and the arm."""
+        structure = model.frame_structure
+        scales = _scales(structure.frame, ends_of(structure.frame, place))
+        found = [
             EffectParameter(
                 name,
                 "N m/rad",
-                scale,
+                scales[name],
                 neutral=np.inf,
-                lower=_SOFTEST * scale,
+                lower=_SOFTEST * scales[name],
                 scaling="compliance",
                 one_sided=True,
             )
-            for name, scale in scales.items()
-        )
+            for name in _parts(structure.frame, place)
+        ]
+        longest = _longest(structure, place)
+        if place.endswith(APART) and longest > 1.0:
+            # The textbook has half the depth of the crossing member.
+            found.append(EffectParameter(_ARM, "", 0.5, 1.0, 0.0, longest, textbook=1.0))
+        return tuple(found)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the springs, in series with those that are there."""
         structure = Structure.build(frame)
         springs = {f"{s.member}@{s.joint}": s for s in frame.joint_springs}
-        own = {
-            direction: value
-            for directions, value in zip(_parts(frame, place), values, strict=True)
-            for direction in directions
-        }
+        groups = _parts(frame, place).values()
+        arm = values[len(groups)] if len(values) > len(groups) else 1.0
+        own = {d: value for names, value in zip(groups, values, strict=False) for d in names}
         for end in ends_of(frame, place):
             member, _, joint = end.rpartition("@")
-            fresh = JointSpring(joint, member, {}, end_arm(structure, end))
+            fresh = JointSpring(joint, member, {}, arm * end_arm(structure, end))
             spring = springs.get(end, fresh)
             springs[end] = replace(spring, stiffness=_in_series(spring.stiffness, own))
         return replace(frame, joint_springs=tuple(springs.values()))
 
     def change(self, model: Model, place: str) -> Change:
         """Return the springs condensed into the end elements."""
-        frame = model.frame_structure.frame
-        return flexible_ends_change(model, ends_of(frame, place), _parts(frame, place))
+        structure = model.frame_structure
+        ends, groups = ends_of(structure.frame, place), _parts(structure.frame, place)
+        parts, longest = tuple(groups.values()), _longest(structure, place)
+        if place.endswith(APART) and longest > 1.0:
+            return free_arm_change(model, ends, parts, longest)
+        return flexible_ends_change(model, ends, parts)
 
 
-def _parts(frame: Frame, place: str) -> tuple[tuple[str, ...], ...]:
-    """Return the local directions that belong to every parameter."""
+def _parts(frame: Frame, place: str) -> dict[str, tuple[str, ...]]:
+    """Return the local directions that belong to every stiffness, by its name."""
     active = ACTIVE[frame.plane]
     bending, torsion = (tuple(d for d in group if d in active) for group in (_BENDING, _TORSION))
+    if place.endswith(APART):
+        names = ("bending",) if len(bending) == 1 else tuple(f"bending {d}" for d in bending)
+        apart = {name: (d,) for name, d in zip(names, bending, strict=True)}
+        return {**apart, **({"torsion": torsion} if torsion else {})}
     # The word first: to list the places takes a look at every joint.
     branch = place.endswith(":branch") and place in branch_places(frame)
-    apart = torsion and (len(joints_of(frame, place)) > 1 or branch)
-    return (bending, torsion) if apart else ((*torsion, *bending),)
+    if torsion and (len(joints_of(frame, place)) > 1 or branch):
+        return {"bending": bending, "torsion": torsion}
+    return {"stiffness": (*torsion, *bending)}
 
 
-def _scales(frame: Frame, ends: Sequence[str]) -> tuple[float, float]:
-    """Return 4 EI/L and GJ/L of the members, averaged over ends, in N m/rad."""
-    bending, torsion = [], []
+def _longest(structure: Structure, place: str) -> float:
+    """Return how long the arm may be, as a multiple of half a depth; 0 where there is none."""
+    ends = ends_of(structure.frame, place)
+    arms = [(end_arm(structure, end), end_room(structure, end)) for end in ends]
+    return min((min(_LONGEST, room / arm) for arm, room in arms if arm > 0.0), default=0.0)
+
+
+def _scales(frame: Frame, ends: Sequence[str]) -> dict[str, float]:
+    """Return 4 EI/L and GJ/L of the members by stiffness, averaged over ends, in N m/rad."""
+    rows = []
     for end in ends:
         member = frame.members[frame.member_index[end.rpartition("@")[0]]]
         s, m, length = member.section, member.material, member_length(frame, member.name)
-        bending.append(4.0 * m.E * s.Iy / length)
-        torsion.append(m.G * s.J / length)
-    own = float(np.mean(bending))
-    return own, float(np.mean(torsion)) or own
+        bending, lateral = (4.0 * m.E * inertia / length for inertia in (s.Iy, s.Iz or s.Iy))
+        rows.append((bending, lateral, m.G * s.J / length))
+    own, lateral, torsion = (float(x) for x in np.mean(rows, axis=0))
+    scales = {"stiffness": own, "bending": own, "bending ry": own, "bending rz": lateral}
+    return {**scales, "torsion": torsion or own}
 
 
 def _in_series(there: Mapping[str, float], new: Mapping[str, float]) -> dict[str, float]:

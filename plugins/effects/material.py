@@ -22,8 +22,10 @@ from femubench.effect import (
     Term,
     elements_of,
     member_labels,
+    members_of,
     once_for,
     proportional,
+    set_places,
 )
 from femubench.fem import (
     FloatArray,
@@ -48,8 +50,9 @@ class MaterialEffect(FrameEffect):
     constant: ClassVar[Literal["E", "rho"]]
 
     def places(self, model: Model) -> Sequence[str]:
-        """Return the whole structure."""
-        return ("all",)
+        """Return the whole structure, and the members of every material where there are more."""
+        structure = model.structure
+        return ("all", *(() if structure is None else set_places(structure.frame, ("material",))))
 
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return the relative change."""
@@ -59,8 +62,9 @@ class MaterialEffect(FrameEffect):
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with another material in the members."""
+        named = members_of(frame, place)
         members = tuple(
-            self._scaled(member, 1.0 + values[0]) if place in ("all", member.name) else member
+            self._scaled(member, 1.0 + values[0]) if member.name in named else member
             for member in frame.members
         )
         return replace(frame, members=members)
@@ -165,9 +169,9 @@ class MemberStiffness(MaterialEffect):
     constant: ClassVar[Literal["E", "rho"]] = "E"
 
     def places(self, model: Model) -> Sequence[str]:
-        """Return the members, or the groups; a single one is `youngs-modulus`."""
+        """Return members and families, or the groups; a single one is `youngs-modulus`."""
         structure = model.structure
-        parts = tuple(model.groups) if structure is None else member_labels(structure.frame)
+        parts = tuple(model.groups) if structure is None else _parts(structure.frame)
         return parts if len(parts) > 1 or structure is None else ()
 
 
@@ -180,8 +184,13 @@ class MemberMass(MaterialEffect):
     constant: ClassVar[Literal["E", "rho"]] = "rho"
 
     def places(self, model: Model) -> Sequence[str]:
-        """Return the members; a single one is `density`."""
+        """Return members and families; a single one is `density`."""
         if model.structure is None:
             return ()
-        members = member_labels(model.structure.frame)
+        members = _parts(model.structure.frame)
         return members if len(members) > 1 else ()
+
+
+def _parts(frame: Frame) -> tuple[str, ...]:
+    """Return the members, then sets and sections of more than one."""
+    return (*member_labels(frame), *set_places(frame))

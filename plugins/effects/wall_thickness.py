@@ -1,0 +1,185 @@
+"""A wall that is thicker or thinner than drawn: tolerance, corrosion, another stock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from femubench import Model
+from femubench.effect import (
+    Change,
+    EffectParameter,
+    ElementOperator,
+    FrameEffect,
+    Size,
+    Term,
+    barycentric,
+    chebyshev_nodes,
+    elements_of,
+    member_labels,
+    members_of,
+    set_places,
+)
+from femubench.fem import (
+    BeamProperties,
+    FloatArray,
+    Frame,
+    IntArray,
+    Member,
+    Section,
+    mass_matrices,
+    rectangular_tube,
+    round_tube,
+    stiffness_matrices,
+)
+
+_SCALE, _MOST, _NODES = 0.1, 0.9, 9
+# What grows with which constant of the section.
+_GROWS = {
+    "EA": "A",
+    "EIy": "Iy",
+    "EIz": "Iz",
+    "GJ": "J",
+    "rhoA": "A",
+    "rhoJp": "Jp",
+    "rhoIy": "Iy",
+    "rhoIz": "Iz",
+}
+
+
+class WallThickness(FrameEffect):
+    """Make the wall of tubes thicker or thinner, the outside as it is.
+
+    Area, second moments, torsion and polar constants and shear coefficients change together, each
+    as that of the shape; constants that were given beside the shape change by the same factor.
+    """
+
+    name: ClassVar[str] = "wall-thickness"
+    summary: ClassVar[str] = "a wall has another thickness"
+    sizes: ClassVar[Sequence[Size]] = (Size(0.03, 0.25, signed=True),)
+
+    def places(self, model: Model) -> Sequence[str]:
+        """Return all members, families and single members, as far as they are tubes."""
+        if model.structure is None:
+            return ()
+        frame = model.structure.frame
+        members = member_labels(frame)
+        everything = ("all",) if len(members) > 1 else ()
+        words = (*everything, *set_places(frame), *members)
+        tubes = {member.name for member in frame.members if _wall(member.section)}
+        return tuple(word for word in words if tubes.issuperset(members_of(frame, word)))
+
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+        """Return the relative change of the wall."""
+        bound = _bound(model.frame_structure.frame, place)
+        return (
+            EffectParameter(
+                "change of the wall", "", _SCALE, lower=-bound, upper=bound, wording="change"
+            ),
+        )
+
+    def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
+        """Return the frame with other sections."""
+        named = members_of(frame, place) if values[0] else ()
+        members = (
+            replace(m, section=_with_wall(m.section, 1.0 + values[0])) if m.name in named else m
+            for m in frame.members
+        )
+        return replace(frame, members=tuple(members))
+
+    def change(self, model: Model, place: str) -> Change:
+        """Return the matrices of the elements, interpolated between Chebyshev points."""
+        structure = model.frame_structure
+        bound = _bound(structure.frame, place)
+        nodes = chebyshev_nodes(-bound, bound, _NODES)
+        rows = elements_of(structure, place, arms=True)
+        own, frame = structure.properties.take(rows), structure.frame
+        index = {frame.member_index[name]: i for i, name in enumerate(members_of(frame, place))}
+        which = np.array([index[int(m)] for m in structure.mesh.member[rows]])
+        members = [frame.members[m] for m in index]
+        still = stiffness_matrices(own), mass_matrices(own)
+        terms = []
+        for node in nodes:
+            other = _scaled(own, members, which, 1.0 + float(node))
+            stiffness, mass = stiffness_matrices(other) - still[0], mass_matrices(other) - still[1]
+            terms.append(Term("stiffness", ElementOperator(structure, rows, stiffness)))
+            terms.append(Term("mass", ElementOperator(structure, rows, mass)))
+
+        def coefficients(values: FloatArray) -> FloatArray:
+            return np.repeat(barycentric(nodes, values[:, 0]), 2, axis=1)
+
+        return Change(tuple(terms), coefficients)
+
+
+def _wall(section: Section) -> float | None:
+    """Return the thickness of a tube's wall in m by its shape and area, None for what is none."""
+    width, height, area = section.width, section.height, section.A
+    if width is None or height is None or area <= 0.0:
+        return None
+    if section.shape == "rectangular-tube":
+        inside = (width + height) ** 2 - 4.0 * area
+        wall = (width + height - np.sqrt(max(inside, 0.0))) / 4.0
+    elif section.shape == "round-tube":
+        wall = (width - np.sqrt(max(width**2 - 4.0 * area / np.pi, 0.0))) / 2.0
+    else:
+        return None
+    return float(wall) if wall < (1.0 - 1e-9) * min(width, height) / 2.0 else None
+
+
+def _tube(section: Section, wall: float) -> Section:
+    width, height = section.width or 0.0, section.height or 0.0
+    if section.shape == "round-tube":
+        return round_tube(width, wall)
+    return rectangular_tube(width, height, wall)
+
+
+def _with_wall(section: Section, factor: float) -> Section:
+    """Return a tube with so many times the wall."""
+    wall = _wall(section) or 0.0
+    old, new = _tube(section, wall), _tube(section, factor * wall)
+    constants = {
+        name: getattr(section, name) * getattr(new, name) / getattr(old, name)
+        for name in ("A", "Iy", "Iz", "J", "Jp")
+    }
+    # A coefficient of the user's own stays.
+    given, usual = section.kappa, old.kappa
+    of_shape = given is not None and usual is not None and np.allclose(given(0.3), usual(0.3))
+    return replace(section, **constants, kappa=new.kappa if of_shape else given)
+
+
+def _scaled(
+    own: BeamProperties, members: Sequence[Member], which: IntArray, factor: float
+) -> BeamProperties:
+    """Return the elements of some members with so many times the wall."""
+    new = [_with_wall(member.section, factor) for member in members]
+    pairs = [(member.section, section) for member, section in zip(members, new, strict=True)]
+    for name, constant in _GROWS.items():
+        ratios = [_ratio(getattr(a, constant), getattr(b, constant)) for a, b in pairs]
+        own = own.scaled(name, np.array(ratios)[which])
+    for axis, name in enumerate(("flex_y", "flex_z")):
+        kappas = [
+            (a.kappa(m.material.nu)[axis] if a.kappa else 1.0)
+            / (b.kappa(m.material.nu)[axis] if b.kappa else 1.0)
+            for m, (a, b) in zip(members, pairs, strict=True)
+        ]
+        ratios = [_ratio(b.A, a.A) for a, b in pairs]
+        own = own.scaled(name, (np.array(kappas) * ratios)[which])
+    return own
+
+
+def _ratio(old: float, new: float) -> float:
+    return new / old if old else 1.0
+
+
+def _bound(frame: Frame, place: str) -> float:
+    """Return the largest relative change for which there is still a wall and still a hole."""
+    sections = [
+        frame.members[frame.member_index[name]].section for name in members_of(frame, place)
+    ]
+    rooms = [
+        0.5 * min(s.width or 0.0, s.height or 0.0) / (_wall(s) or np.inf) - 1.0 for s in sections
+    ]
+    return float(min(_MOST, *(0.99 * room for room in rooms)))

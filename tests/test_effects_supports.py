@@ -1,0 +1,237 @@
+"""Supports that give: what they do to a model, and that a diagnosis finds them."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from femubench import Measurement, Model, Sensors, diagnose
+from femubench.core.conformance.place_words import known_place
+from femubench.core.drawing.places import placed_wireframe
+from femubench.core.effect.places import match
+from femubench.core.fem.model import common_dofs
+from femubench.effect import Site, members_at, split_direction, support_places, supports_of
+from femubench.fem import (
+    FloatArray,
+    Frame,
+    GroundSpring,
+    Joint,
+    Material,
+    Member,
+    ModelError,
+    Place,
+    Support,
+    solid_rectangle,
+)
+from femubench.plugins.effects.support_flexibility import SupportFlexibility
+
+sys.path.insert(0, str(Path(__file__).parent))
+from diagnosis_problems import case_of, measured
+from effect_checks import changed_matrices, check_neutral, compare
+
+FrameBuilder = Callable[..., Frame]
+EFFECT = SupportFlexibility()
+SPACE = ("x", "y", "z", "rx", "ry", "rz")
+
+
+@pytest.fixture(scope="module")
+def held(ladder: FrameBuilder, hframe: FrameBuilder, portal: FrameBuilder) -> list[Model]:
+    """Return a frame of each plane on supports, some between joints, some springs."""
+    clamp, pin = ("z", "rx", "ry"), ("x", "z")
+    ladder_supports = (
+        Support(Place(joint="A"), clamp),
+        Support(Place(member="BC", s=0.4), ("z",)),
+    )
+    cord = (GroundSpring(Place(joint="F"), "z", 1e4),)
+    lies = replace(ladder(), supports=ladder_supports, springs=cord)
+    feet = (Support(Place(joint="L1"), ("x", "z", "ry")), Support(Place(joint="L2"), pin))
+    stands = replace(hframe(mesh=(4, 2, 4)), supports=feet)
+    ends = (Support(Place(joint="J0"), SPACE), Support(Place(joint="J6"), ("x", "y", "z")))
+    return [Model.of(frame) for frame in (lies, stands, replace(portal(3), supports=ends))]
+
+
+def test_places_are_supports_and_springs_whole_and_by_direction(held: list[Model]) -> None:
+    lies, stands, space = (EFFECT.places(model) for model in held)
+    a = ("support:A", "support:A:z", "support:A:rx", "support:A:ry")
+    assert lies == ("support:all", "support:F:z", *a, "support:BC@0.4:z")
+    assert stands[-3:] == ("support:L2", "support:L2:x", "support:L2:z")
+    assert len(space) == 1 + 7 + 4
+    for model in held:
+        assert all(known_place(model, place) for place in EFFECT.places(model))
+        assert not known_place(model, "support:J3")
+
+
+def test_a_support_has_one_stiffness_of_each_kind(held: list[Model]) -> None:
+    def units(model: Model, place: str) -> list[str]:
+        return [p.unit for p in EFFECT.parameters(model, place)]
+
+    assert units(held[0], "support:A") == ["N/m", "N m/rad"]
+    assert units(held[1], "support:L2") == ["N/m"]
+    assert units(held[2], "support:J0:ry") == ["N m/rad"]
+    # A sprung foot is measured by its own spring.
+    assert EFFECT.parameters(held[0], "support:F:z")[0].scale == pytest.approx(1e4)
+
+
+def test_change_is_the_released_support_condensed(held: list[Model]) -> None:
+    for model in held:
+        for place in EFFECT.places(model):
+            check_neutral(EFFECT, model, place)
+            scales = [p.scale for p in EFFECT.parameters(model, place)]
+            values = [factor * scale for factor, scale in zip((0.4, 2.0), scales, strict=False)]
+            mass, stiffness = changed_matrices(model, EFFECT.change(model, place), values)
+            extended = EFFECT.extend(model, place, values)
+            keep = common_dofs(model.frame_structure, extended.frame_structure)
+            rest = np.setdiff1d(np.arange(extended.size), keep)
+            k, m = extended.stiffness.toarray(), extended.mass.toarray()
+            motion = np.zeros((extended.size, model.size))
+            motion[keep] = np.eye(model.size)
+            motion[rest] = -np.linalg.solve(k[np.ix_(rest, rest)], k[np.ix_(rest, keep)])
+            for found, exact in ((stiffness, motion.T @ k @ motion), (mass, motion.T @ m @ motion)):
+                np.testing.assert_allclose(found, exact, rtol=0, atol=1e-10 * np.abs(exact).max())
+
+
+def test_inertia_of_the_support_hardly_matters(held: list[Model]) -> None:
+    """A turning clamp has next to no inertia; on a coarse mesh five modes agree to 1e-4."""
+    for model, place in zip(held, ("support:A:ry", "support:L1:ry", "support:J0:rx"), strict=True):
+        (parameter,) = EFFECT.parameters(model, place)
+        found = compare(EFFECT, model, place, [parameter.scale], count=5)
+        assert found.frequency < 1e-4
+        assert found.effect > 0.01
+
+
+def test_a_support_in_series_with_a_spring_is_a_spring(held: list[Model]) -> None:
+    frame = held[0].frame_structure.frame
+    softer = EFFECT.frame(frame, "support:F:z", [3e4])
+    assert [s.stiffness for s in softer.springs] == [pytest.approx(1e4 * 3e4 / 4e4)]
+    gone = EFFECT.frame(frame, "support:A", [np.inf, 2e3])
+    assert gone.supports[0].fixed == ("z",)
+    assert {(s.direction, s.stiffness) for s in gone.springs if s.at.joint == "A"} == {
+        ("rx", 2e3),
+        ("ry", 2e3),
+    }
+    assert EFFECT.frame(frame, "support:all", [np.inf, np.inf]) == frame
+
+
+def test_no_mass_comes_or_goes(held: list[Model]) -> None:
+    """The condensed inertia is no mass that a balance would show."""
+    for model in held:
+        for term in EFFECT.change(model, EFFECT.places(model)[0]).terms:
+            assert term.matrix == "stiffness" or not term.heavier
+
+
+def test_words_of_supports(held: list[Model]) -> None:
+    frame = held[0].frame_structure.frame
+    assert split_direction("support:A:rz") == ("support:A", "rz")
+    assert split_direction("support:x") == ("support:x", None)
+    assert match(frame, "support:F", "support:F:z")
+    assert not match(frame, "support:A", "support:A:z")
+    assert not match(frame, "support:A:rx", "A:rx")
+    assert supports_of(frame, "support:A:z") == {"A": {"z": np.inf}}
+    assert [m.name for m in members_at(frame, "support:A:z")] == ["AB", "AD"]
+    for word in ("support:C", "support:F:rx", "F"):
+        with pytest.raises(ModelError, match="no support"):
+            supports_of(frame, word)
+    site = Site(frame, "support:BC@0.4:z", 1.0, np.array([1.0]))
+    assert [m.name for m in site.members] == ["BC"]
+    drawn = placed_wireframe(held[0], support_places(frame))
+    corner = drawn.place("support:A:ry")
+    assert corner.kind == "point"
+    assert corner.points == ((0.0, 0.0, 0.0),)
+    assert len(drawn.place("support:all").points) == 3
+
+
+LENGTH, SECTION, STEEL = 1.2, solid_rectangle(0.03, 0.012), Material(207e9, 0.3, 7850.0)
+EI = STEEL.E * SECTION.Iy
+STATIONS = np.linspace(0.1, 1.0, 10)
+
+
+def clamped(elements: int = 12) -> Frame:
+    joints = (Joint("foot", (0.0, 0.0, 0.0)), Joint("tip", (LENGTH, 0.0, 0.0)))
+    beam = Member("beam", ("foot", "tip"), elements, SECTION, STEEL)
+    clamp = (Support(Place(joint="foot"), ("x", "z", "ry")),)
+    return Frame("in-plane", "euler-bernoulli", joints, (beam,), supports=clamp)
+
+
+def boundary(beta: float, turn: float) -> FloatArray:
+    """Return the four conditions on cosh, sinh, cos, sin of beta x: a turning foot, a free tip."""
+    c, s = np.cosh(beta), np.sinh(beta)
+    return np.array(
+        [
+            [1.0, 0.0, 1.0, 0.0],
+            [beta, -turn, -beta, -turn],  # EI w'' = k w'
+            [c / c, s / c, -np.cos(beta) / c, -np.sin(beta) / c],
+            [s / c, c / c, np.sin(beta) / c, -np.cos(beta) / c],
+        ]
+    )
+
+
+def turning_cantilever(spring: float, count: int, rng: np.random.Generator) -> Measurement:
+    """Return the exact modes of a uniform beam whose foot turns on a spring, with noise.
+
+    Source: the frequency equation of Euler and Bernoulli's beam, solved for its roots.
+    """
+    turn = spring * LENGTH / EI
+    grid = np.linspace(0.2, 3.2 * count, 4000)
+    determinant = [np.linalg.det(boundary(b, turn)) for b in grid]
+    change = np.flatnonzero(np.diff(np.sign(determinant)))[:count]
+    beta = [
+        brentq(lambda b: np.linalg.det(boundary(b, turn)), grid[i], grid[i + 1]) for i in change
+    ]
+    columns = []
+    for b in beta:
+        a = np.linalg.svd(boundary(b, turn))[2][-1]
+        x = b * STATIONS
+        columns.append(np.column_stack([np.cosh(x), np.sinh(x), np.cos(x), np.sin(x)]) @ a)
+    shapes = np.column_stack(columns)
+    shapes /= np.abs(shapes).max(axis=0)
+    omega = np.square(np.array(beta) / LENGTH) * np.sqrt(EI / (STEEL.rho * SECTION.A))
+    hertz = omega / (2.0 * np.pi)
+    std = 0.0005 * hertz
+    xyz = np.column_stack([LENGTH * STATIONS, np.zeros((10, 2))])
+    sensors = Sensors(tuple(f"s{i}" for i in range(10)), xyz, ("z",) * 10)
+    return Measurement(
+        sensors,
+        tuple(range(1, count + 1)),
+        hertz + std * rng.standard_normal(count),
+        std,
+        np.full(count, np.nan),
+        shapes + 0.01 * rng.standard_normal(shapes.shape),
+        np.full(shapes.shape, 0.01),
+    )
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_foot_that_turns_is_no_damage_beside_it(seed: int) -> None:
+    """The equation is exact, the model has twelve elements and a rigid clamp."""
+    spring = 20.0 * EI / LENGTH
+    test = turning_cantilever(spring, 7, np.random.default_rng(seed))
+    found = diagnose(case_of(Model.of(clamped()), test, 5))
+    assert found.verdict in ("named", "ambiguous")
+    (cause,) = [c for c in found.causes if c.effect == "support-flexibility"]
+    assert cause.place in ("support:foot:ry", "support:foot")
+    turning = cause.parameters[-1]
+    assert turning.unit == "N m/rad"
+    assert abs(turning.value - spring) < 2.0 * turning.std
+    assert turning.std < 0.1 * spring
+    assert found.causes[0] is cause
+
+
+def test_one_soft_foot_of_two_is_found_in_a_finer_model(hframe: FrameBuilder) -> None:
+    feet = tuple(Support(Place(joint=j), ("x", "z", "ry")) for j in ("L1", "L2"))
+    nominal = replace(hframe(mesh=(8, 4, 8)), supports=feet)
+    (parameter,) = EFFECT.parameters(Model.of(nominal), "support:L2:ry")
+    fine = replace(hframe(mesh=(24, 12, 24)), supports=feet)
+    truth = EFFECT.frame(fine, "support:L2:ry", [parameter.scale])
+    test = measured(Model.of(truth), nominal, count=7, rng=np.random.default_rng(3))
+    found = diagnose(case_of(Model.of(nominal), test, 5))
+    first = found.causes[0]
+    assert (first.effect, first.place) == ("support-flexibility", "support:L2:ry")
+    (stiffness,) = first.parameters
+    assert abs(stiffness.value - parameter.scale) < 2.0 * stiffness.std
+    assert stiffness.std < 0.1 * parameter.scale
