@@ -48,15 +48,18 @@ from femubench.core.effect.places import (
 )
 from femubench.core.effect.reading import Reading
 from femubench.core.effect.sizes import Site, Size
+from femubench.core.effect.suspect import Corrected, Suspect
 from femubench.core.look.modes import Seen
-from femubench.core.roles import Effect
+from femubench.core.roles import Effect, Fault
 from femubench.core.schema.diagnosis import LookWarning
 
 __all__ = [
     "Change",
+    "Corrected",
     "Effect",
     "EffectParameter",
     "ElementOperator",
+    "Fault",
     "FrameEffect",
     "LookWarning",
     "MatrixOperator",
@@ -66,6 +69,7 @@ __all__ = [
     "Seen",
     "Site",
     "Size",
+    "Suspect",
     "Term",
     "barycentric",
     "branch_places",

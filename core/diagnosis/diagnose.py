@@ -10,6 +10,7 @@ import numpy as np
 
 from femubench.core.advise.advice import advise
 from femubench.core.case.case import Case
+from femubench.core.diagnosis.faults import fault_causes, mended_case, with_faults
 from femubench.core.diagnosis.proof import (
     Unseen,
     another_stands,
@@ -32,12 +33,14 @@ from femubench.core.diagnosis.words import sentence_of
 from femubench.core.fem.model import Model
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.extended_model import departure
+from femubench.core.inference.fault_search import inquire
 from femubench.core.inference.posterior import Explanation, Posterior
 from femubench.core.inference.static_response import LargeProblem
 from femubench.core.look.localisation import locate
 from femubench.core.look.look import look
-from femubench.core.plugin.loader import registered_effects
-from femubench.core.roles import Effect
+from femubench.core.modal.measurement import Measurement
+from femubench.core.plugin.loader import registered_effects, registered_faults
+from femubench.core.roles import Effect, Fault
 from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning
 from femubench.core.score.scoring import score_model
 from femubench.core.ties import alike, in_order
@@ -56,6 +59,7 @@ def diagnose(
     case: Case,
     effects: Iterable[Effect] | None = None,
     *,
+    faults: Iterable[Fault] | None = None,
     pairs: bool = True,
     tolerance: float | None = None,
 ) -> Diagnosis:
@@ -66,6 +70,7 @@ def diagnose(
     Arguments:
         case: with at least one used mode.
         effects: what may be missing; all registered effects by default.
+        faults: what may be wrong with data or input; all registered faults by default.
         pairs: whether more than one cause is sought.
         tolerance: standard deviation of every element's relative scatter; the case's by default.
 
@@ -78,10 +83,18 @@ def diagnose(
     scatter = case.tolerance if tolerance is None else tolerance
     registered = registered_effects()
     known = registered if effects is None else tuple(effects)
-    examination = examine(case.model, used, known, tolerance=scatter, pairs=pairs)
+    wrong = registered_faults() if faults is None else tuple(faults)
+
+    def search(model: Model, measurement: Measurement, several: bool) -> Examination:
+        several = several and pairs
+        return examine(model, measurement, known, tolerance=scatter, pairs=several)
+
+    inquiry = inquire(case.model, used, wrong, search)
+    examination, given = inquiry.examination, case
+    case = mended_case(case, inquiry.mended)
     best = examination.best
     model = extended_by(case.model, best)
-    proof = _proof(case, examination, best, model)
+    proof = _proof(case, examination, best, model, given)
     if proof.crossed:
         confirmed = all(part.confirms(len(best.parts)) for part in proof.unseen)
     else:
@@ -90,11 +103,14 @@ def diagnose(
     decision = decide(examination.posterior, examination.adequacy, confirmed=confirmed)
     # The look is no part of the search: whatever is sought, every effect may have its say.
     all_known = {effect.name: effect for effect in (*registered, *known)}
-    looks = look(case.model, used, effects=all_known.values())
-    return _written(case, examination, decision, model, proof, looks, begin)
+    looks = look(given.model, used, effects=all_known.values())
+    told = fault_causes(inquiry.mended)
+    return _written(case, examination, decision, model, proof, looks, told, begin)
 
 
-def _proof(case: Case, examination: Examination, best: Explanation, model: Model) -> _Proof:
+def _proof(
+    case: Case, examination: Examination, best: Explanation, model: Model, given: Case
+) -> _Proof:
     unseen = unseen_of(case, examination, best, model)
     crossed = None
     if not any(len(part.before) for part in unseen):
@@ -103,7 +119,7 @@ def _proof(case: Case, examination: Examination, best: Explanation, model: Model
         crossed = left_out(
             nominal, problem, best.fit, slopes, examination.tolerance, examination.scatter
         )
-    gain = gain_of(score_model(case, case.model), score_model(case, model), crossed)
+    gain = gain_of(score_model(given, given.model), score_model(case, model), crossed)
     return _Proof(unseen if crossed is None else (crossed,), gain, crossed is not None)
 
 
@@ -114,6 +130,7 @@ def _written(
     model: Model,
     proof: _Proof,
     looks: tuple[LookWarning, ...],
+    faults: Sequence[Cause],
     begin: float,
 ) -> Diagnosis:
     best, posterior = examination.best, examination.posterior
@@ -127,9 +144,9 @@ def _written(
     used = case.measurement.select(case.used)
     return Diagnosis(
         case=case.name,
-        verdict=decision.verdict,
-        sentence=sentence_of(decision, causes, options, top, proof.gain),
-        causes=tuple(causes),
+        verdict="named" if faults and decision.verdict == "none" else decision.verdict,
+        sentence=with_faults(sentence_of(decision, causes, options, top, proof.gain), faults),
+        causes=(*faults, *causes),
         rivals=rivals_of(examination, best if named else None),
         reason=_reason(decision),
         advice=_advice(examination, [e for e, _ in group]),

@@ -37,6 +37,11 @@ class Noise:
         identity = np.eye(len(self.factor))
         return np.asarray(la.solve_triangular(self.factor, identity, lower=True))
 
+    @cached_property
+    def log_density(self) -> float:
+        """Return ln of the density at the mean, without (2 pi)^(n/2)."""
+        return -float(np.log(self.factor.diagonal()).sum())
+
     def whiten(self, rows: FloatArray) -> FloatArray:
         """Return vectors along the last axis in units of the noise, same shape."""
         return np.asarray(rows @ self._inverse.T)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from femubench.core.inference.extended_model import agreed, extended
-from femubench.core.inference.fit import Fit, Problem, State, fit, state_at
+from femubench.core.inference.fit import Fit, Problem, State, fit, log_evidence, state_at
 from femubench.core.inference.grid_search import Screened, likely, screen
 from femubench.core.inference.hypothesis import hypotheses_of
 from femubench.core.inference.posterior import Explanation, Posterior, by_weight
@@ -117,7 +117,7 @@ class Search:
         """Return a textbook set with nothing on top, in the coordinates of the model as drawn."""
         state = state_at(*enriched(self.problem, base.parts), base.x)
         alone = replace(state, parts=(), x=np.zeros(0))
-        return Explanation(base, Fit(alone, -0.5 * state.chi2), self.names)
+        return Explanation(base, Fit(alone, log_evidence(alone)), self.names)
 
     def borne_out(self, explanations: list[Explanation]) -> list[Explanation]:
         """Return explanations, the best cause fitted until its own model agrees with it."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from femubench.core.roles import Wording
+from femubench.core.roles import Side, Wording
 
 Verdict = Literal["named", "none", "unknown", "ambiguous", "not-confirmed"]
 
@@ -30,13 +30,17 @@ class CauseParameter:
 
 @dataclass(frozen=True)
 class Cause:
-    """An effect at a place, with what it takes; `summary` says it as a clause."""
+    """An effect at a place, with what it takes; `summary` says it as a clause.
+
+    `side` says whether the model lacks it, or the data or what was typed in are wrong there.
+    """
 
     effect: str
     place: str
     parameters: tuple[CauseParameter, ...]
     probability: float
     summary: str = ""
+    side: Side = "model"
 
 
 @dataclass(frozen=True)

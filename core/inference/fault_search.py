@@ -1,0 +1,416 @@
+"""Faults of the data and of what was typed in, weighed beside physical causes on the same data.
+
+A suspect is first tried on explanations that are known: their predictions stay, their sizes are
+free to first order. What promises enough is mended, and the physical causes are sought anew. All
+are compared by the density of what was measured, as it was measured: where mending multiplies a
+datum, times that factor; where it widens a deviation, over that deviation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import exp, log
+
+import numpy as np
+import scipy.linalg as la
+from scipy.optimize import minimize_scalar
+from scipy.special import logsumexp
+
+from femubench.core.effect.suspect import Corrected, Suspect
+from femubench.core.errors import FemubenchError
+from femubench.core.fem.model import Model
+from femubench.core.inference.examine import Examination
+from femubench.core.inference.extended_model import raw_residual
+from femubench.core.inference.fit import state_at
+from femubench.core.inference.noise import Noise
+from femubench.core.inference.posterior import Explanation
+from femubench.core.inference.residuals import Data
+from femubench.core.inference.static_response import Basis, placed
+from femubench.core.modal.measurement import Measurement
+from femubench.core.roles import Fault
+from femubench.core.ties import in_order
+from femubench.core.typing import BoolArray, FloatArray
+
+# That data or input are wrong somewhere, before any datum is seen: over kinds, then suspects.
+PRIOR_OF_FAULT = 0.1
+_SLACK = 3.0  # nats behind the best explanation within which a suspect is worth a search
+_NAMES, _TRIED, _MOST = 5, 3, 3
+_CLEARLY, _SHARE = 20.0, 0.1  # nats, and of half chi-square, that mending what was typed in gains
+_ADEQUATE, _STRAINED = 1e-3, 3.0
+_FREE = 1e3  # deviation of the scale of a shape, in those of the data
+_STEP, _CURVED = 1e-4, 0.02  # of a coordinate: for a slope, for a curvature
+_MOVED = 0.5  # deviations of a parameter within which it need not be estimated again
+
+Examine = Callable[[Model, Measurement, bool], Examination]
+
+
+@dataclass(frozen=True, eq=False)
+class Charge:
+    """A suspect, and the model and the data that it was found in.
+
+    Arguments:
+        fault: the kind.
+        suspect: the place.
+        model, measurement: as they are.
+        log_prior: ln of the odds of this fault here, against no fault at all.
+        x: coordinate of its parameter, 0 without one.
+        std: deviation of the coordinate.
+        score: ln of prior times evidence, as known explanations promise it.
+    """
+
+    fault: Fault
+    suspect: Suspect
+    model: Model
+    measurement: Measurement
+    log_prior: float
+    x: float = 0.0
+    std: float = 0.0
+    score: float = -np.inf
+
+    def corrected(self, x: float) -> Corrected:
+        """Return model and data as they are right at a coordinate of the parameter."""
+        parameter = self.suspect.parameter
+        value = 0.0 if parameter is None else float(parameter.value(np.array(x)))
+        return self.suspect.corrected(self.model, self.measurement, value)
+
+    @cached_property
+    def rows(self) -> BoolArray:
+        """Return which data it concerns: frequencies, then readings by mode, (m + m n_sensors,)."""
+        _, other = self.corrected(1.0)
+        parts = []
+        for names in (("frequencies", "frequency_std"), ("shapes", "shape_std")):
+            pairs = [(getattr(self.measurement, name), getattr(other, name)) for name in names]
+            differ = [(one != two) & ~(np.isnan(one) & np.isnan(two)) for one, two in pairs]
+            parts.append(np.logical_or(*differ).T.ravel())
+        return np.concatenate(parts)
+
+    @cached_property
+    def reweighs(self) -> bool:
+        """Tell whether it is a matter of deviations alone."""
+        _, other = self.corrected(1.0)
+        names = ("frequencies", "shapes")
+        pairs = [(getattr(self.measurement, name), getattr(other, name)) for name in names]
+        return all(np.array_equal(one, two, equal_nan=True) for one, two in pairs)
+
+    @property
+    def single(self) -> bool:
+        """Tell whether a parameter is to be found from a single datum."""
+        return self.suspect.parameter is not None and int(self.rows.sum()) == 1
+
+    @property
+    def mended(self) -> Corrected:
+        """Return model and data without the fault.
+
+        A single datum cannot tell its own error: it is discounted, by what the error may be.
+        """
+        if not self.single:
+            return self.corrected(self.x)
+        (_, less), (_, more) = self.corrected(-_STEP), self.corrected(_STEP)
+        wide = {
+            std: np.hypot(
+                getattr(self.measurement, std),
+                np.nan_to_num(getattr(more, name) - getattr(less, name)) / (2.0 * _STEP),
+            )
+            for name, std in (("frequencies", "frequency_std"), ("shapes", "shape_std"))
+        }
+        return self.model, replace(self.measurement, **wide)
+
+
+@dataclass(frozen=True)
+class Mended:
+    """A fault that was found, with the probability that it is this one at this place."""
+
+    charge: Charge
+    probability: float
+
+
+@dataclass(frozen=True)
+class Inquiry:
+    """An examination of model and data with the faults mended that were found."""
+
+    examination: Examination
+    mended: tuple[Mended, ...] = ()
+
+
+def inquire(
+    model: Model, measurement: Measurement, faults: Iterable[Fault], examine: Examine
+) -> Inquiry:
+    """Weigh explanations of data by physical causes, and by faults beside them.
+
+    Arguments:
+        model: the nominal model.
+        measurement: the used modes and nothing else.
+        faults: what may be wrong with either.
+        examine: from model, data and whether several causes are sought to their examination.
+
+    Raises:
+        NotApplicable: when a used frequency has no standard deviation.
+        ModelError: when the model has no modes.
+    """
+    known = tuple(faults)
+    mended: list[Mended] = []
+    model, measurement = _possible(model, measurement, known, mended)
+    now = examine(model, measurement, True)
+    while len(mended) < _MOST:
+        charges = _promising(now, _charges(model, measurement, known))
+        found = _tried(now, charges, examine)
+        if found is None:
+            break
+        now, fault = found
+        mended.append(fault)
+        model, measurement = fault.charge.mended
+    return Inquiry(now, tuple(mended))
+
+
+def _charges(model: Model, measurement: Measurement, faults: Sequence[Fault]) -> list[Charge]:
+    """Return every suspect with its prior."""
+    kinds = [(fault, fault.suspects(model, measurement)) for fault in faults]
+    kinds = [(fault, suspects) for fault, suspects in kinds if suspects]
+    each = log(PRIOR_OF_FAULT / (1.0 - PRIOR_OF_FAULT) / max(len(kinds), 1))
+    return [
+        Charge(fault, suspect, model, measurement, each - log(len(suspects)))
+        for fault, suspects in kinds
+        for suspect in suspects
+    ]
+
+
+def _possible(
+    model: Model, measurement: Measurement, faults: Sequence[Fault], mended: list[Mended]
+) -> Corrected:
+    """Return model and data without what cannot be; `mended` is filled."""
+    while len(mended) < _MOST:
+        blatant = [c for c in _charges(model, measurement, faults) if c.suspect.blatant]
+        if not blatant:
+            break
+        costs = [_half_chi2(*charge.mended) for charge in blatant]
+        best = int(np.argmin(costs))
+        gain = _half_chi2(model, measurement) - costs[best]
+        if not gain > _CLEARLY:
+            break
+        others = float(logsumexp(np.array(costs)[best] - np.array(costs)))
+        mended.append(Mended(blatant[best], exp(-others) / (1.0 + exp(-gain))))
+        model, measurement = blatant[best].mended
+    return model, measurement
+
+
+def _half_chi2(model: Model, measurement: Measurement) -> float:
+    """Return half of chi-square of a model as drawn; infinite where it has no modes."""
+    try:
+        data = Data(measurement, np.zeros(0))
+        noise = Noise.of(np.zeros((len(data), 0)), 0.0)
+        problem = placed(Basis.of(model, measurement), data, noise, ())
+        return 0.5 * float(np.square(state_at(problem, (), np.zeros(0)).raw).sum())
+    except (FemubenchError, la.LinAlgError):
+        return np.inf
+
+
+def log_density(examination: Examination, measured: Measurement) -> float:
+    """Return ln of the density of what was measured, over all explanations.
+
+    Arguments:
+        examination: of these data, or of the same with some mended.
+        measured: the data as they were measured.
+    """
+    data = examination.problem.data
+    before = Data(measured, data.bias)
+    weights = [e.log_weight for e in examination.posterior.explanations]
+    return float(logsumexp(weights)) + _jacobian(before, data) - float(np.log(_std(data)).sum())
+
+
+def _std(data: Data) -> FloatArray:
+    """Return the standard deviation of every datum, (n_data,)."""
+    mode, sensor = data.shape_rows
+    mass = [] if data.mass is None else [data.mass[1]]
+    return np.concatenate([data.measurement.frequency_std, 1.0 / data.weight[sensor, mode], mass])
+
+
+def _jacobian(before: Data, after: Data) -> float:
+    """Return the sum of ln |d after / d before| of data that were exchanged and multiplied."""
+    sizes = []
+    for data in (after, before):
+        values = np.abs(np.concatenate([data.measurement.frequencies, data.shapes.ravel()]))
+        sizes.append(np.log(values[values > 0.0]).sum())
+    return float(sizes[0] - sizes[1])
+
+
+class _Known:
+    """An explanation, its sizes free to first order.
+
+    Arguments:
+        explanation: fitted.
+    """
+
+    def __init__(self, explanation: Explanation) -> None:
+        self.explanation = explanation
+        state = self.state = explanation.fit.state
+        factor = state.problem.noise.factor
+        slopes = factor @ state.jacobian
+        self.covariance = factor @ factor.T + slopes @ slopes.T
+        self.rest = factor @ state.residual + slopes @ state.x
+        self.std = _std(state.problem.data)
+        self.base = self._density(self.rest, self.covariance)
+
+    def _density(self, rest: FloatArray, covariance: FloatArray) -> float:
+        lower = la.cholesky(covariance, lower=True)
+        white = la.solve_triangular(lower, rest, lower=True)
+        return -0.5 * float(white @ white) - float(np.log(lower.diagonal()).sum())
+
+    def gain(self, measurement: Measurement) -> float:
+        """Return by how much other data are more probable, in nats."""
+        own = self.state.problem.data
+        data = Data(measurement, own.bias)
+        if len(data) != len(own):
+            return -np.inf
+        ratio = _std(data) / self.std
+        rest = self.rest + ratio * self.state.against(data) - self.state.raw
+        covariance = self.covariance + np.diag(np.square(ratio) - 1.0)
+        return self._density(rest, covariance) - self.base + _jacobian(own, data)
+
+    @cached_property
+    def freed(self) -> tuple[FloatArray, FloatArray]:
+        """Return the inverse covariance with the scales of all shapes free, and times the rest."""
+        data = self.state.problem.data
+        mode, sensor = data.shape_rows
+        scaled, _ = data.scaled(self.state.readings[None])
+        count = len(data.measurement)
+        scale = np.zeros((len(data), count))
+        scale[count + np.arange(len(mode)), mode] = (data.weight * scaled[0])[sensor, mode]
+        inverse = la.inv(self.covariance + _FREE**2 * scale @ scale.T)
+        return inverse, inverse @ self.rest
+
+    def most(self, rows: BoolArray) -> float:
+        """Return what could be gained at most without some data, (n_data,), in nats."""
+        inverse, pull = self.freed
+        own = np.flatnonzero(rows)
+        if not len(own):
+            return 0.0
+        dropped = float(pull[own] @ la.solve(inverse[np.ix_(own, own)], pull[own], assume_a="pos"))
+        scales = float(self.rest @ la.solve(self.covariance, self.rest, assume_a="pos"))
+        return 0.5 * (dropped + max(scales - float(self.rest @ pull), 0.0))
+
+    def tried(self, charge: Charge) -> Charge:
+        """Return a charge with its parameter estimated, and what it promises here."""
+        if charge.suspect.parameter is None or charge.single:
+            gain = self.gain(charge.mended[1])
+            return self._with(charge, 0.0, 0.0, gain + charge.log_prior)
+        return self.estimated(charge)
+
+    def estimated(self, charge: Charge) -> Charge:
+        """Return a charge with its parameter at its most probable value."""
+        assert charge.suspect.parameter is not None
+
+        def cost(x: float) -> float:
+            gain = self.gain(charge.corrected(x)[1])
+            return 0.5 * x**2 - (gain if np.isfinite(gain) else -1e300)
+
+        found = minimize_scalar(cost, bounds=charge.suspect.parameter.range, method="bounded")
+        x, least = float(found.x), float(found.fun)
+        bend = cost(x + _CURVED) + cost(x - _CURVED) - 2.0 * least
+        curvature = max(bend / _CURVED**2, 1.0)
+        prior = charge.log_prior - 0.5 * (x**2 + log(curvature))
+        return self._with(
+            replace(charge, log_prior=prior),
+            x,
+            curvature**-0.5,
+            charge.log_prior - least - 0.5 * log(curvature),
+        )
+
+    def _with(self, charge: Charge, x: float, std: float, gain: float) -> Charge:
+        return replace(charge, x=x, std=std, score=self.explanation.log_weight + gain)
+
+
+def _promising(now: Examination, charges: Sequence[Charge]) -> list[Charge]:
+    """Return the suspects that are worth a search, best first."""
+    names = list(now.posterior.names)[:_NAMES]
+    chosen = [now.posterior.best(key) for key in names]
+    plain = next(e for e in now.posterior.explanations if not e.parts and not e.base.parts)
+    known = [_Known(e) for e in {id(e): e for e in (*chosen, plain)}.values()]
+    floor = now.posterior.explanations[0].log_weight - _SLACK
+    found = [
+        best
+        for charge in charges
+        if charge.fault.side == "data" and (best := _best_on(known, charge, floor)) is not None
+    ]
+    if _strained(now):
+        found += _of_input(now, plain, [c for c in charges if c.fault.side == "input"], floor)
+    return in_order(found, lambda charge: -charge.score)[:_TRIED]
+
+
+def _best_on(known: Sequence[_Known], charge: Charge, floor: float) -> Charge | None:
+    """Return a charge on the explanation where it promises most; None where it is not enough."""
+    best: Charge | None = None
+    for one in known:
+        data = one.state.problem.data
+        mode, sensor = data.shape_rows
+        count, sensors = len(data.measurement), len(data.weight)
+        rows = np.zeros(len(data), dtype=bool)
+        chosen = np.concatenate([np.arange(count), count + mode * sensors + sensor])
+        rows[: len(chosen)] = charge.rows[chosen]
+        most = one.explanation.log_weight + charge.log_prior
+        if not charge.reweighs and most + one.most(rows) < floor:
+            continue
+        tried = one.tried(charge)
+        if tried.score > max(floor, -np.inf if best is None else best.score):
+            best = tried
+    return best
+
+
+def _strained(now: Examination) -> bool:
+    """Tell whether physical causes explain the data badly, or by several or unlikely sizes."""
+    x = now.best.fit.state.x
+    return (
+        now.adequacy < _ADEQUATE or len(now.best.parts) > 1 or bool((np.abs(x) > _STRAINED).any())
+    )
+
+
+def _of_input(
+    now: Examination, plain: Explanation, charges: Sequence[Charge], floor: float
+) -> list[Charge]:
+    """Return the suspects of what was typed in, tried on the model as drawn."""
+    state = plain.fit.state
+    before = 0.5 * state.chi2
+    found = []
+    for charge in charges:
+        try:
+            raw = raw_residual(now.problem, charge.mended[0])
+        except (FemubenchError, la.LinAlgError):
+            continue
+        white = state.residual + state.problem.noise.whiten(raw - state.raw)
+        gain = before - 0.5 * float(white @ white)
+        score = plain.log_weight + gain + charge.log_prior
+        if score > floor or (_inadequate(now) and gain > max(_CLEARLY, _SHARE * before)):
+            found.append(replace(charge, score=score))
+    return found
+
+
+def _inadequate(now: Examination) -> bool:
+    return now.adequacy < _ADEQUATE
+
+
+def _tried(
+    now: Examination, charges: Sequence[Charge], examine: Examine
+) -> tuple[Examination, Mended] | None:
+    """Return the examination without the most probable fault; None where none is more likely."""
+    measured = now.problem.data.measurement
+    singles: list[tuple[float, Charge]] = []
+    for charge in charges:
+        try:
+            seen = examine(*charge.mended, False)
+        except (FemubenchError, la.LinAlgError):
+            continue
+        singles.append((log_density(seen, measured) + charge.log_prior, charge))
+    if not singles:
+        return None
+    (_, best), *others = in_order(singles, lambda pair: -pair[0])
+    seen = examine(*best.mended, True)
+    if best.suspect.parameter is not None:
+        again = _Known(seen.best).estimated(replace(best, log_prior=best.log_prior))
+        best = replace(best, x=again.x, std=again.std)
+    found = log_density(seen, measured) + best.log_prior
+    rivals = [log_density(now, measured), *(density for density, _ in others)]
+    probability = exp(found - float(logsumexp([found, *rivals])))
+    if probability < 0.5 or not (seen.adequacy > _ADEQUATE):
+        return None
+    return seen, Mended(best, probability)
