@@ -33,7 +33,7 @@ from femubench.core.diagnosis.words import sentence_of
 from femubench.core.fem.model import Model
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.extended_model import departure
-from femubench.core.inference.fault_search import inquire
+from femubench.core.inference.fault_search import Depth, inquire
 from femubench.core.inference.posterior import Explanation, Posterior
 from femubench.core.inference.static_response import LargeProblem
 from femubench.core.look.localisation import locate
@@ -85,9 +85,9 @@ def diagnose(
     known = registered if effects is None else tuple(effects)
     wrong = registered_faults() if faults is None else tuple(faults)
 
-    def search(model: Model, measurement: Measurement, several: bool) -> Examination:
-        several = several and pairs
-        return examine(model, measurement, known, tolerance=scatter, pairs=several)
+    def search(model: Model, measurement: Measurement, depth: Depth) -> Examination:
+        tried, several = () if depth == "nothing" else known, pairs and depth == "several"
+        return examine(model, measurement, tried, tolerance=scatter, pairs=several)
 
     inquiry = inquire(case.model, used, wrong, search)
     examination, given = inquiry.examination, case

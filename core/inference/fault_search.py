@@ -8,10 +8,11 @@ datum, times that factor; where it widens a deviation, over that deviation.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import exp, log
+from typing import Literal
 
 import numpy as np
 import scipy.linalg as la
@@ -28,6 +29,7 @@ from femubench.core.inference.noise import Noise
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.residuals import Data
 from femubench.core.inference.static_response import Basis, placed
+from femubench.core.modal.eigen import DENSE_LIMIT
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Fault
 from femubench.core.ties import in_order
@@ -36,14 +38,16 @@ from femubench.core.typing import BoolArray, FloatArray
 # That data or input are wrong somewhere, before any datum is seen: over kinds, then suspects.
 PRIOR_OF_FAULT = 0.1
 _SLACK = 3.0  # nats behind the best explanation within which a suspect is worth a search
-_NAMES, _TRIED, _MOST = 5, 3, 3
+_NAMES, _TRIED, _MOST, _SOLVED = 5, 3, 3, 20
+_MOSTLY, _FAR = 0.5, 0.2  # of half chi-square; of what the best suspect promises
 _CLEARLY, _SHARE = 20.0, 0.1  # nats, and of half chi-square, that mending what was typed in gains
-_ADEQUATE, _STRAINED = 1e-3, 3.0
+_ADEQUATE, _GOOD, _STRAINED = 1e-3, 0.05, 3.0
 _FREE = 1e3  # deviation of the scale of a shape, in those of the data
 _STEP, _CURVED = 1e-4, 0.02  # of a coordinate: for a slope, for a curvature
 _MOVED = 0.5  # deviations of a parameter within which it need not be estimated again
 
-Examine = Callable[[Model, Measurement, bool], Examination]
+Depth = Literal["nothing", "one", "several"]
+Examine = Callable[[Model, Measurement, Depth], Examination]
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +147,7 @@ def inquire(
         model: the nominal model.
         measurement: the used modes and nothing else.
         faults: what may be wrong with either.
-        examine: from model, data and whether several causes are sought to their examination.
+        examine: from model, data and how many causes are sought to their examination.
 
     Raises:
         NotApplicable: when a used frequency has no standard deviation.
@@ -152,16 +156,68 @@ def inquire(
     known = tuple(faults)
     mended: list[Mended] = []
     model, measurement = _possible(model, measurement, known, mended)
-    now = examine(model, measurement, True)
+    file, seen, whole = _opened(model, measurement, known, examine)
     while len(mended) < _MOST:
-        charges = _promising(now, _charges(model, measurement, known))
-        found = _tried(now, charges, examine)
-        if found is None:
+        found = _tried(seen, whole, _promising(seen, file), examine)
+        if found is not None:
+            seen, fault = found
+            mended.append(fault)
+            file, whole = _File.of(*fault.charge.mended, known, examine), True
+        elif whole:
             break
-        now, fault = found
-        mended.append(fault)
-        model, measurement = fault.charge.mended
-    return Inquiry(now, tuple(mended))
+        else:
+            seen, whole = examine(file.model, file.measurement, "several"), True
+    return Inquiry(seen, tuple(mended))
+
+
+@dataclass(frozen=True)
+class _File:
+    """All suspects in a model and its data.
+
+    Arguments:
+        model, measurement: with the faults mended that were found.
+        data: charges of the data.
+        input: charges of what was typed in, with what mending them gains on the model as drawn.
+        promised: whether one of them alone mends most of what is wrong.
+    """
+
+    model: Model
+    measurement: Measurement
+    data: tuple[Charge, ...] = ()
+    input: tuple[tuple[Charge, float], ...] = ()
+    promised: bool = False
+
+    @classmethod
+    def of(
+        cls, model: Model, measurement: Measurement, faults: Sequence[Fault], examine: Examine
+    ) -> _File:
+        """Return the suspects."""
+        charges = _charges(model, measurement, faults)
+        data = tuple(charge for charge in charges if charge.fault.side == "data")
+        bare = examine(model, measurement, "nothing")
+        if bare.adequacy > _ADEQUATE:
+            return cls(model, measurement, data)
+        typed = [charge for charge in charges if charge.fault.side == "input"]
+        file = cls(model, measurement, data, tuple(_gains(bare, typed)))
+        before = bare.posterior.explanations[0]
+        best = max((charge.score for charge in _promising(bare, file)), default=-np.inf)
+        gain = best - before.log_weight
+        return replace(file, promised=gain > max(_CLEARLY, _MOSTLY * 0.5 * before.chi2))
+
+
+def _opened(
+    model: Model, measurement: Measurement, faults: Sequence[Fault], examine: Examine
+) -> tuple[_File, Examination, bool]:
+    """Return the suspects, an examination of the data as they are, and whether it is a whole one.
+
+    Where a fault alone mends most of what is wrong, the long search for several causes of data
+    that are wrong is put off.
+    """
+    if not faults:
+        return _File(model, measurement), examine(model, measurement, "several"), True
+    file = _File.of(model, measurement, faults, examine)
+    depth: Depth = "one" if file.promised else "several"
+    return file, examine(model, measurement, depth), not file.promised
 
 
 def _charges(model: Model, measurement: Measurement, faults: Sequence[Fault]) -> list[Charge]:
@@ -280,15 +336,20 @@ class _Known:
         inverse = la.inv(self.covariance + _FREE**2 * scale @ scale.T)
         return inverse, inverse @ self.rest
 
+    @cached_property
+    def slack(self) -> float:
+        """Return what chi-square falls by where the scales of all shapes are free."""
+        fixed = float(self.rest @ la.solve(self.covariance, self.rest, assume_a="pos"))
+        return max(fixed - float(self.rest @ self.freed[1]), 0.0)
+
     def most(self, rows: BoolArray) -> float:
         """Return what could be gained at most without some data, (n_data,), in nats."""
         inverse, pull = self.freed
         own = np.flatnonzero(rows)
         if not len(own):
             return 0.0
-        dropped = float(pull[own] @ la.solve(inverse[np.ix_(own, own)], pull[own], assume_a="pos"))
-        scales = float(self.rest @ la.solve(self.covariance, self.rest, assume_a="pos"))
-        return 0.5 * (dropped + max(scales - float(self.rest @ pull), 0.0))
+        dropped = float(pull[own] @ np.linalg.solve(inverse[np.ix_(own, own)], pull[own]))
+        return 0.5 * (dropped + self.slack)
 
     def tried(self, charge: Charge) -> Charge:
         """Return a charge with its parameter estimated, and what it promises here."""
@@ -321,21 +382,29 @@ class _Known:
         return replace(charge, x=x, std=std, score=self.explanation.log_weight + gain)
 
 
-def _promising(now: Examination, charges: Sequence[Charge]) -> list[Charge]:
+def _promising(now: Examination, file: _File) -> list[Charge]:
     """Return the suspects that are worth a search, best first."""
-    names = list(now.posterior.names)[:_NAMES]
-    chosen = [now.posterior.best(key) for key in names]
-    plain = next(e for e in now.posterior.explanations if not e.parts and not e.base.parts)
-    known = [_Known(e) for e in {id(e): e for e in (*chosen, plain)}.values()]
-    floor = now.posterior.explanations[0].log_weight - _SLACK
-    found = [
-        best
-        for charge in charges
-        if charge.fault.side == "data" and (best := _best_on(known, charge, floor)) is not None
-    ]
+    if not file.data and not file.input:
+        return []
+    explanations = now.posterior.explanations
+    plain = next(e for e in explanations if not e.parts and not e.base.parts)
+    top = explanations[0].log_weight
+    names = list(now.posterior.names)[: 1 if now.adequacy > _GOOD else _NAMES]
+    chosen = {id(e): e for e in (*map(now.posterior.best, names), plain)}
+    known = [_Known(e) for e in chosen.values()]
+    floor = top - (_SLACK if now.adequacy < _GOOD else 0.0)
+    tried = (_best_on(known, charge, floor) for charge in file.data)
+    found = [charge for charge in tried if charge is not None]
     if _strained(now):
-        found += _of_input(now, plain, [c for c in charges if c.fault.side == "input"], floor)
-    return in_order(found, lambda charge: -charge.score)[:_TRIED]
+        for charge, gain in file.input:
+            score = plain.log_weight + gain + charge.log_prior
+            clearly = gain > max(_CLEARLY, _SHARE * 0.5 * plain.chi2)
+            if score > floor or (now.adequacy < _ADEQUATE and clearly):
+                found.append(replace(charge, score=score))
+    ranked = in_order(found, lambda charge: -charge.score)[:_TRIED]
+    return [
+        c for c in ranked if c.score > ranked[0].score - _FAR * max(ranked[0].score - top, 50.0)
+    ]
 
 
 def _best_on(known: Sequence[_Known], charge: Charge, floor: float) -> Charge | None:
@@ -365,52 +434,54 @@ def _strained(now: Examination) -> bool:
     )
 
 
-def _of_input(
-    now: Examination, plain: Explanation, charges: Sequence[Charge], floor: float
-) -> list[Charge]:
-    """Return the suspects of what was typed in, tried on the model as drawn."""
-    state = plain.fit.state
-    before = 0.5 * state.chi2
-    found = []
-    for charge in charges:
+def _gains(bare: Examination, charges: Sequence[Charge]) -> Iterator[tuple[Charge, float]]:
+    """Yield what was typed in with what mending it gains on the model as drawn, in nats."""
+    state = bare.posterior.explanations[0].fit.state
+    most = _SOLVED if bare.model.size > DENSE_LIMIT else len(charges)
+    for charge in charges[:most]:
         try:
-            raw = raw_residual(now.problem, charge.mended[0])
+            raw = raw_residual(bare.problem, charge.mended[0])
         except (FemubenchError, la.LinAlgError):
             continue
         white = state.residual + state.problem.noise.whiten(raw - state.raw)
-        gain = before - 0.5 * float(white @ white)
-        score = plain.log_weight + gain + charge.log_prior
-        if score > floor or (_inadequate(now) and gain > max(_CLEARLY, _SHARE * before)):
-            found.append(replace(charge, score=score))
-    return found
-
-
-def _inadequate(now: Examination) -> bool:
-    return now.adequacy < _ADEQUATE
+        yield charge, 0.5 * (state.chi2 - float(white @ white))
 
 
 def _tried(
-    now: Examination, charges: Sequence[Charge], examine: Examine
+    now: Examination, whole: bool, charges: Sequence[Charge], examine: Examine
 ) -> tuple[Examination, Mended] | None:
-    """Return the examination without the most probable fault; None where none is more likely."""
+    """Return the examination without the most probable fault; None where none is more likely.
+
+    Arguments:
+        now: of the data as they are.
+        whole: whether several causes were sought there. If not, a fault must explain all by
+            itself, where no single cause does.
+        charges: what is tried.
+        examine: as in `inquire`.
+    """
     measured = now.problem.data.measurement
     singles: list[tuple[float, Charge]] = []
     for charge in charges:
         try:
-            seen = examine(*charge.mended, False)
+            seen = examine(*charge.mended, "one")
         except (FemubenchError, la.LinAlgError):
             continue
         singles.append((log_density(seen, measured) + charge.log_prior, charge))
     if not singles:
         return None
     (_, best), *others = in_order(singles, lambda pair: -pair[0])
-    seen = examine(*best.mended, True)
+    seen = examine(*best.mended, "several")
     if best.suspect.parameter is not None:
-        again = _Known(seen.best).estimated(replace(best, log_prior=best.log_prior))
+        again = _Known(seen.best).estimated(best)
         best = replace(best, x=again.x, std=again.std)
     found = log_density(seen, measured) + best.log_prior
     rivals = [log_density(now, measured), *(density for density, _ in others)]
     probability = exp(found - float(logsumexp([found, *rivals])))
-    if probability < 0.5 or not (seen.adequacy > _ADEQUATE):
+    if not whole and (seen.best.parts or now.adequacy > _ADEQUATE):
         return None
-    return seen, Mended(best, probability)
+    return (seen, Mended(best, probability)) if _stands(seen, probability) else None
+
+
+def _stands(seen: Examination, probability: float) -> bool:
+    """Tell whether a fault is more likely than not, and leaves data that can be explained."""
+    return probability > 0.5 and seen.adequacy > _ADEQUATE

@@ -32,7 +32,7 @@ class ModesSwapped:
             )
             for i, j in combinations(order, 2)
             if shaped[i] or shaped[j]
-            for one, two in [(measurement.numbers[i], measurement.numbers[j])]
+            for one, two in [sorted((measurement.numbers[i], measurement.numbers[j]))]
         ]
 
     def _corrected(

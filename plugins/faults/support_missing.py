@@ -23,7 +23,7 @@ class SupportMissing:
         if model.structure is None:
             return []
         frame = model.structure.frame
-        return [*_forgotten(frame), *_too_many(frame)]
+        return [*_too_many(frame), *_forgotten(frame)]
 
 
 def _forgotten(frame: Frame) -> Iterator[Suspect]:
