@@ -8,7 +8,7 @@ datum, times that factor; where it widens a deviation, over that deviation.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import exp, log
@@ -39,9 +39,9 @@ from femubench.core.typing import BoolArray, FloatArray
 PRIOR_OF_FAULT = 0.1
 _SLACK = 3.0  # nats behind the best explanation within which a suspect is worth a search
 _NAMES, _TRIED, _MOST, _SOLVED = 5, 3, 3, 20
-_MOSTLY, _FAR = 0.5, 0.2  # of half chi-square; of what the best suspect promises
+_MOSTLY, _FAR = 0.5, 0.1  # of half chi-square; of what the best suspect promises
 _CLEARLY, _SHARE = 20.0, 0.1  # nats, and of half chi-square, that mending what was typed in gains
-_ADEQUATE, _GOOD, _STRAINED = 1e-3, 0.05, 3.0
+_ADEQUATE, _GOOD, _UNLIKELY, _GROSS = 1e-3, 0.05, 3.0, 0.1
 _FREE = 1e3  # deviation of the scale of a shape, in those of the data
 _STEP, _CURVED = 1e-4, 0.02  # of a coordinate: for a slope, for a curvature
 _MOVED = 0.5  # deviations of a parameter within which it need not be estimated again
@@ -156,68 +156,150 @@ def inquire(
     known = tuple(faults)
     mended: list[Mended] = []
     model, measurement = _possible(model, measurement, known, mended)
-    file, seen, whole = _opened(model, measurement, known, examine)
+    if not known:
+        return Inquiry(examine(model, measurement, "several"))
+    file = _File(model, measurement, known, examine)
+    # The long search for several causes of data that are wrong is put off.
+    depth: Depth = "one" if file.promised else "several"
     while len(mended) < _MOST:
-        found = _tried(seen, whole, _promising(seen, file), examine)
+        found = file.without_fault(depth)
         if found is not None:
-            seen, fault = found
+            file, fault = found
             mended.append(fault)
-            file, whole = _File.of(*fault.charge.mended, known, examine), True
-        elif whole:
+        elif depth == "several":
             break
-        else:
-            seen, whole = examine(file.model, file.measurement, "several"), True
-    return Inquiry(seen, tuple(mended))
+        depth = "several"
+    return Inquiry(file.seen("several"), tuple(mended))
 
 
-@dataclass(frozen=True)
 class _File:
-    """All suspects in a model and its data.
+    """All suspects in a model and its data, and what was seen of them.
 
     Arguments:
-        model, measurement: with the faults mended that were found.
-        data: charges of the data.
-        input: charges of what was typed in, with what mending them gains on the model as drawn.
-        promised: whether one of them alone mends most of what is wrong.
+        model, measurement: with the faults mended that were found before.
+        faults, examine: as in `inquire`.
     """
 
-    model: Model
-    measurement: Measurement
-    data: tuple[Charge, ...] = ()
-    input: tuple[tuple[Charge, float], ...] = ()
-    promised: bool = False
-
-    @classmethod
-    def of(
-        cls, model: Model, measurement: Measurement, faults: Sequence[Fault], examine: Examine
-    ) -> _File:
-        """Return the suspects."""
+    def __init__(
+        self, model: Model, measurement: Measurement, faults: Sequence[Fault], examine: Examine
+    ) -> None:
+        self.model, self.measurement = model, measurement
+        self.faults, self.examine = faults, examine
         charges = _charges(model, measurement, faults)
-        data = tuple(charge for charge in charges if charge.fault.side == "data")
-        bare = examine(model, measurement, "nothing")
-        if bare.adequacy > _ADEQUATE:
-            return cls(model, measurement, data)
-        typed = [charge for charge in charges if charge.fault.side == "input"]
-        file = cls(model, measurement, data, tuple(_gains(bare, typed)))
-        before = bare.posterior.explanations[0]
-        best = max((charge.score for charge in _promising(bare, file)), default=-np.inf)
-        gain = best - before.log_weight
-        return replace(file, promised=gain > max(_CLEARLY, _MOSTLY * 0.5 * before.chi2))
+        self.data = [charge for charge in charges if charge.fault.side == "data"]
+        self.input = [charge for charge in charges if charge.fault.side == "input"]
+        self._seen: dict[Depth, Examination] = {}
+        self._mended: dict[tuple[str, str], _File] = {}
+
+    def seen(self, depth: Depth) -> Examination:
+        """Return the examination of model and data as they are."""
+        if depth not in self._seen:
+            self._seen[depth] = self.examine(self.model, self.measurement, depth)
+        return self._seen[depth]
+
+    def mended(self, charge: Charge) -> _File:
+        """Return the file without a fault."""
+        key = charge.suspect.place, charge.suspect.words
+        if key not in self._mended:
+            self._mended[key] = _File(*charge.mended, self.faults, self.examine)
+        return self._mended[key]
+
+    @cached_property
+    def gains(self) -> list[tuple[Charge, float]]:
+        """Return what was typed in with what mending it gains on the model as drawn, in nats."""
+        bare = self.seen("nothing")
+        state = bare.posterior.explanations[0].fit.state
+        most = _SOLVED if self.model.size > DENSE_LIMIT else len(self.input)
+        found = []
+        for charge in self.input[:most]:
+            try:
+                raw = raw_residual(bare.problem, charge.mended[0])
+            except (FemubenchError, la.LinAlgError):
+                continue
+            white = state.residual + state.problem.noise.whiten(raw - state.raw)
+            found.append((charge, 0.5 * (state.chi2 - float(white @ white))))
+        return found
+
+    @cached_property
+    def gross(self) -> bool:
+        """Tell whether the model as drawn misses a frequency by more than causes explain."""
+        state = self.seen("nothing").posterior.explanations[0].fit.state
+        m = self.measurement
+        error = state.raw[: len(m)] * m.frequency_std / m.frequencies
+        return bool((np.abs(error) > _GROSS).any())
+
+    @property
+    def promised(self) -> bool:
+        """Tell whether a single fault mends most of what the model as drawn gets wrong."""
+        before = self.seen("nothing").posterior.explanations[0]
+        if self.seen("nothing").adequacy > _ADEQUATE:
+            return False
+        best = max((charge.score for charge in self.promising("nothing")), default=-np.inf)
+        return best - before.log_weight > max(_CLEARLY, _MOSTLY * 0.5 * before.chi2)
+
+    def promising(self, depth: Depth) -> list[Charge]:
+        """Return the suspects that are worth a search, best first."""
+        now = self.seen(depth)
+        explanations, good = now.posterior.explanations, now.adequacy > _GOOD
+        plain = next(e for e in explanations if not e.parts and not e.base.parts)
+        top = explanations[0].log_weight
+        floor = top - (0.0 if good else _SLACK)
+        names = list(now.posterior.names)[: 1 if good else _NAMES]
+        chosen = {id(e): e for e in (*map(now.posterior.best, names), plain)}
+        known = [_Known(e) for e in chosen.values()]
+        tried = (_best_on(known, charge, floor) for charge in self.data)
+        found = [charge for charge in tried if charge is not None]
+        if self.gross or (depth != "nothing" and _strained(now)):
+            for charge, gain in self.gains:
+                score = plain.log_weight + gain + charge.log_prior
+                clearly = gain > max(_CLEARLY, _SHARE * 0.5 * plain.chi2)
+                if score > floor or (now.adequacy < _ADEQUATE and clearly):
+                    found.append(replace(charge, score=score))
+        ranked = in_order(found, lambda charge: -charge.score)[:_TRIED]
+        return [c for c in ranked if c.score > ranked[0].score - max(10.0, _FAR * (c.score - top))]
+
+    def density(self, charge: Charge) -> float:
+        """Return ln of prior times density without a fault and with one cause at most."""
+        try:
+            seen = self.mended(charge).seen("one")
+        except (FemubenchError, la.LinAlgError):
+            return -np.inf
+        return log_density(seen, self.measurement) + charge.log_prior
+
+    def without_fault(self, depth: Depth) -> tuple[_File, Mended] | None:
+        """Return the file without the most probable fault; None where none is more likely.
+
+        Arguments:
+            depth: to which the data as they are were searched; if not for several causes, a fault
+                must explain all by itself, where no single cause does.
+        """
+        charges = self.promising(depth)
+        if not charges:
+            return None
+        pairs = [(self.density(charge) if len(charges) > 1 else 0.0, charge) for charge in charges]
+        (least, best), *others = in_order(pairs, lambda pair: -pair[0])
+        if least == -np.inf:
+            return None
+        mended = self.mended(best)
+        now, seen = self.seen(depth), mended.seen("several")
+        if best.suspect.parameter is not None:
+            again = _Known(seen.best).estimated(best)
+            best = replace(best, x=again.x, std=again.std)
+        found = log_density(seen, self.measurement) + best.log_prior
+        rivals = [log_density(now, self.measurement), *(density for density, _ in others)]
+        probability = exp(found - float(logsumexp([found, *rivals])))
+        if depth == "one" and (seen.best.parts or now.adequacy > _ADEQUATE):
+            return None
+        if probability < 0.5 or seen.adequacy < _ADEQUATE:
+            return None
+        return mended, Mended(best, probability)
 
 
-def _opened(
-    model: Model, measurement: Measurement, faults: Sequence[Fault], examine: Examine
-) -> tuple[_File, Examination, bool]:
-    """Return the suspects, an examination of the data as they are, and whether it is a whole one.
-
-    Where a fault alone mends most of what is wrong, the long search for several causes of data
-    that are wrong is put off.
-    """
-    if not faults:
-        return _File(model, measurement), examine(model, measurement, "several"), True
-    file = _File.of(model, measurement, faults, examine)
-    depth: Depth = "one" if file.promised else "several"
-    return file, examine(model, measurement, depth), not file.promised
+def _strained(now: Examination) -> bool:
+    """Tell whether physical causes explain the data badly, or by several or unlikely sizes."""
+    x = now.best.fit.state.x
+    unlikely = bool((np.abs(x) > _UNLIKELY).any())
+    return now.adequacy < _ADEQUATE or len(now.best.parts) > 1 or unlikely
 
 
 def _charges(model: Model, measurement: Measurement, faults: Sequence[Fault]) -> list[Charge]:
@@ -382,31 +464,6 @@ class _Known:
         return replace(charge, x=x, std=std, score=self.explanation.log_weight + gain)
 
 
-def _promising(now: Examination, file: _File) -> list[Charge]:
-    """Return the suspects that are worth a search, best first."""
-    if not file.data and not file.input:
-        return []
-    explanations = now.posterior.explanations
-    plain = next(e for e in explanations if not e.parts and not e.base.parts)
-    top = explanations[0].log_weight
-    names = list(now.posterior.names)[: 1 if now.adequacy > _GOOD else _NAMES]
-    chosen = {id(e): e for e in (*map(now.posterior.best, names), plain)}
-    known = [_Known(e) for e in chosen.values()]
-    floor = top - (_SLACK if now.adequacy < _GOOD else 0.0)
-    tried = (_best_on(known, charge, floor) for charge in file.data)
-    found = [charge for charge in tried if charge is not None]
-    if _strained(now):
-        for charge, gain in file.input:
-            score = plain.log_weight + gain + charge.log_prior
-            clearly = gain > max(_CLEARLY, _SHARE * 0.5 * plain.chi2)
-            if score > floor or (now.adequacy < _ADEQUATE and clearly):
-                found.append(replace(charge, score=score))
-    ranked = in_order(found, lambda charge: -charge.score)[:_TRIED]
-    return [
-        c for c in ranked if c.score > ranked[0].score - _FAR * max(ranked[0].score - top, 50.0)
-    ]
-
-
 def _best_on(known: Sequence[_Known], charge: Charge, floor: float) -> Charge | None:
     """Return a charge on the explanation where it promises most; None where it is not enough."""
     best: Charge | None = None
@@ -424,64 +481,3 @@ def _best_on(known: Sequence[_Known], charge: Charge, floor: float) -> Charge | 
         if tried.score > max(floor, -np.inf if best is None else best.score):
             best = tried
     return best
-
-
-def _strained(now: Examination) -> bool:
-    """Tell whether physical causes explain the data badly, or by several or unlikely sizes."""
-    x = now.best.fit.state.x
-    return (
-        now.adequacy < _ADEQUATE or len(now.best.parts) > 1 or bool((np.abs(x) > _STRAINED).any())
-    )
-
-
-def _gains(bare: Examination, charges: Sequence[Charge]) -> Iterator[tuple[Charge, float]]:
-    """Yield what was typed in with what mending it gains on the model as drawn, in nats."""
-    state = bare.posterior.explanations[0].fit.state
-    most = _SOLVED if bare.model.size > DENSE_LIMIT else len(charges)
-    for charge in charges[:most]:
-        try:
-            raw = raw_residual(bare.problem, charge.mended[0])
-        except (FemubenchError, la.LinAlgError):
-            continue
-        white = state.residual + state.problem.noise.whiten(raw - state.raw)
-        yield charge, 0.5 * (state.chi2 - float(white @ white))
-
-
-def _tried(
-    now: Examination, whole: bool, charges: Sequence[Charge], examine: Examine
-) -> tuple[Examination, Mended] | None:
-    """Return the examination without the most probable fault; None where none is more likely.
-
-    Arguments:
-        now: of the data as they are.
-        whole: whether several causes were sought there. If not, a fault must explain all by
-            itself, where no single cause does.
-        charges: what is tried.
-        examine: as in `inquire`.
-    """
-    measured = now.problem.data.measurement
-    singles: list[tuple[float, Charge]] = []
-    for charge in charges:
-        try:
-            seen = examine(*charge.mended, "one")
-        except (FemubenchError, la.LinAlgError):
-            continue
-        singles.append((log_density(seen, measured) + charge.log_prior, charge))
-    if not singles:
-        return None
-    (_, best), *others = in_order(singles, lambda pair: -pair[0])
-    seen = examine(*best.mended, "several")
-    if best.suspect.parameter is not None:
-        again = _Known(seen.best).estimated(best)
-        best = replace(best, x=again.x, std=again.std)
-    found = log_density(seen, measured) + best.log_prior
-    rivals = [log_density(now, measured), *(density for density, _ in others)]
-    probability = exp(found - float(logsumexp([found, *rivals])))
-    if not whole and (seen.best.parts or now.adequacy > _ADEQUATE):
-        return None
-    return (seen, Mended(best, probability)) if _stands(seen, probability) else None
-
-
-def _stands(seen: Examination, probability: float) -> bool:
-    """Tell whether a fault is more likely than not, and leaves data that can be explained."""
-    return probability > 0.5 and seen.adequacy > _ADEQUATE
