@@ -10,6 +10,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from femubench.core.challenge.sealed import read_small
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import InputError
+from femubench.core.roles import Side
 from femubench.core.schema.diagnosis import Verdict
 
 _LARGEST = 4 * 2**20  # bytes
@@ -40,12 +41,16 @@ class AnswerParameter(_Part):
 
 
 class AnswerCause(_Part):
-    """An effect at a place; ``a + b`` at ``p + q`` for a pair within a group."""
+    """An effect at a place; ``a + b`` at ``p + q`` for a pair within a group.
+
+    A fault of data or input, by its `side`, belongs to every member of a group.
+    """
 
     effect: Word
     place: Word = ""
     parameters: tuple[AnswerParameter, ...] = Field((), max_length=20)
     probability: Probability | None = None
+    side: Side = "model"
 
     @property
     def parts(self) -> tuple[tuple[str, str], ...]:
@@ -82,12 +87,16 @@ class Answer(_Part):
         A group claims the sum over its members, several causes together the smallest of theirs;
         ``unknown`` and ``not-confirmed`` claim none.
         """
-        stated = [cause.probability for cause in self.causes if cause.probability is not None]
+        known = [cause for cause in self.causes if cause.probability is not None]
+        stated = [cause.probability or 0.0 for cause in known if cause.side == "model"]
+        faults = [cause.probability or 0.0 for cause in known if cause.side != "model"]
         if self.verdict == "none":
             return self.nothing
-        if self.verdict not in ("named", "ambiguous") or not stated:
+        if self.verdict not in ("named", "ambiguous") or not known:
             return None
-        return min(1.0, sum(stated)) if self.verdict == "ambiguous" else min(stated)
+        if self.verdict == "ambiguous":
+            stated = [sum(stated)]
+        return min(1.0, *stated, *faults)
 
 
 def read_answer(path: Path) -> Answer:

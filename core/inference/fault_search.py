@@ -39,7 +39,7 @@ from femubench.core.typing import BoolArray, FloatArray
 PRIOR_OF_FAULT = 0.1
 _SLACK = 3.0  # nats behind the best explanation within which a suspect is worth a search
 _NAMES, _TRIED, _MOST, _SOLVED = 5, 3, 3, 20
-_MOSTLY, _FAR = 0.5, 0.1  # of half chi-square; of what the best suspect promises
+_MOSTLY, _DOMINANT, _FAR = 0.5, 0.7, 0.1  # shares of chi-square, and of what is promised
 _CLEARLY, _SHARE = 20.0, 0.1  # nats, and of half chi-square, that mending what was typed in gains
 _ADEQUATE, _GOOD, _UNLIKELY, _GROSS = 1e-3, 0.05, 3.0, 0.1
 _FREE = 1e3  # deviation of the scale of a shape, in those of the data
@@ -255,8 +255,15 @@ class _File:
                 clearly = gain > max(_CLEARLY, _SHARE * 0.5 * plain.chi2)
                 if score > floor or (now.adequacy < _ADEQUATE and clearly):
                     found.append(replace(charge, score=score))
-        ranked = in_order(found, lambda charge: -charge.score)[:_TRIED]
+        definite = [charge for charge in found if not charge.reweighs]
+        ranked = in_order(definite or found, lambda charge: -charge.score)[:_TRIED]
         return [c for c in ranked if c.score > ranked[0].score - max(10.0, _FAR * (c.score - top))]
+
+    def widens(self, charge: Charge) -> bool:
+        """Tell whether mending a fault widens deviations."""
+        _, other = charge.mended
+        wider = other.frequency_std > self.measurement.frequency_std
+        return bool(wider.any() or (other.shape_std > self.measurement.shape_std).any())
 
     def density(self, charge: Charge) -> float:
         """Return ln of prior times density without a fault and with one cause at most."""
@@ -281,6 +288,9 @@ class _File:
         if least == -np.inf:
             return None
         mended = self.mended(best)
+        # Wider deviations excuse whatever is wrong: they must leave nothing to be explained.
+        if best.reweighs and self.widens(best) and mended.seen("one").best.parts:
+            return None
         now, seen = self.seen(depth), mended.seen("several")
         if best.suspect.parameter is not None:
             again = _Known(seen.best).estimated(best)
@@ -290,7 +300,10 @@ class _File:
         probability = exp(found - float(logsumexp([found, *rivals])))
         if depth == "one" and (seen.best.parts or now.adequacy > _ADEQUATE):
             return None
-        if probability < 0.5 or seen.adequacy < _ADEQUATE:
+        explained = seen.adequacy > _ADEQUATE or (
+            not best.reweighs and seen.best.chi2 < (1.0 - _DOMINANT) * now.best.chi2
+        )
+        if probability < 0.5 or not explained:
             return None
         return mended, Mended(best, probability)
 
