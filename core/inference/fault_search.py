@@ -234,7 +234,8 @@ class _File:
         before = self.seen("nothing").posterior.explanations[0]
         if self.seen("nothing").adequacy > _ADEQUATE:
             return False
-        best = max((charge.score for charge in self.promising("nothing")), default=-np.inf)
+        scores = (c.score for c in self.promising("nothing") if not c.reweighs)
+        best = max(scores, default=-np.inf)
         return best - before.log_weight > max(_CLEARLY, _MOSTLY * 0.5 * before.chi2)
 
     def promising(self, depth: Depth) -> list[Charge]:
@@ -255,9 +256,7 @@ class _File:
                 clearly = gain > max(_CLEARLY, _SHARE * 0.5 * plain.chi2)
                 if score > floor or (now.adequacy < _ADEQUATE and clearly):
                     found.append(replace(charge, score=score))
-        definite = [charge for charge in found if not charge.reweighs]
-        ranked = in_order(definite or found, lambda charge: -charge.score)[:_TRIED]
-        return [c for c in ranked if c.score > ranked[0].score - max(10.0, _FAR * (c.score - top))]
+        return in_order(found, lambda charge: -charge.score)
 
     def widens(self, charge: Charge) -> bool:
         """Tell whether mending a fault widens deviations."""
@@ -280,7 +279,23 @@ class _File:
             depth: to which the data as they are were searched; if not for several causes, a fault
                 must explain all by itself, where no single cause does.
         """
-        charges = self.promising(depth)
+        found = self.promising(depth)
+        # Other deviations would excuse whatever is wrong: they are the last resort.
+        for last in (False, True):
+            ranked = [charge for charge in found if charge.reweighs is last][:_TRIED]
+            top = self.seen(depth).posterior.explanations[0].log_weight
+            near = (
+                c
+                for c in ranked
+                if c.score > ranked[0].score - max(10.0, _FAR * (ranked[0].score - top))
+            )
+            mended = self._without(list(near), depth)
+            if mended is not None:
+                return mended
+        return None
+
+    def _without(self, charges: Sequence[Charge], depth: Depth) -> tuple[_File, Mended] | None:
+        """Return the file without the most probable of some faults, if it stands."""
         if not charges:
             return None
         pairs = [(self.density(charge) if len(charges) > 1 else 0.0, charge) for charge in charges]
@@ -288,7 +303,6 @@ class _File:
         if least == -np.inf:
             return None
         mended = self.mended(best)
-        # Wider deviations excuse whatever is wrong: they must leave nothing to be explained.
         if best.reweighs and self.widens(best) and mended.seen("one").best.parts:
             return None
         now, seen = self.seen(depth), mended.seen("several")
