@@ -93,6 +93,8 @@ class Charge:
     @cached_property
     def reweighs(self) -> bool:
         """Tell whether it is a matter of deviations alone."""
+        if self.fault.side == "input":
+            return False
         _, other = self.corrected(1.0)
         names = ("frequencies", "shapes")
         pairs = [(getattr(self.measurement, name), getattr(other, name)) for name in names]
