@@ -282,16 +282,15 @@ class _File:
                 must explain all by itself, where no single cause does.
         """
         found = self.promising(depth)
+        top = self.seen(depth).posterior.explanations[0].log_weight
+        data = [charge for charge in found if charge.fault.side == "data"]
+        typed = [charge for charge in found if charge.fault.side == "input"]
+        definite = [charge for charge in data if not charge.reweighs]
+        # What was typed in was tried without any cause, which is a worse promise than the others.
         # Other deviations would excuse whatever is wrong: they are the last resort.
-        for last in (False, True):
-            ranked = [charge for charge in found if charge.reweighs is last][:_TRIED]
-            top = self.seen(depth).posterior.explanations[0].log_weight
-            near = (
-                c
-                for c in ranked
-                if c.score > ranked[0].score - max(10.0, _FAR * (ranked[0].score - top))
-            )
-            mended = self._without(list(near), depth)
+        near = [*_near(definite, top), *_near(typed, top)]
+        for charges in (near, _near([charge for charge in data if charge.reweighs], top)):
+            mended = self._without(charges, depth)
             if mended is not None:
                 return mended
         return None
@@ -322,6 +321,14 @@ class _File:
         if probability < 0.5 or not explained:
             return None
         return mended, Mended(best, probability)
+
+
+def _near(ranked: Sequence[Charge], top: float) -> list[Charge]:
+    """Return the first few suspects that promise about as much as the best one of them."""
+    if not ranked:
+        return []
+    best = ranked[0].score
+    return [c for c in ranked[:_TRIED] if c.score > best - max(10.0, _FAR * (best - top))]
 
 
 def _strained(now: Examination) -> bool:
