@@ -38,8 +38,13 @@ from femubench.core.typing import BoolArray, FloatArray
 # That data or input are wrong somewhere, before any datum is seen: over kinds, then suspects.
 PRIOR_OF_FAULT = 0.1
 _SLACK = 3.0  # nats behind the best explanation within which a suspect is worth a search
-_NAMES, _TRIED, _MOST, _SOLVED = 5, 3, 3, 20
-_MOSTLY, _DOMINANT, _FAR = 0.5, 0.7, 0.1  # shares of chi-square, and of what is promised
+_NAMES, _TRIED, _MOST, _SOLVED = 5, 2, 3, 20
+_MOSTLY, _DOMINANT, _HOPELESS, _FAR = (
+    0.5,
+    0.7,
+    0.75,
+    0.1,
+)  # shares of chi-square, and of what is promised
 _CLEARLY, _SHARE = 20.0, 0.1  # nats, and of half chi-square, that mending what was typed in gains
 _ADEQUATE, _GOOD, _UNLIKELY, _GROSS = 1e-3, 0.05, 3.0, 0.1
 _FREE = 1e3  # deviation of the scale of a shape, in those of the data
@@ -258,6 +263,9 @@ class _File:
                 clearly = gain > max(_CLEARLY, _SHARE * 0.5 * plain.chi2)
                 if score > floor or (now.adequacy < _ADEQUATE and clearly):
                     found.append(replace(charge, score=score))
+        if now.adequacy < _ADEQUATE:
+            # What takes away a small part of a large misfit cannot be all that is wrong.
+            found = [c for c in found if c.fault.side == "input" or c.score > _HOPELESS * top]
         return in_order(found, lambda charge: -charge.score)
 
     def widens(self, charge: Charge) -> bool:
@@ -288,8 +296,8 @@ class _File:
         definite = [charge for charge in data if not charge.reweighs]
         # What was typed in was tried without any cause, which is a worse promise than the others.
         # Other deviations would excuse whatever is wrong: they are the last resort.
-        near = [*_near(definite, top), *_near(typed, top)]
-        for charges in (near, _near([charge for charge in data if charge.reweighs], top)):
+        near = [*_near(definite, top)[:_TRIED], *_near(typed, top)[:1]]
+        for charges in (near, _near([charge for charge in data if charge.reweighs], top)[:1]):
             mended = self._without(charges, depth)
             if mended is not None:
                 return mended
@@ -328,7 +336,7 @@ def _near(ranked: Sequence[Charge], top: float) -> list[Charge]:
     if not ranked:
         return []
     best = ranked[0].score
-    return [c for c in ranked[:_TRIED] if c.score > best - max(10.0, _FAR * (best - top))]
+    return [c for c in ranked if c.score > best - max(10.0, _FAR * (best - top))]
 
 
 def _strained(now: Examination) -> bool:
