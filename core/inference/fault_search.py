@@ -39,17 +39,11 @@ from femubench.core.typing import BoolArray, FloatArray
 PRIOR_OF_FAULT = 0.1
 _SLACK = 3.0  # nats behind the best explanation within which a suspect is worth a search
 _NAMES, _TRIED, _MOST, _SOLVED = 5, 2, 3, 20
-_MOSTLY, _DOMINANT, _HOPELESS, _FAR = (
-    0.5,
-    0.7,
-    0.75,
-    0.1,
-)  # shares of chi-square, and of what is promised
+_MOSTLY, _PART, _DOMINANT, _FAR = 0.5, 0.3, 0.7, 0.1  # shares of chi-square, of what is promised
 _CLEARLY, _SHARE = 20.0, 0.1  # nats, and of half chi-square, that mending what was typed in gains
 _ADEQUATE, _GOOD, _UNLIKELY, _GROSS = 1e-3, 0.05, 3.0, 0.1
 _FREE = 1e3  # deviation of the scale of a shape, in those of the data
 _STEP, _CURVED = 1e-4, 0.02  # of a coordinate: for a slope, for a curvature
-_MOVED = 0.5  # deviations of a parameter within which it need not be estimated again
 
 Depth = Literal["nothing", "one", "several"]
 Examine = Callable[[Model, Measurement, Depth], Examination]
@@ -248,14 +242,18 @@ class _File:
     def promising(self, depth: Depth) -> list[Charge]:
         """Return the suspects that are worth a search, best first."""
         now = self.seen(depth)
-        explanations, good = now.posterior.explanations, now.adequacy > _GOOD
+        explanations = now.posterior.explanations
+        good = now.adequacy > _GOOD and len(now.best.parts) < 2
         plain = next(e for e in explanations if not e.parts and not e.base.parts)
         top = explanations[0].log_weight
         floor = top - (0.0 if good else _SLACK)
         names = list(now.posterior.names)[: 1 if good else _NAMES]
-        chosen = {id(e): e for e in (*map(now.posterior.best, names), plain)}
-        known = [_Known(e) for e in chosen.values()]
-        tried = (_best_on(known, charge, floor) for charge in self.data)
+        # With fewer causes too: one of many may stand for the fault.
+        counts = {len(e.parts): e for e in reversed(explanations)} if not good else {}
+        chosen = (*map(now.posterior.best, names), *counts.values(), plain)
+        known = [_Known(e) for e in {id(e): e for e in chosen}.values()]
+        some = now.adequacy < _ADEQUATE
+        tried = (_best_on(known, charge, floor, some=some) for charge in self.data)
         found = [charge for charge in tried if charge is not None]
         if self.gross or (depth != "nothing" and _strained(now)):
             for charge, gain in self.gains:
@@ -263,9 +261,6 @@ class _File:
                 clearly = gain > max(_CLEARLY, _SHARE * 0.5 * plain.chi2)
                 if score > floor or (now.adequacy < _ADEQUATE and clearly):
                     found.append(replace(charge, score=score))
-        if now.adequacy < _ADEQUATE:
-            # What takes away a small part of a large misfit cannot be all that is wrong.
-            found = [c for c in found if c.fault.side == "input" or c.score > _HOPELESS * top]
         return in_order(found, lambda charge: -charge.score)
 
     def widens(self, charge: Charge) -> bool:
@@ -508,8 +503,15 @@ class _Known:
         return replace(charge, x=x, std=std, score=self.explanation.log_weight + gain)
 
 
-def _best_on(known: Sequence[_Known], charge: Charge, floor: float) -> Charge | None:
-    """Return a charge on the explanation where it promises most; None where it is not enough."""
+def _best_on(known: Sequence[_Known], charge: Charge, floor: float, *, some: bool) -> Charge | None:
+    """Return a charge on the explanation where it promises most; None where it is not enough.
+
+    Arguments:
+        known: explanations.
+        charge: of the data.
+        floor: of ln prior times evidence.
+        some: whether it also does to take away a good part of what an explanation leaves.
+    """
     best: Charge | None = None
     for one in known:
         data = one.state.problem.data
@@ -518,10 +520,12 @@ def _best_on(known: Sequence[_Known], charge: Charge, floor: float) -> Charge | 
         rows = np.zeros(len(data), dtype=bool)
         chosen = np.concatenate([np.arange(count), count + mode * sensors + sensor])
         rows[: len(chosen)] = charge.rows[chosen]
-        most = one.explanation.log_weight + charge.log_prior
-        if not charge.reweighs and most + one.most(rows) < floor:
+        own = one.explanation.log_weight
+        part = own + max(_CLEARLY, _PART * 0.5 * one.state.chi2) if some else np.inf
+        enough = min(floor, part)
+        if not charge.reweighs and own + charge.log_prior + one.most(rows) < enough:
             continue
         tried = one.tried(charge)
-        if tried.score > max(floor, -np.inf if best is None else best.score):
+        if tried.score > max(enough, -np.inf if best is None else best.score):
             best = tried
     return best
