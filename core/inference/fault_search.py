@@ -43,7 +43,8 @@ _MOSTLY, _PART, _DOMINANT, _FAR = 0.5, 0.3, 0.7, 0.1  # shares of chi-square, of
 _CLEARLY, _SHARE = 20.0, 0.1  # nats, and of half chi-square, that mending what was typed in gains
 _ADEQUATE, _GOOD, _UNLIKELY, _GROSS = 1e-3, 0.05, 3.0, 0.1
 _FREE = 1e3  # deviation of the scale of a shape, in those of the data
-_STEP, _CURVED = 1e-4, 0.02  # of a coordinate: for a slope, for a curvature
+# Of a coordinate: for a slope, for a curvature, and what counts as at a bound.
+_STEP, _CURVED, _EDGE = 1e-4, 0.02, 0.01
 
 Depth = Literal["nothing", "one", "several"]
 Examine = Callable[[Model, Measurement, Depth], Examination]
@@ -477,7 +478,10 @@ class _Known:
         if charge.suspect.parameter is None or charge.single:
             gain = self.gain(charge.mended[1])
             return self._with(charge, 0.0, 0.0, gain + charge.log_prior)
-        return self.estimated(charge)
+        # At its bounds a parameter makes up for something else.
+        low, high = charge.suspect.parameter.range
+        found = self.estimated(charge)
+        return found if low + _EDGE < found.x < high - _EDGE else replace(found, score=-np.inf)
 
     def estimated(self, charge: Charge) -> Charge:
         """Return a charge with its parameter at its most probable value."""

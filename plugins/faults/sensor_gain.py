@@ -10,7 +10,7 @@ from femubench import Measurement, Model
 from femubench.effect import Corrected, EffectParameter, Suspect
 from femubench.plugins.faults.readings import multiplied, read_sensors
 
-_GAIN = EffectParameter("gain", "", 1.0, neutral=1.0, lower=0.1, upper=7.0)
+_GAIN = EffectParameter("gain", "", 1.0, neutral=1.0, lower=0.2, upper=5.0)
 
 
 class SensorGain:
