@@ -2,7 +2,7 @@
 
 python benchmarks/truth_sweep.py run --jobs 2         # appends, goes on where it stopped
 python benchmarks/truth_sweep.py run --reference      # with the healthy structure beside it
-python benchmarks/truth_sweep.py tables
+python benchmarks/truth_sweep.py tables               # of either run: [--reference]
 """
 
 from __future__ import annotations
@@ -437,25 +437,28 @@ def _beside(cases: Sequence[Scored]) -> str:
     return str(pd.DataFrame(rows).fillna("0").to_markdown(index=False, disable_numparse=True))
 
 
-def tables(cases: Sequence[Scored], truths: Sequence[Truth]) -> str:
+def tables(cases: Sequence[Scored], truths: Sequence[Truth], *, reference: bool = False) -> str:
     """Return all tables: visibility, then the outcomes of both halves apart.
 
     Arguments:
         cases: what has a record.
         truths: all that there are.
+        reference: whether the healthy structure was beside them.
     """
-    parts = ["## How visible the cases are", visibility_table(truths)]
-    for title, is_held in (("Development half", False), ("Held half", True)):
+    parts = [] if reference else ["## How visible the cases are", visibility_table(truths)]
+    beside = " with reference" if reference else ""
+    for name, is_held in (("Development half", False), ("Held half", True)):
+        title = name + beside
         own = [case for case in cases if case.truth.held is is_held]
         parts += [half(title, own)] if own else [f"## {title}", "No case was diagnosed yet."]
     return "\n\n".join(parts)
 
 
-def filled(page: str, text: str) -> str:
+def filled(page: str, text: str, mark: str = MARK) -> str:
     """Return a page with a text between its markers."""
-    head, rest = page.split(f"<!-- {MARK} -->\n", 1)
-    tail = rest.split(f"<!-- /{MARK} -->", 1)[1]
-    return f"{head}<!-- {MARK} -->\n\n{text}\n\n<!-- /{MARK} -->{tail}"
+    head, rest = page.split(f"<!-- {mark} -->\n", 1)
+    tail = rest.split(f"<!-- /{mark} -->", 1)[1]
+    return f"{head}<!-- {mark} -->\n\n{text}\n\n<!-- /{mark} -->{tail}"
 
 
 def parser() -> argparse.ArgumentParser:
@@ -497,7 +500,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     cases = scored(records, truths, options.suite)
     if not cases:
         known.error(f"no results in {results}: run the sweep first")
-    page = filled(options.page.read_text(encoding="utf-8"), tables(cases, truths))
+    text = tables(cases, truths, reference=options.reference)
+    mark = MARK + ("-reference" if options.reference else "")
+    page = filled(options.page.read_text(encoding="utf-8"), text, mark)
     options.page.write_text(page, encoding="utf-8")
     print(f"{len(cases)} of {len(truths)} cases, {options.page}")
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from femubench.reports.blocks import Block, Column, Items, Section, Table, to_markdown, to_terminal
 from femubench.reports.cells import NOTHING, fixed, plain
-from femubench.reports.diagnosis_words import CAUSES, GAINS, pairs_of
+from femubench.reports.diagnosis_words import CAUSES, GAINS, pairs_of, sentence, sits, weight
 from femubench.reports.figures import chance, estimate, figure, rms, signed
 from femubench.reports.markdown import escape
 
@@ -57,6 +57,7 @@ def diagnosis_sections(data: Data) -> list[Section]:
             CAUSES.get(data["verdict"], "Causes"),
             [
                 *_items((_at(cause), _cause(cause)) for cause in data["causes"]),
+                *_items(("", sentence(weight(row))) for row in data["evidence"]),
                 *([data["reason"]] if data["reason"] else []),
             ],
         ),
@@ -158,9 +159,8 @@ def _chi_square(data: Data) -> str:
 
 
 def _cause(cause: Data) -> str:
-    parts = [f"probability {chance(cause['probability'])}"]
-    if cause["summary"]:
-        parts.append(cause["summary"])
+    parts = [f"probability {chance(cause['probability'])}", sits(cause), cause["summary"]]
+    parts = [part for part in parts if part]
     return "; ".join([*parts, *(_parameter(item) for item in cause["parameters"])])
 
 

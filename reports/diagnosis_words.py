@@ -41,7 +41,7 @@ INDICATORS = {
     "mdlac": "match of the frequency changes with those that a softer element would make",
     "ecomac": "difference of measured and predicted shapes at every sensor",
 }
-_MOST_CHANGES = 6
+_MOST_CHANGES, _MOST_PLACES = 6, 5
 _NOISE, _LIMIT = 0.05, 1e-3
 _LARGEST_ODDS = 1e6
 
@@ -85,6 +85,29 @@ def sentence(clause: str) -> str:
 def place_at(place: str) -> str:
     """Return a place as it follows an effect."""
     return "everywhere" if place == "all" else place
+
+
+def weight(row: Data) -> str:
+    """Return what data and prior say for the first explanation against another one."""
+    against = "no cause at all" if row["against"] == "nothing" else plain(row["against"])
+    return (
+        f"against {against}, the data add {signed(row['data'])} to the logarithm of the odds, "
+        f"the prior {signed(row['prior'])}"
+    )
+
+
+def sits(cause: Data) -> str:
+    """Return how sure the place of a cause is, and where else it may sit."""
+    if cause["place"] == "all" or cause["place_probability"] is None:
+        return ""
+    text = f"at this place {chance(cause['place_probability'])}"
+    mirrors = len(cause["mirrors"])
+    if mirrors:
+        text = f"{text}, one of {mirrors + 1} mirror places"
+    others = [f"{name} {chance(p)}" for name, p in cause["places"] if name != cause["place"]]
+    more = len(others) - _MOST_PLACES
+    listed = ", ".join(others[:_MOST_PLACES]) + (f" and {more} more" if more > 0 else "")
+    return f"{text}; else at {listed}" if others else text
 
 
 def pairs_of(rival: Data) -> list[tuple[str, str]]:

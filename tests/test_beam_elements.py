@@ -295,3 +295,20 @@ def test_thin_timoshenko_beam_is_an_euler_bernoulli_beam() -> None:
         found.append(solve_modes(model).elastic.natural_frequencies[:3])
     np.testing.assert_allclose(found[1], found[0], rtol=1e-6)
     assert (found[1] < found[0]).all()
+
+
+@pytest.mark.parametrize("direction", ["y", "z"])
+def test_shear_along_each_axis_has_its_own_coefficient(direction: str) -> None:
+    """Deflection of a cantilever: bending, and P L / (kappa G A) with the kappa along it."""
+    section = Section(4e-4, 2e-8, 5e-8, 3e-8, 7e-8, kappa=lambda nu: (0.2, 0.7))
+    joints = Joint("A", (0.0, 0.0, 0.0), "E"), Joint("B", (0.05, 0.0, 0.0), "E")
+    member = Member("beam", ("A", "B"), 2, section, MATERIAL, up=(0.0, 0.0, 1.0))
+    held = Support(Place(joint="A"), ("x", "y", "z", "rx", "ry", "rz"))
+    model = Model.of(Frame("3d", "timoshenko", joints, (member,), supports=(held,)))
+    tip = (model.dofs.xyz[:, 0] > 0.049) & (np.array(model.dofs.direction) == direction)
+    deflection = np.linalg.solve(model.stiffness.toarray(), tip.astype(float))[tip]
+    inertia, kappa = (section.Iz, 0.2) if direction == "y" else (section.Iy, 0.7)
+    bending = 0.05**3 / (3.0 * MATERIAL.E * inertia)
+    shear = 0.05 / (kappa * MATERIAL.G * section.A)
+    assert shear > 0.1 * bending
+    assert deflection == pytest.approx([bending + shear], rel=1e-9)

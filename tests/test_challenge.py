@@ -365,6 +365,10 @@ def test_the_probability_that_an_answer_claims() -> None:
 
     assert answer("named", part(0.9), part(0.8)).probability == 0.8
     assert answer("ambiguous", part(0.5), part(0.4)).probability == pytest.approx(0.9)
+    # Where members stand together, one is right no more surely than the surest of them.
+    assert answer("ambiguous", part(0.9), part(0.4)).probability == 0.9
+    there = AnswerCause(effect="a", place="b", probability=0.9, place_probability=0.25)
+    assert answer("named", there).probability == pytest.approx(0.225)
     assert answer("none", nothing=0.97).probability == 0.97
     assert answer("unknown", part(0.9)).probability is None
 

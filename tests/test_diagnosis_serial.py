@@ -19,7 +19,7 @@ import femubench
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
 from femubench.core.errors import InputError
-from femubench.core.schema.diagnosis import Gain, Rival
+from femubench.core.schema.diagnosis import Evidence, Gain, Rival
 from femubench.reports.diagnosis import diagnosis_markdown, diagnosis_text, summary_lines
 from femubench.reports.figures import chance
 
@@ -191,6 +191,30 @@ class TestTerminal:
         found = [text.find(part) for part in parts]
         assert -1 not in found, parts[found.index(-1)]
         assert found == sorted(found)
+
+    def test_name_and_place_have_probabilities_of_their_own(self) -> None:
+        places = (("type:T", 0.25), ("type:L", 0.25), ("J1", 0.25), ("J9", 0.25))
+        cause = replace(
+            toys.SOFT, place_probability=0.25, places=places, mirrors=("type:L", "J1", "J9")
+        )
+        told = (
+            "probability 94.2 %; at this place 25.0 %, one of 4 mirror places; "
+            "else at type:L 25.0 %, J1 25.0 %, J9 25.0 %; the joints rotate"
+        )
+        assert told in words(toys.made(causes=(cause,)))
+
+    def test_data_and_prior_are_told_apart(self) -> None:
+        rows = Evidence("nothing", 42.13, -7.25), Evidence("density at all", -0.05, 6.9)
+        found = toys.made(evidence=rows)
+        assert (
+            "Against no cause at all, the data add +42.1 to the logarithm of the odds, the prior "
+            "-7.2." in words(found)
+        )
+        assert "Against density at all, the data add -0.1" in words(found)
+        assert "the data add" not in words(toys.made())
+        data = data_of(found)
+        assert data["evidence"][1] == {"against": "density at all", "data": -0.05, "prior": 6.9}
+        assert diagnosis_from_json(data)["evidence"] == data["evidence"]
 
     def test_headings_tell_findings_from_guesses(self) -> None:
         assert "What is missing" in words(toys.made("named"))

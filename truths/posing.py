@@ -76,9 +76,12 @@ def overlay(
         for path in sorted(folder.iterdir()):
             if path.is_file() and path.name not in left_out and path.suffix not in _ABOUT:
                 shutil.copyfile(path, target / path.name)
+    healthy = document["measurement"].get("mass")
     if mass is not None:
         document["measurement"]["mass"] = {"value": mass[0], "std": mass[1]}
     if reference:
         document["reference"] = {"modes": HEALTHY}
+        if healthy is not None:
+            document["reference"]["mass"] = healthy
     text = tomlkit.dumps(document).rstrip("\n") + "\n"
     (target / CASE_FILE).write_text(text, encoding="utf-8")

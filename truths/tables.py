@@ -13,7 +13,7 @@ from truths.posing import ROOT, SUITE
 from truths.suite import listed_modes
 
 PAGE = ROOT / "docs" / "suite.md"
-MARK = "<!-- suite -->"
+MARK, END = "<!-- suite -->", "<!-- /suite -->"
 NODES = re.compile(r"scikit-fem, (\d+) and\s+(\d+) nodes")
 
 
@@ -40,7 +40,7 @@ def suite_rows() -> list[str]:
 
 
 def write_table(page: Path = PAGE) -> None:
-    """Replace what stands behind the mark of the page."""
+    """Replace what stands between the marks of the page."""
     rows = suite_rows()
     errors = np.array([float(row.split("|")[-2]) for row in rows])
     head = (
@@ -52,8 +52,9 @@ def write_table(page: Path = PAGE) -> None:
         f"\n{len(rows)} structures; the drawing misses the used modes by {errors.min():.1f} to "
         f"{errors.max():.1f} %, {np.median(errors):.1f} % in the median.\n"
     )
-    before, _, _ = page.read_text(encoding="utf-8").partition(MARK)
-    page.write_text(before + MARK + "\n\n" + head + "\n".join(rows) + "\n" + foot, encoding="utf-8")
+    before, _, rest = page.read_text(encoding="utf-8").partition(MARK)
+    table = f"{MARK}\n\n{head}{chr(10).join(rows)}\n{foot}\n{END}"
+    page.write_text(before + table + rest.partition(END)[2], encoding="utf-8")
 
 
 if __name__ == "__main__":

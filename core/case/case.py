@@ -13,6 +13,7 @@ from femubench.core.fem.model import Model
 from femubench.core.modal.measurement import Measurement
 
 TOLERANCE = 0.005
+BEAM_SHARE = 0.5
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,12 @@ class Case(Shown):
         digest: hash of the content of all files of the case.
         tolerance: standard deviation of the relative scatter of every element's stiffness and
             mass that counts as ordinary in a diagnosis; 0 turns it off.
+        reference: modes of the same structure as it was, which the causes sought are not in.
+        reference_used: labels of those that a diagnosis is given; the others serve its proof.
+        model_error: factor on the widths of what a beam model gets wrong; 0 turns it off. None is
+            1 beside a reference, which says much of it, and 0 without.
+        beam_share: how probable it is, before any datum, that the structure behaves like a beam
+            model with ordinary scatter.
     """
 
     name: str
@@ -62,6 +69,10 @@ class Case(Shown):
     band: tuple[float, float] | None = None
     digest: str = ""
     tolerance: float = TOLERANCE
+    reference: Measurement | None = None
+    reference_used: tuple[int, ...] = ()
+    model_error: float | None = None
+    beam_share: float = BEAM_SHARE
 
     def rows(self) -> list[tuple[str, str]]:
         """Return where the case is from, its model, and what was measured on it."""
@@ -77,7 +88,22 @@ class Case(Shown):
         if self.held_out:
             held_out = measured.select(self.held_out).frequencies
             found.append(("held out", modes_line(self.held_out, held_out)))
+        if self.reference is not None:
+            known = self.reference.select(self.reference_used).frequencies
+            found.append(("reference", modes_line(self.reference_used, known)))
         return [*found, *(("modified", str(change)) for change in self.modifications)]
+
+    @property
+    def error_width(self) -> float:
+        """Return the factor on the widths of the model error."""
+        if self.model_error is not None:
+            return self.model_error
+        return 0.0 if self.reference is None else 1.0
+
+    @property
+    def used_reference(self) -> Measurement | None:
+        """Return the modes of the structure as it was that a diagnosis is given."""
+        return None if self.reference is None else self.reference.select(self.reference_used)
 
     def used_measurement(self, seed: int = 0) -> Measurement:
         """Return what a strategy may know: the used modes, noise added for a seed other than 0.

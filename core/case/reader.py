@@ -154,6 +154,10 @@ class _Building:
             band=self.spec.measurement.band,
             digest=self.files.digest(),
             tolerance=self.spec.diagnosis.tolerance,
+            reference=self.reference(measurement.sensors),
+            reference_used=self.reference_used,
+            model_error=self.spec.diagnosis.model_error,
+            beam_share=self.spec.diagnosis.beam_share,
         )
 
     def model(self) -> Model:
@@ -209,6 +213,31 @@ class _Building:
         if spec.mass is None:
             return measurement
         return replace(measurement, total_mass=(spec.mass.value, spec.mass.std))
+
+    @property
+    def reference_used(self) -> tuple[int, ...]:
+        """Return the labels of the modes of the structure as it was that a diagnosis is given."""
+        spec = self.spec.reference
+        if spec is None:
+            return ()
+        return self.spec.measurement.used if spec.used is None else spec.used
+
+    def reference(self, sensors: Sensors) -> Measurement | None:
+        """Return the modes of the structure as it was."""
+        spec = self.spec.reference
+        if spec is None:
+            return None
+        found = self.modes(("reference", "modes"), spec.modes, sensors)
+        key = "modes" if spec.used is None else "used"
+        for number in self.reference_used:
+            if number not in found.numbers:
+                there = ", ".join(map(str, found.numbers[:20]))
+                what = f"mode {number} has no data in {spec.modes}"
+                raise Fault(("reference", key), what, f"one of {there}")
+        if len(set(self.reference_used)) < len(self.reference_used):
+            raise Fault(("reference", key), "a mode is listed twice", "every mode once")
+        mass = None if spec.mass is None else (spec.mass.value, spec.mass.std)
+        return replace(found, total_mass=mass)
 
     def sensors(self, site: Site) -> tuple[Sensors, bool]:
         """Return the sensors, and whether a reader plugin gave them."""

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, InstanceOf, PlainValidator
 from pydantic_core import PydanticCustomError
 
-from femubench.core.case.case import TOLERANCE
+from femubench.core.case.case import BEAM_SHARE, TOLERANCE
 from femubench.core.fem.frame import BeamTheory, BendingMass, Place, Plane
 
 T = TypeVar("T")
@@ -330,6 +330,16 @@ class MeasurementSpec(Table):
     mass: WeightSpec | None = Field(None, description="{value, std} in kg")
 
 
+class ReferenceSpec(Table):
+    """`[reference]`."""
+
+    modes: FileName = Field(description="a file in the case folder")
+    used: Annotated[Many[Count], Field(min_length=1)] | None = Field(
+        None, description="a list of mode numbers, one at least"
+    )
+    mass: WeightSpec | None = Field(None, description="{value, std} in kg")
+
+
 class ModificationSpec(Table):
     """`[[modification]]`."""
 
@@ -348,6 +358,16 @@ class DiagnosisSpec(Table):
         default=TOLERANCE,
         description="a number >= 0 and <= 0.2, the relative scatter of every element",
     )
+    model_error: Annotated[float, Field(strict=True, ge=0, le=10, allow_inf_nan=False)] | None = (
+        Field(
+            default=None,
+            description="a number >= 0 and <= 10, a factor on the widths of the model error",
+        )
+    )
+    beam_share: Annotated[float, Field(strict=True, gt=0, lt=1, allow_inf_nan=False)] = Field(
+        default=BEAM_SHARE,
+        description="a number > 0 and < 1, how likely the structure is but a beam model",
+    )
 
 
 class CaseSpec(Table):
@@ -358,6 +378,7 @@ class CaseSpec(Table):
         description="the table [model]"
     )
     measurement: MeasurementSpec = Field(description="the table [measurement]")
+    reference: ReferenceSpec | None = Field(None, description="the table [reference]")
     modification: Many[ModificationSpec] = Field(
         (), max_length=200, description="tables [[modification]], 200 at most"
     )

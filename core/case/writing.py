@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from femubench.core.case.case import TOLERANCE, Case, Modification
+from femubench.core.case.case import BEAM_SHARE, TOLERANCE, Case, Modification
 from femubench.core.case.faults import Fault, dotted
 from femubench.core.case.files import CASE_FILE
 from femubench.core.case.frame_keys import (
@@ -77,6 +77,12 @@ def new_folder(folder: Path) -> Iterator[Path]:
 _SAME_MATRIX = 1e-9  # of the diagonal: far above rounding, far below any change that matters
 
 
+_SETTINGS = (
+    *("name", "title", "source", "used", "held_out", "band", "reference_used"),
+    *("tolerance", "model_error", "beam_share"),
+)
+
+
 def check_written(fresh: Path, folder: Path, wanted: Case) -> None:
     """Check that the folder reads back to the case.
 
@@ -93,12 +99,16 @@ def check_written(fresh: Path, folder: Path, wanted: Case) -> None:
     if not all(alike(one, other, _SAME_MATRIX) for one, other in matrices):
         what = "no keys of a frame give the matrices of this model"
         raise refused(folder, what, "model", "parameters that keys can say")
-    for part in ("name", "title", "source", "used", "held_out", "band", "tolerance"):
+    for part in _SETTINGS:
         if getattr(back, part) != getattr(wanted, part):
             what = f"{getattr(wanted, part)!r} does not read back"
             raise refused(folder, what, part, f"not {getattr(back, part)!r}")
     first, second = (
-        [case.measurement, *(change.measurement for change in case.modifications)]
+        [
+            case.measurement,
+            *(change.measurement for change in case.modifications),
+            *([] if case.reference is None else [case.reference]),
+        ]
         for case in (wanted, back)
     )
     for one, other in zip(first, second, strict=True):
@@ -200,7 +210,12 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
     """
     keys, files, modifications = _model_part(case, known)
     share = common_share(
-        [case.measurement, *(m.measurement for m in modifications)], known.shape_std
+        [
+            case.measurement,
+            *(m.measurement for m in modifications),
+            *([] if case.reference is None else [case.reference]),
+        ],
+        known.shape_std,
     )
     measurement: Keys = {"modes": "modes.csv", "shape_std": share}
     if len(case.measurement.sensors):
@@ -218,10 +233,25 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
         attached = {"masses": item.masses, "springs": item.springs}
         plain = {key: [keys_of(one) for one in many] for key, many in attached.items() if many}
         tables.append({"name": item.name, **plain, "modes": file})
+    if case.reference is not None:
+        file = "reference.csv"
+        files[file] = modes_csv(case.reference, share)
+        content["reference"] = {"modes": file, "used": [int(n) for n in case.reference_used]}
+        content["reference"] |= _weight(case.reference)
     if tables:
         content["modification"] = tables
-    if case.tolerance != TOLERANCE:
-        content["diagnosis"] = {"tolerance": float(case.tolerance)}
+    settings: dict[str, tuple[float | None, float | None]] = {
+        "tolerance": (case.tolerance, TOLERANCE),
+        "model_error": (case.model_error, None),
+        "beam_share": (case.beam_share, BEAM_SHARE),
+    }
+    own = {
+        key: float(value)
+        for key, (value, usual) in settings.items()
+        if value is not None and value != usual
+    }
+    if own:
+        content["diagnosis"] = own
     return {CASE_FILE: toml_bytes(content, comment), **files}
 
 
@@ -232,10 +262,14 @@ def _settings(case: Case) -> Keys:
         keys["held_out"] = [int(number) for number in case.held_out]
     if case.band is not None:
         keys["band"] = [float(frequency) for frequency in case.band]
-    if case.measurement.total_mass is not None:
-        value, std = case.measurement.total_mass
-        keys["mass"] = {"value": float(value), "std": float(std)}
-    return keys
+    return keys | _weight(case.measurement)
+
+
+def _weight(measurement: Measurement) -> Keys:
+    if measurement.total_mass is None:
+        return {}
+    value, std = measurement.total_mass
+    return {"mass": {"value": float(value), "std": float(std)}}
 
 
 def _file_name(name: str, taken: Files) -> str:

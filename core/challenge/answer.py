@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from femubench.core.challenge.sealed import read_small
 from femubench.core.diagnosis.result import Diagnosis
@@ -15,6 +16,7 @@ from femubench.core.schema.diagnosis import Verdict
 
 _LARGEST = 4 * 2**20  # bytes
 _AND = " + "
+_ROUNDING = 1e-6
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 # Sums of probabilities may round to a little more than 1.
@@ -51,6 +53,22 @@ class AnswerCause(_Part):
     parameters: tuple[AnswerParameter, ...] = Field((), max_length=20)
     probability: Probability | None = None
     side: Side = "model"
+    # The name alone, where it says nothing of the place.
+    place_probability: Probability | None = None
+
+    @field_validator("place_probability", mode="before")
+    @classmethod
+    def _known(cls, value: object) -> object:
+        return None if isinstance(value, float) and math.isnan(value) else value
+
+    @property
+    def claim(self) -> float | None:
+        """Return the probability of the effect at its place, None where it is not stated."""
+        if self.probability is None:
+            return None
+        return self.probability * (
+            1.0 if self.place_probability is None else self.place_probability
+        )
 
     @property
     def parts(self) -> tuple[tuple[str, str], ...]:
@@ -84,19 +102,22 @@ class Answer(_Part):
     def probability(self) -> float | None:
         """Return the probability that the answer claims for what it says; None where it does not.
 
-        A group claims the sum over its members, several causes together the smallest of theirs;
-        ``unknown`` and ``not-confirmed`` claim none.
+        A group claims the sum over its members, or the largest of theirs where several of them
+        stand together; several causes together claim the smallest of theirs; ``unknown`` and
+        ``not-confirmed`` claim none.
         """
-        known = [cause for cause in self.causes if cause.probability is not None]
-        stated = [cause.probability or 0.0 for cause in known if cause.side == "model"]
-        faults = [cause.probability or 0.0 for cause in known if cause.side != "model"]
+        known = [cause for cause in self.causes if cause.claim is not None]
+        stated = [cause.claim or 0.0 for cause in known if cause.side == "model"]
+        faults = [cause.claim or 0.0 for cause in known if cause.side != "model"]
         if self.verdict == "none":
             return self.nothing
         if self.verdict not in ("named", "ambiguous") or not known:
             return None
-        if self.verdict == "ambiguous":
-            stated = [sum(stated)]
-        return min(1.0, *stated, *faults)
+        if self.verdict == "named":
+            return min(*stated, *faults, 1.0)
+        named = sum(c.probability or 0.0 for c in self.causes if c.side == "model")
+        whole = min(1.0, sum(stated)) if named <= 1.0 + _ROUNDING else max(stated)
+        return min(whole, *faults, 1.0)
 
 
 def read_answer(path: Path) -> Answer:

@@ -57,8 +57,8 @@ def unexplained(
     """
     known = tuple(effects)
     problem, _ = posed(model, ideal, hypotheses_of(model, known), tolerance)
-    posterior, _ = Search(problem, known, pairs=False).run()
-    return min(explanation.chi2 for explanation in posterior.explanations)
+    explanations, _ = Search(problem, known, pairs=False).run()
+    return min(explanation.chi2 for explanation in explanations)
 
 
 def _chi2(problem: Problem, causes: Sequence[TrueCause]) -> float:

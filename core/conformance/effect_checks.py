@@ -238,11 +238,12 @@ def worded(effect: Effect) -> Verdict:
 
 def _hints(effect: Effect) -> str:
     """Return what is wrong with the words and hints that do not depend on the place."""
-    caution, softens = getattr(effect, "caution", ""), getattr(effect, "softens", False)
+    caution = getattr(effect, "caution", "")
     if not isinstance(caution, str) or (caution and caution[-1] not in ".!?"):
         return f"caution is {caution!r}, expected a sentence"
-    if not isinstance(softens, bool):
-        return f"softens is {softens!r}, expected True or False"
+    for hint in ("softens", "innate"):
+        if not isinstance(given := getattr(effect, hint, False), bool):
+            return f"{hint} is {given!r}, expected True or False"
     reading = getattr(effect, "reading", None)
     if reading is not None and not (isinstance(reading, Reading) and reading.std > 0.0):
         return f"reading is {reading!r}, expected a Reading with std > 0"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -13,46 +14,72 @@ from femubench.core.case.case import Case
 from femubench.core.diagnosis.faults import fault_causes, mended_case, with_faults
 from femubench.core.diagnosis.proof import (
     Unseen,
-    another_stands,
+    borne_out,
     extended_by,
     gain_of,
     left_out,
-    stands,
     unseen_of,
 )
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.tables import (
-    causes_in,
+    error_scales,
     evidence_rows,
+    odds_rows,
+    placed_causes,
     residual_rows,
     rivals_of,
     smallest_visible,
+    tied_places,
 )
-from femubench.core.diagnosis.verdict import Decision, causes_of, decide
+from femubench.core.diagnosis.verdict import Decision, decide, elsewhere, overstatement
 from femubench.core.diagnosis.words import sentence_of
 from femubench.core.fem.model import Model
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.extended_model import departure
 from femubench.core.inference.fault_search import Depth, inquire
-from femubench.core.inference.posterior import Explanation, Posterior
+from femubench.core.inference.model_error import WIDTHS
+from femubench.core.inference.posterior import Explanation
+from femubench.core.inference.search import adequacy
 from femubench.core.inference.static_response import LargeProblem
 from femubench.core.look.localisation import locate
 from femubench.core.look.look import look
+from femubench.core.look.modes import Seen
+from femubench.core.look.readings import look_at_band
 from femubench.core.modal.measurement import Measurement
 from femubench.core.plugin.loader import registered_effects, registered_faults
 from femubench.core.roles import Effect, Fault
 from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning
 from femubench.core.score.scoring import score_model
-from femubench.core.ties import alike, in_order
+from femubench.core.ties import in_order
+
+_MOST_ADVISED = 8  # explanations that advice parts from each other
+_CLASSES = 3  # of model error that are told
 
 
 @dataclass(frozen=True)
 class _Proof:
-    """Data that did not name the cause."""
+    """What data that did not name the cause say of it.
 
+    Arguments:
+        leader: the best guess, or what unseen data bear out where they refute that.
+        model: the extended model.
+        unseen: errors of the unseen data.
+        gain: before and after.
+        crossed: whether used modes were left out in turn, for want of unseen ones.
+        confirmed: whether unseen data bear the leader out.
+    """
+
+    leader: Explanation
+    model: Model
     unseen: tuple[Unseen, ...]
     gain: Gain
     crossed: bool
+    confirmed: bool
+
+    @property
+    def log_bayes(self) -> float:
+        """Return ln of the Bayes factor of the leader against nothing added, on unseen data."""
+        return sum(part.log_bayes for part in self.unseen)
 
 
 def diagnose(
@@ -86,99 +113,114 @@ def diagnose(
     wrong = registered_faults() if faults is None else tuple(faults)
 
     def search(model: Model, measurement: Measurement, depth: Depth) -> Examination:
-        tried, several = () if depth == "nothing" else known, pairs and depth == "several"
-        return examine(model, measurement, tried, tolerance=scatter, pairs=several)
+        return examine(
+            model,
+            measurement,
+            () if depth == "nothing" else known,
+            tolerance=scatter,
+            pairs=pairs and depth == "several",
+            reference=case.used_reference,
+            width=case.error_width,
+            beam=case.beam_share,
+        )
 
     inquiry = inquire(case.model, used, wrong, search)
     examination, given = inquiry.examination, case
     case = mended_case(case, inquiry.mended)
-    best = examination.best
-    model = extended_by(case.model, best)
-    proof = _proof(case, examination, best, model, given)
-    if proof.crossed:
-        confirmed = all(part.confirms(len(best.parts)) for part in proof.unseen)
-    else:
-        confirmed = stands(case, examination, best, model, proof.unseen)
-        confirmed = confirmed or another_stands(case, examination)
-    decision = decide(examination.posterior, examination.adequacy, confirmed=confirmed)
+    proof = _proof(case, examination, known, given)
+    leader = proof.leader
+    adequate = adequacy(leader.fit.state, leader.unknowns)
+    decision = decide(examination.posterior, adequate, leader, proof.log_bayes, proof.confirmed)
     # The look is no part of the search: whatever is sought, every effect may have its say.
     all_known = {effect.name: effect for effect in (*registered, *known)}
     looks = look(given.model, used, effects=all_known.values())
+    if case.band is not None:
+        # All modes that were found, used or not: what is not among them is not in the structure.
+        looks += tuple(look_at_band(Seen(case.model, case.measurement), case.band))
     told = fault_causes(inquiry.mended)
-    return _written(case, examination, decision, model, proof, looks, told, begin)
+    return _written(case, examination, decision, adequate, proof, looks, told, begin)
 
 
-def _proof(
-    case: Case, examination: Examination, best: Explanation, model: Model, given: Case
-) -> _Proof:
+def _proof(case: Case, examination: Examination, effects: Sequence[Effect], given: Case) -> _Proof:
+    best = examination.best
+    model = extended_by(case.model, best)
     unseen = unseen_of(case, examination, best, model)
     crossed = None
-    if not any(len(part.before) for part in unseen):
-        nominal, slopes = examination.problem, examination.slopes
-        problem = examination.problem_of(best)
-        crossed = left_out(
-            nominal, problem, best.fit, slopes, examination.tolerance, examination.scatter
-        )
+    if any(len(part.before) for part in unseen):
+        found = borne_out(case, examination)
+        confirmed = found is not None
+        if found is not None and found is not best:
+            best, model = found, extended_by(case.model, found)
+            unseen = unseen_of(case, examination, best, model)
+    else:
+        crossed = left_out(examination, effects)
+        unseen = (crossed,)
+        confirmed = crossed.confirms(len(best.parts))
     gain = gain_of(score_model(given, given.model), score_model(case, model), crossed)
-    return _Proof(unseen if crossed is None else (crossed,), gain, crossed is not None)
+    return _Proof(best, model, unseen, gain, crossed is not None, confirmed)
 
 
 def _written(
     case: Case,
     examination: Examination,
     decision: Decision,
-    model: Model,
+    adequate: float,
     proof: _Proof,
     looks: tuple[LookWarning, ...],
     faults: Sequence[Cause],
     begin: float,
 ) -> Diagnosis:
-    best, posterior = examination.best, examination.posterior
-    group = causes_of(posterior, decision.group)
+    best, posterior = proof.leader, examination.posterior
+    group = [best, *(posterior.best(key) for key in decision.group[1:])] if decision.group else []
     shown = group if decision.verdict == "ambiguous" else group[:1]
-    options = [causes_in(explanation, share, posterior.earned) for explanation, share in shown]
-    causes = _group_causes(posterior, options)
+    options = [placed_causes(examination, explanation, decision.held) for explanation in shown]
+    causes = _group_causes(options)
     top = posterior.names[decision.group[0]] if decision.group else decision.nothing
     named = bool(decision.group)
-    after = best.fit.state if named else examination.nominal
+    nothing = examination.nominal
+    # Both in units of one noise: that of an explanation holds what it takes for model error.
+    leader = best if named else posterior.best(())
+    noise = leader.fit.state.problem.noise
+    before = replace(nothing, problem=replace(nothing.problem, noise=noise))
+    after = best.fit.state if named else before
     used = case.measurement.select(case.used)
     return Diagnosis(
         case=case.name,
         verdict="named" if faults and decision.verdict == "none" else decision.verdict,
         sentence=with_faults(sentence_of(decision, causes, options, top, proof.gain), faults),
         causes=(*faults, *causes),
-        rivals=rivals_of(examination, best if named else None),
+        rivals=rivals_of(examination, best if named else None, group),
         reason=_reason(decision),
-        advice=_advice(examination, [e for e, _ in group]),
+        advice=_advice(examination, group),
         smallest_visible=smallest_visible(examination.found[0]),
-        residuals=residual_rows(examination.nominal, after),
+        residuals=residual_rows(before, after),
         gain=proof.gain,
-        chi2=(examination.nominal.chi2, after.chi2),
+        chi2=(before.chi2, after.chi2),
         data_count=len(examination.problem.data),
-        adequacy_p=examination.adequacy,
+        adequacy_p=adequate,
         nothing=decision.nothing,
         looks=looks,
         locations=(*evidence_rows(examination), *locate(case.model, used)),
         base=best.base.names if named else (),
-        extended=model if named else case.model,
-        notes=_notes(examination, proof, best, [e for e, _ in shown]),
+        extended=proof.model if named else case.model,
+        notes=(*_notes(case, examination, proof, shown), *_error_notes(examination, leader)),
         seconds=time.perf_counter() - begin,
+        evidence=odds_rows(posterior, best) if named else (),
+        model_error=error_scales(examination, leader),
+        like_a_beam=examination.like_a_beam,
         subject=case,
     )
 
 
-def _group_causes(posterior: Posterior, options: Iterable[Iterable[Cause]]) -> list[Cause]:
-    """Return every effect of a group once, with the probability that it is part of the name.
+def _group_causes(options: Iterable[Iterable[Cause]]) -> list[Cause]:
+    """Return every effect of a group once, as in the most probable explanation that has it.
 
     Arguments:
-        posterior: what the group was weighed in.
-        options: causes of every explanation with the probability of their places, most probable
-            explanation first.
+        options: causes of every explanation, most probable explanation first.
     """
     found: dict[str, Cause] = {}
     for cause in (cause for option in options for cause in option):
-        likely = cause.probability * posterior.inclusion(cause.effect)
-        found.setdefault(cause.effect, replace(cause, probability=likely))
+        found.setdefault(cause.effect, cause)
     return in_order(found.values(), lambda cause: 1.0 - cause.probability, 1e-9)
 
 
@@ -197,23 +239,49 @@ def _reason(decision: Decision) -> str:
 
 
 def _advice(examination: Examination, group: Sequence[Explanation]) -> tuple[Advice, ...]:
-    if len(group) < 2:
+    """Return what parts the names of a group, and each name's places, from each other."""
+    others = (e for found in group for e in elsewhere(examination.posterior, found))
+    told = [*group, *others][:_MOST_ADVISED]
+    if len(told) < 2:
         return ()
-    problems = [examination.problem_of(e) for e in group]
-    fits = [e.fit for e in group]
+    problems = [examination.problem_of(e) for e in told]
+    fits = [e.fit for e in told]
     return advise(examination.model, problems, fits, tolerance=examination.tolerance)
 
 
+def _overstated(best: Explanation) -> list[str]:
+    """Return a note on every kind of data whose stated deviations are far too large."""
+    kinds: tuple[Literal["frequencies", "shapes"], ...] = ("frequencies", "shapes")
+    factors = {kind: overstatement(best.fit.state, kind) for kind in kinds}
+    return [
+        f"What is left of the {kind} is far less than their stated scatter leaves by chance: "
+        f"their standard deviations (or the tolerance) seem about {factor:.2g} times too large, "
+        "which hides causes and widens every margin."
+        for kind, factor in factors.items()
+        if factor > 1.0
+    ]
+
+
 def _notes(
-    examination: Examination, proof: _Proof, best: Explanation, shown: Sequence[Explanation]
+    case: Case, examination: Examination, proof: _Proof, shown: Sequence[Explanation]
 ) -> tuple[str, ...]:
-    notes = []
+    best = proof.leader
+    notes = _overstated(best)
+    if case.band is not None and best.parts:
+        found = look_at_band(Seen(proof.model, case.measurement), case.band)
+        notes += [f"With the causes in it: {warning.what}" for warning in found]
     if proof.crossed:
         notes.append(
             "The case holds nothing back: the gain is that on used modes left out in turn."
         )
     elif best.parts and not any(part.visible for part in proof.unseen):
         notes.append("The unseen data hardly change with the cause, so they cannot confirm it.")
+    if best is not examination.best:
+        first = examination.best
+        names = " + ".join(examination.posterior.key(first))
+        notes.append(
+            f"{names} at {first.place} is likelier by the used data, but unseen data refute it."
+        )
     unearned = [name for name in best.base.names if name not in examination.posterior.earned]
     if unearned:
         notes.append(
@@ -234,15 +302,19 @@ def _notes(
     return tuple(notes)
 
 
-def tied_places(posterior: Posterior, best: Explanation) -> tuple[str, ...]:
-    """Return the other places at which the causes of an explanation are exactly as probable."""
-    tied = (
-        e.place
-        for e in posterior.explanations
-        if (e.base.names, e.searched) == (best.base.names, best.searched)
-        and alike(e.log_weight, best.log_weight)
+def _error_notes(examination: Examination, leader: Explanation) -> tuple[str, ...]:
+    """Return what the drawing itself gets wrong, the largest classes by name."""
+    ratios = [row for row in error_scales(examination, leader) if not row.unit]
+    if not ratios:
+        return ()
+    wide = {row.name: row.scale / WIDTHS.get(row.name, np.inf) for row in ratios}
+    largest = sorted(ratios, key=lambda row: -wide[row.name])[:_CLASSES]
+    told = ", ".join(f"{row.name} {100.0 * row.scale:.2g} %" for row in largest)
+    return (
+        f"What the drawing itself gets wrong, above all: {told} (standard deviations). That the "
+        "structure is a beam model but for ordinary scatter has probability "
+        f"{examination.like_a_beam:.2g}.",
     )
-    return tuple(dict.fromkeys(place for place in tied if place != best.place))
 
 
 __all__ = ["diagnose", "extended_by"]

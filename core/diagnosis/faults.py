@@ -36,7 +36,7 @@ def fault_causes(mended: Iterable[Mended]) -> list[Cause]:
             tuple(_parameters(fault.charge)),
             fault.probability,
             fault.charge.suspect.words,
-            fault.charge.fault.side,
+            side=fault.charge.fault.side,
         )
         for fault in mended
     ]

@@ -2,36 +2,58 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from math import log
 
 import numpy as np
-from scipy.special import chdtrc
+from scipy.special import chdtrc, logsumexp
 
-from femubench.core.case.case import Case
+from femubench.core.case.case import Case, Modification
 from femubench.core.diagnosis.verdict import inseparable
 from femubench.core.fem.model import Model
-from femubench.core.inference.examine import Examination
+from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.extended_model import extended, raw_residual
-from femubench.core.inference.fit import Fit, Problem, bounds_of, fit, state_at
+from femubench.core.inference.fit import Fit, Problem, bounds_of, state_at
+from femubench.core.inference.mesh_error import mesh_bias, mesh_corrections
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.posterior import Explanation, Key, Posterior
 from femubench.core.inference.residuals import Data
 from femubench.core.modal.measurement import Measurement
+from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import Gain
-from femubench.core.schema.results import Block, PairedMode
+from femubench.core.schema.results import Block
 from femubench.core.score.scoring import frequency_error, modified_modes
-from femubench.core.typing import FloatArray
+from femubench.core.typing import BoolArray, FloatArray
 
 # Below this many deviations unseen data cannot tell one model from another.
 _CLEARLY = 3.0
-_HALF_WAY = 0.5
+_SEES = 0.5  # deviations by which a mode must change to say anything of a cause
 _IDEAL = 0.05
 _INADEQUATE, _GOOD = 2e-3, 0.05
-# What unseen errors must fall by where they stay more than noise: no real structure is a beam.
-# Physics from the textbook need not be all that is missing; a fitted cause must carry further.
-_HALVED, _FOURFOLD = 2.0, 4.0
 _FEW = 2
+_DECISIVE = 5.0  # odds of 150 to 1
+# By what factor errors must fall at least, in the mean of their logarithms, where they stay more
+# than noise: no real structure is a beam. Physics from the textbook need not be all that is
+# missing; a fitted cause must carry further.
+_HALVED, _FOURFOLD = 2.0, 4.0
+# What a beam model gets wrong of an unseen frequency: nothing as often as not, else log-normal.
+_MODEL_ERROR, _SPREAD = 0.003, 1.5
+# A mode farther off than any model error and than five times what is usual was not measured, or
+# is not that mode.
+_GROSS, _UNUSUAL = 0.05, 5.0
+
+
+def _log_likelihood(errors: FloatArray, std: FloatArray) -> float:
+    """Return ln of the probability of errors, integrated over the size of a model error."""
+    z = np.linspace(-3.0, 3.0, 25)
+    sizes = _MODEL_ERROR * np.exp(_SPREAD * z)
+    weights = np.exp(-0.5 * np.square(z))
+    sizes, weights = np.append(sizes, 0.0), np.append(0.5 * weights / weights.sum(), 0.5)
+    variance = np.square(std) + np.square(sizes)[:, None]
+    terms = -0.5 * (np.square(errors) / variance + np.log(variance)).sum(axis=1)
+    return float(logsumexp(terms, b=weights))
 
 
 @dataclass(frozen=True)
@@ -41,11 +63,31 @@ class Unseen:
     Arguments:
         before, after: f_measured / f_predicted - 1 or alike, (k,).
         std: of a datum: measurement, scatter, and the uncertainty of the causes, (k,).
+        plain_std: the same without the causes where it is another, since what either takes for
+            model error has a size of its own; that is then known, and no more is granted.
     """
 
     before: FloatArray
     after: FloatArray
     std: FloatArray
+    plain_std: FloatArray | None = None
+
+    @cached_property
+    def sound(self) -> Unseen:
+        """Return the same without gross misses, which no cause explains and none can answer for."""
+        miss = np.minimum(np.abs(self.before), np.abs(self.after))
+        usual = max(1.5 * float(np.median(miss)) if len(miss) else 0.0, _GROSS / _UNUSUAL)
+        return self._of(miss <= _UNUSUAL * usual)
+
+    def _of(self, rows: BoolArray) -> Unseen:
+        plain = None if self.plain_std is None else self.plain_std[rows]
+        return Unseen(self.before[rows], self.after[rows], self.std[rows], plain)
+
+    @cached_property
+    def seeing(self) -> Unseen:
+        """Return those of the sound ones that the causes change."""
+        sound = self.sound
+        return sound._of(np.abs(sound.before - sound.after) > _SEES * sound.std)
 
     @property
     def size(self) -> float:
@@ -53,19 +95,22 @@ class Unseen:
         return float(np.linalg.norm((self.before - self.after) / self.std))
 
     @property
-    def share(self) -> float:
-        """Return how far the causes move the prediction towards the data: 1 for all the way.
-
-        Its standard deviation is 1 / `size`.
-        """
-        shift = (self.before - self.after) / self.std
-        size = float(shift @ shift)
-        return float(shift @ (self.before / self.std)) / size if size > 0.0 else 1.0
-
-    @property
     def visible(self) -> bool:
         """Tell whether the causes change unseen modes by more than noise."""
-        return self.size > _CLEARLY
+        return self.sound.size > _CLEARLY
+
+    @property
+    def log_bayes(self) -> float:
+        """Return ln of the Bayes factor of the causes against nothing added.
+
+        Of modes that can see the causes; what either model gets wrong has a size of its own.
+
+        Source: Kass & Raftery (1995), JASA 90, 773-795.
+        """
+        seeing = self.seeing
+        after = np.hypot(seeing.std, _IDEAL * (seeing.before - seeing.after))
+        plain = seeing.std if seeing.plain_std is None else seeing.plain_std
+        return _log_likelihood(seeing.after, after) - _log_likelihood(seeing.before, plain)
 
     @property
     def probability(self) -> float:
@@ -73,7 +118,8 @@ class Unseen:
 
         A cause is an idealisation: of what it changes, one part in twenty is its own error.
         """
-        rest = self.after / np.hypot(self.std, _IDEAL * (self.before - self.after))
+        sound = self.sound
+        rest = sound.after / np.hypot(sound.std, _IDEAL * (sound.before - sound.after))
         return float(chdtrc(len(rest), rest @ rest)) if len(rest) else 1.0
 
     def confirms(self, fitted: int) -> bool:
@@ -85,20 +131,25 @@ class Unseen:
         Arguments:
             fitted: number of causes that are more than textbook physics.
         """
-        if len(self.before) == 0:
+        if not self.visible:
             return True
-        if self.share < _HALF_WAY and (1.0 - self.share) * self.size > _CLEARLY:
-            return False
+        log_bayes = self.log_bayes
+        if log_bayes < -_DECISIVE or self.plain_std is not None:
+            return log_bayes >= -_DECISIVE
         if fitted > _FEW:
             return self.probability > _GOOD
-        if self.probability > _INADEQUATE:
-            return True
-        before, after = (np.median(np.abs(e / self.std)) for e in (self.before, self.after))
-        return bool(before >= (_FOURFOLD if fitted else _HALVED) * after)
+        enough = len(self.seeing.before) * log(_FOURFOLD if fitted else _HALVED)
+        return self.probability > _INADEQUATE or log_bayes > enough
 
 
 def held_out(
-    case: Case, nominal: Problem, best: Problem, found: Fit, extended: Model, scatter: float
+    case: Case,
+    nominal: Problem,
+    best: Problem,
+    found: Fit,
+    extended: Model,
+    scatter: float,
+    examination: Examination | None = None,
 ) -> Unseen:
     """Return the errors of the held-out modes.
 
@@ -108,6 +159,8 @@ def held_out(
         found: the causes, in the coordinates of `best`.
         extended: the model with the causes.
         scatter: relative standard deviation of a frequency by ordinary tolerances.
+        examination: where what the model gets wrong of the used modes says what it gets wrong of
+            the others.
     """
     used, hidden = len(case.used), len(case.held_out)
     if hidden == 0:
@@ -115,33 +168,45 @@ def held_out(
     everything = case.measurement.select([*case.used, *case.held_out])
     std = _relative_std(everything) * everything.frequencies
     everything = replace(everything, frequency_std=std)
-    data = Data(everything, nominal.data.bias)
+    data = Data(everything, nominal.data.bias, nominal.data.still)
     noise = Noise.of(np.zeros((len(data), 0)), 0.0)
     rows = slice(used, used + hidden)
     before = state_at(Problem(nominal.model, nominal.space, data, noise), (), np.zeros(0))
     whole = Problem(best.model, best.space, data, noise)
     after = state_at(whole, found.parts, found.state.x)
-    exact = raw_residual(whole, extended)
+    # A cause may add a mode: the extended model has corrections of its own for the mesh.
+    own_bias = mesh_bias(extended, len(nominal.data.bias))
+    own_data = data if own_bias is None else Data(everything, own_bias)
+    exact = raw_residual(replace(whole, data=own_data), extended)
     relative = everything.frequency_std[rows] / everything.frequencies[rows]
     spread = after.jacobian[rows]
     own = np.einsum("ik,kl,il->i", spread, found.covariance, spread) if spread.shape[1] else 0.0
     std = np.sqrt(np.square(relative) * (1.0 + own) + scatter**2)
-    return Unseen(before.raw[rows] * relative, exact[rows] * relative, std)
+    first, last = before.raw[rows], exact[rows]
+    if examination is None or found.state.problem.noise.beam:
+        return Unseen(first * relative, last * relative, std)
+    nothing = examination.posterior.nothing.fit.state
+    plain, spared = examination.foreseen(nothing, before.raw, data, case.reference)
+    mean, error = examination.foreseen(found.state, exact, data, case.reference)
+    return Unseen(
+        (first - plain) * relative,
+        (last - mean) * relative,
+        np.hypot(std, relative * error),
+        np.hypot(np.hypot(relative, scatter), relative * spared),
+    )
 
 
 def modified(
-    case: Case,
-    extended: Model,
-    bias: FloatArray,
-    scatter: float,
-    neighbours: Sequence[Model] = (),
+    case: Case, extended: Model, scatter: float, neighbours: Sequence[Model] = ()
 ) -> Unseen:
     """Return the errors of the modified structures, all modes in one list.
+
+    Each prediction is corrected for the mesh by that of the same mode of the same model: causes
+    and modifications may add modes and change their order.
 
     Arguments:
         case: with its modifications.
         extended: the model with the causes.
-        bias: relative corrections of predicted frequencies for the mesh, by elastic mode.
         scatter: relative standard deviation of a frequency by ordinary tolerances.
         neighbours: the model with the causes off by one deviation in independent directions.
     """
@@ -154,18 +219,25 @@ def modified(
                 for model in (case.model, extended, *neighbours)
             ]
         )
-        count = len(m)
-        correct = np.ones(count)
-        correct[: len(bias)] += bias[:count]
-        errors = m.frequencies / (predicted * correct) - 1.0
+        pairs = zip((case.model, extended), predicted, strict=False)
+        found = [_corrections(model, change, hertz) for model, hertz in pairs]
+        # One mesh serves both where the other is not known.
+        known = [row for row in found if row is not None]
+        rows = [known[0] if row is None and known else row for row in found]
+        correct = np.array([np.ones(len(m)) if row is None else 1.0 + row for row in rows])
+        errors = m.frequencies / (predicted[:2] * correct) - 1.0
         spread = np.square(predicted[2:] / predicted[1] - 1.0).sum(axis=0)
         deviation = np.sqrt(np.square(_relative_std(m)) + scatter**2 + spread)
-        paired = np.isfinite(errors[:2]).all(axis=0) & np.isfinite(deviation)
+        paired = np.isfinite(errors).all(axis=0) & np.isfinite(deviation)
         before.append(errors[0, paired])
         after.append(errors[1, paired])
         std.append(deviation[paired])
     empty = np.zeros(0)
     return Unseen(*(np.concatenate([*rows, empty]) for rows in (before, after, std)))
+
+
+def _corrections(model: Model, change: Modification, hertz: FloatArray) -> FloatArray | None:
+    return mesh_corrections(model.attach(change.masses, change.springs), hertz)
 
 
 def _relative_std(measurement: Measurement) -> FloatArray:
@@ -176,55 +248,59 @@ def _relative_std(measurement: Measurement) -> FloatArray:
     return np.where(known, std, typical)
 
 
-def left_out(
-    nominal: Problem,
-    problem: Problem,
-    found: Fit,
-    slopes: FloatArray,
-    tolerance: float,
-    scatter: float,
-) -> Unseen:
-    """Return the errors of every used mode, predicted by a fit to the others.
+def left_out(examination: Examination, effects: Iterable[Effect]) -> Unseen:
+    """Return the errors of every used mode, predicted from the others alone.
+
+    The causes are chosen anew without the mode, so that it has no part in what predicts it.
 
     Arguments:
-        nominal: data and modal coordinates of the model as drawn.
-        problem: with the textbook effects of the explanation.
-        found: its causes.
-        slopes: sensitivities of the data to scatter, (n_data, n_scatter).
-        tolerance: standard deviation of the scatter.
-        scatter: that of a frequency, relative.
+        examination: of all used modes.
+        effects: what may be missing.
     """
-    data = problem.data
+    data = examination.problem.data
     numbers = data.measurement.numbers
-    nothing = state_at(nominal, (), np.zeros(0))
-    mode, _ = data.shape_rows
+    nothing = examination.nominal
+    noise = Noise.of(np.zeros((len(data), 0)), 0.0)
+    several = len(examination.best.parts) > 1
     before, after, std = [], [], []
     for j, number in enumerate(numbers):
-        kept = [other for other in numbers if other != number]
-        if not kept:
+        kept = data.measurement.select([other for other in numbers if other != number])
+        if len(kept) == 0:
             break
-        rows = np.ones(len(data), dtype=bool)
-        rows[: len(numbers) + len(mode)] = np.append(np.arange(len(numbers)), mode) != j
-        part = Data(data.measurement.select(kept), data.bias)
-        noise = Noise.of(slopes[rows], tolerance)
-        again = fit(Problem(problem.model, problem.space, part, noise), found.parts, found.state.x)
-        if again is None:
-            continue
-        point = state_at(problem, found.parts, again.state.x)
+        again = examine(
+            examination.model,
+            kept,
+            effects,
+            tolerance=examination.tolerance,
+            pairs=several,
+            reference=examination.reference,
+            width=examination.width,
+            beam=examination.beam,
+        )
+        found, problem = again.best.fit, again.problem_of(again.best)
+        point = state_at(replace(problem, data=data, noise=noise), found.parts, found.state.x)
+        spread = point.jacobian[j] @ found.covariance @ point.jacobian[j]
         relative = data.measurement.frequency_std[j] / data.measurement.frequencies[j]
         before.append(nothing.raw[j] * relative)
         after.append(point.raw[j] * relative)
-        std.append(float(np.hypot(relative, scatter)))
+        std.append(np.sqrt(relative**2 * (1.0 + spread) + examination.scatter**2))
     return Unseen(np.array(before), np.array(after), np.array(std))
 
 
 def gain_of(before: dict[str, Block], after: dict[str, Block], crossed: Unseen | None) -> Gain:
-    """Return medians of absolute frequency errors in percent, before and after."""
+    """Return medians of absolute frequency errors in percent, before and after.
+
+    Of modes that have a partner in both models; nan where there is none.
+    """
 
     def pair(name: str) -> tuple[float, float] | None:
         if name not in before or name not in after:
             return None
-        return _median(before[name].modes), _median(after[name].modes)
+        pairs = zip(before[name].modes, after[name].modes, strict=True)
+        both = [pair for pair in pairs if all(mode.predicted_hz is not None for mode in pair)]
+        errors = [[frequency_error(mode) for mode in pair] for pair in both]
+        first, second = 100.0 * np.median(errors, axis=0) if both else (np.nan, np.nan)
+        return float(first), float(second)
 
     used = pair("used")
     assert used is not None
@@ -232,10 +308,6 @@ def gain_of(before: dict[str, Block], after: dict[str, Block], crossed: Unseen |
     if crossed is not None and len(crossed.before):
         cross = tuple(100.0 * float(np.median(np.abs(e))) for e in (crossed.before, crossed.after))
     return Gain(used, pair("higher"), pair("modified"), cross)  # type: ignore[arg-type]
-
-
-def _median(modes: Sequence[PairedMode]) -> float:
-    return 100.0 * float(np.median([frequency_error(mode) for mode in modes]))
 
 
 _TIED, _PLACES = 0.1, 6
@@ -270,11 +342,18 @@ def unseen_of(
         sharply: take the sizes of the causes for certain on the modified structures, which saves
             a solution a size; held-out modes know their uncertainty anyway.
     """
-    nominal, problem = examination.problem, examination.problem_of(explanation)
     near = () if sharply else _neighbours(case.model, explanation)
     return (
-        held_out(case, nominal, problem, explanation.fit, model, examination.scatter),
-        modified(case, model, nominal.data.bias, examination.scatter, near),
+        held_out(
+            case,
+            examination.problem,
+            examination.problem_of(explanation),
+            explanation.fit,
+            model,
+            examination.scatter,
+            examination,
+        ),
+        modified(case, model, examination.scatter, near),
     )
 
 
@@ -316,22 +395,39 @@ def stands(
     return all(part.confirms(count) for part in unseen)
 
 
-def another_stands(case: Case, examination: Examination) -> bool:
-    """Tell whether unseen data bear out what the used data cannot tell from the best guess.
+def borne_out(case: Case, examination: Examination) -> Explanation | None:
+    """Return what unseen data bear out of all that the used data cannot tell from the best guess.
 
-    That is another name of the group, or the same name at a place about as likely.
+    That is the best guess, unless all data together, used and unseen, speak for another name of
+    the group: decisively, or at all where unseen data refute the best guess. Where no name is
+    borne out, it is the same name at a place about as likely, or None.
     """
-    posterior = examination.posterior
-    if not any(posterior.names) or not (case.held_out or case.modifications):
-        return False
-    group = inseparable(posterior)[0]
-    others = [posterior.best(key) for key in group[1:]]
-    others += _other_places(posterior, group[0])
-    for other in others:
-        model = extended_by(case.model, other)
-        if stands(case, examination, other, model, unseen_of(case, examination, other, model)):
-            return True
-    return False
+    posterior, best = examination.posterior, examination.best
+    first = _judged(case, examination, best)
+    name = posterior.key(best)
+    others = inseparable(posterior)[0][1:] if name else ()
+    rivals = []
+    for key in others:
+        stands, log_bayes = _judged(case, examination, posterior.best(key))
+        gain = log_bayes - first[1] + log(posterior.names[key] / posterior.names[name])
+        if stands and gain > (_DECISIVE if first[0] else 0.0):
+            rivals.append((gain, posterior.best(key)))
+    if rivals:
+        return max(rivals, key=lambda pair: pair[0])[1]
+    if first[0]:
+        return best
+    for found in _other_places(posterior, name) if name else ():
+        if _judged(case, examination, found)[0]:
+            return found
+    return None
+
+
+def _judged(case: Case, examination: Examination, found: Explanation) -> tuple[bool, float]:
+    """Tell whether unseen data bear an explanation out, and its ln Bayes factor on them."""
+    model = extended_by(case.model, found)
+    unseen = unseen_of(case, examination, found, model)
+    log_bayes = sum(part.log_bayes for part in unseen)
+    return stands(case, examination, found, model, unseen), log_bayes
 
 
 def _other_places(posterior: Posterior, key: Key) -> list[Explanation]:

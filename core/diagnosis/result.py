@@ -12,6 +12,8 @@ from femubench.core.fem.model import Model
 from femubench.core.schema.diagnosis import (
     Advice,
     Cause,
+    ErrorScale,
+    Evidence,
     Gain,
     LocationRow,
     LookWarning,
@@ -51,6 +53,10 @@ class Diagnosis(Shown):
         extended: the model with the causes in it; the nominal one where none was named.
         notes: further remarks, one sentence each.
         seconds: spent.
+        evidence: what the data say for the first explanation, and what the prior adds.
+        model_error: what the drawing gets wrong, beside the first explanation; empty where the
+            structure is taken for a beam model.
+        like_a_beam: probability that it is one, but for ordinary scatter.
         subject: the case itself, for drawings of its structure.
     """
 
@@ -74,6 +80,9 @@ class Diagnosis(Shown):
     extended: Model = field(repr=False)
     notes: tuple[str, ...] = ()
     seconds: float = 0.0
+    evidence: tuple[Evidence, ...] = ()
+    model_error: tuple[ErrorScale, ...] = ()
+    like_a_beam: float = 1.0
     subject: Case | None = field(default=None, repr=False)
 
     def rows(self) -> Sequence[tuple[str, str]]:
@@ -96,8 +105,8 @@ class Diagnosis(Shown):
         """Return one of the tables as a data frame.
 
         Arguments:
-            table: ``causes``, ``rivals``, ``advice``, ``smallest_visible``, ``residuals``,
-                ``looks`` or ``locations``.
+            table: ``causes``, ``rivals``, ``evidence``, ``model_error``, ``advice``,
+                ``smallest_visible``, ``residuals``, ``looks`` or ``locations``.
 
         Raises:
             KeyError: when there is no such table.
@@ -114,6 +123,8 @@ class Diagnosis(Shown):
 _TABLES: dict[str, Any] = {
     "causes": Cause,
     "rivals": Rival,
+    "evidence": Evidence,
+    "model_error": ErrorScale,
     "advice": Advice,
     "smallest_visible": SmallestVisible,
     "residuals": ResidualRow,

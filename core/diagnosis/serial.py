@@ -20,6 +20,7 @@ from femubench.core.schema.diagnosis import (
     Advice,
     Cause,
     CauseParameter,
+    Evidence,
     Gain,
     LocationRow,
     LookWarning,
@@ -45,6 +46,7 @@ def diagnosis_to_json(
     tables = {name: _plain(getattr(diagnosis, name)) for name in names}
     for look in tables["looks"]:
         look["changes"] = [{"mode": mode, "percent": change} for mode, change in look["changes"]]
+    tables["model_error"] = [{"class": row.pop("name"), **row} for row in tables["model_error"]]
     return {
         **tables,
         "structure": None if case is None else _plain(placed_wireframe(case, _words(diagnosis))),
@@ -91,6 +93,14 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 - data of any form
 _CONFIG = ConfigDict(extra="ignore", allow_inf_nan=False, strict=True)
 
 
+class _Scale(BaseModel):
+    model_config = _CONFIG | ConfigDict(serialize_by_alias=True)
+
+    name: str = Field(alias="class")
+    scale: float | None
+    unit: str
+
+
 class _Change(BaseModel):
     model_config = _CONFIG
 
@@ -103,7 +113,7 @@ def _json_type(kind: Any) -> Any:  # noqa: ANN401 - any type of a field
     inside = tuple(_json_type(part) for part in get_args(kind) if part is not Ellipsis)
     size = len(inside)
     if get_origin(kind) is tuple:
-        entries = list[inside[0]]  # type: ignore[valid-type]
+        entries = list[Union[inside]]  # type: ignore[valid-type]  # noqa: UP007
         several = Ellipsis in get_args(kind)
         return entries if several else Annotated[entries, Field(min_length=size, max_length=size)]
     if get_origin(kind) in (Union, UnionType):
@@ -132,13 +142,15 @@ def _record(kind: type, **more: tuple[Any, Any]) -> type[BaseModel]:
 _UNTOLD = ("extended", "subject")
 # What older versions did not write, by the data class; a type goes with what is no field of it.
 _OPTIONAL: dict[Any, dict[str, Any]] = {
-    **{k: {} for k in (Advice, Cause, CauseParameter, Gain, LocationRow, ResidualRow, Rival)},
+    **{k: {} for k in (Advice, Cause, CauseParameter, Evidence, Gain)},
+    **{k: {} for k in (LocationRow, ResidualRow, Rival)},
     SmallestVisible: {"place": ""},
     LookWarning: {"changes": (list[_Change], [])},
     Diagnosis: {
         **dict.fromkeys(("case", "sentence", "reason"), ""),
         **{"chi2": [None, None], "data_count": 0, "nothing": None, "seconds": None},
         **{name: [] for name in ("looks", "locations", "base")},
+        "model_error": (list[_Scale], []),
     },
 }
 _DiagnosisRecord = _record(

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
+
 import numpy as np
 
-from femubench.core.diagnosis.verdict import angle_between
+from femubench.core.diagnosis.symmetry import mirror_places
+from femubench.core.diagnosis.verdict import angle_between, credible, places_of
 from femubench.core.inference.examine import Examination
 from femubench.core.inference.fit import State
-from femubench.core.inference.posterior import Explanation
+from femubench.core.inference.posterior import Explanation, Posterior, fits_better
 from femubench.core.inference.search import Found
 from femubench.core.roles import EffectParameter
 from femubench.core.schema.diagnosis import (
     Cause,
     CauseParameter,
+    ErrorScale,
+    Evidence,
     LocationRow,
     ResidualRow,
     Rival,
@@ -24,6 +30,14 @@ from femubench.core.typing import FloatArray
 TOO_SMALL = 12.0  # of chi-square: an effect below is too small to see
 _LISTED = 12
 _STEP = 1e-4
+
+
+def error_scales(examination: Examination, explanation: Explanation) -> tuple[ErrorScale, ...]:
+    """Return what an explanation takes for model error, one row a class."""
+    scales = explanation.fit.state.problem.noise.scales
+    if examination.error is None or scales is None:
+        return ()
+    return tuple(ErrorScale(*row) for row in examination.error.scales(scales))
 
 
 def residual_rows(before: State, after: State) -> tuple[ResidualRow, ...]:
@@ -50,7 +64,7 @@ def causes_in(explanation: Explanation, share: float, earned: frozenset[str]) ->
 
     Arguments:
         explanation: fitted.
-        share: probability of the name and, within it, of these places.
+        share: probability of each.
         earned: textbook effects that are part of the name.
 
     Examples:
@@ -85,6 +99,58 @@ def causes_in(explanation: Explanation, share: float, earned: frozenset[str]) ->
     return causes
 
 
+def placed_causes(
+    examination: Examination, explanation: Explanation, held: float = 1.0
+) -> list[Cause]:
+    """Return the causes of an explanation, each with the probability of its name and of its place.
+
+    Arguments:
+        examination: what the explanation was weighed in.
+        explanation: one of its explanations.
+        held: probability that any of them holds, at most.
+    """
+    posterior = examination.posterior
+    causes = causes_in(explanation, 1.0, posterior.earned)
+    first = len(causes) - len(explanation.parts)
+    tied = _tied(posterior, explanation)
+    found = []
+    for k, cause in enumerate(causes):
+        shares = places_of(posterior, explanation, k - first) if k >= first else {cause.place: 1.0}
+        alike_at = {
+            part.hypothesis.place
+            for other in tied
+            for part in other.parts
+            if part.hypothesis.name == cause.effect
+        }
+        others = [place for place in shares if place in alike_at and place != cause.place]
+        found.append(
+            replace(
+                cause,
+                probability=held * posterior.inclusion(cause.effect),
+                place_probability=shares[cause.place],
+                places=credible(shares),
+                mirrors=mirror_places(examination.model, cause.place, others) if others else (),
+            )
+        )
+    return found
+
+
+def _tied(posterior: Posterior, best: Explanation) -> list[Explanation]:
+    """Return the explanations with the same causes elsewhere that are exactly as probable."""
+    return [
+        e
+        for e in posterior.explanations
+        if (e.base.names, e.searched) == (best.base.names, best.searched)
+        and e.place != best.place
+        and alike(e.log_weight, best.log_weight)
+    ]
+
+
+def tied_places(posterior: Posterior, best: Explanation) -> tuple[str, ...]:
+    """Return the other places at which the causes of an explanation are exactly as probable."""
+    return tuple(dict.fromkeys(e.place for e in _tied(posterior, best)))
+
+
 def _parameter(
     p: EffectParameter, value: float, std: float | None, *, textbook: bool = False
 ) -> CauseParameter:
@@ -102,10 +168,18 @@ def _slope(parameter: EffectParameter, x: float) -> float:
     return abs(ends[1] - ends[0]) / max(high - low, 1e-12)
 
 
-def rivals_of(examination: Examination, best: Explanation | None) -> tuple[Rival, ...]:
-    """Return other explanations by probability, one row a name and place."""
-    nothing = examination.nominal.chi2
+def rivals_of(
+    examination: Examination, best: Explanation | None, group: Iterable[Explanation] = ()
+) -> tuple[Rival, ...]:
+    """Return other explanations by probability, one row a name and place.
+
+    Arguments:
+        examination: all explanations.
+        best: the one that is no rival of itself.
+        group: what must not be missing, however improbable.
+    """
     posterior = examination.posterior
+    nothing = posterior.nothing
     totals: dict[tuple[str, str], float] = {}
     first: dict[tuple[str, str], Explanation] = {}
     for explanation, p in zip(posterior.explanations, posterior.probabilities, strict=True):
@@ -116,15 +190,36 @@ def rivals_of(examination: Examination, best: Explanation | None) -> tuple[Rival
         first.setdefault(label, explanation)
     own = (" + ".join(best.searched), best.place) if best is not None else ("", "")
     ranked = [label for label in by_probability(totals) if label != own]
+    inside = [(" + ".join(e.searched), e.place) for e in group]
+    ranked = [*ranked[:_LISTED], *(label for label in ranked[_LISTED:] if label in inside)]
     return tuple(
         Rival(
             *label,
-            delta_chi2=nothing - first[label].chi2,
+            delta_chi2=2.0 * (first[label].log_likelihood - nothing.log_likelihood),
             probability=totals[label],
             angle=angle_between(best, first[label]) if best is not None else float("nan"),
         )
-        for label in ranked[:_LISTED]
+        for label in ranked
     )
+
+
+def odds_rows(posterior: Posterior, best: Explanation) -> tuple[Evidence, ...]:
+    """Return what data and prior say for an explanation, against nothing and the best rival.
+
+    A rival that only adds to the explanation fits better in any case, and is none.
+    """
+    name = posterior.key(best)
+    nothing = next(e for e in posterior.explanations if not e.parts and not e.base.parts)
+    rivals = [key for key in posterior.names if key and not set(name) <= set(key)]
+    others = [("nothing", nothing)]
+    for key in rivals[:1]:
+        rival = posterior.best(key)
+        others.append((f"{' + '.join(key)} at {rival.place or 'all'}", rival))
+    rows = []
+    for label, other in others:
+        data = fits_better(best, other)
+        rows.append(Evidence(label, data, best.log_weight - other.log_weight - data))
+    return tuple(rows)
 
 
 def smallest_visible(found: Found) -> tuple[SmallestVisible, ...]:

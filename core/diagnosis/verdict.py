@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import scipy.linalg as la
+from scipy.special import chdtr, expit
 
-from femubench.core.inference.posterior import LIKELY_NOTHING, Explanation, Key, Posterior
+from femubench.core.inference.fit import State
+from femubench.core.inference.posterior import (
+    LIKELY_NOTHING,
+    Explanation,
+    Key,
+    Posterior,
+    fits_better,
+)
 from femubench.core.schema.diagnosis import Verdict
+from femubench.core.ties import alike, by_probability
 
 # Rivals at least this probable, or nearly parallel and not yet excluded, stay in the group.
 _RIVAL, _PARALLEL_RIVAL = 0.05, 0.005
@@ -20,6 +30,11 @@ _SURE = 0.98
 _COMMON, _MOST = 0.92, 0.8
 _NOISE = 1e-3
 _LARGEST_GROUP = 6
+# A rival this near in ln likelihood, with hardly more or fewer values fitted, is excluded by its
+# prior alone: 6 of chi-square.
+_AS_WELL, _MORE_VALUES = 3.0, 2
+_LEAST = 1e-9  # of chi-square, for simulated data without scatter
+_CREDIBLE = 0.95
 
 
 @dataclass(frozen=True)
@@ -31,12 +46,15 @@ class Decision:
         group: the names that stay, most probable first; the first one is the best guess.
         nothing: probability that nothing is missing.
         angles: of every name of the group to the first one, degrees.
+        held: probability that any known explanation holds, at most; below 1 where what is left, or
+            unseen data, speak against all of them.
     """
 
     verdict: Verdict
     group: tuple[Key, ...]
     nothing: float
     angles: tuple[float, ...]
+    held: float = 1.0
 
 
 def angle_between(first: Explanation, second: Explanation) -> float:
@@ -52,26 +70,46 @@ def angle_between(first: Explanation, second: Explanation) -> float:
     return float(np.degrees(la.subspace_angles(one, two)[0]))
 
 
-def decide(posterior: Posterior, adequate: float, *, confirmed: bool) -> Decision:
+def decide(
+    posterior: Posterior, adequate: float, leader: Explanation, log_bayes: float, confirmed: bool
+) -> Decision:
     """Return the verdict.
 
     Arguments:
         posterior: all explanations.
-        adequate: probability of what the best explanation leaves, were it noise.
-        confirmed: whether unseen data bear the best explanation out.
+        adequate: probability of what the leading explanation leaves, were it noise.
+        leader: the most probable explanation, or what unseen data bear out in its place.
+        log_bayes: ln of its Bayes factor on unseen data against nothing added.
+        confirmed: whether unseen data bear it out.
     """
     nothing = posterior.names.get((), 0.0)
     if nothing >= LIKELY_NOTHING:
+        held = 1.0 if adequate > _NOISE else most_believed(adequate)
         verdict: Verdict = "none" if adequate > _NOISE else "unknown"
-        return Decision(verdict, (), nothing, ())
-    group, angles = inseparable(posterior)
+        return Decision(verdict, (), nothing * held, (), held)
+    group, angles = inseparable(posterior, leader)
+    held = 1.0
     if adequate <= _NOISE:
-        verdict = "unknown"
+        verdict, held = "unknown", most_believed(adequate)
+        nothing *= held
     elif not confirmed:
-        verdict = "not-confirmed"
+        verdict, held = "not-confirmed", float(expit(min(log_bayes, 0.0)))
     else:
         verdict = "ambiguous" if len(group) > 1 and not mostly_common(posterior, group) else "named"
-    return Decision(verdict, group, nothing, angles)
+    return Decision(verdict, group, nothing, angles, held)
+
+
+def most_believed(p: float) -> float:
+    """Return the most that can be believed of a hypothesis that data contradict, at even odds.
+
+    Arguments:
+        p: probability of data as far off, were it true; below 1 / e.
+
+    Source: Sellke, Bayarri & Berger (2001), Am. Stat. 55, 62-71: the least Bayes factor
+    -e p ln p.
+    """
+    factor = -np.e * p * np.log(p) if p > 0.0 else 0.0
+    return float(factor / (1.0 + factor))
 
 
 def mostly_common(posterior: Posterior, group: Sequence[Key]) -> bool:
@@ -106,34 +144,125 @@ def _says_as_much(posterior: Posterior, best: Explanation, first: Key, key: Key)
     return angle_between(best, posterior.best(key)) < _PARALLEL
 
 
-def inseparable(posterior: Posterior) -> tuple[tuple[Key, ...], tuple[float, ...]]:
-    """Return the best name with all that these data cannot exclude, and their angles to it."""
+def inseparable(
+    posterior: Posterior, leader: Explanation | None = None
+) -> tuple[tuple[Key, ...], tuple[float, ...]]:
+    """Return the best name with all that these data cannot exclude, and their angles to it.
+
+    Not excluded is what is probable enough, and what fits about as well, whatever its prior says.
+
+    Arguments:
+        posterior: all explanations.
+        leader: what stands first, and the angles are to; the most probable one by default.
+    """
     names = {key: p for key, p in posterior.names.items() if key}
     something = sum(names.values())
     ranked = list(names)
     best = posterior.best(ranked[0])
     group, angles, covered = [ranked[0]], [0.0], names[ranked[0]] / something
     for key in ranked[1:]:
-        share = names[key] / something
-        if share < _PARALLEL_RIVAL or len(group) == _LARGEST_GROUP:
+        if len(group) == _LARGEST_GROUP:
             break
+        share = names[key] / something
         angle = angle_between(best, posterior.best(key))
-        if share >= _RIVAL or angle < _PARALLEL or covered < _SURE:
+        likely = share >= _PARALLEL_RIVAL
+        likely = likely and (share >= _RIVAL or angle < _PARALLEL or covered < _SURE)
+        if likely or fits_as_well(posterior, best, key):
             group.append(key)
             angles.append(angle)
             covered += share
-    return tuple(group), tuple(angles)
+    if leader is None or posterior.key(leader) == group[0]:
+        return tuple(group), tuple(angles)
+    first = posterior.key(leader)
+    keys = (first, *(key for key in group if key != first))
+    return keys, (0.0, *(angle_between(leader, posterior.best(key)) for key in keys[1:]))
 
 
-def causes_of(posterior: Posterior, group: Sequence[Key]) -> list[tuple[Explanation, float]]:
-    """Return the best explanation of every name in a group with the probability of its place."""
-    result = []
-    for key in group:
-        members = posterior.members(key)
-        places: dict[str, float] = {}
-        for explanation, p in members:
-            places[explanation.place] = places.get(explanation.place, 0.0) + p
-        best = members[0][0]
-        total = sum(places.values())
-        result.append((best, places[best.place] / total if total > 0.0 else 0.0))
-    return result
+def overstatement(state: State, kind: Literal["all", "frequencies", "shapes"] = "all") -> float:
+    """Return by what factor stated deviations seem too large; 1 where chance may have done it.
+
+    The lower tail of chi-square, as its upper tail is used for what is left.
+
+    Arguments:
+        state: after the fit.
+        kind: of the data.
+    """
+    data = state.problem.data
+    first, last = len(data.measurement), len(data.measurement) + len(data.shape_rows[0])
+    rows = {"all": slice(None), "frequencies": slice(first), "shapes": slice(first, last)}[kind]
+    rest = state.residual[rows]
+    scales = 0 if kind == "frequencies" else data.scale_count
+    dof, chi2 = len(rest) - len(state.x) - scales, float(rest @ rest)
+    if dof < 1 or chdtr(dof, chi2) >= _NOISE:
+        return 1.0
+    return float(np.sqrt(dof / max(chi2, _LEAST)))
+
+
+def fits_as_well(posterior: Posterior, best: Explanation, key: Key) -> bool:
+    """Tell whether a name explains the data about as well as the best explanation does.
+
+    A name that only adds to the best one always does, and is left to its evidence. Where the
+    stated deviations are too large, so are those of the likelihoods.
+    """
+    if set(posterior.key(best)) <= set(key):
+        return False
+    limit = _AS_WELL / overstatement(best.fit.state) ** 2
+    return any(
+        fits_better(best, other) <= limit and abs(best.unknowns - other.unknowns) <= _MORE_VALUES
+        for other, _ in posterior.members(key)
+    )
+
+
+def places_of(posterior: Posterior, explanation: Explanation, part: int) -> dict[str, float]:
+    """Return where one cause of an explanation sits, most probable place first.
+
+    All explanations of the same name count, whatever is beside the cause; where the effect is in
+    them several times, what sits where the others of it sit here is left to those.
+
+    Arguments:
+        posterior: what the explanation was weighed in.
+        explanation: one of its explanations.
+        part: position of the cause among its parts.
+    """
+    own = explanation.parts[part].hypothesis
+    taken = [p.hypothesis.place for p in explanation.parts if p.hypothesis.name == own.name]
+    taken.remove(own.place)
+    shares: dict[str, float] = {}
+    for other, p in posterior.members(posterior.key(explanation)):
+        places = [q.hypothesis.place for q in other.parts if q.hypothesis.name == own.name]
+        free = [place for place in places if place not in taken] or places
+        for place in free:
+            shares[place] = shares.get(place, 0.0) + p / len(free)
+    total = sum(shares.values())
+    return {place: shares[place] / total for place in by_probability(shares)}
+
+
+def credible(shares: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
+    """Return the fewest places with 95 % of the probability, and all that tie with the last.
+
+    Arguments:
+        shares: probability of every place, most probable first.
+    """
+    found: list[tuple[str, float]] = []
+    covered = 0.0
+    for place, share in shares.items():
+        if covered >= _CREDIBLE and not alike(share, found[-1][1]):
+            break
+        found.append((place, share))
+        covered += share
+    return tuple(found)
+
+
+def elsewhere(posterior: Posterior, explanation: Explanation) -> list[Explanation]:
+    """Return the same name at other places that the data do not exclude, most probable first."""
+    sets = [
+        {place for place, _ in credible(places_of(posterior, explanation, k))}
+        for k in range(len(explanation.parts))
+    ]
+    found: dict[str, Explanation] = {}
+    for other, _ in posterior.members(posterior.key(explanation)):
+        if len(other.parts) == len(explanation.parts) and other.place != explanation.place:
+            within = all(p.hypothesis.place in set().union(*sets) for p in other.parts)
+            if within:
+                found.setdefault(other.place, other)
+    return list(found.values())

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 from femubench.core.diagnosis.verdict import Decision
 from femubench.core.schema.diagnosis import Cause, Gain
+
+_NUMBERS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight"}
 
 
 def percent(probability: float) -> str:
@@ -20,6 +23,20 @@ def percent(probability: float) -> str:
 def named(cause: Cause) -> str:
     """Return a cause with its place."""
     return f"{cause.effect} at {cause.place}" if cause.place != "all" else cause.effect
+
+
+def where(cause: Cause) -> str:
+    """Return how sure the place of a cause is; nothing for what is everywhere."""
+    p = cause.place_probability
+    if cause.place == "all" or not math.isfinite(p):
+        return ""
+    mirror = _mirrors(cause)
+    return f"{percent(p)}, {mirror}" if mirror else percent(p)
+
+
+def _mirrors(cause: Cause) -> str:
+    count = len(cause.mirrors) + 1
+    return f"one of {_NUMBERS.get(count, str(count))} mirror places" if count > 1 else ""
 
 
 def listed(names: Iterable[str], last: str = "and") -> str:
@@ -51,7 +68,7 @@ def sentence_of(
         sure = percent(decision.nothing)
         return f"The data show nothing that the model lacks (probability {sure})."
     if decision.verdict == "named":
-        return f"The model lacks {names} (probability {percent(probability)}){_gain(gain)}."
+        return f"The model lacks {names} ({_sure(probability, causes)}){_gain(gain)}."
     if decision.verdict == "ambiguous":
         return _either(options)
     guess = f"; the nearest is {names}" if causes else ""
@@ -60,14 +77,27 @@ def sentence_of(
     return f"What fits the used data best does not hold on data that it has not seen{guess}."
 
 
+def _sure(probability: float, causes: Sequence[Cause]) -> str:
+    """Return how sure the name is, and how sure every place."""
+    placed = [(cause, where(cause)) for cause in causes]
+    words = [
+        f"{'its place' if len(causes) == 1 else f'the place of {cause.effect}'} {text}"
+        for cause, text in placed
+        if text
+    ]
+    return "; ".join([f"probability {percent(probability)}", *words])
+
+
 def _either(options: Sequence[Sequence[Cause]]) -> str:
     """Return what all options share, and what they leave open."""
     sets = [dict.fromkeys(named(cause) for cause in option) for option in options]
     common = [name for name in sets[0] if all(name in other for other in sets)]
+    mirrored = {named(c): f" ({_mirrors(c)})" if c.mirrors else "" for c in options[0]}
     rest = [" with ".join(n for n in names if n not in common) for names in sets]
     open_ = listed((words or "nothing more" for words in rest), "or")
     if common:
-        return f"The model lacks {listed(common)}, and these data cannot tell what else: {open_}."
+        shared = listed(f"{name}{mirrored[name]}" for name in common)
+        return f"The model lacks {shared}, and these data cannot tell what else: {open_}."
     return f"The model lacks something, and these data cannot tell which: {open_}."
 
 

@@ -89,6 +89,8 @@ class FrameEffect(Effect):
         caution: a sentence for whoever finds this effect named; a note of the diagnosis.
         softens: whether its stiffness may fall with the level of excitation, so that a second
             level is worth measuring.
+        innate: whether it is there from the day that the structure was built, so that it cannot
+            be what differs from a reference.
         reading: the instrument that reads it directly; a proposal of the advice.
         sizes: how large it is in hidden cases, one range a parameter; of more parameters the last
             range goes on. Without one it is drawn from half a deviation of its prior to two.
@@ -98,6 +100,7 @@ class FrameEffect(Effect):
     summary: ClassVar[str] = ""
     caution: ClassVar[str] = ""
     softens: ClassVar[bool] = False
+    innate: ClassVar[bool] = False
     reading: ClassVar[Reading | None] = None
     sizes: ClassVar[Sequence[Size]] = ()
 

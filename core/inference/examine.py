@@ -2,30 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import log
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.model import Model
-from femubench.core.fem.structure import Structure
-from femubench.core.inference.fit import Problem, State, state_at
+from femubench.core.inference.fit import Fit, Problem, State, fit, log_evidence, state_at
 from femubench.core.inference.hypothesis import Hypothesis, hypotheses_of
 from femubench.core.inference.mesh_error import mesh_bias
-from femubench.core.inference.modal_basis import Space, scatter_terms
+from femubench.core.inference.model_error import (
+    UNSHARED,
+    WIDTHS,
+    Fitted,
+    ModelError,
+    conditioned,
+    error_slopes,
+    rows_of,
+    scatter_slopes,
+)
 from femubench.core.inference.noise import Noise
-from femubench.core.inference.posterior import LIKELY_NOTHING, Explanation, Posterior
+from femubench.core.inference.posterior import LIKELY_NOTHING, Explanation, Posterior, by_weight
 from femubench.core.inference.residuals import Data
 from femubench.core.inference.screening import with_shortlist
 from femubench.core.inference.search import Found, Search, adequacy
 from femubench.core.inference.static_response import Basis, placed
-from femubench.core.modal.eigen import Modes
+from femubench.core.modal.eigen import zero_tolerance
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect
 from femubench.core.typing import FloatArray
+
+_ROUNDS, _STEPS = 2, 3
+# Explanations that are given scales of their own: so many at most, and so much behind in ln weight.
+_REFINED, _NEAR = 12, 8.0
+_WORTH = 1.0  # ln, by which other scales must suit the leading explanation better
+_HOPELESS = 30.0  # ln, behind which a beam model is not pursued
 
 
 @dataclass(frozen=True)
@@ -39,6 +54,8 @@ class Examination:
         tolerance: standard deviation of that scatter.
         posterior: all explanations.
         found: the atlas of every textbook set that was searched.
+        error: what a beam model gets wrong, where that was asked.
+        reference, width, beam: as in `examine`.
     """
 
     model: Model
@@ -47,6 +64,10 @@ class Examination:
     tolerance: float
     posterior: Posterior
     found: tuple[Found, ...]
+    error: ModelError | None = None
+    reference: Measurement | None = None
+    width: float = 0.0
+    beam: float = 1.0
 
     @cached_property
     def nominal(self) -> State:
@@ -77,6 +98,52 @@ class Examination:
         size = np.linalg.norm(self.slopes[:count], axis=1)
         return float(self.tolerance * np.median(size * m.frequency_std / m.frequencies))
 
+    @property
+    def like_a_beam(self) -> float:
+        """Return the probability that the structure is a beam model but for ordinary scatter."""
+        pairs = zip(self.posterior.explanations, self.posterior.probabilities, strict=True)
+        return sum(p for e, p in pairs if e.fit.state.problem.noise.beam)
+
+    def foreseen(
+        self, state: State, raw: FloatArray, data: Data, reference: Measurement | None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return mean and deviation of what the model error makes of unseen frequencies.
+
+        In standard deviations of their measurement; nothing where the structure is taken for a
+        beam model.
+
+        Arguments:
+            state: an explanation.
+            raw: residuals of used and unseen modes beside it, (n,).
+            data: used modes, then unseen ones.
+            reference: used and unseen modes of the structure as it was.
+        """
+        used, count = len(self.problem.data.measurement), len(data.measurement)
+        scales = state.problem.noise.scales
+        if self.error is None or scales is None:
+            return np.zeros(count - used), np.zeros(count - used)
+        modes = Basis.of(self.model, data.measurement).modes
+        mode, _ = data.shape_rows
+        # Shapes of unseen modes are not asked for, and would say what is sought.
+        kept = np.flatnonzero(
+            np.concatenate([np.ones(count), mode < used, np.ones(1)])[: len(data)]
+        )
+        problem, structure = replace(self.problem, data=data), self.model.structure
+        slopes = {k: s[kept] for k, s in error_slopes(problem, structure, modes).items()}
+        raw, earlier = raw[kept], np.zeros(len(kept), dtype=bool)
+        if reference is not None:
+            before = before_of(self.problem, reference)
+            more = error_slopes(before.problem, structure, modes)
+            slopes = {
+                k: np.vstack(
+                    [rows_of(k, slopes, more, len(raw)), rows_of(k, more, slopes, len(before.raw))]
+                )
+                for k in dict.fromkeys((*slopes, *more))
+            }
+            earlier = np.append(earlier, np.ones(len(before.raw), dtype=bool))
+            raw = np.append(raw, before.raw)
+        return self.error.foreseen(scales, slopes, earlier, raw, np.arange(used, count))
+
     def problem_of(self, explanation: Explanation) -> Problem:
         """Return the data in the coordinates of an explanation's textbook effects."""
         # Of a large model every explanation has coordinates of its own.
@@ -90,6 +157,9 @@ def examine(
     *,
     tolerance: float,
     pairs: bool = True,
+    reference: Measurement | None = None,
+    width: float = 0.0,
+    beam: float = 0.5,
 ) -> Examination:
     """Weigh every explanation of what a model gets wrong.
 
@@ -99,6 +169,9 @@ def examine(
         effects: what may be missing.
         tolerance: standard deviation of the relative scatter of every element.
         pairs: whether more than one cause is sought.
+        reference: modes of the structure as it was, without the causes that are sought.
+        width: factor on the widths of the model error; 0 takes the structure for a beam model.
+        beam: prior probability that it is one, but for the scatter of its elements.
 
     Raises:
         NotApplicable: when a used frequency has no standard deviation.
@@ -109,12 +182,114 @@ def examine(
         >>> seen.best.base.names == (torsion.name,)
         True
     """
-    known = tuple(effects)
     # Thousands of small matrices: threads would wait for each other most of the time.
     with threadpool_limits(1):
-        problem, slopes = posed(model, measurement, hypotheses_of(model, known), tolerance)
-        posterior, found = Search(problem, known, pairs=pairs).run()
-    return Examination(model, problem, slopes, tolerance, posterior, tuple(found))
+        known = tuple(effects)
+        hypotheses = hypotheses_of(model, known)
+        if reference is not None:
+            hypotheses = tuple(h for h in hypotheses if not is_innate(h))
+            known = tuple({id(h.effect): h.effect for h in hypotheses}.values())
+        basis = Basis.of(model, measurement)
+        problem, slopes = posed(model, measurement, hypotheses, tolerance, basis)
+        before = None if reference is None else before_of(problem, reference)
+        explanations: list[Explanation] = []
+        error: ModelError | None = None
+        if width > 0.0:
+            error = model_error_of(problem, basis, before, width, log(1.0 - beam))
+            explanations = searched(problem, error, known, pairs)
+        noise = beam_noise(basis, slopes, before, tolerance, log(beam))
+        own = replace(problem, noise=noise)
+        floor = max((e.log_weight for e in explanations), default=-np.inf) - _HOPELESS
+        more, atlas = Search(own, known, pairs=pairs, floor=floor).run()
+    posterior = Posterior.of([*explanations, *more])
+    return Examination(
+        *(model, own, slopes, tolerance, posterior, tuple(atlas)), error, reference, width, beam
+    )
+
+
+def is_innate(hypothesis: Hypothesis) -> bool:
+    """Tell whether an effect is there from the first day, and so in a reference too."""
+    return bool(getattr(hypothesis.effect, "innate", hypothesis.textbook is not None))
+
+
+def before_of(problem: Problem, reference: Measurement) -> State:
+    """Return the nominal model beside the reference.
+
+    Raises:
+        NotApplicable: when its sensors are others, or a frequency has no deviation.
+    """
+    if reference.sensors.labels != problem.data.measurement.sensors.labels:
+        raise NotApplicable("the reference was measured with other sensors")
+    data = Data(reference, problem.data.bias, problem.data.still)
+    return state_at(replace(problem, data=data, noise=Noise(np.eye(len(data)))), (), np.zeros(0))
+
+
+def searched(
+    problem: Problem, error: ModelError, effects: Sequence[Effect], pairs: bool
+) -> list[Explanation]:
+    """Return explanations beside a model error, each with scales of its own where it matters.
+
+    Scales that leave room for no cause hide it, those of a good explanation do not: what leads is
+    sought with its own.
+    """
+    scales = error.fitted(state_at(problem, (), np.zeros(0)))
+    explanations: list[Explanation] = []
+    for _ in range(_ROUNDS):
+        own = replace(problem, noise=error.noise(scales))
+        explanations += Search(own, effects, pairs=pairs).run()[0]
+        best = by_weight(explanations)[0].fit.state
+        before, scales = scales, error.fitted(best, scales)
+        if error.log_density(best, scales.v) - error.log_density(best, before.v) < _WORTH:
+            break
+    ranked = by_weight(explanations)
+    near = [e for e in ranked[:_REFINED] if e.log_weight > ranked[0].log_weight - _NEAR]
+    return [*(with_scales(error, e, scales) for e in near), *ranked[len(near) :]]
+
+
+def with_scales(error: ModelError, explanation: Explanation, near: Fitted) -> Explanation:
+    """Return an explanation with the scales of model error that suit it best."""
+    state = explanation.fit.state
+    problem = replace(state.problem, noise=error.noise(error.fitted(state, near)))
+    found: Fit | None
+    if state.parts:
+        found = fit(problem, state.parts, state.x, steps=_STEPS)
+    else:
+        # A textbook set without causes is a state of its own, which no fit of nothing leads to.
+        there = replace(state, problem=problem)
+        found = Fit(there, log_evidence(there))
+    return explanation if found is None else replace(explanation, fit=found)
+
+
+def model_error_of(
+    problem: Problem, basis: Basis, before: State | None, width: float, log_prior: float
+) -> ModelError:
+    """Return the model error of a problem, and of a reference where there is one."""
+    structure = problem.model.structure
+    present = error_slopes(problem, structure, basis.modes)
+    reference = None if before is None else error_slopes(before.problem, structure, basis.modes)
+    residual = np.zeros(0) if before is None else before.raw
+    widths = {name: width * value for name, value in WIDTHS.items()}
+    return ModelError.of(present, reference, residual, widths, UNSHARED, log_prior)
+
+
+def beam_noise(
+    basis: Basis, slopes: FloatArray, before: State | None, tolerance: float, weight: float
+) -> Noise:
+    """Return the noise of a structure that is a beam model but for the scatter of its elements.
+
+    Arguments:
+        basis: of the nominal model.
+        slopes: sensitivities of the data to the scatter, (n_data, n_scatter).
+        before: the nominal model beside the reference, if there is one.
+        tolerance: standard deviation of the scatter.
+        weight: ln of the probability.
+    """
+    rows, known = slopes, np.zeros(0)
+    if before is not None:
+        earlier = scatter_slopes(before.problem, basis.modes)[:, : slopes.shape[1]]
+        rows, known = np.vstack([earlier, slopes]), before.raw
+    covariance = np.eye(len(rows)) + tolerance**2 * rows @ rows.T
+    return conditioned(covariance, known, weight, beam=True)
 
 
 def posed(
@@ -122,29 +297,16 @@ def posed(
     measurement: Measurement,
     hypotheses: Iterable[Hypothesis],
     tolerance: float,
+    basis: Basis | None = None,
 ) -> tuple[Problem, FloatArray]:
     """Return data, noise and modal coordinates, and the sensitivities behind the noise."""
     if len(measurement) == 0:
         raise NotApplicable("there is no used mode")
-    basis = Basis.of(model, measurement)
+    if basis is None:
+        basis = Basis.of(model, measurement)
     bias = mesh_bias(model, 2 * len(measurement) + 8)
-    data = Data(measurement, np.zeros(0) if bias is None else bias)
-    plain = placed(basis, data, Noise.of(np.zeros((len(data), 0)), 0.0), tuple(hypotheses))
-    slopes = np.zeros((len(data), 0))
-    if model.structure is not None and tolerance > 0.0:
-        slopes = _scatter_slopes(plain, model.structure, basis.modes)
+    still = basis.modes.rigid | (basis.modes.eigenvalues <= zero_tolerance(basis.modes))
+    data = Data(measurement, np.zeros(0) if bias is None else bias, int(still.sum()))
+    plain = placed(basis, data, Noise(np.eye(len(data))), tuple(hypotheses))
+    slopes = scatter_slopes(plain, basis.modes) if tolerance else np.zeros((len(data), 0))
     return with_shortlist(replace(plain, noise=Noise.of(slopes, tolerance))), slopes
-
-
-def _scatter_slopes(problem: Problem, structure: Structure, modes: Modes) -> FloatArray:
-    """Return d data / d relative change of every element's stiffness, then of its mass."""
-    space: Space = problem.space
-    nominal = state_at(problem, (), np.zeros(0))
-    shapes = modes.take(np.argsort(~modes.rigid, kind="stable")).shapes
-    top = int(nominal.partner.max()) + 1
-    forces = scatter_terms(structure, shapes, space.eigenvalues[:top])
-    near = np.moveaxis(forces[:, nominal.partner, :], 0, 2)
-    element = structure.properties
-    own = element.rhoA * (element.length - element.rigid_mass_1 - element.rigid_mass_2)
-    masses = np.concatenate([np.zeros(len(element)), own])
-    return nominal.rows(np.swapaxes(near, 0, 1), masses)

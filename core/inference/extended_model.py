@@ -48,6 +48,7 @@ def raw_residual(problem: Problem, model: Model) -> FloatArray:
     order = np.argsort(modes.eigenvalues)
     hertz = signed_hz(modes.eigenvalues[order])[None]
     seen = np.asarray(model.observe(data.measurement.sensors) @ modes.shapes[:, order])[None]
+    seen = data.aligned(hertz, seen, problem.space.zero)
     hertz, seen = data.predicted(hertz, seen, problem.space.zero)
     partner = data.pair(hertz, seen)[0]
     residual = data.residual(hertz[:, partner], seen[:, :, partner], np.array([model.total_mass]))

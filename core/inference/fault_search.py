@@ -392,7 +392,7 @@ def log_density(examination: Examination, measured: Measurement) -> float:
         measured: the data as they were measured.
     """
     data = examination.problem.data
-    before = Data(measured, data.bias)
+    before = replace(data, measurement=measured)
     weights = [e.log_weight for e in examination.posterior.explanations]
     return float(logsumexp(weights)) + _jacobian(before, data) - float(np.log(_std(data)).sum())
 
@@ -438,7 +438,7 @@ class _Known:
     def gain(self, measurement: Measurement) -> float:
         """Return by how much other data are more probable, in nats."""
         own = self.state.problem.data
-        data = Data(measurement, own.bias)
+        data = replace(own, measurement=measurement)
         if len(data) != len(own):
             return -np.inf
         ratio = _std(data) / self.std

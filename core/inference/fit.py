@@ -73,7 +73,7 @@ class State:
     @cached_property
     def residual(self) -> FloatArray:
         """Return the residuals in units of the noise, (n_data,)."""
-        return self.problem.noise.whiten(self.raw)
+        return self.problem.noise.residual(self.raw)
 
     @property
     def chi2(self) -> float:
@@ -108,13 +108,17 @@ class State:
         return np.where(space.still(self.eigenvalues[self.partner]), 0.0, seen)
 
     @cached_property
-    def jacobian(self) -> FloatArray:
-        """Return d prediction / d x in units of the noise, (n_data, k)."""
+    def slopes(self) -> FloatArray:
+        """Return d prediction / d x in standard deviations of the measurement, (n_data, k)."""
         if not self.parts:
             return np.zeros((len(self.raw), 0))
         near, values = self.vectors[:, self.partner], self.eigenvalues[self.partner]
-        forces, masses = self.problem.space.forces(self.parts, self.x, near, values)
-        return self.problem.noise.whiten(self.rows(forces, masses).T).T
+        return self.rows(*self.problem.space.forces(self.parts, self.x, near, values))
+
+    @cached_property
+    def jacobian(self) -> FloatArray:
+        """Return d prediction / d x in units of the noise, (n_data, k)."""
+        return self.problem.noise.whiten(self.slopes.T).T
 
     def rows(self, forces: FloatArray, masses: FloatArray) -> FloatArray:
         """Return d prediction / d x in standard deviations from modal forces, (n_data, p).
@@ -128,6 +132,8 @@ class State:
         gap = values - self.eigenvalues[:, None]
         least = _CLOSE * np.abs(values)
         gap = np.where(np.abs(gap) < least, np.copysign(least, gap), gap)
+        # Close modes are turned to what was seen: how they mix is no datum.
+        gap[np.abs(gap) <= 2.0 * self.problem.data.closeness * np.abs(values)] = np.inf
         gap[self.partner, np.arange(len(values))] = np.inf
         still = self.problem.space.still(self.eigenvalues)
         gap[np.logical_and.outer(still, still[self.partner])] = np.inf
@@ -153,6 +159,13 @@ def state_at(problem: Problem, parts: Sequence[Projection], x: FloatArray) -> St
     """
     stiffness, mass, weight = problem.space.assembled(parts, x)
     values, vectors = solve_pencil(stiffness, mass)
+    data = problem.data
+    count = min(len(values), problem.space.rigid + 2 * len(data.measurement) + 8)
+    seen = problem.space.padded_readings(len(vectors)) @ vectors[:, :count]
+    hertz = signed_hz(values[:count])
+    for group, turn in data.turns(hertz, seen, problem.space.zero) if data.closeness else ():
+        vectors[:, group] = vectors[:, group] @ turn
+        seen[:, group] = seen[:, group] @ turn
     raw, partner = _compared(problem.data, *_predicted(problem, values, vectors), weight)
     return State(problem, tuple(parts), x, values, vectors, partner, weight, raw + problem.offset)
 

@@ -7,7 +7,7 @@ ones to it (Fox & Kapoor 1968), so that thousands of candidates cost one batched
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import log_ndtr
@@ -173,7 +173,11 @@ def screen(
     residuals, still = _residuals(problem, projections, top), base.residual
     if yielding is not None:
         residuals, still = marginal(residuals, yielding), marginal(still, yielding)
-    return interpolated(projections, residuals, still)
+    density = problem.noise.log_density
+    return [
+        replace(item, log_evidence=item.log_evidence + density)
+        for item in interpolated(projections, residuals, still)
+    ]
 
 
 def likely(
@@ -225,13 +229,14 @@ def _residuals(problem: Problem, projections: Sequence[Projection], top: int) ->
         rows = np.concatenate([np.arange(first[i], first[i + 1]) for i in members])
         own = [projections[i] for i in members]
         hertz[rows], seen[rows] = _modes(space, own, chosen, low)
+    seen = data.aligned(hertz, seen, space.zero)
     hertz, seen = data.predicted(hertz, seen, space.zero)
     partner = data.pair(hertz, seen)
     mass = [space.mass + p.hypothesis.grid_factors @ p.weights for p in projections]
     each = np.arange(len(partner))[:, None]
     paired = np.moveaxis(np.moveaxis(seen, 2, 1)[each, partner], 1, 2)
     raw = data.residual(hertz[each, partner], paired, np.concatenate(mass))
-    return problem.noise.whiten(raw + problem.offset)
+    return problem.noise.residual(raw + problem.offset)
 
 
 def _responses(

@@ -62,3 +62,24 @@ def mesh_bias(model: Model, count: int, modes: Modes | None = None) -> FloatArra
         return frequency_changes(model, coarse, fine, count, lambda shapes: shapes[keep])
     except ModelError:
         return None
+
+
+def mesh_corrections(model: Model, hertz: FloatArray) -> FloatArray | None:
+    """Return f_fine / f - 1 of some modes of a model, whatever their numbers, (k,).
+
+    None where `mesh_bias` has none, or knows too few modes.
+
+    Arguments:
+        model: any model.
+        hertz: some of its natural frequencies, nan where there is none, (k,).
+    """
+    known = np.flatnonzero(np.isfinite(hertz))
+    modes = elastic_modes(model, 2 * len(hertz) + 8)
+    gap = np.abs(modes.natural_frequencies[:, None] - hertz[None, known])
+    index = gap.argmin(axis=0)
+    bias = mesh_bias(model, int(index.max(initial=-1)) + 1, modes)
+    if bias is None or len(bias) <= index.max(initial=-1):
+        return None
+    result = np.zeros(len(hertz))
+    result[known] = bias[index]
+    return result

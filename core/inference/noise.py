@@ -13,13 +13,22 @@ from femubench.core.typing import FloatArray
 
 @dataclass(frozen=True)
 class Noise:
-    """The covariance of the residuals: measurement and ordinary scatter of the elements.
+    """The distribution of the residuals: measurement, scatter of the elements, model error.
 
     Arguments:
-        factor: lower Cholesky factor of I + S S' tolerance^2, (n_data, n_data).
+        factor: lower Cholesky factor of the covariance, (n_data, n_data).
+        mean: what the residuals are expected to be, (n_data,); not zero where a reference says
+            what the model gets wrong.
+        log_weight: ln of the probability of this noise, and of the reference under it.
+        beam: whether the structure is taken for a beam model with ordinary scatter.
+        scales: of the model error, (k,); None for a beam model.
     """
 
     factor: FloatArray
+    mean: FloatArray | float = 0.0
+    log_weight: float = 0.0
+    beam: bool = True
+    scales: FloatArray | None = None
 
     @classmethod
     def of(cls, slopes: FloatArray, tolerance: float) -> Noise:
@@ -39,8 +48,12 @@ class Noise:
 
     @cached_property
     def log_density(self) -> float:
-        """Return ln of the density at the mean, without (2 pi)^(n/2)."""
-        return -float(np.log(self.factor.diagonal()).sum())
+        """Return ln of the density at the mean, without (2 pi)^(n/2), and ln of the weight."""
+        return self.log_weight - float(np.log(self.factor.diagonal()).sum())
+
+    def residual(self, raw: FloatArray) -> FloatArray:
+        """Return residuals in units of the noise, same shape."""
+        return self.whiten(raw - self.mean)
 
     def whiten(self, rows: FloatArray) -> FloatArray:
         """Return vectors along the last axis in units of the noise, same shape."""

@@ -46,6 +46,16 @@ class Explanation:
         """Return chi-square at the best fit."""
         return self.fit.state.chi2
 
+    @property
+    def log_likelihood(self) -> float:
+        """Return ln of the probability of the data at the best fit, up to a constant of them."""
+        return self.fit.state.problem.noise.log_density - 0.5 * self.chi2
+
+    @property
+    def unknowns(self) -> int:
+        """Return the number of values that were fitted."""
+        return len(self.fit.state.x)
+
     @cached_property
     def log_weight(self) -> float:
         """Return ln of prior times evidence."""
@@ -68,6 +78,11 @@ class Explanation:
         """Return the places of the causes in the order of `searched`."""
         pairs = sorted((part.hypothesis.name, part.hypothesis.place) for part in self.parts)
         return " + ".join(place for _, place in pairs)
+
+
+def fits_better(one: Explanation, other: Explanation) -> float:
+    """Return ln of the likelihood ratio of two explanations: what the data say, no prior in it."""
+    return one.log_likelihood - other.log_likelihood
 
 
 def by_weight(explanations: Iterable[Explanation]) -> list[Explanation]:
@@ -114,17 +129,28 @@ class Posterior:
     def _missed(self, names: frozenset[str]) -> bool:
         """Tell whether the best explanation with textbook effects is much better than without.
 
-        Textbook physics is weighed against the model without it, not against another effect that
-        is fitted to stand for it.
+        Better by the evidence and by the data alone. Textbook physics is weighed against the model
+        without it, not against another effect that is fitted to stand for it; where nobody tried
+        the same causes without it, the two textbook models alone are compared.
         """
         best = next((e for e in self.explanations if names <= set(e.base.names)), None)
         if best is None:
             return False
         rest, fitted = best.effects - names, tuple(n for n in best.searched if n not in names)
-        for other in self.explanations:
-            if other.effects == rest and other.searched == fitted:
-                return best.fit.log_evidence - other.fit.log_evidence > log(_FACTOR)
-        return True
+        without = self._first(rest, fitted)
+        if without is None:
+            physics = frozenset(best.base.names)
+            bare, without = self._first(physics, ()), self._first(physics - names, ())
+            best = bare or best
+        if without is None:
+            return True
+        gains = best.fit.log_evidence - without.fit.log_evidence, fits_better(best, without)
+        return min(gains) > log(_FACTOR)
+
+    def _first(self, effects: frozenset[str], searched: Key) -> Explanation | None:
+        """Return the best explanation with these effects in all and these of them fitted."""
+        found = (e for e in self.explanations if (e.effects, e.searched) == (effects, searched))
+        return next(found, None)
 
     def key(self, explanation: Explanation) -> Key:
         """Return the name of an explanation: its causes and the textbook effects that count."""
@@ -147,6 +173,11 @@ class Posterior:
     def best(self, key: Key) -> Explanation:
         """Return the most probable explanation of that name."""
         return next(e for e in self.explanations if self.key(e) == key)
+
+    @property
+    def nothing(self) -> Explanation:
+        """Return the most probable explanation without a cause or textbook physics."""
+        return next(e for e in self.explanations if not e.parts and not e.base.parts)
 
     def members(self, key: Key) -> list[tuple[Explanation, float]]:
         """Return the explanations of that name with their probabilities."""

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from femubench.core.errors import NotApplicable
+from femubench.core.modal.close_modes import clusters_of, turn_towards
 from femubench.core.modal.correlation import UNSEEN, seen_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray, IntArray
@@ -24,10 +25,14 @@ class Data:
     Arguments:
         measurement: the used modes.
         bias: relative corrections of predicted frequencies by elastic mode, for the mesh, (k,).
+        still: number of modes of zero frequency of the model that they were found on, which come
+            first there; what gives these a frequency moves no other mode on in the list. None
+            where every candidate counts its own.
     """
 
     measurement: Measurement
     bias: FloatArray
+    still: int | None = None
 
     def __post_init__(self) -> None:
         std = self.measurement.frequency_std
@@ -66,6 +71,61 @@ class Data:
         """Return the number of shape scales that the data themselves must fix."""
         return int((self.weight > 0.0).any(axis=0).sum())
 
+    @cached_property
+    def closeness(self) -> float:
+        """Return the relative distance below which a test cannot tell two frequencies apart."""
+        m = self.measurement
+        return float(np.median(m.frequency_std / m.frequencies)) if self.scale_count else 0.0
+
+    @cached_property
+    def _complete(self) -> tuple[IntArray, FloatArray]:
+        """Return the sensors at which all measured shapes are known, and the shapes there."""
+        known = self.weight > 0.0
+        columns = known.any(axis=0)
+        rows = np.flatnonzero(known[:, columns].all(axis=1))
+        return rows, self.shapes[np.ix_(rows, columns)]
+
+    def turns(
+        self, frequencies: FloatArray, readings: FloatArray, rigid: float
+    ) -> list[tuple[IntArray, FloatArray]]:
+        """Return the groups of close modes of a candidate and how to turn each to what was seen.
+
+        Of modes that lie closer together than the test can tell, only the space that they span has
+        a meaning: any shapes in it are as good.
+
+        Arguments:
+            frequencies: predicted, Hz, (q,).
+            readings: at the sensors, (n_sensors, q).
+            rigid: what counts as zero in Hz.
+        """
+        sensors, measured = self._complete
+        moving = np.flatnonzero(frequencies > rigid)
+        found = []
+        for group in clusters_of(frequencies[moving], self.closeness):
+            turn = turn_towards(readings[np.ix_(sensors, moving[group])], measured)
+            if turn is not None:
+                found.append((moving[group], turn))
+        return found
+
+    def aligned(self, frequencies: FloatArray, readings: FloatArray, rigid: float) -> FloatArray:
+        """Return readings with close modes turned to the measured shapes, for every candidate.
+
+        Arguments:
+            frequencies: predicted, Hz, ascending, (g, q).
+            readings: at the sensors, (g, n_sensors, q).
+            rigid: what counts as zero in Hz.
+        """
+        low, high = frequencies[:, :-1], frequencies[:, 1:]
+        close = (low > rigid) & (high - low <= self.closeness * low)
+        rows = np.flatnonzero(close.any(axis=1) & (self.closeness > 0.0))
+        if len(rows) == 0:
+            return readings
+        result = readings.copy()
+        for g in rows:
+            for group, turn in self.turns(frequencies[g], readings[g], rigid):
+                result[g][:, group] = readings[g][:, group] @ turn
+        return result
+
     def pair(self, frequencies: FloatArray, readings: FloatArray) -> IntArray:
         """Return the predicted partner of every measured mode for every candidate, (g, m).
 
@@ -76,8 +136,14 @@ class Data:
         Arguments:
             frequencies: predicted, Hz, (g, q).
             readings: predicted shapes at the sensors, (g, n_sensors, q).
+
+        Raises:
+            NotApplicable: when there are fewer predicted modes than measured ones.
         """
         measured = self.measurement.frequencies
+        if frequencies.shape[1] < len(measured):
+            what = f"the model has {frequencies.shape[1]} modes, the data have {len(measured)}"
+            raise NotApplicable(f"{what}; expected a finer mesh, or fewer modes in the data")
         label = np.hypot(self.measurement.frequency_std / measured, _LABEL)
         gap = frequencies[:, None, :] / measured[:, None] - 1.0
         cost = np.square(gap / label[:, None])
@@ -174,11 +240,16 @@ class Data:
     def corrected(self, frequencies: FloatArray, rigid: float) -> FloatArray:
         """Return frequencies with the correction for the mesh, counted from the first elastic one.
 
+        The first elastic one is that of the model on which the corrections were found.
+
         Arguments:
             frequencies: predicted, ascending, (g, q).
             rigid: what counts as zero in Hz.
         """
-        order = np.cumsum(frequencies > rigid, axis=1) - 1
+        if self.still is None:
+            order = np.cumsum(frequencies > rigid, axis=1) - 1
+        else:
+            order = np.broadcast_to(np.arange(frequencies.shape[1]), frequencies.shape) - self.still
         known = (order >= 0) & (order < len(self.bias))
         if len(self.bias) == 0:
             return frequencies

@@ -12,7 +12,7 @@ from femubench.core.inference.extended_model import agreed, extended
 from femubench.core.inference.fit import Fit, Problem, State, fit, log_evidence, state_at
 from femubench.core.inference.grid_search import Screened, likely, screen
 from femubench.core.inference.hypothesis import hypotheses_of
-from femubench.core.inference.posterior import Explanation, Posterior, by_weight
+from femubench.core.inference.posterior import Explanation, by_weight
 from femubench.core.inference.prior import Base, selection_cost, textbook_bases
 from femubench.core.inference.projection import Projection
 from femubench.core.inference.screening import beside, screened, with_shortlist
@@ -90,15 +90,23 @@ class Search:
         problem: data and modal coordinates of the nominal model.
         effects: what may be missing.
         pairs: whether more than one cause is sought.
+        floor: of ln weight; where no single cause comes near it, no pairs are sought.
     """
 
-    def __init__(self, problem: Problem, effects: Sequence[Effect], *, pairs: bool = True) -> None:
-        self.problem, self.effects, self.pairs = problem, effects, pairs
+    def __init__(
+        self,
+        problem: Problem,
+        effects: Sequence[Effect],
+        *,
+        pairs: bool = True,
+        floor: float = -np.inf,
+    ) -> None:
+        self.problem, self.effects, self.pairs, self.floor = problem, effects, pairs, floor
         places = {p.hypothesis.name: p.hypothesis.places for p in problem.space.projections}
         self.names = len(places)
         self.places = sum(places.values()) / max(self.names, 1)
 
-    def run(self) -> tuple[Posterior, list[Found]]:
+    def run(self) -> tuple[list[Explanation], list[Found]]:
         """Return all explanations and the atlas of every base that was searched."""
         bases = textbook_bases(self.problem.space.projections)
         found = [self.on(bases[0])]
@@ -107,11 +115,11 @@ class Search:
         explanations = [e for item in found for e in item.explanations]
         searched = {item.base.names for item in found}
         explanations += [e for e in bare if e.base.names not in searched]
-        if self.pairs and self.names:
+        if self.pairs and self.names and _best(explanations).log_weight > self.floor:
             explanations += self.combined(found)
         if isinstance(self.problem, LargeProblem):
             explanations = self.borne_out(explanations)
-        return Posterior.of(explanations), found
+        return explanations, found
 
     def bare(self, base: Base) -> Explanation:
         """Return a textbook set with nothing on top, in the coordinates of the model as drawn."""

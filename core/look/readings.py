@@ -173,9 +173,9 @@ def look_at_band(seen: Seen, band: tuple[float, float]) -> list[LookWarning]:
     inside = np.flatnonzero((frequencies > low) & (frequencies < high))
     m = seen.measurement.frequencies
     measured = int(((m >= band[0]) & (m <= band[1])).sum())
-    if len(inside) <= measured:
-        return []
     alone = [k for k in inside if k not in seen.pairing.index]
+    if not alone:
+        return []
     which = ", ".join(f"{k + 1} at {frequencies[k]:.4g} Hz" for k in alone)
     what = (
         f"The model has {len(inside)} modes well inside the band {band[0]:g} to {band[1]:g} Hz, "

@@ -50,15 +50,28 @@ def align_close_modes(
     seen = np.isfinite(measured).all(axis=1)
     aligned = np.array(shapes, dtype=float)
     for group in clusters_of(frequencies, closeness):
-        space = aligned[np.ix_(seen, group)]
-        if len(space) < len(group) or np.linalg.matrix_rank(space) < len(group):
-            continue
-        coordinates = la.lstsq(space, measured[seen])[0]
-        likeness = np.diagonal(mac(space @ coordinates, measured[seen]))
-        best = np.argsort(-likeness, kind="stable")[: len(group)]
-        target = coordinates[:, best] / np.linalg.norm(coordinates[:, best], axis=0)
-        left, _, right = la.svd(target * likeness[best])
-        turn = left[:, : len(best)] @ right
-        rest = la.null_space(turn.T)
-        aligned[:, group] = aligned[:, group] @ np.column_stack([turn, rest])
+        turn = turn_towards(aligned[np.ix_(seen, group)], measured[seen])
+        if turn is not None:
+            aligned[:, group] = aligned[:, group] @ turn
     return aligned
+
+
+def turn_towards(space: FloatArray, measured: FloatArray) -> FloatArray | None:
+    """Return the orthogonal matrix that turns close modes to the shapes that they hold best.
+
+    None where the sensors cannot tell the modes from each other.
+
+    Arguments:
+        space: the close modes at the sensors, (n_sensors, k).
+        measured: (n_sensors, m), no cell missing.
+    """
+    count = space.shape[1]
+    if len(space) < count or np.linalg.matrix_rank(space) < count:
+        return None
+    coordinates = la.lstsq(space, measured)[0]
+    likeness = np.diagonal(mac(space @ coordinates, measured))
+    best = np.argsort(-likeness, kind="stable")[:count]
+    target = coordinates[:, best] / np.linalg.norm(coordinates[:, best], axis=0)
+    left, _, right = la.svd(target * likeness[best])
+    turn = left[:, : len(best)] @ right
+    return np.column_stack([turn, la.null_space(turn.T)])

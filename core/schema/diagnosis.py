@@ -32,7 +32,14 @@ class CauseParameter:
 class Cause:
     """An effect at a place, with what it takes; `summary` says it as a clause.
 
-    `side` says whether the model lacks it, or the data or what was typed in are wrong there.
+    Arguments:
+        probability: that the effect is part of what is missing, wherever it sits.
+        place_probability: that it sits at this place, given that it is; nan where not known.
+        places: the credible set, with the probability of each: the most probable places, 95 % or
+            more together.
+        mirrors: the other places that fit exactly as well, as images of this one by a symmetry
+            of the structure that the data do not break.
+        side: whether the model lacks it, or the data or what was typed in are wrong there.
     """
 
     effect: str
@@ -40,6 +47,9 @@ class Cause:
     parameters: tuple[CauseParameter, ...]
     probability: float
     summary: str = ""
+    place_probability: float = float("nan")
+    places: tuple[tuple[str, float], ...] = ()
+    mirrors: tuple[str, ...] = ()
     side: Side = "model"
 
 
@@ -62,6 +72,22 @@ class Rival:
 
 
 @dataclass(frozen=True)
+class Evidence:
+    """What speaks for the first explanation against another one, in ln of the odds.
+
+    Arguments:
+        against: ``nothing``, or a rival with its place.
+        data: ln of the likelihood ratio at the best fits: what the data say.
+        prior: what the prior adds: how many causes, effects, places, and how wide a range of
+            sizes was open to each.
+    """
+
+    against: str
+    data: float
+    prior: float
+
+
+@dataclass(frozen=True)
 class Advice:
     """A measurement that one could make, and the distance in squared sigmas (d2) it creates."""
 
@@ -78,6 +104,21 @@ class SmallestVisible:
     size: float
     unit: str
     wording: Wording = "value"
+
+
+@dataclass(frozen=True)
+class ErrorScale:
+    """How large a class of model error is beside the first explanation, standard deviation.
+
+    Arguments:
+        name: of the class.
+        scale: of the perturbations of the class.
+        unit: empty for a ratio.
+    """
+
+    name: str
+    scale: float
+    unit: str
 
 
 @dataclass(frozen=True)

@@ -72,7 +72,8 @@ class AxialPreload(FrameEffect):
 
 
 def euler_load(frame: Frame, name: str) -> float:
-    """Return pi^2 E I / L^2 of a member in N, with the smaller second moment."""
+    """Return pi^2 E I / L^2 of a member in N, with the smaller second moment that is known."""
     member = frame.members[frame.member_index[name]]
-    inertia = min(member.section.Iy, member.section.Iz)
+    # A frame in one plane needs Iy alone.
+    inertia = min(i for i in (member.section.Iy, member.section.Iz) if i > 0.0)
     return float(np.pi**2 * member.material.E * inertia / member_length(frame, name) ** 2)

@@ -27,6 +27,7 @@ class BendingTorsionCoupling(FrameEffect):
 
     name: ClassVar[str] = "bending-torsion-coupling"
     summary: ClassVar[str] = "a member twists when it bends"
+    innate: ClassVar[bool] = True
     sizes: ClassVar[Sequence[Size]] = (Size(0.05, 0.30, signed=True),)
 
     def places(self, model: Model) -> Sequence[str]:

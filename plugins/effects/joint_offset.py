@@ -50,6 +50,7 @@ class JointOffset(FrameEffect):
 
     name: ClassVar[str] = "joint-offset"
     summary: ClassVar[str] = "the joints are rigid over a length"
+    innate: ClassVar[bool] = True
     sizes: ClassVar[Sequence[Size]] = (Size(0.3, 1.5, Site.half_height),)
 
     def places(self, model: Model) -> Sequence[str]:

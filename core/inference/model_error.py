@@ -1,0 +1,454 @@
+"""What a beam model gets wrong of a real structure, as random perturbations in classes.
+
+Measured data are the prediction plus the sensitivities to many small unknown changes z, each
+standard normal times the scale tau of its class: C = I + sum_k tau_k^2 S_k S_k'. The scales are
+unknown too, tau_k = w_k u_k with ln u_k normal; the data infer them for every explanation, so that
+each has the same freedom to be wrong. A half-normal prior of the scales lets them collapse to zero.
+
+Source: Kennedy & O'Hagan (2001) for the discrepancy of a model as a random function; MacKay (1992)
+for scales that the evidence sets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg as la
+from scipy.optimize import minimize
+
+from femubench.core.fem.beam import mass_matrices, stiffness_matrices
+from femubench.core.fem.frame import ACTIVE
+from femubench.core.fem.structure import Structure
+from femubench.core.inference.fit import Problem, State, state_at
+from femubench.core.inference.modal_basis import Space, scatter_terms
+from femubench.core.inference.noise import Noise
+from femubench.core.modal.eigen import Modes
+from femubench.core.typing import BoolArray, FloatArray, IntArray
+
+# Widths w of the classes: relative changes, and compliances in those of the member's own end.
+WIDTHS: Mapping[str, float] = {
+    "element stiffness": 0.02,
+    "element mass": 0.01,
+    "stiffness of everything": 0.03,
+    "density of everything": 0.03,
+    "flexibility of joint types": 0.15,
+    "flexibility of joints": 0.05,
+    "mass of joints": 0.02,
+    "general": 0.02,
+    "sensor gains": 0.01,
+    "shapes": 1.0,
+}
+UNSHARED = 0.02  # of the scale, median: what the states do not share
+_MEDIAN, _SPREAD = 0.3, 1.0  # of u, log-normal
+_LEAST, _MOST = 0.01, 10.0  # of u
+_STEPS, _FEW_STEPS, _SETTLED = 40, 10, 1e-5
+_GENERAL = 20  # elastic modes that a general change couples
+_TURNED = 1e-9  # below which a mode has no part in another
+_ENDS = (slice(3, 6), slice(9, 12))  # rotations among the local displacements of an element
+
+
+def error_slopes(
+    problem: Problem, structure: Structure | None, modes: Modes
+) -> dict[str, FloatArray]:
+    """Return the sensitivities of the data to unit perturbations of every class, (n_data, p_k).
+
+    Arguments:
+        problem: data in the modal coordinates of the nominal model.
+        structure: its frame; None for a model from matrices, which has fewer classes.
+        modes: of the nominal model, in the order of the coordinates.
+    """
+    nominal = state_at(problem, (), np.zeros(0))
+    found = {
+        "stiffness of everything": _everything(nominal, 1.0, 0.0),
+        "density of everything": _everything(nominal, -1.0, problem.space.mass),
+        "general": _general(nominal),
+        "sensor gains": _gains(nominal),
+        **_shapes(nominal),
+    }
+    if structure is not None:
+        shapes = modes.take(np.argsort(~modes.rigid, kind="stable")).shapes
+        rows = scatter_slopes(problem, modes)
+        count = len(structure.properties)
+        found["element stiffness"], found["element mass"] = rows[:, :count], rows[:, count:]
+        found["mass of joints"] = _joint_masses(nominal, structure, shapes)
+        stiff, heavy, types = _end_moments(structure, shapes)
+        values = nominal.eigenvalues[nominal.partner]
+        ends = stiff - values[:, None, None] * heavy  # (m, p, N)
+        own = np.einsum("mpN,Nm->mp", ends, nominal.vectors[: ends.shape[2], nominal.partner])
+        forces = -np.moveaxis(ends * own[:, :, None], 2, 0)
+        single = nominal.rows(forces, np.zeros(len(types)))
+        found["flexibility of joints"] = single
+        found["flexibility of joint types"] = single @ np.eye(types.max(initial=-1) + 1)[types]
+    return found
+
+
+def scatter_slopes(problem: Problem, modes: Modes) -> FloatArray:
+    """Return d data / d relative change of every element's stiffness, then of its mass."""
+    structure = problem.model.structure
+    if structure is None:
+        return np.zeros((len(problem.data), 0))
+    space: Space = problem.space
+    nominal = state_at(problem, (), np.zeros(0))
+    shapes = modes.take(np.argsort(~modes.rigid, kind="stable")).shapes
+    # Close modes are turned to the measured ones, and their forces with them.
+    turned = nominal.vectors[:, nominal.partner]
+    top = int(np.flatnonzero(np.abs(turned).max(axis=1) > _TURNED)[-1]) + 1
+    forces = scatter_terms(structure, shapes, space.eigenvalues[:top])
+    near = np.einsum("piN,im->mNp", forces, turned[:top])
+    element = structure.properties
+    own = element.rhoA * (element.length - element.rigid_mass_1 - element.rigid_mass_2)
+    masses = np.concatenate([np.zeros(len(element)), own])
+    return nominal.rows(np.swapaxes(near, 0, 1), masses)
+
+
+def _everything(nominal: State, sign: float, mass: float) -> FloatArray:
+    """Return the slope of all stiffness, or of all mass, (n_data, 1)."""
+    forces = np.zeros((len(nominal.vectors), len(nominal.partner), 1))
+    values = nominal.eigenvalues[nominal.partner]
+    forces[:, :, 0] = sign * nominal.vectors[:, nominal.partner] * values
+    return nominal.rows(forces, np.array([mass]))
+
+
+def _general(nominal: State) -> FloatArray:
+    """Return the slopes of random symmetric changes sqrt(lambda_a lambda_b) g_ab, (n_data, p)."""
+    space, near = nominal.problem.space, nominal.vectors[:, nominal.partner]
+    modes = np.arange(space.rigid, min(space.rigid + _GENERAL, len(space)))
+    one, other = (modes[index] for index in np.triu_indices(len(modes)))
+    size = np.sqrt(np.maximum(space.eigenvalues[one] * space.eigenvalues[other], 0.0))
+    column = np.arange(len(one))
+    forces = np.zeros((len(near), len(nominal.partner), len(one)))
+    forces[one, :, column] = size[:, None] * near[other]
+    forces[other, :, column] = size[:, None] * near[one]
+    return nominal.rows(forces, np.zeros(len(one)))
+
+
+def _gains(nominal: State) -> FloatArray:
+    """Return the slopes of a relative gain of every sensor, (n_data, n_sensors)."""
+    data = nominal.problem.data
+    mode, sensor = data.shape_rows
+    count = len(data.measurement)
+    found = np.zeros((len(data), len(data.weight)))
+    found[count + np.arange(len(mode)), sensor] = (data.weight * data.shapes)[sensor, mode]
+    return found
+
+
+def _shapes(nominal: State) -> dict[str, FloatArray]:
+    """Return the slopes of single readings, in deviations, by mode, (n_data, n) each."""
+    data = nominal.problem.data
+    mode, sensor = data.shape_rows
+    row = len(data.measurement) + np.arange(len(mode))
+    found = {}
+    for j, number in enumerate(data.measurement.numbers):
+        slopes = np.zeros((len(data), len(data.weight)))
+        slopes[row[mode == j], sensor[mode == j]] = 1.0
+        found[f"shapes {number}"] = slopes
+    return found
+
+
+def _joint_masses(nominal: State, structure: Structure, shapes: FloatArray) -> FloatArray:
+    """Return the slopes of a mass at every joint, as a share of the structure, (n_data, n)."""
+    mesh, frame = structure.mesh, structure.frame
+    local = (structure.gather @ shapes).reshape(len(mesh.ends), 12, -1)
+    moved: dict[int, FloatArray] = {}
+    for element, ends in enumerate(mesh.ends):
+        for node, part in zip(ends, (slice(0, 3), slice(6, 9)), strict=True):
+            if node < len(frame.joints):
+                moved.setdefault(int(node), local[element, part])
+    mass = nominal.problem.space.mass
+    values = nominal.eigenvalues[nominal.partner]
+    near = nominal.vectors[:, nominal.partner]
+    forces = [-mass * rows.T @ (rows @ near * values) for _, rows in sorted(moved.items())]
+    return nominal.rows(np.stack(forces, axis=2), np.full(len(forces), mass))
+
+
+def _end_moments(
+    structure: Structure, shapes: FloatArray
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Return the end moments of all members by all modes, scaled, and the class of each.
+
+    A compliance c at an end lowers the energy by c M^2 / 2, to first order, M with the inertia of
+    the end's own rotation. Unit compliances are L/4EI in bending and L/GJ in torsion.
+
+    Returns:
+        elastic moments and, at unit eigenvalue, those of inertia, both times the root of the unit
+        compliance, (p, N) each; joint type and direction, (p,).
+    """
+    frame, mesh = structure.frame, structure.mesh
+    local = (structure.gather @ shapes).reshape(len(mesh.ends), 12, -1)
+    matrices = stiffness_matrices(structure.properties), mass_matrices(structure.properties)
+    kind = {joint.name: joint.type or joint.name for joint in frame.joints}
+    active = [d for d, word in enumerate(("rx", "ry", "rz")) if word in ACTIVE[frame.plane]]
+    moments: tuple[list[FloatArray], list[FloatArray]] = [], []
+    labels = []
+    for number, member in enumerate(frame.members):
+        own = np.flatnonzero(mesh.member == number)
+        own = own[np.argsort(mesh.stations[own, 0])]
+        length = float(structure.properties.length[own].sum())
+        s, m = member.section, member.material
+        stiff = (m.G * s.J / length, 4.0 * m.E * s.Iy / length, 4.0 * m.E * s.Iz / length)
+        for element, rotations, joint in zip((own[0], own[-1]), _ENDS, member.ends, strict=True):
+            for d in active:
+                if stiff[d] > 0.0 and np.isfinite(stiff[d]):
+                    for rows, matrix in zip(moments, matrices, strict=True):
+                        row = matrix[element][rotations][d] @ local[element]
+                        rows.append(row / np.sqrt(stiff[d]))
+                    labels.append((kind[joint], d))
+    known = {label: i for i, label in enumerate(dict.fromkeys(labels))}
+    types = np.array([known[label] for label in labels], dtype=np.int64)
+    return np.array(moments[0]), np.array(moments[1]), types
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """The classes of model error in the data, and in those of a reference where there is one.
+
+    Both states share one model error; what they do not share is a small part of it, whose scale is
+    inferred like those of the classes.
+
+    Arguments:
+        names: of the classes.
+        widths: w of each.
+        present: covariance of the data by unit perturbations of each, (n_classes, n, n).
+        reference: likewise of the reference, (n_classes, r, r).
+        cross: between reference and data, (n_classes, r, n).
+        residual: of the reference at the nominal model, in deviations, (r,).
+        unshared: width of the scale of what the states do not share.
+        share: ln of the prior probability that the structure is no beam model.
+    """
+
+    names: tuple[str, ...]
+    widths: FloatArray
+    present: FloatArray
+    reference: FloatArray
+    cross: FloatArray
+    residual: FloatArray
+    unshared: float
+    log_prior: float
+
+    @classmethod
+    def of(
+        cls,
+        present: Mapping[str, FloatArray],
+        reference: Mapping[str, FloatArray] | None,
+        residual: FloatArray,
+        widths: Mapping[str, float],
+        unshared: float,
+        log_prior: float,
+    ) -> ModelError:
+        """Return the model error of sensitivities, (n_data, p_k) by class."""
+        before = {} if reference is None else reference
+        names = tuple(dict.fromkeys((*present, *before)))
+        count = len(next(iter(present.values())))
+        now = {name: rows_of(name, present, before, count) for name in names}
+        other = {name: rows_of(name, before, present, len(residual)) for name in names}
+        return cls(
+            names,
+            np.array([widths[kind(name)] for name in names]),
+            np.array([now[name] @ now[name].T for name in names]),
+            np.array([other[name] @ other[name].T for name in names]),
+            np.array([other[name] @ now[name].T for name in names]),
+            residual,
+            unshared,
+            log_prior,
+        )
+
+    def _variances(self, v: FloatArray) -> tuple[FloatArray, float]:
+        """Return tau^2 of the classes, and the unshared share, of standard normal v."""
+        u = _MEDIAN * np.exp(_SPREAD * v)
+        tau = np.square(self.widths * u[: len(self.names)])
+        return tau, (self.unshared * u[-1] / _MEDIAN) ** 2 if len(self.residual) else 0.0
+
+    @cached_property
+    def _blocks(self) -> tuple[FloatArray, FloatArray]:
+        """Return the covariances by class of reference and data as one, and within each state."""
+        r, n = len(self.residual), self.present.shape[1]
+        joint = np.zeros((len(self.names), r + n, r + n))
+        joint[:, :r, :r], joint[:, r:, r:] = self.reference, self.present
+        apart = joint.copy() if r else joint[:0]
+        joint[:, :r, r:], joint[:, r:, :r] = self.cross, np.swapaxes(self.cross, 1, 2)
+        flat = joint.shape[1] ** 2
+        return joint.reshape(-1, flat), apart.reshape(-1, flat)
+
+    def covariance(self, v: FloatArray) -> FloatArray:
+        """Return the covariance of reference and data, (r + n, r + n)."""
+        joint, apart = self._blocks
+        size = len(self.residual) + self.present.shape[1]
+        tau, unshared = self._variances(v)
+        total = tau @ joint + (unshared * tau @ apart if len(apart) else 0.0)
+        return np.asarray(np.eye(size) + total.reshape(size, size))
+
+    def _slopes(self, v: FloatArray, weight: FloatArray) -> FloatArray:
+        """Return the sum of the covariance's derivatives by v, entry by entry times a weight."""
+        joint, apart = self._blocks
+        tau, unshared = self._variances(v)
+        both = joint @ weight.ravel()
+        within = apart @ weight.ravel() if len(apart) else 0.0
+        found = tau * (both + unshared * within)
+        if len(apart):
+            found = np.append(found, unshared * float(tau @ within))
+        return np.asarray(2.0 * _SPREAD * found)
+
+    def fitted(self, state: State, near: Fitted | None = None) -> Fitted:
+        """Return the most probable scales where the causes of a state may still move.
+
+        Arguments:
+            state: any explanation, linear in its causes nearby.
+            near: scales of a similar one, from where a few steps do, and about which there is as
+                much room.
+        """
+        first = np.zeros(len(self.names) + (len(self.residual) > 0)) if near is None else near.v
+        y, free = self._linear(state)
+
+        def cost(v: FloatArray) -> tuple[float, FloatArray]:
+            inverse, log_det = _inverse(self.covariance(v) + free)
+            alpha = inverse @ y
+            value = 0.5 * float(alpha @ y + log_det + v @ v)
+            return value, v + 0.5 * self._slopes(v, inverse - np.outer(alpha, alpha))
+
+        low, high = (np.log(u / _MEDIAN) / _SPREAD for u in (_LEAST, _MOST))
+        found = minimize(
+            cost,
+            first,
+            jac=True,
+            method="L-BFGS-B",
+            bounds=[(low, high)] * len(first),
+            options={"maxiter": _STEPS if near is None else _FEW_STEPS, "ftol": _SETTLED},
+        )
+        v = np.asarray(found.x)
+        if near is not None:
+            return Fitted(v, near.log_volume)
+        inverse, _ = _inverse(self.covariance(v) + free)
+        fisher = np.eye(len(v)) + self._fisher(v, inverse)
+        return Fitted(v, -0.5 * float(np.linalg.slogdet(fisher)[1]))
+
+    def _fisher(self, v: FloatArray, inverse: FloatArray) -> FloatArray:
+        """Return what the data say of the scales, 1/2 tr C^-1 C_k C^-1 C_l, (k, k)."""
+        joint, apart = self._blocks
+        tau, unshared = self._variances(v)
+        slopes = joint + unshared * apart if len(apart) else joint
+        slopes = tau[:, None] * slopes
+        if len(apart):
+            slopes = np.concatenate([slopes, (unshared * tau @ apart)[None]])
+        turned = inverse @ slopes.reshape(-1, *inverse.shape)
+        flat = turned.reshape(len(turned), -1)
+        other = np.swapaxes(turned, 1, 2).reshape(len(turned), -1)
+        return np.asarray(0.5 * (2.0 * _SPREAD) ** 2 * flat @ other.T)
+
+    def log_density(self, state: State, v: FloatArray) -> float:
+        """Return ln of the density of all data, linear in the causes, and of scales."""
+        y, free = self._linear(state)
+        inverse, log_det = _inverse(self.covariance(v) + free)
+        return -0.5 * float(y @ inverse @ y + log_det + v @ v)
+
+    def _linear(self, state: State) -> tuple[FloatArray, FloatArray]:
+        """Return reference and data with the causes at zero, and the covariance by the causes."""
+        r = len(self.residual)
+        y = np.concatenate([self.residual, state.raw + state.slopes @ state.x])
+        free = np.zeros((len(y), len(y)))
+        free[r:, r:] = state.slopes @ state.slopes.T
+        return y, free
+
+    def scales(self, v: FloatArray) -> list[tuple[str, float, str]]:
+        """Return name, standard deviation and unit of every class, at definite scales."""
+        tau, unshared = self._variances(v)
+        rows = zip(self.names, np.sqrt(tau), strict=True)
+        found = [(n, float(s), "deviations" if kind(n) == "shapes" else "") for n, s in rows]
+        return [
+            *found,
+            *([("unshared", float(np.sqrt(unshared)), "")] if len(self.residual) else []),
+        ]
+
+    def foreseen(
+        self,
+        scales: FloatArray,
+        slopes: Mapping[str, FloatArray],
+        earlier: BoolArray,
+        raw: FloatArray,
+        unseen: IntArray,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return mean and deviation of residuals of unseen data, given those of all others.
+
+        In standard deviations of their measurement, which is no part of the deviation.
+
+        Arguments:
+            scales: of an explanation.
+            slopes: sensitivities of all data to each class, (N, p_k).
+            earlier: which data are of the reference, (N,).
+            raw: residuals of all data beside the explanation, (N,).
+            unseen: rows, (u,).
+        """
+        tau, unshared = self._variances(scales)
+        total = np.zeros((len(raw), len(raw)))
+        for name, variance in zip(self.names, tau, strict=True):
+            if name in slopes:
+                total += variance * slopes[name] @ slopes[name].T
+        total *= 1.0 + unshared * (earlier[:, None] == earlier)
+        known = np.setdiff1d(np.arange(len(raw)), unseen)
+        inverse, _ = _inverse(np.eye(len(known)) + total[np.ix_(known, known)])
+        weight = total[np.ix_(unseen, known)] @ inverse
+        rest = total[unseen, unseen] - np.einsum("uk,uk->u", weight, total[np.ix_(unseen, known)])
+        return weight @ raw[known], np.sqrt(np.maximum(rest, 0.0))
+
+    def noise(self, found: Fitted) -> Noise:
+        """Return the noise of the data at definite scales, given the reference."""
+        total = self.covariance(found.v)
+        weight = found.log_volume - 0.5 * float(found.v @ found.v) + self.log_prior
+        noise = conditioned(total, self.residual, weight, beam=False)
+        return replace(noise, scales=found.v)
+
+
+def conditioned(total: FloatArray, known: FloatArray, weight: float, *, beam: bool) -> Noise:
+    """Return the noise of data whose reference is known.
+
+    Arguments:
+        total: covariance of reference and data, (r + n, r + n).
+        known: residuals of the reference, (r,).
+        weight: ln of the probability of this covariance.
+        beam: as in `Noise`.
+    """
+    r = len(known)
+    if r == 0:
+        return Noise(np.asarray(la.cholesky(total, lower=True)), 0.0, weight, beam)
+    first = np.asarray(la.cholesky(total[:r, :r], lower=True))
+    both = np.column_stack([total[:r, r:], known])
+    turned = np.asarray(la.solve_triangular(first, both, lower=True))
+    weight -= 0.5 * float(turned[:, -1] @ turned[:, -1]) + float(np.log(first.diagonal()).sum())
+    rest = total[r:, r:] - turned[:, :-1].T @ turned[:, :-1]
+    factor = np.asarray(la.cholesky(rest, lower=True))
+    return Noise(factor, turned[:, :-1].T @ turned[:, -1], weight, beam)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Scales that were inferred.
+
+    Arguments:
+        v: standard normal logarithms, (k,).
+        log_volume: ln of the volume about them, where the prior's is 1.
+    """
+
+    v: FloatArray
+    log_volume: float
+
+
+def _inverse(matrix: FloatArray) -> tuple[FloatArray, float]:
+    """Return the inverse of a positive definite matrix and ln of its determinant."""
+    factor = la.cholesky(matrix, lower=True, check_finite=False)
+    inverse, _ = la.lapack.dpotri(factor, lower=1)
+    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    return np.asarray(inverse), 2.0 * float(np.log(factor.diagonal()).sum())
+
+
+def rows_of(
+    name: str, own: Mapping[str, FloatArray], other: Mapping[str, FloatArray], count: int
+) -> FloatArray:
+    """Return the sensitivities of a state to a class; zeros where only the other state has it."""
+    return own[name] if name in own else np.zeros((count, other[name].shape[1]))
+
+
+def kind(name: str) -> str:
+    """Return the class that a scale belongs to: that of a mode's shape to all shapes."""
+    return "shapes" if name.startswith("shapes") else name

@@ -1,0 +1,232 @@
+"""What a beam model gets wrong: sensitivities of its classes, scales, prediction beside it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from femubench import Model
+from femubench.core.challenge.structures import structure_named
+from femubench.core.fem.frame import Factor, JointSpring, Place
+from femubench.core.inference.fit import Problem, State, fit, state_at
+from femubench.core.inference.model_error import (
+    WIDTHS,
+    ModelError,
+    conditioned,
+    error_slopes,
+    kind,
+)
+from femubench.core.inference.noise import Noise
+from femubench.core.inference.static_response import Basis
+from femubench.effect import member_length, total_mass
+from femubench.fem import FloatArray, Frame, PointMass
+
+sys.path.insert(0, str(Path(__file__).parent))
+from diagnosis_problems import effects_named, measured, part_at, problem_of
+
+FRAME = structure_named("portal").frame
+MODEL = Model.of(FRAME)
+TEST = measured(MODEL, FRAME)
+NOTHING = np.zeros(0)
+MEMBER = FRAME.members[0]
+JOINT = MEMBER.ends[1]
+LENGTH = member_length(FRAME, MEMBER.name)
+ELEMENT = 1  # the second one of the first member
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    return problem_of(MODEL, TEST, effects_named("local-stiffness-loss", "added-mass"))
+
+
+@pytest.fixture(scope="module")
+def slopes(problem: Problem) -> dict[str, FloatArray]:
+    return error_slopes(problem, MODEL.structure, Basis.of(MODEL, TEST).modes)
+
+
+def raw(frame: Frame) -> FloatArray:
+    """Return the residuals of the test beside another frame."""
+    model = Model.of(frame)
+    return state_at(problem_of(model, TEST, ()), (), NOTHING).raw
+
+
+def change(frame: Frame) -> FloatArray:
+    """Return by how much the prediction moves, in deviations."""
+    return raw(FRAME) - raw(frame)
+
+
+def stiffer(step: float) -> Frame:
+    return replace(FRAME, factors=(*FRAME.factors, Factor("E", (f"{MEMBER.name}/2",), 1.0 + step)))
+
+
+def heavier(step: float) -> Frame:
+    lump = PointMass(Place(JOINT), step * total_mass(MODEL))
+    return replace(FRAME, masses=(*FRAME.masses, lump))
+
+
+def softer(step: float) -> Frame:
+    """A spring about the bending axis at an end, of 4 EI/L over the step."""
+    stiffness = 4.0 * MEMBER.material.E * MEMBER.section.Iy / LENGTH / step
+    spring = JointSpring(JOINT, MEMBER.name, {"ry": stiffness})
+    return replace(FRAME, joint_springs=(*FRAME.joint_springs, spring))
+
+
+def element(slopes: dict[str, FloatArray]) -> FloatArray:
+    return slopes["element stiffness"][:, ELEMENT]
+
+
+def joint(slopes: dict[str, FloatArray]) -> FloatArray:
+    number = [item.name for item in FRAME.joints].index(JOINT)
+    return slopes["mass of joints"][:, number]
+
+
+def end(slopes: dict[str, FloatArray]) -> FloatArray:
+    """In-plane frames have one direction an end, two ends a member."""
+    return slopes["flexibility of joints"][:, 1]
+
+
+@pytest.mark.parametrize(("frame", "column"), [(stiffer, element), (heavier, joint), (softer, end)])
+def test_slopes_are_those_of_a_frame_that_is_changed(
+    slopes: dict[str, FloatArray],
+    frame: Callable[[float], Frame],
+    column: Callable[[dict[str, FloatArray]], FloatArray],
+) -> None:
+    """Richardson's extrapolation of the change: quadratic terms are gone."""
+    step = 2e-4
+    slope = (4.0 * change(frame(0.5 * step)) - change(frame(step))) / step
+    expected = column(slopes)
+    assert np.linalg.norm(expected) > 0.5
+    np.testing.assert_allclose(slope, expected, atol=2e-3 * np.abs(expected).max())
+
+
+def test_everything_stiffer_raises_all_frequencies_alike(
+    problem: Problem, slopes: dict[str, FloatArray]
+) -> None:
+    count = len(TEST)
+    hertz = slopes["stiffness of everything"][:count, 0] * TEST.frequency_std / TEST.frequencies
+    np.testing.assert_allclose(hertz, 0.5, rtol=1e-6)
+    np.testing.assert_allclose(
+        slopes["density of everything"][:count], -slopes["stiffness of everything"][:count]
+    )
+    assert TEST.total_mass is not None
+    weighed = slopes["density of everything"][-1, 0]
+    assert weighed == pytest.approx(total_mass(MODEL) / TEST.total_mass[1])
+    # All elements together are everything; ends together are their types.
+    together = slopes["element stiffness"].sum(axis=1)
+    np.testing.assert_allclose(together[:count], slopes["stiffness of everything"][:count, 0])
+    ends, types = slopes["flexibility of joints"], slopes["flexibility of joint types"]
+    np.testing.assert_allclose(ends.sum(axis=1), types.sum(axis=1), atol=1e-9)
+
+
+def test_a_known_reference_conditions_what_is_to_come() -> None:
+    """ln p(reference) + ln p(data | reference) = ln p(both)."""
+    rng = np.random.default_rng(4)
+    root = rng.standard_normal((7, 7))
+    total = np.eye(7) + root @ root.T
+    both = rng.standard_normal(7)
+    noise = conditioned(total, both[:3], 0.5, beam=True)
+    residual = noise.residual(both[3:])
+    found = noise.log_density - 0.5 * residual @ residual
+    expected = multivariate_normal(cov=total).logpdf(both) + 3.5 * np.log(2.0 * np.pi)
+    assert found == pytest.approx(expected + 0.5)
+
+
+def drawn(
+    problem: Problem, slopes: dict[str, FloatArray], rng: np.random.Generator, size: float
+) -> tuple[State, FloatArray]:
+    """Return the nominal model beside data with model error in some classes, and that error."""
+    error = np.zeros(len(problem.data))
+    for name in ("element stiffness", "flexibility of joint types", "mass of joints"):
+        columns = slopes[name]
+        error += size * WIDTHS[name] * columns @ rng.standard_normal(columns.shape[1])
+    raw = error + rng.standard_normal(len(error))
+    return replace(state_at(problem, (), NOTHING), raw=raw), error
+
+
+def test_scales_follow_the_size_of_the_error(
+    problem: Problem, slopes: dict[str, FloatArray]
+) -> None:
+    model = ModelError.of(slopes, None, NOTHING, WIDTHS, 0.0, 0.0)
+    chosen = model.names.index("element stiffness"), model.names.index("mass of joints")
+    seen = []
+    for size in (0.0, 1.0, 3.0):
+        rng = np.random.default_rng(5)
+        state, _ = drawn(problem, slopes, rng, size)
+        found = model.fitted(state)
+        best = model.log_density(state, found.v)
+        for step in 0.3 * np.eye(len(found.v)):
+            assert best > max(model.log_density(state, found.v + s) for s in (step, -step)) - 1e-3
+        whitened = model.noise(found).residual(state.raw)
+        assert 0.6 < np.square(whitened).mean() < 1.4
+        seen.append(found.v[list(chosen)].sum())
+    assert seen[0] < seen[1] < seen[2]
+
+
+def test_unseen_data_lie_within_what_is_foreseen(
+    problem: Problem, slopes: dict[str, FloatArray]
+) -> None:
+    """Over draws of the model error, errors of unseen frequencies are as large as stated."""
+    count = len(TEST)
+    unseen = np.array([count - 2, count - 1])
+    mode, _ = problem.data.shape_rows
+    shapes = count + np.flatnonzero(mode >= count - 2)
+    used = np.setdiff1d(np.arange(len(problem.data)), [*unseen, *shapes])
+    model = ModelError.of({k: s[used] for k, s in slopes.items()}, None, NOTHING, WIDTHS, 0.0, 0.0)
+    rows = np.concatenate([used, unseen])
+    scores, blind = [], []
+    for seed in range(40):
+        state, error = drawn(problem, slopes, np.random.default_rng(seed), 1.0)
+        part = replace(state, problem=replace(problem, noise=Noise(np.eye(len(used)))))
+        object.__setattr__(part, "raw", state.raw[used])
+        found = model.fitted(part)
+        mean, std = model.foreseen(
+            found.v,
+            {k: s[rows] for k, s in slopes.items()},
+            np.zeros(len(rows), dtype=bool),
+            state.raw[rows],
+            np.arange(len(used), len(rows)),
+        )
+        scores.append((error[unseen] - mean) / std)
+        blind.append(error[unseen] / std)
+    z = np.concatenate(scores)
+    assert 0.6 < np.sqrt(np.mean(np.square(z))) < 1.5
+    assert np.sqrt(np.mean(np.square(np.concatenate(blind)))) > 1.5
+
+
+def test_a_cause_beside_a_model_error_keeps_its_size(
+    problem: Problem, slopes: dict[str, FloatArray]
+) -> None:
+    """The same error stands in a reference: what is left of it hides nothing."""
+    part = part_at(problem, "local-stiffness-loss", f"{MEMBER.name}/2")
+    rng = np.random.default_rng(8)
+    _, error = drawn(problem, slopes, rng, 1.0)
+    x = np.array([1.0])
+    shift = state_at(problem, (part,), x).raw - state_at(problem, (), NOTHING).raw
+    before = error + rng.standard_normal(len(error))
+    # Data of the damaged structure, as if measured: the residual of the right cause is the error.
+    offset = error + rng.standard_normal(len(error)) - state_at(problem, (part,), x).raw
+    model = ModelError.of(slopes, slopes, before, WIDTHS, 0.02, 0.0)
+    present = replace(problem, offset=offset)
+    nothing = state_at(present, (), NOTHING)
+    noise = model.noise(model.fitted(nothing))
+    found = fit(replace(present, noise=noise), (part,), np.array([0.3]))
+    assert found is not None
+    assert np.linalg.norm(shift) > 8.0
+    assert abs(found.state.x[0] - 1.0) < 3.0 * np.sqrt(found.covariance[0, 0])
+    assert np.sqrt(found.covariance[0, 0]) < 0.3
+    alone = ModelError.of(slopes, None, NOTHING, WIDTHS, 0.0, 0.0)
+    blurred = fit(
+        replace(present, noise=alone.noise(alone.fitted(nothing))), (part,), np.array([0.3])
+    )
+    assert blurred is not None
+    assert blurred.covariance[0, 0] > found.covariance[0, 0]
+
+
+def test_shapes_share_a_width_whatever_their_mode(slopes: dict[str, FloatArray]) -> None:
+    assert {kind(name) for name in slopes} == set(WIDTHS)
