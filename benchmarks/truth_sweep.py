@@ -34,7 +34,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))  # the truths are not install
 
 from femubench import read_case
 from femubench.core.challenge.answer import Answer
-from femubench.core.challenge.score import LARGEST_GROUP, Parts, candidates
+from femubench.core.challenge.score import LARGEST_GROUP, Parts, candidates, faults_in
 from femubench.core.challenge.sweep import Record, wilson
 from femubench.core.effect.places import match
 from femubench.core.fem.frame import Frame
@@ -260,6 +260,8 @@ def outcome(truth: Truth, record: Record, same: Same) -> str:
     one of its members is right by itself.
     """
     verdict = str(record["verdict"]).replace("-", " ")
+    if truth.kind.endswith("-fault") and (found := faults_said(record)):
+        return fault_outcome(truth, found, same)
     if verdict not in ("named", "ambiguous"):
         return verdict
     sets = said_sets(truth, record)
@@ -277,6 +279,27 @@ def outcome(truth: Truth, record: Record, same: Same) -> str:
     if any(_holds(truth, parts, same) for parts in sets):
         return "with others"
     return "one of two" if any(_half(truth, parts, same) for parts in sets) else "wrong"
+
+
+def faults_said(record: Record) -> Parts:
+    """Return the faults of data and input that a record names."""
+    return faults_in(Answer.model_validate(record["answer"])) if "answer" in record else ()
+
+
+def fault_outcome(truth: Truth, found: Parts, same: Same) -> str:
+    """Return which of `OUTCOMES` the faults are that were named, whatever else was."""
+    if _holds(truth, found, same):
+        return "right" if _only(truth, found, same) else "with others"
+    return "other place" if _holds(truth, found, anywhere) else "wrong"
+
+
+def beside(record: Record) -> str:
+    """Return what is said of the structure beside the faults of data and input."""
+    verdict = str(record["verdict"])
+    if verdict not in ("named", "ambiguous"):
+        return verdict.replace("-", " ")
+    causes = Answer.model_validate(record["answer"]).causes
+    return "a cause" if any(cause.side == "model" for cause in causes) else "none"
 
 
 def counts_as_right(truth: Truth, said: str) -> bool:
@@ -312,11 +335,13 @@ class Scored:
         truth: of the case.
         said: one of `OUTCOMES`.
         sure: whether the verdict states a probability of at least `SURE`.
+        beside: what was said of the structure beside faults of data and input.
     """
 
     truth: Truth
     said: str
     sure: bool
+    beside: str = ""
 
 
 def scored(records: Mapping[str, Record], truths: Iterable[Truth], suite: Path) -> list[Scored]:
@@ -332,7 +357,8 @@ def scored(records: Mapping[str, Record], truths: Iterable[Truth], suite: Path) 
         if truth.name in records:
             record = records[truth.name]
             said = outcome(truth, record, same(truth.structure))
-            found.append(Scored(truth, said, (record.get("probability") or 0.0) >= SURE))
+            sure = (record.get("probability") or 0.0) >= SURE
+            found.append(Scored(truth, said, sure, beside(record)))
     return found
 
 
@@ -393,10 +419,22 @@ def half(title: str, cases: Sequence[Scored]) -> str:
     if single:
         effects = outcome_table("effect", lambda truth: truth.causes[0].effect, single)
         parts += ["Single defects by effect:", effects]
+    if faulty := [case for case in cases if case.truth.kind.endswith("-fault")]:
+        parts += ["What is said of the structure beside a fault of data or input:", _beside(faulty)]
     if found:
         ranges = outcome_table("chi-square", reach, found, RANGES)
         parts += ["All that hide something, by the chi-square of the change:", ranges]
     return "\n\n".join(parts)
+
+
+def _beside(cases: Sequence[Scored]) -> str:
+    """Return what is said of the structure where the fault was named, and where it was not."""
+    rows = []
+    for head, chosen in (("named", True), ("not named", False)):
+        own = [case.beside for case in cases if (case.said in ("right", "with others")) is chosen]
+        words = ranked(own, ("none", "a cause", "unknown", "not confirmed"))
+        rows.append({"fault": head, "cases": str(len(own))} | {w: str(own.count(w)) for w in words})
+    return str(pd.DataFrame(rows).fillna("0").to_markdown(index=False, disable_numparse=True))
 
 
 def tables(cases: Sequence[Scored], truths: Sequence[Truth], *, reference: bool = False) -> str:

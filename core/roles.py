@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 Scaling = Literal["linear", "exponential", "compliance"]
 # Of a size: in its unit; a relative change, also in percent with a sign; a part of a whole.
 Wording = Literal["value", "change", "share"]
+# Where something is wrong: in the structure's model, in what was measured, in what was typed in.
+Side = Literal["model", "data", "input"]
 CAPABILITIES = ("shapes", "elements", "geometry", "joints")
 
 
@@ -362,4 +364,30 @@ class Effect(Protocol):
 
     def extend(self, model: Any, place: str, values: Sequence[float]) -> Model:  # noqa: ANN401
         """Return the model with the effect in it."""
+        ...
+
+
+@runtime_checkable
+class Fault(Protocol):
+    """Something that is wrong with the data, or with what was typed in; no cause of physics.
+
+    A diagnosis weighs every suspect beside the physical causes, on the same data.
+    """
+
+    @property
+    def name(self) -> str:
+        """Return a slug such as ``"lost-digit"``; a plain attribute will do."""
+        ...
+
+    @property
+    def side(self) -> Literal["data", "input"]:
+        """Return whether what was measured is wrong, or what was typed in."""
+        ...
+
+    def suspects(
+        self,
+        model: Any,  # noqa: ANN401 - see the module
+        measurement: Any,  # noqa: ANN401
+    ) -> Sequence[Any]:
+        """Return where the fault may sit, each a `femubench.effect.Suspect`."""
         ...

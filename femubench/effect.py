@@ -61,16 +61,19 @@ from femubench.core.effect.places import (
 )
 from femubench.core.effect.reading import Reading
 from femubench.core.effect.sizes import Site, Size
+from femubench.core.effect.suspect import Corrected, Suspect
 from femubench.core.look.modes import Seen
-from femubench.core.roles import Effect
+from femubench.core.roles import Effect, Fault
 from femubench.core.schema.diagnosis import LookWarning
 
 __all__ = [
     "APART",
     "Change",
+    "Corrected",
     "Effect",
     "EffectParameter",
     "ElementOperator",
+    "Fault",
     "FrameEffect",
     "LookWarning",
     "MatrixOperator",
@@ -80,6 +83,7 @@ __all__ = [
     "Seen",
     "Site",
     "Size",
+    "Suspect",
     "Term",
     "barycentric",
     "branch_places",

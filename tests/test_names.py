@@ -25,7 +25,7 @@ ALLOWED = {
 
 def names_of(plugins: Plugins) -> set[str]:
     cases = {case for scenario in plugins.scenarios.values() for case in scenario.cases}
-    return {*plugins.effects, *plugins.strategies, *plugins.scenarios, *cases}
+    return {*plugins.effects, *plugins.faults, *plugins.strategies, *plugins.scenarios, *cases}
 
 
 def found_in(text: str, names: set[str]) -> Iterator[tuple[int, str]]:

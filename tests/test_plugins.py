@@ -294,6 +294,7 @@ def test_objects_with_methods_are_plugins_too(tmp_path: Path) -> None:
         "strategies": ("fine",),
         "scenarios": ("s",),
         "effects": ("unit",),
+        "faults": (),
         "readers": ("unit",),
         "reporters": ("unit",),
     }

@@ -17,7 +17,7 @@ from femubench.core.library.new_package import KINDS, write_package
 from femubench.core.plugin import hookspecs
 from femubench.core.plugin.loader import HOOKS, load_plugins
 from femubench.core.roles import CAPABILITIES
-from femubench.effect import Effect, FrameEffect
+from femubench.effect import Effect, Fault, FrameEffect, Suspect
 from femubench.results import Reporter
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -26,12 +26,14 @@ SECTIONS = {
     "femubench_strategies": "Strategies",
     "femubench_scenarios": "Scenarios",
     "femubench_effects": "Effects",
+    "femubench_faults": "Faults",
     "femubench_readers": "Readers",
     "femubench_reporters": "Reporters",
 }
 ROLES = {
     "Strategies": (Strategy, ("update",), tuple(Strategy.__annotations__)),
     "Effects": (Effect, ("places", "parameters", "extend"), ("name", "summary")),
+    "Faults": (Fault, ("suspects",), ("name", "side")),
     "Readers": (Reader, ("read_matrix", "read_modes"), ("name", "suffixes")),
     "Reporters": (Reporter, ("render",), ("name", "suffix")),
 }
@@ -71,7 +73,11 @@ def test_every_member_of_a_role_is_told_with_its_arguments(heading: str) -> None
 def test_what_goes_in_and_out_is_told() -> None:
     assert signature(FrameEffect.frame) in section("Effects")
     assert all(f"`{need}`" in section("Strategies") for need in CAPABILITIES)
-    for made, heading in ((UpdateResult, "Strategies"), (Scenario, "Scenarios")):
+    for made, heading in (
+        (UpdateResult, "Strategies"),
+        (Scenario, "Scenarios"),
+        (Suspect, "Faults"),
+    ):
         names = ", ".join(field.name for field in fields(made))
         assert f"{made.__name__}({names})`" in section(heading)
 

@@ -234,3 +234,28 @@ def test_records_cut_off_are_left_out(tmp_path: Path) -> None:
     lines = ['{"name": "a", "digest": 1}', '{"name": "a", "digest": 2}', '{"name": "b", "dig']
     file.write_text("\n".join(lines), encoding="utf-8")
     assert sweep.read_records(file) == {"a": {"name": "a", "digest": 2}}
+
+
+def test_a_fault_is_judged_by_the_faults_that_are_named(same: sweep.Same) -> None:
+    """Whatever is said of the structure beside it, which is told apart."""
+    swapped = truth("data-fault", SWAP)
+
+    def record(verdict: str, *sides: tuple[str, str]) -> dict[str, Any]:
+        found = said(verdict, *(word for word, _ in sides))
+        for cause, (_, side) in zip(found["answer"]["causes"], sides, strict=True):
+            cause["side"] = side
+        return found
+
+    fault, other = ("sensors-swapped@sensor:7Z+5Z", "data"), ("sensor-sign@sensor:5Z", "data")
+    cause = ("added-mass@J1", "model")
+    cases = [
+        ("right", "none", record("named", fault)),
+        ("right", "unknown", record("unknown", fault, cause)),
+        ("right", "a cause", record("ambiguous", fault, cause)),
+        ("with others", "none", record("named", fault, other)),
+        ("wrong", "none", record("named", other)),
+        ("unknown", "unknown", record("unknown", cause)),
+        ("other place", "none", record("named", ("sensors-swapped@sensor:1Z+5Z", "data"))),
+    ]
+    for outcome, beside, found in cases:
+        assert (sweep.outcome(swapped, found, same), sweep.beside(found)) == (outcome, beside)

@@ -178,8 +178,9 @@ def frame_of(model: FrameSpec) -> Frame:
     sections = {}
     for name, spec in model.sections.items():
         with at_key("sections", name):
-            sections[name] = section_of(spec, model.plane, model.beam)
-    materials = {name: _made(Material, spec) for name, spec in model.materials.items()}
+            made = section_of(spec, model.plane, model.beam)
+            sections[name] = replace(made, name=name)
+    materials = {n: Material(m.E, m.nu, m.rho, n) for n, m in model.materials.items()}
     own = ("plane", "beam", "rotary_inertia", "bending_mass")
     parts: dict[str, Any] = {key: getattr(model, key) for key in own}
     for key, kind in _PARTS.items():

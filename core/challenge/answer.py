@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 from femubench.core.challenge.sealed import read_small
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import InputError
+from femubench.core.roles import Side
 from femubench.core.schema.diagnosis import Verdict
 
 _LARGEST = 4 * 2**20  # bytes
@@ -42,12 +43,16 @@ class AnswerParameter(_Part):
 
 
 class AnswerCause(_Part):
-    """An effect at a place; ``a + b`` at ``p + q`` for a pair within a group."""
+    """An effect at a place; ``a + b`` at ``p + q`` for a pair within a group.
+
+    A fault of data or input, by its `side`, belongs to every member of a group.
+    """
 
     effect: Word
     place: Word = ""
     parameters: tuple[AnswerParameter, ...] = Field((), max_length=20)
     probability: Probability | None = None
+    side: Side = "model"
     # The name alone, where it says nothing of the place.
     place_probability: Probability | None = None
 
@@ -101,15 +106,18 @@ class Answer(_Part):
         stand together; several causes together claim the smallest of theirs; ``unknown`` and
         ``not-confirmed`` claim none.
         """
-        stated = [cause.claim for cause in self.causes if cause.claim is not None]
+        known = [cause for cause in self.causes if cause.claim is not None]
+        stated = [cause.claim or 0.0 for cause in known if cause.side == "model"]
+        faults = [cause.claim or 0.0 for cause in known if cause.side != "model"]
         if self.verdict == "none":
             return self.nothing
-        if self.verdict not in ("named", "ambiguous") or not stated:
+        if self.verdict not in ("named", "ambiguous") or not known:
             return None
         if self.verdict == "named":
-            return min(stated)
-        named = sum(cause.probability or 0.0 for cause in self.causes)
-        return min(1.0, sum(stated)) if named <= 1.0 + _ROUNDING else max(stated)
+            return min(*stated, *faults, 1.0)
+        named = sum(c.probability or 0.0 for c in self.causes if c.side == "model")
+        whole = min(1.0, sum(stated)) if named <= 1.0 + _ROUNDING else max(stated)
+        return min(whole, *faults, 1.0)
 
 
 def read_answer(path: Path) -> Answer:

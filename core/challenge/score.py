@@ -132,10 +132,17 @@ def _judge_outside(answer: Answer, excess: float) -> Judgement:
 def candidates(answer: Answer) -> tuple[Parts, ...]:
     """Return every set of causes that the answer takes for possible."""
     if answer.verdict == "ambiguous":
-        return tuple(cause.parts for cause in answer.causes)
+        faults = faults_in(answer)
+        return tuple(faults + cause.parts for cause in answer.causes if cause.side == "model")
     if answer.verdict == "named":
         return (tuple(part for cause in answer.causes for part in cause.parts),)
     return ()
+
+
+def faults_in(answer: Answer) -> Parts:
+    """Return the faults of data and input that an answer names, whatever it says of the model."""
+    faults = (cause for cause in answer.causes if cause.side != "model")
+    return tuple(part for cause in faults for part in cause.parts)
 
 
 def _effects(parts: Parts) -> frozenset[str]:
@@ -146,7 +153,7 @@ def _group_size(answer: Answer) -> int:
     """Return the number of different names in the answer's group; 0 without one."""
     if answer.verdict != "ambiguous":
         return 0
-    return len({_effects(cause.parts) for cause in answer.causes})
+    return len({_effects(cause.parts) for cause in answer.causes if cause.side == "model"})
 
 
 def _places_fit(frame: Frame, parts: Parts, causes: Sequence[TrueCause]) -> bool:

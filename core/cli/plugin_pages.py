@@ -11,7 +11,7 @@ from femubench.core.cli.registry import wrapped
 from femubench.core.plugin.loader import LoadedPlugin, Plugins
 from femubench.core.plugin.validation import CHECKS, KINDS
 from femubench.core.plugin.variants import options_of
-from femubench.core.roles import Effect, Reader, Reporter, Scenario, Strategy, declared
+from femubench.core.roles import Effect, Fault, Reader, Reporter, Scenario, Strategy, declared
 
 Row = tuple[str, str]
 
@@ -113,6 +113,11 @@ def _effect(effect: Effect) -> Iterator[Row]:
     yield "run", f"bench diagnose CASE --effects {effect.name}"
 
 
+def _fault(fault: Fault) -> Iterator[Row]:
+    yield "wrong", {"data": "what was measured", "input": "what was typed in"}[fault.side]
+    yield "run", "bench diagnose CASE"
+
+
 def _reader(reader: Reader) -> Iterator[Row]:
     yield "suffixes", ", ".join(reader.suffixes)
     yield (
@@ -130,6 +135,7 @@ _ROWS: dict[str, Callable[..., Iterator[Row]]] = {
     "strategies": _strategy,
     "scenarios": _scenario,
     "effects": _effect,
+    "faults": _fault,
     "readers": _reader,
     "reporters": _reporter,
 }

@@ -11,6 +11,7 @@ import numpy as np
 
 from femubench.core.advise.advice import advise
 from femubench.core.case.case import Case
+from femubench.core.diagnosis.faults import fault_causes, mended_case, with_faults
 from femubench.core.diagnosis.proof import (
     Unseen,
     borne_out,
@@ -35,6 +36,7 @@ from femubench.core.diagnosis.words import sentence_of
 from femubench.core.fem.model import Model
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.extended_model import departure
+from femubench.core.inference.fault_search import Depth, inquire
 from femubench.core.inference.model_error import WIDTHS
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.search import adequacy
@@ -43,8 +45,9 @@ from femubench.core.look.localisation import locate
 from femubench.core.look.look import look
 from femubench.core.look.modes import Seen
 from femubench.core.look.readings import look_at_band
-from femubench.core.plugin.loader import registered_effects
-from femubench.core.roles import Effect
+from femubench.core.modal.measurement import Measurement
+from femubench.core.plugin.loader import registered_effects, registered_faults
+from femubench.core.roles import Effect, Fault
 from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning
 from femubench.core.score.scoring import score_model
 from femubench.core.ties import in_order
@@ -83,6 +86,7 @@ def diagnose(
     case: Case,
     effects: Iterable[Effect] | None = None,
     *,
+    faults: Iterable[Fault] | None = None,
     pairs: bool = True,
     tolerance: float | None = None,
 ) -> Diagnosis:
@@ -93,6 +97,7 @@ def diagnose(
     Arguments:
         case: with at least one used mode.
         effects: what may be missing; all registered effects by default.
+        faults: what may be wrong with data or input; all registered faults by default.
         pairs: whether more than one cause is sought.
         tolerance: standard deviation of every element's relative scatter; the case's by default.
 
@@ -105,30 +110,38 @@ def diagnose(
     scatter = case.tolerance if tolerance is None else tolerance
     registered = registered_effects()
     known = registered if effects is None else tuple(effects)
-    examination = examine(
-        case.model,
-        used,
-        known,
-        tolerance=scatter,
-        pairs=pairs,
-        reference=case.used_reference,
-        width=case.error_width,
-        beam=case.beam_share,
-    )
-    proof = _proof(case, examination, known)
+    wrong = registered_faults() if faults is None else tuple(faults)
+
+    def search(model: Model, measurement: Measurement, depth: Depth) -> Examination:
+        return examine(
+            model,
+            measurement,
+            () if depth == "nothing" else known,
+            tolerance=scatter,
+            pairs=pairs and depth == "several",
+            reference=case.used_reference,
+            width=case.error_width,
+            beam=case.beam_share,
+        )
+
+    inquiry = inquire(case.model, used, wrong, search)
+    examination, given = inquiry.examination, case
+    case = mended_case(case, inquiry.mended)
+    proof = _proof(case, examination, known, given)
     leader = proof.leader
     adequate = adequacy(leader.fit.state, leader.unknowns)
     decision = decide(examination.posterior, adequate, leader, proof.log_bayes, proof.confirmed)
     # The look is no part of the search: whatever is sought, every effect may have its say.
     all_known = {effect.name: effect for effect in (*registered, *known)}
-    looks = look(case.model, used, effects=all_known.values())
+    looks = look(given.model, used, effects=all_known.values())
     if case.band is not None:
         # All modes that were found, used or not: what is not among them is not in the structure.
         looks += tuple(look_at_band(Seen(case.model, case.measurement), case.band))
-    return _written(case, examination, decision, adequate, proof, looks, begin)
+    told = fault_causes(inquiry.mended)
+    return _written(case, examination, decision, adequate, proof, looks, told, begin)
 
 
-def _proof(case: Case, examination: Examination, effects: Sequence[Effect]) -> _Proof:
+def _proof(case: Case, examination: Examination, effects: Sequence[Effect], given: Case) -> _Proof:
     best = examination.best
     model = extended_by(case.model, best)
     unseen = unseen_of(case, examination, best, model)
@@ -143,7 +156,7 @@ def _proof(case: Case, examination: Examination, effects: Sequence[Effect]) -> _
         crossed = left_out(examination, effects)
         unseen = (crossed,)
         confirmed = crossed.confirms(len(best.parts))
-    gain = gain_of(score_model(case, case.model), score_model(case, model), crossed)
+    gain = gain_of(score_model(given, given.model), score_model(case, model), crossed)
     return _Proof(best, model, unseen, gain, crossed is not None, confirmed)
 
 
@@ -154,6 +167,7 @@ def _written(
     adequate: float,
     proof: _Proof,
     looks: tuple[LookWarning, ...],
+    faults: Sequence[Cause],
     begin: float,
 ) -> Diagnosis:
     best, posterior = proof.leader, examination.posterior
@@ -172,11 +186,14 @@ def _written(
     used = case.measurement.select(case.used)
     return Diagnosis(
         case=case.name,
-        verdict=decision.verdict,
-        sentence=sentence_of(
-            decision, causes, options, top, proof.gain, reference=case.reference is not None
+        verdict="named" if faults and decision.verdict == "none" else decision.verdict,
+        sentence=with_faults(
+            sentence_of(
+                decision, causes, options, top, proof.gain, reference=case.reference is not None
+            ),
+            faults,
         ),
-        causes=tuple(causes),
+        causes=(*faults, *causes),
         rivals=rivals_of(examination, best if named else None, group),
         reason=_reason(decision),
         advice=_advice(examination, group),

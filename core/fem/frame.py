@@ -26,11 +26,12 @@ ACTIVE: Mapping[Plane, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Material:
-    """Isotropic linear material: E in Pa, Poisson's ratio, density in kg/m3."""
+    """Isotropic linear material: E in Pa, Poisson's ratio, density in kg/m3, name in its case."""
 
     E: float
     nu: float
     rho: float
+    name: str = field(default="", compare=False)
 
     @property
     def G(self) -> float:  # noqa: N802 - the field's symbol

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -26,6 +26,7 @@ class Section:
         width: size along y in m; None where the section was given as numbers.
         height: size along z in m; None likewise.
         shape: the name of the shape; empty for numbers.
+        name: in its case; sections that differ in it alone are the same.
     """
 
     A: float
@@ -37,6 +38,7 @@ class Section:
     width: float | None = None
     height: float | None = None
     shape: str = ""
+    name: str = field(default="", compare=False)
 
 
 def constant_kappa(value: float) -> ShearCoefficients:

@@ -85,6 +85,16 @@ class State:
         """Return chi-square plus the share of the prior."""
         return self.chi2 + float(self.x @ self.x)
 
+    @cached_property
+    def predicted(self) -> tuple[FloatArray, FloatArray]:
+        """Return frequencies with the correction for the mesh, (1, q), and readings of modes."""
+        return _predicted(self.problem, self.eigenvalues, self.vectors)
+
+    def against(self, data: Data) -> FloatArray:
+        """Return the residuals of other data on the same modes and sensors, (n_data,)."""
+        raw, _ = _compared(data, *self.predicted, self.mass)
+        return raw + self.problem.offset
+
     @property
     def frequencies(self) -> FloatArray:
         """Return all predicted frequencies in Hz, without the correction for the mesh."""
@@ -156,11 +166,27 @@ def state_at(problem: Problem, parts: Sequence[Projection], x: FloatArray) -> St
     for group, turn in data.turns(hertz, seen, problem.space.zero) if data.closeness else ():
         vectors[:, group] = vectors[:, group] @ turn
         seen[:, group] = seen[:, group] @ turn
-    hertz, seen = data.predicted(hertz[None], seen[None], problem.space.zero)
+    raw, partner = _compared(problem.data, *_predicted(problem, values, vectors), weight)
+    return State(problem, tuple(parts), x, values, vectors, partner, weight, raw + problem.offset)
+
+
+def _predicted(
+    problem: Problem, values: FloatArray, vectors: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the frequencies and readings of enough modes, (1, q) and (1, n_sensors, q)."""
+    space, data = problem.space, problem.data
+    count = min(len(values), space.rigid + 2 * len(data.measurement) + 8)
+    seen = space.padded_readings(len(vectors)) @ vectors[:, :count]
+    return data.predicted(signed_hz(values[None, :count]), seen[None], space.zero)
+
+
+def _compared(
+    data: Data, hertz: FloatArray, seen: FloatArray, mass: float
+) -> tuple[FloatArray, IntArray]:
+    """Return the residuals of data, (n_data,), and the partners of their modes, (m,)."""
     partner = data.pair(hertz, seen)[0]
-    raw = data.residual(hertz[:, partner], seen[:, :, partner], np.array([weight]))[0]
-    raw = raw + problem.offset
-    return State(problem, tuple(parts), x, values, vectors, partner, weight, raw)
+    raw = data.residual(hertz[:, partner], seen[:, :, partner], np.array([mass]))
+    return np.asarray(raw[0]), partner
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from femubench.core.plugin.markers import hookspec
 
 if TYPE_CHECKING:
-    from femubench.core.roles import Effect, Reader, Reporter, Scenario, Strategy
+    from femubench.core.roles import Effect, Fault, Reader, Reporter, Scenario, Strategy
 
 # Hook specifications have no body: pluggy reads their signature alone.
 # mypy: disable-error-code="empty-body"
@@ -27,6 +27,11 @@ def femubench_scenarios() -> Iterable[Scenario]:
 @hookspec
 def femubench_effects() -> Iterable[Effect | type[Effect]]:
     """Return the physical causes that the plugin adds to the diagnosis."""
+
+
+@hookspec
+def femubench_faults() -> Iterable[Fault | type[Fault]]:
+    """Return what may be wrong with data or with what was typed in."""
 
 
 @hookspec

@@ -23,7 +23,7 @@ from femubench.core.errors import PluginError
 from femubench.core.plugin import hookspecs
 from femubench.core.plugin.markers import PROJECT
 from femubench.core.plugin.validation import CHECKS, did_you_mean
-from femubench.core.roles import Effect, Reader, Reporter, Scenario, Strategy
+from femubench.core.roles import Effect, Fault, Reader, Reporter, Scenario, Strategy
 from femubench.core.version import __version__
 
 PREFIX = f"{PROJECT}_"
@@ -86,6 +86,7 @@ class Plugins:
     strategies: Mapping[str, Strategy] = field(default_factory=dict)
     scenarios: Mapping[str, Scenario] = field(default_factory=dict)
     effects: Mapping[str, Effect] = field(default_factory=dict)
+    faults: Mapping[str, Fault] = field(default_factory=dict)
     readers: Mapping[str, Reader] = field(default_factory=dict)
     reporters: Mapping[str, Reporter] = field(default_factory=dict)
     loaded: tuple[LoadedPlugin, ...] = ()
@@ -170,6 +171,11 @@ def registered_effects() -> tuple[Effect, ...]:
         True
     """
     return tuple(load_plugins().effects.values())
+
+
+def registered_faults() -> tuple[Fault, ...]:
+    """Return every fault of data or input that plugins offer."""
+    return tuple(load_plugins().faults.values())
 
 
 class _HookError(PluginError):

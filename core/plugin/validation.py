@@ -13,6 +13,7 @@ from femubench.core.errors import PluginError, UnknownNameError
 from femubench.core.roles import (
     CAPABILITIES,
     Effect,
+    Fault,
     Reader,
     Reporter,
     Scenario,
@@ -115,10 +116,24 @@ def check_effect(offered: object) -> Effect:
     return effect
 
 
+def check_fault(offered: object) -> Fault:
+    """Return a fault of the data or of what was typed in.
+
+    Raises:
+        PluginError: when it lacks its method, a name or its side.
+    """
+    fault: Fault = _filled(offered, "Fault", "suspects")
+    if getattr(fault, "side", None) not in ("data", "input"):
+        given = getattr(fault, "side", None)
+        raise PluginError(f"{_label(offered)}: side is {given!r}, neither 'data' nor 'input'")
+    return fault
+
+
 CHECKS: Mapping[str, Callable[[object], Any]] = {
     "strategies": check_strategy,
     "scenarios": check_scenario,
     "effects": check_effect,
+    "faults": check_fault,
     "readers": check_reader,
     "reporters": check_reporter,
 }
@@ -128,6 +143,7 @@ CHECKS: Mapping[str, Callable[[object], Any]] = {
 KINDS = {
     "strategy": "strategies",
     "effect": "effects",
+    "fault": "faults",
     "reader": "readers",
     "scenario": "scenarios",
     "reporter": "reporters",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from femubench.core.roles import Wording
+from femubench.core.roles import Side, Wording
 
 Verdict = Literal["named", "none", "unknown", "ambiguous", "not-confirmed"]
 
@@ -39,6 +39,7 @@ class Cause:
             more together.
         mirrors: the other places that fit exactly as well, as images of this one by a symmetry
             of the structure that the data do not break.
+        side: whether the model lacks it, or the data or what was typed in are wrong there.
     """
 
     effect: str
@@ -49,6 +50,7 @@ class Cause:
     place_probability: float = float("nan")
     places: tuple[tuple[str, float], ...] = ()
     mirrors: tuple[str, ...] = ()
+    side: Side = "model"
 
 
 @dataclass(frozen=True)

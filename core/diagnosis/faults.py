@@ -1,0 +1,60 @@
+"""Faults of data and input in a diagnosis: as causes, as words, and the case without them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from femubench.core.case.case import Case
+from femubench.core.diagnosis.words import listed, percent
+from femubench.core.inference.fault_search import Charge, Mended
+from femubench.core.schema.diagnosis import Cause, CauseParameter
+
+_STEP = 1e-4
+
+
+def mended_case(case: Case, mended: Iterable[Mended]) -> Case:
+    """Return a case with its faults mended, or the datum discounted that is wrong.
+
+    Design changes keep their own data: whether those have the fault too is not known.
+    """
+    for fault in mended:
+        charge = replace(fault.charge, model=case.model, measurement=case.measurement)
+        model, measurement = charge.mended
+        case = replace(case, model=model, measurement=measurement)
+    return case
+
+
+def fault_causes(mended: Iterable[Mended]) -> list[Cause]:
+    """Return faults as causes, on the side of the data or of the input."""
+    return [
+        Cause(
+            fault.charge.fault.name,
+            fault.charge.suspect.place,
+            tuple(_parameters(fault.charge)),
+            fault.probability,
+            fault.charge.suspect.words,
+            side=fault.charge.fault.side,
+        )
+        for fault in mended
+    ]
+
+
+def _parameters(charge: Charge) -> list[CauseParameter]:
+    known = [CauseParameter(name, value, 0.0, "") for name, value in charge.suspect.known.items()]
+    p = charge.suspect.parameter
+    if p is None:
+        return known
+    low, value, high = (float(p.value(np.array(charge.x + step))) for step in (-_STEP, 0.0, _STEP))
+    std = charge.std * abs(high - low) / (2.0 * _STEP)
+    return [*known, CauseParameter(p.name, value, std, p.unit, wording=p.wording)]
+
+
+def with_faults(sentence: str, faults: Sequence[Cause]) -> str:
+    """Return the sentence of a verdict with the faults that were mended before it."""
+    if not faults:
+        return sentence
+    told = listed(f"{cause.summary} (probability {percent(cause.probability)})" for cause in faults)
+    return f"{told[0].upper()}{told[1:]}. With that mended: {sentence[0].lower()}{sentence[1:]}"

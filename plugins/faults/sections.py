@@ -1,0 +1,86 @@
+"""Sections of a frame, made anew with other sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from femubench import Model
+from femubench.fem import Frame, Section, rectangular_tube, round_tube, solid_rectangle
+
+_SAME = 1e-6
+_SHAPES = ("rectangular-tube", "round-tube", "solid-rectangle")
+_CONSTANTS = ("A", "Iy", "Iz", "J", "Jp")
+
+
+def sections_of(frame: Frame) -> tuple[Section, ...]:
+    """Return the sections that members have, each name once."""
+    named = {(member.section.name, member.section): member.section for member in frame.members}
+    return tuple(named.values())
+
+
+def sizes_of(section: Section) -> dict[str, float]:
+    """Return the sizes of a section with a shape as they may have been typed, in m."""
+    width, height = section.width, section.height
+    if width is None or height is None or section.shape not in _SHAPES:
+        return {}
+    if width == height:
+        return {"width": width}
+    return {"width": width, "height": height}
+
+
+def resized(section: Section, sizes: Mapping[str, float]) -> Section | None:
+    """Return a section with other sizes, and what was typed in beside its shape as it was.
+
+    None for one without a shape, or with a wall too thick for the sizes. A square or round one
+    has one size.
+
+    Arguments:
+        section: with a shape.
+        sizes: of ``width``, ``height`` and ``wall`` those that differ, m.
+    """
+    old = sizes_of(section)
+    if not old:
+        return None
+    new = {"wall": wall_of(section), **old, **sizes}
+    width, height = new["width"], new.get("height", new["width"])
+    if section.shape == "round-tube" and new["wall"] > 0.499 * old["width"]:
+        new["wall"] = 0.5 * width  # solid
+    if new["wall"] > 0.5 * min(width, height):
+        return None
+    own = _made(section.shape, old["width"], old.get("height", old["width"]), wall_of(section))
+    typed = {
+        key: getattr(section, key)
+        for key in _CONSTANTS
+        if not np.isclose(getattr(section, key), getattr(own, key), rtol=_SAME, atol=0.0)
+    }
+    return replace(_made(section.shape, width, height, new["wall"]), **typed, name=section.name)
+
+
+def wall_of(section: Section) -> float:
+    """Return the wall that follows from the area of a tube, 0 for what is solid."""
+    width, height = section.width or 0.0, section.height or 0.0
+    if section.shape == "rectangular-tube":
+        root = max((width + height) ** 2 - 4.0 * section.A, 0.0)
+        return float(width + height - np.sqrt(root)) / 4.0
+    if section.shape == "round-tube":
+        return float(width - np.sqrt(max(width**2 - 4.0 * section.A / np.pi, 0.0))) / 2.0
+    return 0.0
+
+
+def _made(shape: str, width: float, height: float, wall: float) -> Section:
+    if shape == "rectangular-tube":
+        return rectangular_tube(width, height, wall)
+    return round_tube(width, wall) if shape == "round-tube" else solid_rectangle(width, height)
+
+
+def with_section(model: Model, old: Section, new: Section) -> Model:
+    """Return the model with one section in the place of another one of the same name."""
+    structure = model.frame_structure
+    members = tuple(
+        replace(m, section=new) if (m.section, m.section.name) == (old, old.name) else m
+        for m in structure.frame.members
+    )
+    return Model.of(structure.rebuilt(replace(structure.frame, members=members)))
