@@ -116,7 +116,7 @@ def diagnose(
         return examine(
             model,
             measurement,
-            () if depth == "nothing" else known,
+            known,
             tolerance=scatter,
             pairs=pairs and depth == "several",
             reference=case.used_reference,
@@ -124,7 +124,14 @@ def diagnose(
             beam=case.beam_share,
         )
 
-    inquiry = inquire(case.model, used, wrong, search)
+    inquiry = inquire(
+        case.model,
+        used,
+        wrong,
+        search,
+        reference=case.used_reference,
+        width=case.error_width or 1.0,
+    )
     examination, given = inquiry.examination, case
     case = mended_case(case, inquiry.mended)
     proof = _proof(case, examination, known, given)

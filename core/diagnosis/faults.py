@@ -9,7 +9,7 @@ import numpy as np
 
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.words import listed, percent
-from femubench.core.inference.fault_search import Charge, Mended
+from femubench.core.inference.charge import Charge, Mended
 from femubench.core.schema.diagnosis import Cause, CauseParameter
 
 _STEP = 1e-4

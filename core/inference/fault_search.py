@@ -1,9 +1,14 @@
 """Faults of the data and of what was typed in, weighed beside physical causes on the same data.
 
-A suspect is first tried on explanations that are known: their predictions stay, their sizes are
-free to first order. What promises enough is mended, and the physical causes are sought anew. All
-are compared by the density of what was measured, as it was measured: where mending multiplies a
-datum, times that factor; where it widens a deviation, over that deviation.
+A beam model gets much wrong of a real structure, but a sensor with the wrong sign is like nothing
+that it gets wrong. So suspects are tried on the model as drawn, with its own error as noise: first
+all of them at the scales of model error that suit the data as they are, then those that promise
+something at scales of their own. What is more probable than no fault is mended, the physical causes
+are sought anew, and all is compared by the density of what was measured, as it was measured: where
+mending multiplies a datum, times that factor; where it widens a deviation, over that deviation.
+
+Source: Kennedy & O'Hagan (2001) for the model error; Box & Tiao (1968) for a datum that is
+discounted.
 """
 
 from __future__ import annotations
@@ -18,13 +23,14 @@ import numpy as np
 import scipy.linalg as la
 from scipy.optimize import minimize_scalar
 from scipy.special import logsumexp
+from threadpoolctl import threadpool_limits
 
-from femubench.core.effect.suspect import Corrected, Suspect
 from femubench.core.errors import FemubenchError
 from femubench.core.fem.model import Model
-from femubench.core.inference.examine import Examination
+from femubench.core.inference.charge import Charge, Mended, charges_of
+from femubench.core.inference.examine import Examination, before_of, model_error_of, posed
 from femubench.core.inference.extended_model import raw_residual
-from femubench.core.inference.fit import state_at
+from femubench.core.inference.fit import State, log_evidence, state_at
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.residuals import Data
@@ -33,103 +39,22 @@ from femubench.core.modal.eigen import DENSE_LIMIT
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Fault
 from femubench.core.ties import in_order
-from femubench.core.typing import BoolArray, FloatArray
+from femubench.core.typing import FloatArray
 
-# That data or input are wrong somewhere, before any datum is seen: over kinds, then suspects.
-PRIOR_OF_FAULT = 0.1
-_SLACK = 3.0  # nats behind the best explanation within which a suspect is worth a search
-_NAMES, _TRIED, _MOST, _SOLVED = 5, 2, 3, 20
-_MOSTLY, _PART, _DOMINANT, _FAR = 0.5, 0.3, 0.7, 0.1  # shares of chi-square, of what is promised
-_CLEARLY, _SHARE = 20.0, 0.1  # nats, and of half chi-square, that mending what was typed in gains
-_ADEQUATE, _GOOD, _UNLIKELY, _GROSS = 1e-3, 0.05, 3.0, 0.1
-_FREE = 1e3  # deviation of the scale of a shape, in those of the data
-# Of a coordinate: for a slope, for a curvature, and what counts as at a bound.
-_STEP, _CURVED, _EDGE = 1e-4, 0.02, 0.01
+_SURE = 0.9  # probability from which a fault is mended
+_ODDS = log(_SURE / (1.0 - _SURE))
+_MOST, _TRIED = 3, 2  # faults that are mended, and tried beside causes each time
+# Of each kind so many suspects are tried at scales of their own, if they promise so many nats.
+_OF_A_KIND, _PROMISING = 3, -3.0
+_CLEARLY = 20.0  # nats by which a fault may lag behind causes, and still be tried with them
+_SOLVED = 20  # suspects of what was typed in that are solved of a large model
+_LITTLE = 0.3  # share of the squared misfit that is left, where a fault is most of it
+_FIT, _GROSS = 0.05, 0.05
+_GRID, _EDGE, _CURVED = 13, 0.02, 0.02
 
-Depth = Literal["nothing", "one", "several"]
+Depth = Literal["one", "several"]
+Weighed = list[tuple[Charge, float]]
 Examine = Callable[[Model, Measurement, Depth], Examination]
-
-
-@dataclass(frozen=True, eq=False)
-class Charge:
-    """A suspect, and the model and the data that it was found in.
-
-    Arguments:
-        fault: the kind.
-        suspect: the place.
-        model, measurement: as they are.
-        log_prior: ln of the odds of this fault here, against no fault at all.
-        x: coordinate of its parameter, 0 without one.
-        std: deviation of the coordinate.
-        score: ln of prior times evidence, as known explanations promise it.
-    """
-
-    fault: Fault
-    suspect: Suspect
-    model: Model
-    measurement: Measurement
-    log_prior: float
-    x: float = 0.0
-    std: float = 0.0
-    score: float = -np.inf
-
-    def corrected(self, x: float) -> Corrected:
-        """Return model and data as they are right at a coordinate of the parameter."""
-        parameter = self.suspect.parameter
-        value = 0.0 if parameter is None else float(parameter.value(np.array(x)))
-        return self.suspect.corrected(self.model, self.measurement, value)
-
-    @cached_property
-    def rows(self) -> BoolArray:
-        """Return which data it concerns: frequencies, then readings by mode, (m + m n_sensors,)."""
-        _, other = self.corrected(1.0)
-        parts = []
-        for names in (("frequencies", "frequency_std"), ("shapes", "shape_std")):
-            pairs = [(getattr(self.measurement, name), getattr(other, name)) for name in names]
-            differ = [(one != two) & ~(np.isnan(one) & np.isnan(two)) for one, two in pairs]
-            parts.append(np.logical_or(*differ).T.ravel())
-        return np.concatenate(parts)
-
-    @cached_property
-    def reweighs(self) -> bool:
-        """Tell whether it is a matter of deviations alone."""
-        if self.fault.side == "input":
-            return False
-        _, other = self.corrected(1.0)
-        names = ("frequencies", "shapes")
-        pairs = [(getattr(self.measurement, name), getattr(other, name)) for name in names]
-        return all(np.array_equal(one, two, equal_nan=True) for one, two in pairs)
-
-    @property
-    def single(self) -> bool:
-        """Tell whether a parameter is to be found from a single datum."""
-        return self.suspect.parameter is not None and int(self.rows.sum()) == 1
-
-    @property
-    def mended(self) -> Corrected:
-        """Return model and data without the fault.
-
-        A single datum cannot tell its own error: it is discounted, by what the error may be.
-        """
-        if not self.single:
-            return self.corrected(self.x)
-        (_, less), (_, more) = self.corrected(-_STEP), self.corrected(_STEP)
-        wide = {
-            std: np.hypot(
-                getattr(self.measurement, std),
-                np.nan_to_num(getattr(more, name) - getattr(less, name)) / (2.0 * _STEP),
-            )
-            for name, std in (("frequencies", "frequency_std"), ("shapes", "shape_std"))
-        }
-        return self.model, replace(self.measurement, **wide)
-
-
-@dataclass(frozen=True)
-class Mended:
-    """A fault that was found, with the probability that it is this one at this place."""
-
-    charge: Charge
-    probability: float
 
 
 @dataclass(frozen=True)
@@ -141,7 +66,13 @@ class Inquiry:
 
 
 def inquire(
-    model: Model, measurement: Measurement, faults: Iterable[Fault], examine: Examine
+    model: Model,
+    measurement: Measurement,
+    faults: Iterable[Fault],
+    examine: Examine,
+    *,
+    reference: Measurement | None = None,
+    width: float = 1.0,
 ) -> Inquiry:
     """Weigh explanations of data by physical causes, and by faults beside them.
 
@@ -150,6 +81,8 @@ def inquire(
         measurement: the used modes and nothing else.
         faults: what may be wrong with either.
         examine: from model, data and how many causes are sought to their examination.
+        reference: modes of the structure as it was, where they are known.
+        width: factor on the widths of the model error beside which faults are sought.
 
     Raises:
         NotApplicable: when a used frequency has no standard deviation.
@@ -158,208 +91,285 @@ def inquire(
     known = tuple(faults)
     mended: list[Mended] = []
     model, measurement = _possible(model, measurement, known, mended)
-    if not known:
-        return Inquiry(examine(model, measurement, "several"))
-    file = _File(model, measurement, known, examine)
-    # The long search for several causes of data that are wrong is put off.
-    depth: Depth = "one" if file.promised else "several"
-    while len(mended) < _MOST:
-        found = file.without_fault(depth)
-        if found is not None:
-            file, fault = found
-            mended.append(fault)
-        elif depth == "several":
+    now = _Drawn(model, measurement, reference, width)
+    ranked: Weighed = []
+    while known and len(mended) < _MOST:
+        ranked = _weighed(now, charges_of(now.model, now.measurement, known))
+        found = _definite(now, ranked, examine)
+        if found is None:
             break
-        depth = "several"
-    return Inquiry(file.seen("several"), tuple(mended))
+        mended.append(found)
+        now = now.mended(found.charge)
+    seen = examine(now.model, now.measurement, "several")
+    # Other deviations would excuse whatever is wrong: they are the last resort.
+    other = _reweighed(now, [pair for pair in ranked if pair[0].reweighs], seen, examine)
+    return Inquiry(seen, tuple(mended)) if other is None else Inquiry(other[0], (*mended, other[1]))
 
 
-class _File:
-    """All suspects in a model and its data, and what was seen of them.
+def _definite(now: _Drawn, ranked: Weighed, examine: Examine) -> Mended | None:
+    """Return the most probable fault, but for deviations; None where no fault is as probable."""
+    pairs = [(c, g) for c, g in ranked if not c.reweighs and now.mostly(c)]
+    if max((gain for _, gain in pairs), default=-np.inf) < _ODDS:
+        return None
+    seen = examine(now.model, now.measurement, "one")
+    without = _with_causes(seen, now.log_density, now.measurement)
+    sound = seen.adequacy > _FIT and len(seen.best.parts) < 2
+    least = without - now.log_density - (0.0 if sound else _CLEARLY)
+    tried = [(c, gain) for c, gain in pairs if gain > least][:_TRIED]
+    densities = [_density(now, *pair, examine(*pair[0].mended, "one")) for pair in tried]
+    if not tried:
+        return None
+    best = int(np.argmax(densities))
+    rest = [now.log_density + gain for _, gain in pairs[len(tried) :]]
+    probability = exp(densities[best] - float(logsumexp([without, *densities, *rest])))
+    return Mended(now.estimated(tried[best][0]), probability) if probability > _SURE else None
+
+
+def _reweighed(
+    now: _Drawn, ranked: Weighed, seen: Examination, examine: Examine
+) -> tuple[Examination, Mended] | None:
+    """Return the examination with other deviations, if those are more probable than the stated."""
+    without = _with_causes(seen, now.log_density, now.measurement)
+    best = now.beside(seen.best)
+    found = [(charge, now.log_density + gain) for charge, gain in ranked]
+    found += [
+        (charge, log_density(seen, now.measurement) + gain)
+        for charge, gain in (best.screened(charge) for charge, _ in ranked)
+    ]
+    charge, promise = max(found, key=lambda pair: pair[1], default=(None, -np.inf))
+    if charge is None or promise < without + _ODDS:
+        return None
+    mended = examine(*charge.mended, "several")
+    density = _density(now, charge, promise - now.log_density, mended)
+    probability = 1.0 / (1.0 + exp(min(without - density, 700.0)))
+    if probability <= _SURE:
+        return None
+    return mended, Mended(now.beside(mended.best).estimated(charge), probability)
+
+
+def _density(now: _Drawn, charge: Charge, gain: float, mended: Examination) -> float:
+    """Return ln of prior times density with a fault mended.
+
+    Arguments:
+        gain: under model error alone, with the prior, in nats above no fault.
+        mended: the examination without the fault.
+    """
+    prior = now.prior(charge)
+    return _with_causes(mended, now.log_density + gain - prior, now.measurement) + prior
+
+
+def _with_causes(seen: Examination, plain: float, measured: Measurement) -> float:
+    """Return ln of the density of data with physical causes, or with model error alone.
+
+    Arguments:
+        seen: the examination.
+        plain: ln of the density under model error, without causes.
+        measured: the data as they were measured.
+    """
+    return float(np.logaddexp(log_density(seen, measured), plain))
+
+
+class _Drawn:
+    """A model as drawn beside its data, what a beam model gets wrong as noise.
 
     Arguments:
         model, measurement: with the faults mended that were found before.
-        faults, examine: as in `inquire`.
+        reference, width: as in `inquire`.
+        basis: modes of the model, where they are known.
     """
 
     def __init__(
-        self, model: Model, measurement: Measurement, faults: Sequence[Fault], examine: Examine
+        self,
+        model: Model,
+        measurement: Measurement,
+        reference: Measurement | None,
+        width: float,
+        basis: Basis | None = None,
     ) -> None:
         self.model, self.measurement = model, measurement
-        self.faults, self.examine = faults, examine
-        charges = _charges(model, measurement, faults)
-        self.data = [charge for charge in charges if charge.fault.side == "data"]
-        self.input = [charge for charge in charges if charge.fault.side == "input"]
-        self._seen: dict[Depth, Examination] = {}
-        self._mended: dict[tuple[str, str], _File] = {}
-
-    def seen(self, depth: Depth) -> Examination:
-        """Return the examination of model and data as they are."""
-        if depth not in self._seen:
-            self._seen[depth] = self.examine(self.model, self.measurement, depth)
-        return self._seen[depth]
-
-    def mended(self, charge: Charge) -> _File:
-        """Return the file without a fault."""
-        key = charge.suspect.place, charge.suspect.words
-        if key not in self._mended:
-            self._mended[key] = _File(*charge.mended, self.faults, self.examine)
-        return self._mended[key]
+        self.reference, self.width = reference, width
+        self.basis = Basis.of(model, measurement) if basis is None else basis
 
     @cached_property
-    def gains(self) -> list[tuple[Charge, float]]:
-        """Return what was typed in with what mending it gains on the model as drawn, in nats."""
-        bare = self.seen("nothing")
-        state = bare.posterior.explanations[0].fit.state
-        most = _SOLVED if self.model.size > DENSE_LIMIT else len(self.input)
-        found = []
-        for charge in self.input[:most]:
-            try:
-                raw = raw_residual(bare.problem, charge.mended[0])
-            except (FemubenchError, la.LinAlgError):
-                continue
-            white = state.residual + state.problem.noise.whiten(raw - state.raw)
-            found.append((charge, 0.5 * (state.chi2 - float(white @ white))))
-        return found
+    def state(self) -> State:
+        """Return the prediction, and the noise with scales that suit these data best."""
+        problem, _ = posed(self.model, self.measurement, (), 0.0, self.basis)
+        before = None if self.reference is None else before_of(problem, self.reference)
+        error = model_error_of(problem, self.basis, before, self.width, 0.0)
+        found = state_at(problem, (), np.zeros(0))
+        noise = error.noise(error.fitted(found))
+        return replace(found, problem=replace(problem, noise=noise))
 
     @cached_property
-    def gross(self) -> bool:
-        """Tell whether the model as drawn misses a frequency by more than causes explain."""
-        state = self.seen("nothing").posterior.explanations[0].fit.state
-        m = self.measurement
-        error = state.raw[: len(m)] * m.frequency_std / m.frequencies
-        return bool((np.abs(error) > _GROSS).any())
+    def log_density(self) -> float:
+        """Return ln of the density of the data, in the units that they were measured in."""
+        data = self.state.problem.data
+        return log_evidence(self.state) - float(np.log(std_of(data)).sum())
 
-    @property
-    def promised(self) -> bool:
-        """Tell whether a single fault mends most of what the model as drawn gets wrong."""
-        before = self.seen("nothing").posterior.explanations[0]
-        if self.seen("nothing").adequacy > _ADEQUATE:
-            return False
-        scores = (c.score for c in self.promising("nothing") if not c.reweighs)
-        best = max(scores, default=-np.inf)
-        return best - before.log_weight > max(_CLEARLY, _MOSTLY * 0.5 * before.chi2)
+    def beside(self, explanation: Explanation) -> _Drawn:
+        """Return the same with causes in the model, whose sizes are free to first order."""
+        other = _Drawn(self.model, self.measurement, self.reference, self.width, self.basis)
+        state = explanation.fit.state
+        factor, moved = state.problem.noise.factor, state.slopes @ state.x
+        total = factor @ factor.T + state.slopes @ state.slopes.T
+        noise = replace(state.problem.noise, factor=np.asarray(la.cholesky(total, lower=True)))
+        problem = replace(state.problem, noise=noise, offset=state.problem.offset + moved)
+        other.state = replace(state, problem=problem, raw=state.raw + moved)
+        return other
 
-    def promising(self, depth: Depth) -> list[Charge]:
-        """Return the suspects that are worth a search, best first."""
-        now = self.seen(depth)
-        explanations = now.posterior.explanations
-        good = now.adequacy > _GOOD and len(now.best.parts) < 2
-        plain = next(e for e in explanations if not e.parts and not e.base.parts)
-        top = explanations[0].log_weight
-        floor = top - (0.0 if good else _SLACK)
-        names = list(now.posterior.names)[: 1 if good else _NAMES]
-        # With fewer causes too: one of many may stand for the fault.
-        counts = {len(e.parts): e for e in reversed(explanations)} if not good else {}
-        chosen = (*map(now.posterior.best, names), *counts.values(), plain)
-        known = [_Known(e) for e in {id(e): e for e in chosen}.values()]
-        some = now.adequacy < _ADEQUATE
-        tried = (_best_on(known, charge, floor, some=some) for charge in self.data)
-        found = [charge for charge in tried if charge is not None]
-        if self.gross or (depth != "nothing" and _strained(now)):
-            for charge, gain in self.gains:
-                score = plain.log_weight + gain + charge.log_prior
-                clearly = gain > max(_CLEARLY, _SHARE * 0.5 * plain.chi2)
-                if score > floor or (now.adequacy < _ADEQUATE and clearly):
-                    found.append(replace(charge, score=score))
-        return in_order(found, lambda charge: -charge.score)
+    def mended(self, charge: Charge) -> _Drawn:
+        """Return the same without a fault."""
+        model, measurement = charge.mended
+        basis = self.basis if model is self.model else None
+        return _Drawn(model, measurement, self.reference, self.width, basis)
 
-    def widens(self, charge: Charge) -> bool:
-        """Tell whether mending a fault widens deviations."""
-        _, other = charge.mended
-        wider = other.frequency_std > self.measurement.frequency_std
-        return bool(wider.any() or (other.shape_std > self.measurement.shape_std).any())
-
-    def density(self, charge: Charge) -> float:
-        """Return ln of prior times density without a fault and with one cause at most."""
-        try:
-            seen = self.mended(charge).seen("one")
-        except (FemubenchError, la.LinAlgError):
-            return -np.inf
-        return log_density(seen, self.measurement) + charge.log_prior
-
-    def without_fault(self, depth: Depth) -> tuple[_File, Mended] | None:
-        """Return the file without the most probable fault; None where none is more likely.
+    def exactly(self, charge: Charge, gain: float) -> tuple[Charge, float]:
+        """Return a fault with its gain at scales of its own; none where it promises nothing.
 
         Arguments:
-            depth: to which the data as they are were searched; if not for several causes, a fault
-                must explain all by itself, where no single cause does.
+            gain: at the present scales.
         """
-        found = self.promising(depth)
-        top = self.seen(depth).posterior.explanations[0].log_weight
-        data = [charge for charge in found if charge.fault.side == "data"]
-        typed = [charge for charge in found if charge.fault.side == "input"]
-        definite = [charge for charge in data if not charge.reweighs]
-        # What was typed in was tried without any cause, which is a worse promise than the others.
-        # Other deviations would excuse whatever is wrong: they are the last resort.
-        near = [*_near(definite, top)[:_TRIED], *_near(typed, top)[:1]]
-        for charges in (near, _near([charge for charge in data if charge.reweighs], top)[:1]):
-            mended = self._without(charges, depth)
-            if mended is not None:
-                return mended
-        return None
+        if gain <= _PROMISING:
+            return charge, -np.inf
+        found = charge if charge.single else self.estimated(charge)
+        return found, self.gain(found)
 
-    def _without(self, charges: Sequence[Charge], depth: Depth) -> tuple[_File, Mended] | None:
-        """Return the file without the most probable of some faults, if it stands."""
-        if not charges:
-            return None
-        pairs = [(self.density(charge) if len(charges) > 1 else 0.0, charge) for charge in charges]
-        (least, best), *others = in_order(pairs, lambda pair: -pair[0])
-        if least == -np.inf:
-            return None
-        mended = self.mended(best)
-        if best.reweighs and self.widens(best) and mended.seen("one").best.parts:
-            return None
-        now, seen = self.seen(depth), mended.seen("several")
-        if best.suspect.parameter is not None:
-            again = _Known(seen.best).estimated(best)
-            best = replace(best, x=again.x, std=again.std)
-        found = log_density(seen, self.measurement) + best.log_prior
-        rivals = [log_density(now, self.measurement), *(density for density, _ in others)]
-        probability = exp(found - float(logsumexp([found, *rivals])))
-        if depth == "one" and (seen.best.parts or now.adequacy > _ADEQUATE):
-            return None
-        explained = seen.adequacy > _ADEQUATE or (
-            not best.reweighs and seen.best.chi2 < (1.0 - _DOMINANT) * now.best.chi2
-        )
-        if probability < 0.5 or not explained:
-            return None
-        return mended, Mended(best, probability)
+    def gain(self, charge: Charge) -> float:
+        """Return by how many nats a fault is likelier than none, at scales of its own."""
+        try:
+            other = self.mended(charge)
+            found = other.log_density
+        except (FemubenchError, la.LinAlgError):
+            return -np.inf
+        found += jacobian(self.state.problem.data, other.state.problem.data)
+        return found - self.log_density + self.prior(charge)
+
+    @staticmethod
+    def prior(charge: Charge) -> float:
+        """Return ln of the prior of a fault at its coordinate, times the width of the posterior."""
+        if charge.suspect.parameter is None or charge.single:
+            return charge.log_prior
+        return charge.log_prior - 0.5 * charge.x**2 + log(max(charge.std, 1e-6))
+
+    def mostly(self, charge: Charge) -> bool:
+        """Tell whether a fault is most of what the drawing gets wrong, where it need be.
+
+        Frequencies of a real structure are off by any amount, and a stubby member is as if it were
+        turned: a wrong frequency stands out of the others' errors, and what was typed in wrongly
+        leaves little to be wrong.
+        """
+        if charge.fault.side == "input":
+            after = self.mended(charge).state
+            return float(after.raw @ after.raw) < _LITTLE * float(self.state.raw @ self.state.raw)
+        if not charge.single:
+            return True
+        wide = self.mended(charge).measurement
+        m = self.measurement
+        rows = (self.state.raw - self.state.problem.noise.mean)[: len(m)]
+        error = np.square(rows * m.frequency_std / m.frequencies)
+        own = wide.frequency_std != m.frequency_std
+        return not own.any() or bool(error[~own].sum() < _LITTLE * error.sum())
+
+    @cached_property
+    def _model_error(self) -> FloatArray:
+        """Return the covariance of model error, in deviations of the data, (n_data, n_data)."""
+        factor = self.state.problem.noise.factor
+        return np.asarray(factor @ factor.T - np.eye(len(factor)))
+
+    def first(self, measurement: Measurement) -> float:
+        """Return by how many nats other data are likelier, at the scales of these."""
+        own = self.state.problem.data
+        data = replace(own, measurement=measurement)
+        if len(data) != len(own):
+            return -np.inf
+        ratio = std_of(own) / std_of(data)
+        rest = self.state.against(data) - ratio * self.state.problem.noise.mean
+        if np.array_equal(ratio, np.ones(len(own))):
+            white = self.state.problem.noise.whiten(rest)
+            log_det = -self.state.problem.noise.log_density + self.state.problem.noise.log_weight
+        else:
+            covariance = np.eye(len(own)) + ratio[:, None] * self._model_error * ratio
+            lower = la.cholesky(covariance, lower=True)
+            white = la.solve_triangular(lower, rest, lower=True)
+            log_det = float(np.log(lower.diagonal() / ratio).sum())
+        return jacobian(own, data) - 0.5 * float(white @ white) - log_det - self._plain
+
+    @cached_property
+    def _plain(self) -> float:
+        noise = self.state.problem.noise
+        return noise.log_density - noise.log_weight - 0.5 * self.state.chi2
+
+    def screened(self, charge: Charge) -> tuple[Charge, float]:
+        """Return a fault with its parameter estimated, and what it gains at the present scales."""
+        if charge.suspect.parameter is None or charge.single:
+            return charge, self.first(charge.mended[1]) + charge.log_prior
+        found = self.estimated(charge)
+        low, high = charge.suspect.parameter.range
+        # At its bounds a parameter makes up for something else.
+        if not low + _EDGE < found.x < high - _EDGE:
+            return found, -np.inf
+        return found, self.first(found.mended[1]) + self.prior(found)
+
+    def estimated(self, charge: Charge) -> Charge:
+        """Return a fault with its parameter at the most probable value."""
+        if charge.suspect.parameter is None:
+            return charge
+        # What is wrong with a single datum is told by all others, and what is known nearly by the
+        # scales that suit the data without it.
+        drawn = self.mended(charge) if charge.single or charge.std > 0.0 else self
+
+        def cost(x: float) -> float:
+            gain = drawn.first(charge.corrected(x)[1])
+            return 0.5 * x**2 - (gain if np.isfinite(gain) else -1e300)
+
+        low, high = charge.suspect.parameter.range
+        grid = np.linspace(max(low, -3.0), min(high, 3.0), _GRID)
+        nearest = int(np.argmin([cost(x) for x in grid]))
+        between = grid[max(nearest - 1, 0)], grid[min(nearest + 1, _GRID - 1)]
+        found = minimize_scalar(cost, bounds=between, method="bounded", options={"xatol": 1e-3})
+        x = float(found.x)
+        bend = cost(x + _CURVED) + cost(x - _CURVED) - 2.0 * float(found.fun)
+        return replace(charge, x=x, std=max(bend / _CURVED**2, 1.0) ** -0.5)
+
+    def typed(self, charges: Sequence[Charge]) -> list[tuple[Charge, float]]:
+        """Return faults of what was typed in with what each gains at the present scales."""
+        problem, noise = self.state.problem, self.state.problem.noise
+        count = len(self.measurement)
+        error = self.state.raw[:count] * self.measurement.frequency_std
+        if not (np.abs(error / self.measurement.frequencies) > _GROSS).any():
+            return []
+        found = []
+        for charge in charges[: _SOLVED if self.model.size > DENSE_LIMIT else len(charges)]:
+            try:
+                rest = noise.residual(raw_residual(problem, charge.mended[0]))
+            except (FemubenchError, la.LinAlgError):
+                continue
+            gain = 0.5 * (self.state.chi2 - float(rest @ rest))
+            found.append((charge, gain + charge.log_prior))
+        return found
 
 
-def _near(ranked: Sequence[Charge], top: float) -> list[Charge]:
-    """Return the first few suspects that promise about as much as the best one of them."""
-    if not ranked:
-        return []
-    best = ranked[0].score
-    return [c for c in ranked if c.score > best - max(10.0, _FAR * (best - top))]
-
-
-def _strained(now: Examination) -> bool:
-    """Tell whether physical causes explain the data badly, or by several or unlikely sizes."""
-    x = now.best.fit.state.x
-    unlikely = bool((np.abs(x) > _UNLIKELY).any())
-    return now.adequacy < _ADEQUATE or len(now.best.parts) > 1 or unlikely
-
-
-def _charges(model: Model, measurement: Measurement, faults: Sequence[Fault]) -> list[Charge]:
-    """Return every suspect with its prior."""
-    kinds = [(fault, fault.suspects(model, measurement)) for fault in faults]
-    kinds = [(fault, suspects) for fault, suspects in kinds if suspects]
-    each = log(PRIOR_OF_FAULT / (1.0 - PRIOR_OF_FAULT) / max(len(kinds), 1))
-    return [
-        Charge(fault, suspect, model, measurement, each - log(len(suspects)))
-        for fault, suspects in kinds
-        for suspect in suspects
-    ]
+def _weighed(now: _Drawn, charges: Sequence[Charge]) -> Weighed:
+    """Return the suspects that promise something, likeliest first, with nats above no fault."""
+    with threadpool_limits(1):
+        data = [charge for charge in charges if charge.fault.side == "data"]
+        promises = [now.screened(charge) for charge in data]
+        promises += now.typed([charge for charge in charges if charge.fault.side == "input"])
+        kinds: dict[str, Weighed] = {}
+        for charge, gain in in_order(promises, lambda pair: -pair[1]):
+            kinds.setdefault(charge.fault.name, []).append((charge, gain))
+        few = [pair for kind in kinds.values() for pair in kind[:_OF_A_KIND]]
+        exact = [now.exactly(charge, gain) for charge, gain in few]
+    kept = [(c, gain) for c, gain in exact if c.reweighs or np.isfinite(gain)]
+    return in_order(kept, lambda pair: -pair[1])
 
 
 def _possible(
     model: Model, measurement: Measurement, faults: Sequence[Fault], mended: list[Mended]
-) -> Corrected:
+) -> tuple[Model, Measurement]:
     """Return model and data without what cannot be; `mended` is filled."""
     while len(mended) < _MOST:
-        blatant = [c for c in _charges(model, measurement, faults) if c.suspect.blatant]
+        blatant = [c for c in charges_of(model, measurement, faults) if c.suspect.blatant]
         if not blatant:
             break
         costs = [_half_chi2(*charge.mended) for charge in blatant]
@@ -394,142 +404,20 @@ def log_density(examination: Examination, measured: Measurement) -> float:
     data = examination.problem.data
     before = replace(data, measurement=measured)
     weights = [e.log_weight for e in examination.posterior.explanations]
-    return float(logsumexp(weights)) + _jacobian(before, data) - float(np.log(_std(data)).sum())
+    return float(logsumexp(weights)) + jacobian(before, data) - float(np.log(std_of(data)).sum())
 
 
-def _std(data: Data) -> FloatArray:
+def std_of(data: Data) -> FloatArray:
     """Return the standard deviation of every datum, (n_data,)."""
     mode, sensor = data.shape_rows
     mass = [] if data.mass is None else [data.mass[1]]
     return np.concatenate([data.measurement.frequency_std, 1.0 / data.weight[sensor, mode], mass])
 
 
-def _jacobian(before: Data, after: Data) -> float:
+def jacobian(before: Data, after: Data) -> float:
     """Return the sum of ln |d after / d before| of data that were exchanged and multiplied."""
     sizes = []
     for data in (after, before):
         values = np.abs(np.concatenate([data.measurement.frequencies, data.shapes.ravel()]))
         sizes.append(np.log(values[values > 0.0]).sum())
     return float(sizes[0] - sizes[1])
-
-
-class _Known:
-    """An explanation, its sizes free to first order.
-
-    Arguments:
-        explanation: fitted.
-    """
-
-    def __init__(self, explanation: Explanation) -> None:
-        self.explanation = explanation
-        state = self.state = explanation.fit.state
-        factor = state.problem.noise.factor
-        slopes = factor @ state.jacobian
-        self.covariance = factor @ factor.T + slopes @ slopes.T
-        self.rest = factor @ state.residual + slopes @ state.x
-        self.std = _std(state.problem.data)
-        self.base = self._density(self.rest, self.covariance)
-
-    def _density(self, rest: FloatArray, covariance: FloatArray) -> float:
-        lower = la.cholesky(covariance, lower=True)
-        white = la.solve_triangular(lower, rest, lower=True)
-        return -0.5 * float(white @ white) - float(np.log(lower.diagonal()).sum())
-
-    def gain(self, measurement: Measurement) -> float:
-        """Return by how much other data are more probable, in nats."""
-        own = self.state.problem.data
-        data = replace(own, measurement=measurement)
-        if len(data) != len(own):
-            return -np.inf
-        ratio = _std(data) / self.std
-        rest = self.rest + ratio * self.state.against(data) - self.state.raw
-        covariance = self.covariance + np.diag(np.square(ratio) - 1.0)
-        return self._density(rest, covariance) - self.base + _jacobian(own, data)
-
-    @cached_property
-    def freed(self) -> tuple[FloatArray, FloatArray]:
-        """Return the inverse covariance with the scales of all shapes free, and times the rest."""
-        data = self.state.problem.data
-        mode, sensor = data.shape_rows
-        scaled, _ = data.scaled(self.state.readings[None])
-        count = len(data.measurement)
-        scale = np.zeros((len(data), count))
-        scale[count + np.arange(len(mode)), mode] = (data.weight * scaled[0])[sensor, mode]
-        inverse = la.inv(self.covariance + _FREE**2 * scale @ scale.T)
-        return inverse, inverse @ self.rest
-
-    @cached_property
-    def slack(self) -> float:
-        """Return what chi-square falls by where the scales of all shapes are free."""
-        fixed = float(self.rest @ la.solve(self.covariance, self.rest, assume_a="pos"))
-        return max(fixed - float(self.rest @ self.freed[1]), 0.0)
-
-    def most(self, rows: BoolArray) -> float:
-        """Return what could be gained at most without some data, (n_data,), in nats."""
-        inverse, pull = self.freed
-        own = np.flatnonzero(rows)
-        if not len(own):
-            return 0.0
-        dropped = float(pull[own] @ np.linalg.solve(inverse[np.ix_(own, own)], pull[own]))
-        return 0.5 * (dropped + self.slack)
-
-    def tried(self, charge: Charge) -> Charge:
-        """Return a charge with its parameter estimated, and what it promises here."""
-        if charge.suspect.parameter is None or charge.single:
-            gain = self.gain(charge.mended[1])
-            return self._with(charge, 0.0, 0.0, gain + charge.log_prior)
-        # At its bounds a parameter makes up for something else.
-        low, high = charge.suspect.parameter.range
-        found = self.estimated(charge)
-        return found if low + _EDGE < found.x < high - _EDGE else replace(found, score=-np.inf)
-
-    def estimated(self, charge: Charge) -> Charge:
-        """Return a charge with its parameter at its most probable value."""
-        assert charge.suspect.parameter is not None
-
-        def cost(x: float) -> float:
-            gain = self.gain(charge.corrected(x)[1])
-            return 0.5 * x**2 - (gain if np.isfinite(gain) else -1e300)
-
-        found = minimize_scalar(cost, bounds=charge.suspect.parameter.range, method="bounded")
-        x, least = float(found.x), float(found.fun)
-        bend = cost(x + _CURVED) + cost(x - _CURVED) - 2.0 * least
-        curvature = max(bend / _CURVED**2, 1.0)
-        prior = charge.log_prior - 0.5 * (x**2 + log(curvature))
-        return self._with(
-            replace(charge, log_prior=prior),
-            x,
-            curvature**-0.5,
-            charge.log_prior - least - 0.5 * log(curvature),
-        )
-
-    def _with(self, charge: Charge, x: float, std: float, gain: float) -> Charge:
-        return replace(charge, x=x, std=std, score=self.explanation.log_weight + gain)
-
-
-def _best_on(known: Sequence[_Known], charge: Charge, floor: float, *, some: bool) -> Charge | None:
-    """Return a charge on the explanation where it promises most; None where it is not enough.
-
-    Arguments:
-        known: explanations.
-        charge: of the data.
-        floor: of ln prior times evidence.
-        some: whether it also does to take away a good part of what an explanation leaves.
-    """
-    best: Charge | None = None
-    for one in known:
-        data = one.state.problem.data
-        mode, sensor = data.shape_rows
-        count, sensors = len(data.measurement), len(data.weight)
-        rows = np.zeros(len(data), dtype=bool)
-        chosen = np.concatenate([np.arange(count), count + mode * sensors + sensor])
-        rows[: len(chosen)] = charge.rows[chosen]
-        own = one.explanation.log_weight
-        part = own + max(_CLEARLY, _PART * 0.5 * one.state.chi2) if some else np.inf
-        enough = min(floor, part)
-        if not charge.reweighs and own + charge.log_prior + one.most(rows) < enough:
-            continue
-        tried = one.tried(charge)
-        if tried.score > max(enough, -np.inf if best is None else best.score):
-            best = tried
-    return best
