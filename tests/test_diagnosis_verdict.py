@@ -398,7 +398,7 @@ def test_a_stated_scatter_that_is_far_too_large_is_said(factor: float, said: boo
     case = trial("member-mass", "rung-middle", 0.2)
     m = case.measurement
     loose = replace(m, frequency_std=factor * m.frequency_std, shape_std=factor * m.shape_std)
-    found = diagnosed(replace(case, measurement=loose), pairs=False, tolerance=0.0)
+    found = diagnosed(replace(case, measurement=loose), faults=False, pairs=False, tolerance=0.0)
     notes = [note for note in found.notes if "times too large" in note]
     assert bool(notes) is said
     if said:
@@ -469,7 +469,7 @@ def test_a_guess_that_does_not_explain_the_data_is_not_stated_as_sure() -> None:
     shapes = case.measurement.shapes.copy()
     shapes[[0, 3]] = shapes[[3, 0]]
     swapped = replace(case, measurement=replace(case.measurement, shapes=shapes))
-    found = diagnosed(swapped, pairs=False)
+    found = diagnosed(swapped, faults=False, pairs=False)
     assert found.verdict == "unknown"
     assert found.causes
     assert all(cause.probability < 0.02 for cause in found.causes)

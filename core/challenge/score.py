@@ -68,7 +68,8 @@ def judge_answer(truth: Truth, answer: Answer, delta_chi2: Sequence[float]) -> J
 
     `none` is right where nothing is hidden, or nothing that can be seen. A name is right when it
     holds every visible cause and no other; with ``ambiguous``, when one member of the group does.
-    For a cause outside the catalogue ``unknown`` and ``not-confirmed`` are right.
+    For a cause outside the catalogue ``unknown`` and ``not-confirmed`` are right, and for a sensor
+    that is wrong a fault of the data and no cause.
 
     Arguments:
         truth: what is hidden.
@@ -77,7 +78,7 @@ def judge_answer(truth: Truth, answer: Answer, delta_chi2: Sequence[float]) -> J
             cause; for a cause outside the catalogue by how much it raises it.
     """
     if truth.outside:
-        return _judge_outside(answer, min(delta_chi2, default=0.0))
+        return _judge_outside(truth, answer, min(delta_chi2, default=0.0))
     group = _group_size(answer)
     if not truth.causes:
         right = answer.verdict == "none"
@@ -120,10 +121,12 @@ def _judge_causes(
     return Judgement(names, names, places, group, found, too_small, False, sizes, reason)
 
 
-def _judge_outside(answer: Answer, excess: float) -> Judgement:
+def _judge_outside(truth: Truth, answer: Answer, excess: float) -> Judgement:
     too_small = excess < TOO_SMALL
     right = answer.verdict in ("unknown", "not-confirmed")
     right = right or (too_small and answer.verdict == "none")
+    in_data = bool(answer.causes) and all(cause.side == "data" for cause in answer.causes)
+    right = right or (in_data and truth.outside.startswith("sensor"))
     reason = "the cause is outside the catalogue"
     reason = reason if right else f"{reason}, but it says {_said(answer)}"
     return Judgement(right, None, None, _group_size(answer), 0, too_small, False, (), reason)

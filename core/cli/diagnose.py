@@ -41,6 +41,7 @@ def _share(ctx: click.Context, param: click.Parameter, value: float | None) -> f
     help="Ordinary relative scatter of every element; 0 for none. Default: the case's.",
 )  # fmt: skip
 @click.option("--no-pairs", is_flag=True, help="Look for single effects only, which is quicker.")
+@click.option("--no-faults", is_flag=True, help="Take data and input as they are.")
 @click.option(
     "--effects", metavar="A,B,...", help="Try these effects only. Default: all that apply."
 )
@@ -59,6 +60,7 @@ def diagnose(
     output: Path | None,
     tolerance: float | None,
     no_pairs: bool,
+    no_faults: bool,
     effects: str | None,
     style: str,
     report_file: Path | None,
@@ -87,7 +89,9 @@ def diagnose(
     from femubench.core.library.report import rendering
 
     with waiting(f"looking for what {read.name} lacks", quiet=quiet):
-        found = diagnosis_of(read, names, plugins, pairs=not no_pairs, tolerance=tolerance)
+        found = diagnosis_of(
+            read, names, plugins, pairs=not no_pairs, faults=not no_faults, tolerance=tolerance
+        )
     written = output if output is not None and has_model(found) else None
     fault = None if written is None else _fault(found, written)
     data = diagnosis_to_json(

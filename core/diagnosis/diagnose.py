@@ -144,8 +144,8 @@ def diagnose(
     if case.band is not None:
         # All modes that were found, used or not: what is not among them is not in the structure.
         looks += tuple(look_at_band(Seen(case.model, case.measurement), case.band))
-    told = fault_causes(inquiry.mended)
-    return _written(case, examination, decision, adequate, proof, looks, told, begin)
+    faults_told = fault_causes(inquiry.mended), fault_causes(inquiry.loose)
+    return _written(case, examination, decision, adequate, proof, looks, faults_told, begin)
 
 
 def _proof(case: Case, examination: Examination, effects: Sequence[Effect], given: Case) -> _Proof:
@@ -174,9 +174,10 @@ def _written(
     adequate: float,
     proof: _Proof,
     looks: tuple[LookWarning, ...],
-    faults: Sequence[Cause],
+    faults: tuple[Sequence[Cause], Sequence[Cause]],
     begin: float,
 ) -> Diagnosis:
+    mended, loose = faults
     best, posterior = proof.leader, examination.posterior
     group = [best, *(posterior.best(key) for key in decision.group[1:])] if decision.group else []
     shown = group if decision.verdict == "ambiguous" else group[:1]
@@ -193,14 +194,15 @@ def _written(
     used = case.measurement.select(case.used)
     return Diagnosis(
         case=case.name,
-        verdict="named" if faults and decision.verdict == "none" else decision.verdict,
+        verdict="named" if any(faults) and decision.verdict == "none" else decision.verdict,
         sentence=with_faults(
             sentence_of(
                 decision, causes, options, top, proof.gain, reference=case.reference is not None
             ),
-            faults,
+            mended,
+            loose,
         ),
-        causes=(*faults, *causes),
+        causes=(*mended, *causes, *loose),
         rivals=rivals_of(examination, best if named else None, group),
         reason=_reason(decision),
         advice=_advice(examination, group),

@@ -52,9 +52,13 @@ def _parameters(charge: Charge) -> list[CauseParameter]:
     return [*known, CauseParameter(p.name, value, std, p.unit, wording=p.wording)]
 
 
-def with_faults(sentence: str, faults: Sequence[Cause]) -> str:
-    """Return the sentence of a verdict with the faults that were mended before it."""
-    if not faults:
-        return sentence
-    told = listed(f"{cause.summary} (probability {percent(cause.probability)})" for cause in faults)
-    return f"{told[0].upper()}{told[1:]}. With that mended: {sentence[0].lower()}{sentence[1:]}"
+def with_faults(sentence: str, mended: Sequence[Cause], loose: Sequence[Cause]) -> str:
+    """Return the sentence of a verdict with the faults that were mended before it, or only told."""
+    if mended:
+        sentence = f"{_told(mended)}. With that mended: {sentence[0].lower()}{sentence[1:]}"
+    return f"{sentence} {_told(loose)}." if loose else sentence
+
+
+def _told(faults: Iterable[Cause]) -> str:
+    text = listed(f"{cause.summary} (probability {percent(cause.probability)})" for cause in faults)
+    return text[0].upper() + text[1:]

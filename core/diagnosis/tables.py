@@ -11,6 +11,7 @@ from femubench.core.diagnosis.symmetry import mirror_places
 from femubench.core.diagnosis.verdict import angle_between, credible, places_of
 from femubench.core.inference.examine import Examination
 from femubench.core.inference.fit import State
+from femubench.core.inference.hypothesis import Hypothesis
 from femubench.core.inference.posterior import Explanation, Posterior, fits_better
 from femubench.core.inference.search import Found
 from femubench.core.roles import EffectParameter
@@ -30,6 +31,7 @@ from femubench.core.typing import FloatArray
 TOO_SMALL = 12.0  # of chi-square: an effect below is too small to see
 _LISTED = 12
 _STEP = 1e-4
+_COUNTS = 1e-6  # probability from which an explanation counts
 
 
 def error_scales(examination: Examination, explanation: Explanation) -> tuple[ErrorScale, ...]:
@@ -59,13 +61,22 @@ def residual_rows(before: State, after: State) -> tuple[ResidualRow, ...]:
     return tuple(rows)
 
 
-def causes_in(explanation: Explanation, share: float, earned: frozenset[str]) -> list[Cause]:
+def causes_in(
+    explanation: Explanation,
+    share: float,
+    earned: frozenset[str],
+    *,
+    spread: FloatArray | None = None,
+    own: float = 0.0,
+) -> list[Cause]:
     """Return the causes of an explanation with values and deviations.
 
     Arguments:
         explanation: fitted.
         share: probability of each.
         earned: textbook effects that are part of the name.
+        spread: standard deviations of the coordinates, (k,); those of the fit by default.
+        own: share of what a cause changes by which it is itself in error.
 
     Examples:
         >>> best = examination.best
@@ -81,14 +92,17 @@ def causes_in(explanation: Explanation, share: float, earned: frozenset[str]) ->
                 _parameter(p, float(p.textbook or 0.0), None, textbook=True) for p in h.parameters
             )
             causes.append(Cause(h.name, h.place, fixed, share, _summary(h.effect)))
-    x, spread = explanation.fit.state.x, explanation.fit.covariance
+    x = explanation.fit.state.x
+    if spread is None:
+        spread = np.sqrt(explanation.fit.covariance.diagonal())
     start = 0
     for part in explanation.parts:
         h = part.hypothesis
         fitted = []
         for i, parameter in enumerate(h.parameters, start=start):
-            std = float(np.sqrt(spread[i, i])) * _slope(parameter, float(x[i]))
             value = float(parameter.value(np.array(x[i])))
+            moved = value - parameter.neutral if np.isfinite(parameter.neutral) else value
+            std = float(np.hypot(spread[i] * _slope(parameter, float(x[i])), own * moved))
             if h.name in book and parameter.neutral == 0.0:
                 # A relative change on top of the textbook's: what matters is the product.
                 textbook = 1.0 + float(book[h.name].parameters[i - start].textbook or 0.0)
@@ -97,6 +111,49 @@ def causes_in(explanation: Explanation, share: float, earned: frozenset[str]) ->
         start += len(h.parameters)
         causes.append(Cause(h.name, h.place, tuple(fitted), share, _summary(h.effect)))
     return causes
+
+
+def spread_over(posterior: Posterior, leader: Explanation) -> FloatArray:
+    """Return the standard deviations of a leader's coordinates over all explanations, (k,).
+
+    What else may be wrong moves a size, and so does what is taken for model error: every
+    explanation that has the same cause at the same place counts by its probability.
+
+    Source: Hoeting et al. (1999), the variance of an average over models.
+    """
+    found, start = [], 0
+    for part in leader.parts:
+        width = len(part.hypothesis.parameters)
+        here = leader.fit.state.x[start : start + width]
+        total, weight = np.zeros(width), 0.0
+        for e, p in zip(posterior.explanations, posterior.probabilities, strict=True):
+            own = _coordinates(e, part.hypothesis) if p > _COUNTS else None
+            if own is not None:
+                total += p * (own[1] + np.square(own[0] - here))
+                weight += p
+        own = _coordinates(leader, part.hypothesis)
+        assert own is not None
+        found.append(np.sqrt(total / weight if weight > 0.0 else own[1]))
+        start += width
+    return np.concatenate(found) if found else np.zeros(0)
+
+
+def _coordinates(
+    explanation: Explanation, hypothesis: Hypothesis
+) -> tuple[FloatArray, FloatArray] | None:
+    """Return the coordinates of a hypothesis and their variances; None where it is no part."""
+    start = 0
+    for part in explanation.parts:
+        h, width = part.hypothesis, len(part.hypothesis.parameters)
+        if (h.name, h.place, width) == (
+            hypothesis.name,
+            hypothesis.place,
+            len(hypothesis.parameters),
+        ):
+            own = slice(start, start + width)
+            return explanation.fit.state.x[own], explanation.fit.covariance.diagonal()[own]
+        start += width
+    return None
 
 
 def placed_causes(
@@ -110,7 +167,9 @@ def placed_causes(
         held: probability that any of them holds, at most.
     """
     posterior = examination.posterior
-    causes = causes_in(explanation, 1.0, posterior.earned)
+    spread = spread_over(posterior, explanation)
+    own = examination.own_share(explanation.fit.state)
+    causes = causes_in(explanation, 1.0, posterior.earned, spread=spread, own=own)
     first = len(causes) - len(explanation.parts)
     tied = _tied(posterior, explanation)
     found = []

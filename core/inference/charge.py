@@ -64,6 +64,16 @@ class Charge:
         return self.fault.side == "data" and self.changed == 0
 
     @property
+    def loosens(self) -> float:
+        """Return how many times as large as without the fault deviations are stated, at median."""
+        _, other = self.mended
+        names = ("frequency_std", "shape_std")
+        ratios = [(getattr(self.measurement, n) / getattr(other, n)).ravel() for n in names]
+        known = np.concatenate(ratios)
+        moved = known[np.isfinite(known) & (known != 1.0)]
+        return float(np.median(moved)) if len(moved) else 1.0
+
+    @property
     def single(self) -> bool:
         """Tell whether a parameter is to be found from a single datum."""
         return self.suspect.parameter is not None and self.changed == 1

@@ -48,6 +48,8 @@ _MOST, _TRIED = 3, 2  # faults that are mended, and tried beside causes each tim
 _OF_A_KIND, _PROMISING = 3, -3.0
 _CLEARLY = 20.0  # nats by which a fault may lag behind causes, and still be tried with them
 _SOLVED = 20  # suspects of what was typed in that are solved of a large model
+_ROUNDS = 3
+_TWICE = 2.0  # by which deviations must be stated too large to be told
 _LITTLE = 0.3  # share of the squared misfit that is left, where a fault is most of it
 _FIT, _GROSS = 0.05, 0.05
 _GRID, _EDGE, _CURVED = 13, 0.02, 0.02
@@ -59,10 +61,18 @@ Examine = Callable[[Model, Measurement, Depth], Examination]
 
 @dataclass(frozen=True)
 class Inquiry:
-    """An examination of model and data with the faults mended that were found."""
+    """An examination of model and data with the faults mended that were found.
+
+    Arguments:
+        examination: of what is left.
+        mended: the faults.
+        loose: deviations that are stated far too large. That hides causes and makes none, so they
+            are told and stay.
+    """
 
     examination: Examination
     mended: tuple[Mended, ...] = ()
+    loose: tuple[Mended, ...] = ()
 
 
 def inquire(
@@ -102,8 +112,15 @@ def inquire(
         now = now.mended(found.charge)
     seen = examine(now.model, now.measurement, "several")
     # Other deviations would excuse whatever is wrong: they are the last resort.
-    other = _reweighed(now, [pair for pair in ranked if pair[0].reweighs], seen, examine)
-    return Inquiry(seen, tuple(mended)) if other is None else Inquiry(other[0], (*mended, other[1]))
+    other = _reweighed(now, [charge for charge, _ in ranked if charge.reweighs], seen, examine)
+    if other is None:
+        return Inquiry(seen, tuple(mended))
+    if other.charge.loosens < 1.0:
+        again = examine(*other.charge.mended, "several")
+        charge = now.beside(again.best).estimated(other.charge)
+        return Inquiry(again, (*mended, replace(other, charge=charge)))
+    clearly = replace(other.charge, x=other.charge.x - 2.0 * other.charge.std).loosens > _TWICE
+    return Inquiry(seen, tuple(mended), (other,) if clearly else ())
 
 
 def _definite(now: _Drawn, ranked: Weighed, examine: Examine) -> Mended | None:
@@ -122,29 +139,29 @@ def _definite(now: _Drawn, ranked: Weighed, examine: Examine) -> Mended | None:
     best = int(np.argmax(densities))
     rest = [now.log_density + gain for _, gain in pairs[len(tried) :]]
     probability = exp(densities[best] - float(logsumexp([without, *densities, *rest])))
-    return Mended(now.estimated(tried[best][0]), probability) if probability > _SURE else None
+    return Mended(now.refined(tried[best][0]), probability) if probability > _SURE else None
 
 
 def _reweighed(
-    now: _Drawn, ranked: Weighed, seen: Examination, examine: Examine
-) -> tuple[Examination, Mended] | None:
-    """Return the examination with other deviations, if those are more probable than the stated."""
-    without = _with_causes(seen, now.log_density, now.measurement)
+    now: _Drawn, charges: Sequence[Charge], seen: Examination, examine: Examine
+) -> Mended | None:
+    """Return other deviations, if those are more probable than the stated ones."""
+    plain, caused = now.log_density, log_density(seen, now.measurement)
+    without = float(np.logaddexp(plain, caused))
     best = now.beside(seen.best)
-    found = [(charge, now.log_density + gain) for charge, gain in ranked]
-    found += [
-        (charge, log_density(seen, now.measurement) + gain)
-        for charge, gain in (best.screened(charge) for charge, _ in ranked)
-    ]
-    charge, promise = max(found, key=lambda pair: pair[1], default=(None, -np.inf))
-    if charge is None or promise < without + _ODDS:
+    found = [(charge, plain + now.gain(charge)) for charge in charges]
+    again = (best.screened(charge) for charge in charges)
+    found += [(charge, caused + gain) for charge, gain in again]
+    charge, density = max(found, key=lambda pair: pair[1], default=(None, -np.inf))
+    if charge is None or density < without - _CLEARLY:
         return None
-    mended = examine(*charge.mended, "several")
-    density = _density(now, charge, promise - now.log_density, mended)
-    probability = 1.0 / (1.0 + exp(min(without - density, 700.0)))
-    if probability <= _SURE:
-        return None
-    return mended, Mended(now.beside(mended.best).estimated(charge), probability)
+    # Wrong deviations lead to wrong causes, and these to wrong deviations: to and fro.
+    for _ in range(_ROUNDS if charge.loosens < 1.0 else 0):
+        mended = examine(*charge.mended, "one")
+        density = log_density(mended, now.measurement) + now.prior(charge)
+        charge = now.beside(mended.best).estimated(charge)
+    odds = density - without
+    return Mended(charge, 1.0 / (1.0 + exp(-min(odds, 700.0)))) if odds > _ODDS else None
 
 
 def _density(now: _Drawn, charge: Charge, gain: float, mended: Examination) -> float:
@@ -231,8 +248,13 @@ class _Drawn:
         """
         if gain <= _PROMISING:
             return charge, -np.inf
-        found = charge if charge.single else self.estimated(charge)
+        found = charge if charge.single else self.refined(charge)
         return found, self.gain(found)
+
+    def refined(self, charge: Charge) -> Charge:
+        """Return a fault with its parameter at the scales that suit the data without it."""
+        known = charge.suspect.parameter is None
+        return charge if known else self.mended(charge).estimated(charge)
 
     def gain(self, charge: Charge) -> float:
         """Return by how many nats a fault is likelier than none, at scales of its own."""
@@ -314,12 +336,9 @@ class _Drawn:
         """Return a fault with its parameter at the most probable value."""
         if charge.suspect.parameter is None:
             return charge
-        # What is wrong with a single datum is told by all others, and what is known nearly by the
-        # scales that suit the data without it.
-        drawn = self.mended(charge) if charge.single or charge.std > 0.0 else self
 
         def cost(x: float) -> float:
-            gain = drawn.first(charge.corrected(x)[1])
+            gain = self.first(charge.corrected(x)[1])
             return 0.5 * x**2 - (gain if np.isfinite(gain) else -1e300)
 
         low, high = charge.suspect.parameter.range

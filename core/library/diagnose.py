@@ -31,6 +31,7 @@ def diagnose(
     effects: str | Effect | Iterable[str | Effect] | None = None,
     *,
     pairs: bool = True,
+    faults: bool = True,
     tolerance: float | None = None,
     output: str | PathLike[str] | None = None,
 ) -> Diagnosis:
@@ -42,6 +43,7 @@ def diagnose(
         case: a name, a folder or a `Case`.
         effects: what may be missing, by name or as effects; all that are installed by default.
         pairs: whether more than one cause is sought.
+        faults: whether faults of the data and of what was typed in are sought too.
         tolerance: standard deviation of every element's relative scatter; the case's by default.
         output: new folder for the extended model as a case, where one was found.
 
@@ -55,7 +57,9 @@ def diagnose(
     """
     if output is not None:
         check_new(Path(output))
-    found = diagnosis_of(case, effects, usable_plugins(), pairs=pairs, tolerance=tolerance)
+    found = diagnosis_of(
+        case, effects, usable_plugins(), pairs=pairs, faults=faults, tolerance=tolerance
+    )
     if output is not None and has_model(found):
         write_extended(found, Path(output))
     return found
@@ -67,6 +71,7 @@ def diagnosis_of(
     plugins: Plugins,
     *,
     pairs: bool = True,
+    faults: bool = True,
     tolerance: float | None = None,
 ) -> Diagnosis:
     """Return the diagnosis; see `diagnose`."""
@@ -77,7 +82,7 @@ def diagnosis_of(
     try:
         # Many small matrices: threads would only wait for each other.
         with threadpool_limits(1):
-            return search(read, effects=wanted, pairs=pairs)
+            return search(read, effects=wanted, faults=None if faults else (), pairs=pairs)
     except NotApplicable as fault:
         raise InputError(f"cannot be diagnosed: {fault}", file=read.folder) from fault
 
