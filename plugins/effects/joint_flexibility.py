@@ -9,6 +9,7 @@ import numpy as np
 
 from femubench import Model
 from femubench.effect import (
+    APART,
     Change,
     EffectParameter,
     FrameEffect,
@@ -28,24 +29,27 @@ _MOST = 6
 
 
 class JointFlexibility(FrameEffect):
-    """Let all joints turn on springs whose stiffnesses are alike, each type with its own.
+    """Let all joints turn on springs, as stiff as a multiple of the members that end there.
 
-    The stiffness of a type is that of all times its own factor, in the stiffnesses of the members
-    that end there; the factors are drawn from one distribution around 1. Members that pass
-    through a joint are continuous there.
+    One multiple for all; ``:apart``, every joint type has a factor of its own besides, and the
+    factors scatter around 1. Members that pass through a joint are continuous there.
     """
 
     name: ClassVar[str] = "joint-flexibility"
     summary: ClassVar[str] = "all joints give"
     softens: ClassVar[bool] = True
-    sizes: ClassVar[Sequence[Size]] = (Size(0.3, 30.0, log=True), Size(0.0, 0.7, signed=True))
+    sizes: ClassVar[Sequence[Size]] = (Size(0.3, 30.0, log=True),)
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the whole frame, where there are joints of several types."""
         return () if model.structure is None or not _groups(model.structure) else ("all",)
 
+    def finer(self, model: Model, place: str) -> Sequence[str]:
+        """Return the place with a factor for every type."""
+        return () if place.endswith(APART) else (f"{place}{APART}",)
+
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
-        """Return the stiffness of all in 4 EI/L and GJ/L, and the factor of each type as its ln."""
+        """Return the multiple of 4 EI/L and GJ/L, and the factors of the types as their ln."""
         stiffness = EffectParameter(
             "stiffness, multiple of the members' own",
             "",
@@ -55,19 +59,21 @@ class JointFlexibility(FrameEffect):
             scaling="compliance",
             one_sided=True,
         )
+        groups = _groups(model.frame_structure) if place.endswith(APART) else ()
         factors = (
             EffectParameter(f"ln of {group.name} over all", "", _SPREAD, 0.0, -_WIDEST, _WIDEST)
-            for group in _groups(model.frame_structure)
+            for group in groups
         )
         return (stiffness, *factors)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the springs, in series with those that are there."""
         springs: dict[str, dict[str, float]] = {}
-        for group, factor in zip(_groups(Structure.build(frame)), values[1:], strict=True):
+        groups = _groups(Structure.build(frame))
+        multiples = _multiples(np.array([values]), len(groups))
+        for group, (multiple,) in zip(groups, multiples, strict=True):
             own = zip(_parts(frame), _scales(frame, group), strict=True)
-            stiffness = values[0] * np.exp(factor)
-            along = {d: float(stiffness * scale) for part, scale in own for d in part}
+            along = {d: float(multiple * scale) for part, scale in own for d in part}
             springs |= dict.fromkeys(group.ends, along)
         return softened_ends(frame, springs)
 
@@ -79,8 +85,7 @@ class JointFlexibility(FrameEffect):
         scales = [np.array(_scales(frame, group)) for group in groups]
 
         def coefficients(values: FloatArray) -> FloatArray:
-            stiffness = values[:, :1] * np.exp(values[:, 1:])
-            own = zip(changes, stiffness.T, scales, strict=True)
+            own = zip(changes, _multiples(values, len(groups)), scales, strict=True)
             return np.hstack([c.coefficients(np.outer(k, scale)) for c, k, scale in own])
 
         return Change(tuple(term for change in changes for term in change.terms), coefficients)
@@ -100,6 +105,12 @@ def _groups(structure: Structure) -> tuple[JointGroup, ...]:
             if owner.setdefault(structure.element_ends[end][0], group.name) != group.name:
                 return ()
     return groups if 1 < len(groups) <= _MOST else ()
+
+
+def _multiples(values: FloatArray, count: int) -> FloatArray:
+    """Return the multiple of every group, (n_groups, g), of values, (g, 1) or (g, 1 + n_groups)."""
+    factors = values[:, 1:] if values.shape[1] > 1 else np.zeros((len(values), count))
+    return np.asarray((values[:, :1] * np.exp(factors)).T)
 
 
 def _parts(frame: Frame) -> tuple[tuple[str, ...], ...]:
