@@ -13,8 +13,16 @@ import pytest
 import scipy.linalg as la
 
 from femubench import Model, NotApplicable, Sensors, solve_modes
+from femubench.core.effect.places import match
 from femubench.core.modal.eigen import counted_evaluations, solve_dense
-from femubench.effect import FrameEffect, directed_point, elastic_band, total_mass, translation_rows
+from femubench.effect import (
+    FrameEffect,
+    bare_place,
+    directed_point,
+    elastic_band,
+    total_mass,
+    translation_rows,
+)
 from femubench.fem import FloatArray, Frame, GroundSpring, ModelError, Place, Support
 from femubench.modal import rigid_body_vectors
 from femubench.plugins.effects.added_mass import AddedMass
@@ -101,7 +109,9 @@ CASES = [
     (BraceSpring, "portal", "J0-J6"),
     (AttachedOscillator, "ladder", "F"),
     (AttachedOscillator, "hframe", "horizontal@0.5:x"),
+    (AttachedOscillator, "hframe", "horizontal@0.5:x:free"),
     (AttachedOscillator, "portal", "J2:y"),
+    (AttachedOscillator, "portal", "J2:y:free"),
     (AxialPreload, "ladder", "AB"),
     (AxialPreload, "portal", "m6"),
     (MassEccentricity, "ladder", "BE"),
@@ -123,7 +133,7 @@ def test_model_and_change_agree(
     place: str,
 ) -> None:
     made, model = effect(), models[name]
-    assert place in made.places(model)
+    assert bare_place(place) in made.places(model)
     for x in (0.4, 2.0):
         values = sizes(made, model, place, x)
         extended = assert_agree(made, model, place, values)
@@ -281,6 +291,25 @@ def test_stiff_oscillator_is_a_mass_and_a_soft_one_rides_along(models: dict[str,
     carried = replace(model, mass=model.mass + 0.5 * (across.T @ across))
     # Three rigid modes and the mass that hangs on next to nothing.
     np.testing.assert_allclose(hertz(soft, 13)[4:], hertz(carried)[3:], rtol=1e-6)
+    free = effect.extend(model, "T1:x:free", [0.5, 1e-3])
+    np.testing.assert_allclose(hertz(free, 13)[4:], hertz(model)[3:], rtol=1e-6)
+
+
+def test_an_oscillator_is_tried_free_where_it_can_be_felt_across(models: dict[str, Model]) -> None:
+    effect = AttachedOscillator()
+    assert effect.finer(models["hframe"], "T1:x") == ("T1:x:free",)
+    assert effect.finer(models["hframe"], "T1:x:free") == ()
+    assert effect.finer(models["ladder"], "A") == ()  # out of plane there is one direction
+    assert match(models["hframe"].frame_structure.frame, "T1:x:free", "T1:-x")
+
+
+def test_no_oscillator_is_as_light_as_to_drown_in_damping(models: dict[str, Model]) -> None:
+    """Two tuned resonances part by the root of the mass ratio, here 3 %."""
+    for model in models.values():
+        place = AttachedOscillator().places(model)[0]
+        mass, _ = AttachedOscillator().parameters(model, place)
+        assert mass.neutral == 0.0
+        assert mass.value(mass.range[0]) == pytest.approx(1e-3 * total_mass(model))
 
 
 def test_preload_keeps_rigid_modes(models: dict[str, Model]) -> None:

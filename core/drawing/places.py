@@ -70,7 +70,7 @@ class PlacedWireframe(Wireframe):
     def place(self, word: str) -> DrawnPlace:
         """Return what the word of a place covers."""
         listed = next((place for place in self.places if place.place == word), None)
-        return listed or _plain_place(self, word, split_direction(word)[0])
+        return listed or _plain_place(self, word, split_direction(bare_place(word))[0])
 
 
 def placed_wireframe(source: Case | Model, words: Iterable[str]) -> PlacedWireframe:
