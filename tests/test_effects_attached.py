@@ -14,6 +14,8 @@ import scipy.linalg as la
 
 from femubench import Model, NotApplicable, Sensors, solve_modes
 from femubench.core.effect.places import match
+from femubench.core.inference.hypothesis import hypothesis_at
+from femubench.core.inference.projection import Projector
 from femubench.core.modal.eigen import counted_evaluations, solve_dense
 from femubench.effect import (
     FrameEffect,
@@ -301,6 +303,16 @@ def test_an_oscillator_is_tried_free_where_it_can_be_felt_across(models: dict[st
     assert effect.finer(models["hframe"], "T1:x:free") == ()
     assert effect.finer(models["ladder"], "A") == ()  # out of plane there is one direction
     assert match(models["hframe"].frame_structure.frame, "T1:x:free", "T1:-x")
+
+
+@pytest.mark.parametrize("place", ["T1:x", "T1:z", "T1:x:free", "T1:z:free"])
+def test_on_a_scale_an_oscillator_weighs_its_mass(models: dict[str, Model], place: str) -> None:
+    model, effect = models["hframe"], AttachedOscillator()
+    seen = Projector(model, solve_modes(model, 9).shapes)(hypothesis_at(model, effect, place, 1))
+    factors = seen.hypothesis.change.coefficients(np.array([[0.3, 50.0]]))[0]
+    assert factors @ seen.weights == pytest.approx(0.3)
+    (own,) = effect.frame(model.frame_structure.frame, place, [0.3, 50.0]).oscillators
+    assert (own.crosswise, own.direction) == (not place.endswith("free"), place[3])
 
 
 def test_no_oscillator_is_as_light_as_to_drown_in_damping(models: dict[str, Model]) -> None:

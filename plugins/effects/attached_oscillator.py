@@ -95,7 +95,8 @@ class AttachedOscillator(FrameEffect):
         spring = with_extra(-translation_rows(model, at, [direction]), [1.0])
         terms = [
             Term("stiffness", RowOperator(spring, np.eye(1))),
-            Term("mass", RowOperator(own, np.eye(1))),
+            # On a scale it weighs what it weighs, however it hangs.
+            Term("mass", RowOperator(own, np.eye(1)), weight=None if others else 1.0),
         ]
         if others:
             carried = with_extra(translation_rows(model, at, others), [0.0] * len(others))
