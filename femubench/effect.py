@@ -29,14 +29,18 @@ from femubench.core.effect.change import (
 from femubench.core.effect.flexible_ends import (
     end_arm,
     end_room,
+    end_stiffness,
     flexible_ends_change,
     free_arm_change,
     rate_nodes,
+    softened_ends,
 )
 from femubench.core.effect.flexible_supports import flexible_supports_change, softened_supports
 from femubench.core.effect.frame_effect import EffectParameter, FrameEffect
 from femubench.core.effect.places import (
     APART,
+    FREE,
+    bare_place,
     branch_places,
     element_labels,
     elements_of,
@@ -68,6 +72,7 @@ from femubench.core.schema.diagnosis import LookWarning
 
 __all__ = [
     "APART",
+    "FREE",
     "Change",
     "Corrected",
     "Effect",
@@ -85,6 +90,7 @@ __all__ = [
     "Size",
     "Suspect",
     "Term",
+    "bare_place",
     "barycentric",
     "branch_places",
     "chebyshev_nodes",
@@ -97,6 +103,7 @@ __all__ = [
     "end_arm",
     "end_places",
     "end_room",
+    "end_stiffness",
     "ends_of",
     "flexible_ends_change",
     "flexible_supports_change",
@@ -119,6 +126,7 @@ __all__ = [
     "proportional",
     "rate_nodes",
     "set_places",
+    "softened_ends",
     "softened_supports",
     "sparse_term",
     "split_direction",

@@ -123,6 +123,7 @@ class TestReading:
             ('"-z"', '"rz"', "oscillators[0].direction", "rotation", "translation"),
             ("mass = 0.05", "mass = 0", "oscillators[0].mass", "0", "> 0"),
             ("300.0", "0.0", "oscillators[0].frequency", "0", "> 0"),
+            ("300.0", "300.0\ncrosswise = 1", "oscillators[0].crosswise", "1", "true or false"),
             ("-12.0", "inf", "preloads[0].force", "inf", "N"),
             ("y = 0.004", "x = 0.004", "eccentricities[0].x", "unknown", "y"),
         ],

@@ -141,6 +141,16 @@ def test_of_the_same_effect_twice_each_leaves_the_other_its_place() -> None:
     assert sum(places_of(found, best, 0).values()) == pytest.approx(1.0)
 
 
+def test_a_place_is_one_however_many_values_the_effect_has_there() -> None:
+    best = at(0.4, ("a", "x"), ("b", "u:apart"))
+    found = Posterior.of((best, at(0.3, ("a", "x"), ("b", "u")), at(0.3, ("a", "x"), ("b", "v"))))
+    assert places_of(found, best, 1) == pytest.approx({"u:apart": 0.7, "v": 0.3})
+    twice = at(0.6, ("a", "x:apart"), ("a", "y"))
+    found = Posterior.of((twice, at(0.4, ("a", "x"), ("a", "z"))))
+    assert places_of(found, twice, 0) == pytest.approx({"x:apart": 0.8, "z": 0.2})
+    assert places_of(found, twice, 1) == pytest.approx({"y": 0.6, "z": 0.4})
+
+
 def test_a_credible_set_ends_at_95_percent_but_not_between_equals() -> None:
     assert credible({"x": 0.9, "y": 0.06, "z": 0.04}) == (("x", 0.9), ("y", 0.06))
     equal = dict.fromkeys("abcd", 0.25)

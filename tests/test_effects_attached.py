@@ -12,9 +12,19 @@ import numpy as np
 import pytest
 import scipy.linalg as la
 
-from femubench import Model, NotApplicable, Sensors, solve_modes
+from femubench import Model, NotApplicable, Sensors, diagnose, solve_modes
+from femubench.core.effect.places import match
+from femubench.core.inference.hypothesis import hypothesis_at
+from femubench.core.inference.projection import Projector
 from femubench.core.modal.eigen import counted_evaluations, solve_dense
-from femubench.effect import FrameEffect, directed_point, elastic_band, total_mass, translation_rows
+from femubench.effect import (
+    FrameEffect,
+    bare_place,
+    directed_point,
+    elastic_band,
+    total_mass,
+    translation_rows,
+)
 from femubench.fem import FloatArray, Frame, GroundSpring, ModelError, Place, Support
 from femubench.modal import rigid_body_vectors
 from femubench.plugins.effects.added_mass import AddedMass
@@ -26,9 +36,10 @@ from femubench.plugins.effects.brace_spring import BraceSpring
 from femubench.plugins.effects.grounding_spring import GroundingSpring
 from femubench.plugins.effects.joint_mass import JointMass
 from femubench.plugins.effects.mass_eccentricity import MassEccentricity
-from femubench.plugins.effects.temperature import Temperature
+from femubench.plugins.effects.temperature import Temperature, slope_of
 
 sys.path.insert(0, str(Path(__file__).parent))
+from diagnosis_problems import case_of, effects_named, measured
 from effect_checks import as_matrices, changed_matrices
 
 FrameBuilder = Callable[..., Frame]
@@ -101,7 +112,9 @@ CASES = [
     (BraceSpring, "portal", "J0-J6"),
     (AttachedOscillator, "ladder", "F"),
     (AttachedOscillator, "hframe", "horizontal@0.5:x"),
+    (AttachedOscillator, "hframe", "horizontal@0.5:x:free"),
     (AttachedOscillator, "portal", "J2:y"),
+    (AttachedOscillator, "portal", "J2:y:free"),
     (AxialPreload, "ladder", "AB"),
     (AxialPreload, "portal", "m6"),
     (MassEccentricity, "ladder", "BE"),
@@ -112,6 +125,9 @@ CASES = [
     (Temperature, "ladder", "all"),
     (Temperature, "hframe", "all"),
     (Temperature, "portal", "all"),
+    (Temperature, "ladder", "all:x"),
+    (Temperature, "hframe", "all:z"),
+    (Temperature, "portal", "all:y"),
 ]
 
 
@@ -123,7 +139,7 @@ def test_model_and_change_agree(
     place: str,
 ) -> None:
     made, model = effect(), models[name]
-    assert place in made.places(model)
+    assert bare_place(place) in made.places(model)
     for x in (0.4, 2.0):
         values = sizes(made, model, place, x)
         extended = assert_agree(made, model, place, values)
@@ -149,6 +165,7 @@ def test_model_and_change_agree(
         (BraceSpring, "J1-J6"),
         (AttachedOscillator, "J6:x"),
         (Temperature, "all"),
+        (Temperature, "all:x"),
     ],
 )
 def test_flexible_joints_and_rigid_ends_do_no_harm(
@@ -281,6 +298,35 @@ def test_stiff_oscillator_is_a_mass_and_a_soft_one_rides_along(models: dict[str,
     carried = replace(model, mass=model.mass + 0.5 * (across.T @ across))
     # Three rigid modes and the mass that hangs on next to nothing.
     np.testing.assert_allclose(hertz(soft, 13)[4:], hertz(carried)[3:], rtol=1e-6)
+    free = effect.extend(model, "T1:x:free", [0.5, 1e-3])
+    np.testing.assert_allclose(hertz(free, 13)[4:], hertz(model)[3:], rtol=1e-6)
+
+
+def test_an_oscillator_is_tried_free_where_it_can_be_felt_across(models: dict[str, Model]) -> None:
+    effect = AttachedOscillator()
+    assert effect.finer(models["hframe"], "T1:x") == ("T1:x:free",)
+    assert effect.finer(models["hframe"], "T1:x:free") == ()
+    assert effect.finer(models["ladder"], "A") == ()  # out of plane there is one direction
+    assert match(models["hframe"].frame_structure.frame, "T1:x:free", "T1:-x")
+
+
+@pytest.mark.parametrize("place", ["T1:x", "T1:z", "T1:x:free", "T1:z:free"])
+def test_on_a_scale_an_oscillator_weighs_its_mass(models: dict[str, Model], place: str) -> None:
+    model, effect = models["hframe"], AttachedOscillator()
+    seen = Projector(model, solve_modes(model, 9).shapes)(hypothesis_at(model, effect, place, 1))
+    factors = seen.hypothesis.change.coefficients(np.array([[0.3, 50.0]]))[0]
+    assert factors @ seen.weights == pytest.approx(0.3)
+    (own,) = effect.frame(model.frame_structure.frame, place, [0.3, 50.0]).oscillators
+    assert (own.crosswise, own.direction) == (not place.endswith("free"), place[3])
+
+
+def test_no_oscillator_is_as_light_as_to_drown_in_damping(models: dict[str, Model]) -> None:
+    """Two tuned resonances part by the root of the mass ratio, here 3 %."""
+    for model in models.values():
+        place = AttachedOscillator().places(model)[0]
+        mass, _ = AttachedOscillator().parameters(model, place)
+        assert mass.neutral == 0.0
+        assert mass.value(mass.range[0]) == pytest.approx(1e-3 * total_mass(model))
 
 
 def test_preload_keeps_rigid_modes(models: dict[str, Model]) -> None:
@@ -368,6 +414,44 @@ def test_models_from_matrices(models: dict[str, Model]) -> None:
         assert not other_effect().places(model)
     with pytest.raises(NotApplicable):
         Temperature().extend(model, "all", [1.0])
+
+
+def test_a_temperature_that_changes_along_an_axis_goes_with_the_elements(
+    hframe: FrameBuilder,
+) -> None:
+    """By hand: in the middle 5 K, from end to end 20 K; upper and lower members lie across."""
+    model, effect = Model.of(hframe(mesh=(4, 2, 4))), Temperature()
+    frame = model.frame_structure.frame
+    assert tuple(effect.places(model)) == ("all", "all:x", "all:z")
+    low, high = (getattr(frame.corners[:, 2], f)() for f in ("min", "max"))
+    slope = slope_of(frame.members[0].material.E)
+    found = {at: f.factor for f in effect.frame(frame, "all:z", [5.0, 20.0]).factors for at in f.at}
+    assert len(found) == sum(m.elements for m in frame.members)
+    for member, (first, last) in zip(frame.members, frame.member_ends, strict=True):
+        z = frame.corners[[first, last], 2]
+        for k in range(member.elements):
+            middle = z[0] + (k + 0.5) / member.elements * (z[1] - z[0])
+            warmer = 5.0 + 20.0 * ((middle - low) / (high - low) - 0.5)
+            assert found[f"{member.name}/{k + 1}"] == pytest.approx(1.0 + slope * warmer, abs=1e-9)
+    even = effect.extend(model, "all:z", [25.0, 0.0])
+    np.testing.assert_allclose(hertz(even)[3:], hertz(effect.extend(model, "all", [25.0]))[3:])
+
+
+def test_where_it_was_warm_is_found_where_the_data_show_it(ladder: FrameBuilder) -> None:
+    """A machine at one end: neither a modulus of all nor one member does as well."""
+    model, effect, std = Model.of(ladder()), Temperature(), 2e-4
+    truth, rng = effect.extend(model, "all:x", [20.0, 40.0]), np.random.default_rng(4)
+    test = measured(truth, ladder(), count=8, rng=rng)
+    exact = solve_modes(truth).elastic.natural_frequencies[:8]
+    frequencies = exact * (1.0 + std * rng.normal(size=8))
+    test = replace(test, frequencies=frequencies, frequency_std=std * frequencies)
+    known = effects_named("youngs-modulus", "density", "temperature", "member-stiffness")
+    found = diagnose(replace(case_of(model, test, 7), tolerance=0.0), known)
+    cause = found.causes[0]
+    assert (cause.effect, cause.place) == ("temperature", "all:x")
+    for parameter, value in zip(cause.parameters, (20.0, 40.0), strict=True):
+        assert parameter.std is not None
+        assert abs(parameter.value - value) < 3.0 * parameter.std < 20.0
 
 
 def test_scales_are_worked_out_once_and_belong_to_their_model(ladder: FrameBuilder) -> None:

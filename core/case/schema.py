@@ -154,6 +154,7 @@ class OscillatorSpec(Table):
     direction: Direction = Field(description="a translation x, y or z, with an optional sign")
     mass: Positive = Field(description="a number > 0 in kg")
     frequency: Positive = Field(description="a number > 0 in Hz")
+    crosswise: bool = Field(True, strict=True, description="true or false")
 
 
 _MOST = 20_000  # entries of a list whose work grows with its length

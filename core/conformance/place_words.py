@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.effect.places import (
-    APART,
+    bare_place,
     elements_of,
     joints_of,
     pair_of,
@@ -19,7 +19,7 @@ from femubench.core.fem.structure import Structure
 
 def known_place(model: Model, place: str) -> bool:
     """Tell whether a place, without its direction or role, is in a model."""
-    bare = split_direction(place.removesuffix(APART).removesuffix(":branch"))[0]
+    bare = split_direction(bare_place(place).removesuffix(":branch"))[0]
     if model.structure is not None:
         return _in_frame(model.structure, bare) or _in_frame(model.structure, place)
     known = set(model.groups) | {"all"}

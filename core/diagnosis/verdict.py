@@ -10,6 +10,7 @@ import numpy as np
 import scipy.linalg as la
 from scipy.special import chdtr, expit
 
+from femubench.core.effect.places import bare_place
 from femubench.core.inference.fit import State
 from femubench.core.inference.posterior import (
     LIKELY_NOTHING,
@@ -217,7 +218,8 @@ def places_of(posterior: Posterior, explanation: Explanation, part: int) -> dict
     """Return where one cause of an explanation sits, most probable place first.
 
     All explanations of the same name count, whatever is beside the cause; where the effect is in
-    them several times, what sits where the others of it sit here is left to those.
+    them several times, what sits where the others of it sit here is left to those. A place is one
+    however many values the effect has there.
 
     Arguments:
         posterior: what the explanation was weighed in.
@@ -225,11 +227,17 @@ def places_of(posterior: Posterior, explanation: Explanation, part: int) -> dict
         part: position of the cause among its parts.
     """
     own = explanation.parts[part].hypothesis
-    taken = [p.hypothesis.place for p in explanation.parts if p.hypothesis.name == own.name]
+    words = {bare_place(own.place): own.place}
+
+    def places_in(e: Explanation) -> list[str]:
+        found = (q.hypothesis.place for q in e.parts if q.hypothesis.name == own.name)
+        return [words.setdefault(bare_place(place), place) for place in found]
+
+    taken = places_in(explanation)
     taken.remove(own.place)
     shares: dict[str, float] = {}
     for other, p in posterior.members(posterior.key(explanation)):
-        places = [q.hypothesis.place for q in other.parts if q.hypothesis.name == own.name]
+        places = places_in(other)
         free = [place for place in places if place not in taken] or places
         for place in free:
             shares[place] = shares.get(place, 0.0) + p / len(free)

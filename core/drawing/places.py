@@ -13,7 +13,7 @@ from femubench.core.case.case import Case
 from femubench.core.drawing.wireframe import Point, Wireframe, check_within, to_point, wireframe_of
 from femubench.core.effect.places import (
     ALL,
-    APART,
+    bare_place,
     ends_of,
     joints_of,
     members_of,
@@ -70,7 +70,7 @@ class PlacedWireframe(Wireframe):
     def place(self, word: str) -> DrawnPlace:
         """Return what the word of a place covers."""
         listed = next((place for place in self.places if place.place == word), None)
-        return listed or _plain_place(self, word, split_direction(word)[0])
+        return listed or _plain_place(self, word, split_direction(bare_place(word))[0])
 
 
 def placed_wireframe(source: Case | Model, words: Iterable[str]) -> PlacedWireframe:
@@ -107,7 +107,7 @@ def _plain_place(wireframe: Wireframe, word: str, head: str) -> DrawnPlace:
 
 
 def _place(wireframe: Wireframe, frame: Frame | None, word: str) -> DrawnPlace:
-    head, _ = split_direction(word.removesuffix(APART))
+    head, _ = split_direction(bare_place(word))
     plain = _plain_place(wireframe, word, head)
     if frame is not None and plain.kind != "all" and (joints := joints_of(frame, head)):
         return DrawnPlace(word, "joint", points=_points(frame, joints))

@@ -115,13 +115,13 @@ class Term:
     Arguments:
         matrix: what it is added to.
         operator: the matrix.
-        heavier: whether a mass makes the structure heavier; inertia of dofs that follow others
-            does not, wherever they go.
+        weight: by how much a mass makes the structure heavier in kg, 0 for the inertia of what
+            follows other dofs; None for what it weighs when the whole is moved.
     """
 
     matrix: Literal["mass", "stiffness"]
     operator: Operator
-    heavier: bool = True
+    weight: float | None = None
 
 
 @dataclass(frozen=True)

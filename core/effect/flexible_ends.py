@@ -29,7 +29,9 @@ from femubench.core.effect.change import (
     barycentric,
     chebyshev_nodes,
 )
+from femubench.core.effect.places import member_length
 from femubench.core.fem.beam import mass_matrices, stiffness_matrices
+from femubench.core.fem.frame import Frame, JointSpring
 from femubench.core.fem.joints import available_length, half_depth
 from femubench.core.fem.kinematics import rigid_arm
 from femubench.core.fem.model import Model
@@ -114,6 +116,63 @@ def end_room(structure: Structure, end: str) -> float:
     p = structure.properties
     rigid = (p.rigid_1, p.rigid_2)[side][element], (p.rigid_mass_1, p.rigid_mass_2)[side][element]
     return available_length(structure, end) - max(0.0, *map(float, rigid))
+
+
+def end_stiffness(frame: Frame, ends: Sequence[str]) -> tuple[float, float, float]:
+    """Return the members' own stiffness against turning ends, averaged over ends, in N m/rad.
+
+    Returns:
+        4 EI/L about local y, about local z, and GJ/L; what a section does not say is as about y.
+
+    Examples:
+        >>> bending, lateral, torsion = effect.end_stiffness(frame, ["rung-middle@J5"])
+        >>> bending > torsion
+        True
+    """
+    rows = []
+    for end in ends:
+        member = frame.members[frame.member_index[end.rpartition("@")[0]]]
+        s, m, length = member.section, member.material, member_length(frame, member.name)
+        bending, lateral = (4.0 * m.E * inertia / length for inertia in (s.Iy, s.Iz or s.Iy))
+        rows.append((bending, lateral, m.G * s.J / length))
+    own, lateral, torsion = (float(x) for x in np.mean(rows, axis=0))
+    return own, lateral, torsion or own
+
+
+def softened_ends(
+    frame: Frame, stiffness: Mapping[str, Mapping[str, float]], arm: float = 1.0
+) -> Frame:
+    """Return the frame with rotational springs at member ends, in series with those there.
+
+    Arguments:
+        frame: any frame.
+        stiffness: from ``member@joint`` to local directions to N m/rad; infinite ones are rigid
+            and leave the arm.
+        arm: its length as a multiple of `end_arm`.
+
+    Examples:
+        >>> softer = effect.softened_ends(frame, {"rung-middle@J5": {"ry": 1e4}})
+        >>> dict(softer.joint_springs[0].stiffness)
+        {'ry': 10000.0}
+    """
+    structure = Structure.build(frame)
+    springs = {f"{s.member}@{s.joint}": s for s in frame.joint_springs}
+    for end, own in stiffness.items():
+        member, _, joint = end.rpartition("@")
+        fresh = JointSpring(joint, member, {}, arm * end_arm(structure, end))
+        spring = springs.get(end, fresh)
+        springs[end] = replace(spring, stiffness=_in_series(spring.stiffness, own))
+    return replace(frame, joint_springs=tuple(springs.values()))
+
+
+def _in_series(there: Mapping[str, float], new: Mapping[str, float]) -> dict[str, float]:
+    """Return stiffnesses in series by direction; what is rigid is left out."""
+    joined = dict(there)
+    for direction, value in new.items():
+        if np.isfinite(value):
+            other = joined.get(direction)
+            joined[direction] = value if other is None else value * other / (value + other)
+    return joined
 
 
 def free_arm_change(

@@ -175,4 +175,4 @@ def _cores(first: IntArray, second: IntArray, count: int, shift: int = 0) -> Flo
 def _terms(
     matrix: Literal["mass", "stiffness"], rows: SparseArray, cores: FloatArray
 ) -> list[Term]:
-    return [Term(matrix, RowOperator(rows, core), heavier=False) for core in cores]
+    return [Term(matrix, RowOperator(rows, core), weight=0.0) for core in cores]

@@ -34,6 +34,8 @@ class EffectParameter:
         scale: of the value at x = 1.
         neutral: the value that leaves the model as it is; infinite for ``compliance``.
         lower, upper: bounds of the value.
+        least: size from which on it is taken for what it is; a smaller one is not tried. None
+            for any.
         scaling: how x becomes a value.
         one_sided: whether x >= 0.
         textbook: a value that physics gives without any fit, e.g. 1 for shear deformation.
@@ -51,6 +53,7 @@ class EffectParameter:
     one_sided: bool = False
     textbook: float | None = None
     wording: Wording = "value"
+    least: float | None = None
 
     def value(self, x: Any) -> Any:  # noqa: ANN401 - numbers, arrays and complex steps alike
         """Return the value at a coordinate, bounds not applied; any shape."""
@@ -76,7 +79,8 @@ class EffectParameter:
             low, high = self.coordinate(self.upper), self.coordinate(max(self.lower, 1e-300))
         else:
             low, high = self.coordinate(self.lower), self.coordinate(self.upper)
-        low = 0.0 if self.one_sided else low
+        if self.one_sided:
+            low = 0.0 if self.least is None else self.coordinate(self.neutral + self.least)
         return max(low, -6.0), min(high, 6.0)
 
 

@@ -3,8 +3,8 @@
 ``all``; a joint type (``type:L`` where it equals a joint's name); a joint; a member; ``member/k``,
 element k from 1; ``member@joint``, an end; ``member@0.25``, a point; ``A-E``, a pair of joints; a
 suffix ``:z`` names a direction; ``support:A``, what holds a point to ground; ``set:wing``,
-``section:tube``, ``material:steel``, families of members. ``:apart`` is no other
-place: there an effect has more values, one a direction.
+``section:tube``, ``material:steel``, families of members. ``:apart`` and ``:free`` are no other
+places: there an effect has more values, one a direction, or leaves other directions alone.
 """
 
 from __future__ import annotations
@@ -26,10 +26,20 @@ from femubench.core.typing import IntArray
 ALL = "all"
 _TYPE, _BRANCH, _SUPPORT = "type:", ":branch", "support:"
 _SET, _SECTION, _MATERIAL = "set:", "section:", "material:"
-APART = ":apart"
+APART, FREE = ":apart", ":free"
 # Stations are written with six digits, mesh nodes have more.
 _SAME = 1e-5
 _FEW = 4
+
+
+def bare_place(place: str) -> str:
+    """Return the place itself of a word with ``:apart`` or ``:free``.
+
+    Examples:
+        >>> effect.bare_place("J5:apart")
+        'J5'
+    """
+    return place.removesuffix(APART).removesuffix(FREE)
 
 
 def elements_of(structure: Structure, place: str, *, arms: bool = False) -> IntArray:
@@ -259,7 +269,7 @@ def ends_of(frame: Frame, place: str) -> tuple[str, ...]:
         >>> effect.ends_of(frame, "J5")
         ('front-right@J5', 'front-left@J5', 'rung-middle@J5')
     """
-    place = place.removesuffix(APART)
+    place = bare_place(place)
     if place.endswith(_BRANCH):
         kind = place.removesuffix(_BRANCH).removeprefix(_TYPE)
         for group in joint_groups(frame):
@@ -416,7 +426,7 @@ def pair_of(frame: Frame, place: str) -> tuple[str, str]:
 
 def _canonical(frame: Frame, place: str) -> tuple[str, ...]:
     """Return one form for all words that stand for the same place."""
-    place = place.removesuffix(APART)
+    place = bare_place(place)
     if place.startswith(_SUPPORT):
         with suppress(ModelError):
             return tuple(
@@ -448,6 +458,6 @@ def match(frame: Frame, place_a: str, place_b: str) -> bool:
 
     At a joint of two members an end is the joint; a type with one joint is that joint; the member
     of a frame with one member is ``all``; the ends of a member are joints; pairs have no order,
-    directions no sign; a place is the same ``:apart``.
+    directions no sign; a place is the same ``:apart`` and ``:free``.
     """
     return _canonical(frame, place_a) == _canonical(frame, place_b)

@@ -101,5 +101,5 @@ def _oscillator_rows(
     direction = DIRECTIONS.index(item.direction.lstrip("+-"))
     own = transform[6 * node + direction : 6 * node + direction + 1]
     active = np.flatnonzero(structure.active_local[:3])
-    others = place[active[active != direction]]
+    others = place[active[active != direction] if item.crosswise else active[:0]]
     return sp.vstack([own, others]), own - place[direction : direction + 1]

@@ -207,12 +207,14 @@ class Oscillator:
 
     Arguments:
         frequency: natural frequency on a fixed base in Hz.
+        crosswise: whether it goes along with its place in the other directions.
     """
 
     at: Place
     direction: str
     mass: float
     frequency: float
+    crosswise: bool = True
 
 
 @dataclass(frozen=True)

@@ -95,8 +95,11 @@ class Projector:
             rows = np.eye(grown.shape[1])
             cores = np.array([term.operator.project(grown) for term in change.terms])
             weights = np.array([self._weight(term, motion) for term in change.terms])
-        heavier = is_mass & np.array([term.heavier for term in change.terms], dtype=bool)
-        return Projection(hypothesis, rows, cores, is_mass, np.where(heavier, weights, 0.0))
+        known = [
+            w if term.weight is None else term.weight
+            for w, term in zip(weights, change.terms, strict=True)
+        ]
+        return Projection(hypothesis, rows, cores, is_mass, np.where(is_mass, known, 0.0))
 
     def _small(
         self, terms: Sequence[Term], extra: int

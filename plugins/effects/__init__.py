@@ -11,6 +11,7 @@ CLASSES = {
     "shear-deformation": "shear_deformation:ShearDeformation",
     "rotary-inertia": "rotary_inertia:RotaryInertia",
     "joint-rotation": "joint_rotation:JointRotation",
+    "joint-flexibility": "joint_flexibility:JointFlexibility",
     "joint-offset": "joint_offset:JointOffset",
     "joint-mass": "joint_mass:JointMass",
     "added-mass": "added_mass:AddedMass",

@@ -11,6 +11,7 @@ import scipy.sparse as sp
 
 from femubench import Model
 from femubench.effect import (
+    FREE,
     Change,
     EffectParameter,
     FrameEffect,
@@ -18,6 +19,7 @@ from femubench.effect import (
     Site,
     Size,
     Term,
+    bare_place,
     directed_places,
     directed_point,
     elastic_band,
@@ -28,11 +30,17 @@ from femubench.effect import (
 from femubench.fem import FloatArray, Frame, Oscillator
 
 _SHARE = 0.005  # of the structure's mass
+# A part that is tuned to a mode splits its peak by the root of the mass ratio (Den Hartog 1956,
+# 3.2), and the two merge where that is less than the sum of the damping ratios. Structures of
+# metal have some 1 %, panels, cables and instruments on their mounts 2 %: what is lighter than
+# 0.03^2, a thousandth, damps a mode and is never read as a frequency.
+_LEAST = 0.001  # of the structure's mass
 
 
 class AttachedOscillator(FrameEffect):
     """Let a mass ride on a place and swing on a spring in one direction, which adds a mode.
 
+    Across its direction the mass goes along with its place; ``:free``, it is not felt there.
     Without mass it is not there, whatever its frequency.
     """
 
@@ -51,12 +59,22 @@ class AttachedOscillator(FrameEffect):
         middles = [f"{m.name}@{_middle(m.elements):g}" for m in frame.members]
         return directed_places(model, [*frame.joint_index, *middles])
 
+    def finer(self, model: Model, place: str) -> Sequence[str]:
+        """Return the place with a mass that hangs free, where it can be felt across at all."""
+        if place.endswith(FREE):
+            return ()
+        at, direction = directed_point(model, place)
+        across = set(free_translations(model, at)) - {direction}
+        return (f"{place}{FREE}",) if across else ()
+
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return its mass, and its frequency around the middle of the lowest elastic ones."""
-        scale = _SHARE * model.total_mass
+        scale, least = (share * model.total_mass for share in (_SHARE, _LEAST))
         centre = float(np.exp(np.log(elastic_band(model)).mean()))
         return (
-            EffectParameter("mass", "kg", scale, scaling="exponential", one_sided=True),
+            EffectParameter(
+                "mass", "kg", scale, scaling="exponential", one_sided=True, least=least
+            ),
             EffectParameter("frequency", "Hz", 0.5 * centre, centre, 0.05 * centre, 5.0 * centre),
         )
 
@@ -64,18 +82,21 @@ class AttachedOscillator(FrameEffect):
         """Return the frame with the oscillator."""
         if not values[0]:
             return frame
-        oscillator = Oscillator(*directed_point(frame, place), values[0], values[1])
+        at = directed_point(frame, bare_place(place))
+        oscillator = Oscillator(*at, values[0], values[1], crosswise=not place.endswith(FREE))
         return replace(frame, oscillators=(*frame.oscillators, oscillator))
 
     def change(self, model: Model, place: str) -> Change:
         """Return 1 kg on a dof of its own and the spring of 1 N/m that carries it."""
-        at, direction = directed_point(model, place)
-        others = [d for d in free_translations(model, at) if d != direction]
+        at, direction = directed_point(model, bare_place(place))
+        crosswise = () if place.endswith(FREE) else free_translations(model, at)
+        others = [d for d in crosswise if d != direction]
         own = sp.csr_array(([1.0], [model.size], [0, 1]), shape=(1, model.size + 1))
         spring = with_extra(-translation_rows(model, at, [direction]), [1.0])
         terms = [
             Term("stiffness", RowOperator(spring, np.eye(1))),
-            Term("mass", RowOperator(own, np.eye(1))),
+            # On a scale it weighs what it weighs, however it hangs.
+            Term("mass", RowOperator(own, np.eye(1)), weight=None if others else 1.0),
         ]
         if others:
             carried = with_extra(translation_rows(model, at, others), [0.0] * len(others))

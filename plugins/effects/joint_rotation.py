@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -20,15 +19,16 @@ from femubench.effect import (
     end_arm,
     end_places,
     end_room,
+    end_stiffness,
     ends_of,
     flexible_ends_change,
     free_arm_change,
     joints_of,
     joints_with_members,
-    member_length,
+    softened_ends,
     type_places,
 )
-from femubench.fem import ACTIVE, Frame, JointSpring, Structure
+from femubench.fem import ACTIVE, Frame, Structure
 
 _SOFTEST = 1e-3  # of the scale
 _TORSION, _BENDING = ("rx",), ("ry", "rz")
@@ -91,17 +91,10 @@ class JointRotation(FrameEffect):
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the springs, in series with those that are there."""
-        structure = Structure.build(frame)
-        springs = {f"{s.member}@{s.joint}": s for s in frame.joint_springs}
         groups = _parts(frame, place).values()
         arm = values[len(groups)] if len(values) > len(groups) else 1.0
         own = {d: value for names, value in zip(groups, values, strict=False) for d in names}
-        for end in ends_of(frame, place):
-            member, _, joint = end.rpartition("@")
-            fresh = JointSpring(joint, member, {}, arm * end_arm(structure, end))
-            spring = springs.get(end, fresh)
-            springs[end] = replace(spring, stiffness=_in_series(spring.stiffness, own))
-        return replace(frame, joint_springs=tuple(springs.values()))
+        return softened_ends(frame, dict.fromkeys(ends_of(frame, place), own), arm)
 
     def change(self, model: Model, place: str) -> Change:
         """Return the springs condensed into the end elements."""
@@ -136,23 +129,7 @@ def _longest(structure: Structure, place: str) -> float:
 
 
 def _scales(frame: Frame, ends: Sequence[str]) -> dict[str, float]:
-    """Return 4 EI/L and GJ/L of the members by stiffness, averaged over ends, in N m/rad."""
-    rows = []
-    for end in ends:
-        member = frame.members[frame.member_index[end.rpartition("@")[0]]]
-        s, m, length = member.section, member.material, member_length(frame, member.name)
-        bending, lateral = (4.0 * m.E * inertia / length for inertia in (s.Iy, s.Iz or s.Iy))
-        rows.append((bending, lateral, m.G * s.J / length))
-    own, lateral, torsion = (float(x) for x in np.mean(rows, axis=0))
-    scales = {"stiffness": own, "bending": own, "bending ry": own, "bending rz": lateral}
-    return {**scales, "torsion": torsion or own}
-
-
-def _in_series(there: Mapping[str, float], new: Mapping[str, float]) -> dict[str, float]:
-    """Return stiffnesses in series by direction; what is rigid is left out."""
-    joined = dict(there)
-    for direction, value in new.items():
-        if np.isfinite(value):
-            other = joined.get(direction)
-            joined[direction] = value if other is None else value * other / (value + other)
-    return joined
+    """Return the members' own stiffness, averaged over ends, by the name of the spring's."""
+    own, lateral, torsion = end_stiffness(frame, ends)
+    names = ("stiffness", "bending", "bending ry")
+    return {**dict.fromkeys(names, own), "bending rz": lateral, "torsion": torsion}
