@@ -258,7 +258,9 @@ def _plain(value: object) -> Any:  # noqa: ANN401 - what TOML can hold
 
 
 def _materials(frame: Frame, known: Known) -> tuple[list[str], dict[str, Keys]]:
-    contents = [(member.name, keys_of(member.material)) for member in frame.members]
+    contents = [
+        (member.name, keys_of(member.material, without=("name",))) for member in frame.members
+    ]
     tables = {name: spec.model_dump() for name, spec in known.materials.items()}
     return named_tables(contents, known.names("material"), tables, "material")
 
