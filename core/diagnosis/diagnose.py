@@ -110,7 +110,6 @@ def diagnose(
     """
     begin, effort = time.perf_counter(), effort or Effort()
     used = case.measurement.select(case.used)
-    scatter = case.tolerance if tolerance is None else tolerance
     registered = registered_effects()
     known = registered if effects is None else tuple(effects)
     wrong = registered_faults() if faults is None else tuple(faults)
@@ -120,7 +119,7 @@ def diagnose(
             model,
             measurement,
             () if depth == "nothing" else known,
-            tolerance=scatter,
+            tolerance=case.tolerance if tolerance is None else tolerance,
             pairs=pairs and depth == "several",
             reference=case.used_reference,
             width=case.error_width,
@@ -136,8 +135,7 @@ def diagnose(
     adequate = adequacy(leader.fit.state, leader.unknowns)
     decision = decide(examination.posterior, adequate, leader, proof.log_bayes, proof.confirmed)
     # The look is no part of the search: whatever is sought, every effect may have its say.
-    all_known = {effect.name: effect for effect in (*registered, *known)}
-    looks = look(given.model, used, effects=all_known.values())
+    looks = look(given.model, used, effects={e.name: e for e in (*registered, *known)}.values())
     if case.band is not None:
         # All modes that were found, used or not: what is not among them is not in the structure.
         looks += tuple(look_at_band(Seen(case.model, case.measurement), case.band))
@@ -225,6 +223,7 @@ def _written(
         model_error=error_scales(examination, leader),
         like_a_beam=examination.like_a_beam,
         subject=case,
+        examination=examination,
     )
 
 

@@ -26,6 +26,8 @@ from femubench.core.schema.diagnosis import (
 if TYPE_CHECKING:
     import pandas as pd
 
+    from femubench.core.inference.examine import Examination
+
 
 @dataclass(frozen=True, repr=False)
 class Diagnosis(Shown):
@@ -58,6 +60,7 @@ class Diagnosis(Shown):
             structure is taken for a beam model.
         like_a_beam: probability that it is one, but for ordinary scatter.
         subject: the case itself, for drawings of its structure.
+        examination: every explanation that was tried; None where it was read from a file.
     """
 
     case: str
@@ -84,6 +87,7 @@ class Diagnosis(Shown):
     model_error: tuple[ErrorScale, ...] = ()
     like_a_beam: float = 1.0
     subject: Case | None = field(default=None, repr=False)
+    examination: Examination | None = field(default=None, repr=False, compare=False)
 
     def rows(self) -> Sequence[tuple[str, str]]:
         """Return verdict, causes, rivals and gain."""

@@ -210,15 +210,13 @@ def examine(
         basis = Basis.of(model, measurement)
         problem, slopes = posed(model, measurement, hypotheses, tolerance, basis)
         before = None if reference is None else before_of(problem, reference)
-        rounds = 1 + (_ROUNDS if width > 0.0 else 0)
-        stages.enter_context(effort.stage(rounds * most_fits(problem, pairs=pairs)))
+        stages.enter_context(effort.stage(most_fits(problem, pairs, 1 + _ROUNDS * (width > 0.0))))
         explanations: list[Explanation] = []
-        error: ModelError | None = None
+        error = None
         if width > 0.0:
             error = model_error_of(problem, basis, before, width, log(1.0 - beam))
             explanations = searched(problem, error, known, pairs, effort)
-        noise = beam_noise(basis, slopes, before, tolerance, log(beam))
-        own = replace(problem, noise=noise)
+        own = replace(problem, noise=beam_noise(basis, slopes, before, tolerance, log(beam)))
         floor = max((e.log_weight for e in explanations), default=-np.inf) - _HOPELESS
         more, atlas = Search(own, known, pairs=pairs, floor=floor, effort=effort).run()
     posterior = Posterior.of([*explanations, *more])

@@ -66,10 +66,10 @@ _ADEQUATE = 0.05
 _SPLIT = 4  # single causes that are tried with more values at their places
 
 
-def most_fits(problem: Problem, *, pairs: bool) -> int:
-    """Return how many fits a search is known to do at most; greedy steps may add some."""
+def most_fits(problem: Problem, pairs: bool, searches: int = 1) -> int:
+    """Return how many fits searches are known to do at most; greedy steps may add some."""
     singles = _GROUNDS * min(_REFINED, len(problem.space.projections))
-    return singles + pairs * (_SINGLES_FOR_PAIRS + 2) * _PARTNERS
+    return searches * (singles + pairs * (_SINGLES_FOR_PAIRS + 2) * _PARTNERS)
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class Search:
 
     def run(self) -> tuple[list[Explanation], list[Found]]:
         """Return all explanations and the atlas of every base that was searched."""
-        with self.effort.stage(most_fits(self.problem, pairs=self.pairs)):
+        with self.effort.stage(most_fits(self.problem, self.pairs)):
             return self._run()
 
     def _run(self) -> tuple[list[Explanation], list[Found]]:
