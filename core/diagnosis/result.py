@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from femubench.core.case.case import Case
 from femubench.core.display import Shown
 from femubench.core.fem.model import Model
+from femubench.core.inference.examine import Examination
 from femubench.core.schema.diagnosis import (
     Advice,
     Cause,
@@ -25,8 +26,6 @@ from femubench.core.schema.diagnosis import (
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from femubench.core.inference.examine import Examination
 
 
 @dataclass(frozen=True, repr=False)
