@@ -19,13 +19,13 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from itertools import permutations
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import Any, TypeVar
 
 import pandas as pd
 from threadpoolctl import threadpool_limits
@@ -33,11 +33,23 @@ from threadpoolctl import threadpool_limits
 sys.path.insert(0, str(Path(__file__).parents[1]))  # the truths are not installed
 
 from femubench import read_case
-from femubench.core.challenge.answer import Answer
+from femubench.core.challenge.answer import Answer, AnswerCause
+from femubench.core.challenge.calibration import (
+    Statement,
+    calibration_rows,
+    coverage_rows,
+    fault_rows,
+    statements,
+    wilson,
+)
 from femubench.core.challenge.score import LARGEST_GROUP, Parts, candidates, faults_in
-from femubench.core.challenge.sweep import Record, wilson
+from femubench.core.challenge.sweep import Record
+from femubench.core.challenge.true_fit import Finding, fits_of, fits_worse, is_search_fault
+from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.effect.places import match
+from femubench.core.errors import FemubenchError
 from femubench.core.fem.frame import Frame
+from femubench.core.plugin.loader import load_plugins
 from truths.posing import DEFECTS, FAULTS, HEALTHY, SUITE, pose
 from truths.truth import TRUTH_FILE, TrueCause, Truth, read_truth
 
@@ -119,6 +131,7 @@ def diagnosed(task: Task, key: tuple[str, str]) -> Record:
     from femubench.core.diagnosis.diagnose import diagnose
 
     record: Record = {"name": key[0], "digest": key[1], "verdict": "error"}
+    diagnosis: Diagnosis | None = None
     begin = time.process_time()
     with tempfile.TemporaryDirectory() as scratch, threadpool_limits(1):
         target = Path(scratch, "case")
@@ -142,7 +155,28 @@ def diagnosed(task: Task, key: tuple[str, str]) -> Record:
             record["verdict"] = "too-long"
         except Exception as error:  # a fault of the diagnosis is a finding of the sweep
             record["error"] = f"{type(error).__name__}: {error}"
-    return {**record, "seconds": round(time.process_time() - begin, 2)}
+    record["seconds"] = round(time.process_time() - begin, 2)
+    if diagnosis is not None:
+        with suppress(TooLong, FemubenchError), limited(task.seconds), threadpool_limits(1):
+            record |= _fits(diagnosis, read_truth(task.folder))
+    return record
+
+
+def _fits(diagnosis: Diagnosis, truth: Truth) -> Record:
+    """Return how the true causes fit beside what was found; nothing where there are none."""
+    if diagnosis.examination is None or truth.kind not in ("defect", "pair"):
+        return {}
+    # A true size is one parameter's; where an effect has more, the others are not known.
+    causes = [
+        [
+            Finding(effect, place, () if cause.size is None or i else (cause.size,))
+            for i, (effect, place) in enumerate(cause.findings)
+        ]
+        for cause in truth.causes
+    ]
+    structure = diagnosis.examination.model.structure
+    same = same_place(None if structure is None else structure.frame)
+    return fits_of(diagnosis.examination, causes, load_plugins().effects, same)
 
 
 def read_records(path: Path) -> dict[str, Record]:
@@ -336,12 +370,19 @@ class Scored:
         said: one of `OUTCOMES`.
         sure: whether the verdict states a probability of at least `SURE`.
         beside: what was said of the structure beside faults of data and input.
+        stated: probabilities of names and places.
+        deviations: of sizes that were found, from the true ones, in stated deviations.
+        fits: whether the answer fits worse than the truth, and whether by a fault of the search;
+            None where the truth was not fitted.
     """
 
     truth: Truth
     said: str
     sure: bool
     beside: str = ""
+    stated: tuple[Statement, ...] = ()
+    deviations: tuple[float, ...] = ()
+    fits: tuple[bool, bool] | None = None
 
 
 def scored(records: Mapping[str, Record], truths: Iterable[Truth], suite: Path) -> list[Scored]:
@@ -356,9 +397,56 @@ def scored(records: Mapping[str, Record], truths: Iterable[Truth], suite: Path) 
     for truth in truths:
         if truth.name in records:
             record = records[truth.name]
-            said = outcome(truth, record, same(truth.structure))
+            places = same(truth.structure)
+            said = outcome(truth, record, places)
             sure = (record.get("probability") or 0.0) >= SURE
-            found.append(Scored(truth, said, sure, beside(record)))
+            worse = fits_worse(record)
+            found.append(
+                Scored(
+                    *(truth, said, sure, beside(record)),
+                    stated=tuple(stated(truth, record, places)),
+                    deviations=tuple(deviations(truth, record, places)),
+                    fits=None if worse is None else (worse, bool(is_search_fault(record))),
+                )
+            )
+    return found
+
+
+def stated(truth: Truth, record: Record, same: Same) -> list[Statement]:
+    """Return the probabilities of names and places in a record, and whether they are right.
+
+    What is taken at the textbook value counts neither way; where the data or what was typed in
+    are wrong, their faults count alone.
+    """
+    if "answer" not in record:
+        return []
+    wanted = {effect for cause in truth.causes for effect, _ in cause.findings}
+    textbook = set(record.get("textbook", ())) - wanted
+
+    def is_placed(effect: str, place: str) -> bool:
+        return any(_names((effect, place), cause, same) for cause in truth.causes)
+
+    def counts(cause: AnswerCause) -> bool:
+        faulty = truth.kind.endswith("-fault")
+        return cause.side != "model" if faulty else cause.effect not in textbook
+
+    answer = Answer.model_validate(record["answer"])
+    return statements(answer, wanted.__contains__, is_placed, counts)
+
+
+def deviations(truth: Truth, record: Record, same: Same) -> list[float]:
+    """Return how far sizes are from the true ones, of causes that are named where they sit."""
+    if record["verdict"] not in ("named", "ambiguous"):
+        return []
+    found = []
+    for said in Answer.model_validate(record["answer"]).causes:
+        for cause in truth.causes:
+            sizes = [p for p in said.parameters if p.std and p.unit == cause.unit]
+            here = said.effect == cause.effect and same(said.place, cause.place)
+            if here and cause.size is not None and len(sizes) == 1:
+                (size,) = sizes
+                assert size.std is not None
+                found.append((size.value - cause.size) / size.std)
     return found
 
 
@@ -424,7 +512,26 @@ def half(title: str, cases: Sequence[Scored]) -> str:
     if found:
         ranges = outcome_table("chi-square", reach, found, RANGES)
         parts += ["All that hide something, by the chi-square of the change:", ranges]
+    said = [one for case in cases for one in case.stated]
+    parts += ["Stated probabilities of names, and of names at their places:"]
+    parts += [_markdown(calibration_rows(said))]
+    if sizes := coverage_rows(by_kind(cases, lambda case: case.deviations)):
+        parts += ["Sizes of what is named where it sits, in stated deviations:", _markdown(sizes)]
+    fits = by_kind(cases, lambda case: () if case.fits is None else (case.fits,))
+    if faults := fault_rows(fits):
+        parts += ["Answers beside the fit of the truth itself:", _markdown(faults)]
     return "\n\n".join(parts)
+
+
+V = TypeVar("V")
+
+
+def by_kind(cases: Iterable[Scored], values: Callable[[Scored], Sequence[V]]) -> dict[str, list[V]]:
+    """Return some values of all cases by kind."""
+    found: dict[str, list[V]] = {}
+    for case in cases:
+        found.setdefault(kind_of(case.truth), []).extend(values(case))
+    return {kind: found[kind] for kind in ranked(found, KIND_ORDER)}
 
 
 def _beside(cases: Sequence[Scored]) -> str:

@@ -669,6 +669,12 @@ def test_progress_only_where_someone_watches(monkeypatch: pytest.MonkeyPatch) ->
         assert report is None
     with progress.waiting("looking"), progress.waiting("not", quiet=True):
         pass
+    with progress.time_left("looking", quiet=True) as told:
+        assert told is None
+    with progress.time_left("looking") as told:
+        assert told is not None
+        told(0, 0)
+        told(1, 2)
     with progress.progress_bar() as report:
         assert report is not None
         report(JobResult("[red]case", "strategy", 0, "ok"), 1, 2)

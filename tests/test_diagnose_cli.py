@@ -20,6 +20,7 @@ from femubench.core.cli.main import bench
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.serial import diagnosis_from_json
 from femubench.core.errors import InputError, NotApplicable
+from femubench.core.inference.effort import Effort
 from femubench.core.library import diagnose as library
 from femubench.core.library.cases import read_cases
 from femubench.core.modal.eigen import solve_modes
@@ -60,10 +61,12 @@ class Search:
     def __init__(self) -> None:
         self.found: Diagnosis | Exception = toys.made()
         self.calls: list[tuple[Case, list[str], bool]] = []
+        self.budgets: list[float | None] = []
         self.written: list[tuple[Path, Case, object, list[str], str]] = []
         self.fault: Exception | None = None
 
-    def diagnose(self, case: Case, *, effects: Any, pairs: bool) -> Diagnosis:
+    def diagnose(self, case: Case, *, effects: Any, pairs: bool, effort: Effort) -> Diagnosis:
+        self.budgets.append(effort.budget)
         self.calls.append((case, [effect.name for effect in effects], pairs))
         if isinstance(self.found, Exception):
             raise self.found
@@ -131,6 +134,8 @@ class TestAsking:
         assert invoke("case", *words).exit_code == 0
         ((case, effects, pairs),) = search.calls
         assert (case.tolerance, effects, pairs) == (0.02, ["test-moss", "test-rust"], False)
+        assert invoke("case", "--budget", "0.5").exit_code == 0
+        assert search.budgets == [None, 0.5]
 
     def test_built_in_case_and_no_tolerance(self, invoke: Invoke, search: Search) -> None:
         assert invoke("hframe", "--tolerance", "0").exit_code == 0
@@ -155,6 +160,8 @@ class TestWrongInput:
             (["case", "--tolerance", "0.3"], "0.3 is no number >= 0 and <= 0.2"),
             (["case", "--tolerance", "nan"], "nan is no number >= 0 and <= 0.2"),
             (["case", "--tolerance=-1e-9"], "is no number >= 0 and <= 0.2"),
+            (["case", "--budget=-1"], "-1.0 is no number >= 0"),
+            (["case", "--budget", "nan"], "nan is no number >= 0"),
             (["case", "--json", "no/such.json"], "no: folder does not exist"),
             (["case", "--json", "case"], "is a directory"),
             (

@@ -183,11 +183,11 @@ def test_tables_count_both_halves_apart() -> None:
 
 def test_the_page_keeps_its_words() -> None:
     page = (ROOT / "docs" / "truth-sweep.md").read_text(encoding="utf-8")
-    once = sweep.filled(page, "a table")
+    once = sweep.filled(page, "| a | table |")
     assert once.startswith(page.split("<!-- truth-sweep -->")[0])
-    assert sweep.filled(once, "a table") == once
-    assert sweep.filled(once, "another", "truth-sweep-reference").count("a table") == 1
-    assert "a table" in once.split("<!-- /truth-sweep -->")[0]
+    assert sweep.filled(once, "| a | table |") == once
+    assert sweep.filled(once, "another", "truth-sweep-reference").count("| a | table |") == 1
+    assert "| a | table |" in once.split("<!-- /truth-sweep -->")[0]
 
 
 @pytest.fixture
@@ -226,6 +226,41 @@ def test_failures_are_outcomes(task: sweep.Task, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(diagnosing, "diagnose", fails)
     record = sweep.diagnosed(task, task.key)
     assert (record["verdict"], record["error"]) == ("error", "ZeroDivisionError: as it were")
+
+
+def test_stated_probabilities_and_sizes(same: sweep.Same) -> None:
+    heavy = replace(CLAMP, size=0.3, unit="kg")
+    record = said("ambiguous", "added-mass@rung-middle@0.5", "density@all", p=0.6)
+    sizes = [{"name": "mass", "value": 0.36, "std": 0.02, "unit": "kg"}]
+    record["answer"]["causes"][0]["parameters"] = sizes
+    defect = truth("defect", heavy)
+    found = [(one.matter, one.right) for one in sweep.stated(defect, record, same)]
+    assert found == [("name", True), ("place", True), ("name", False), ("place", False)]
+    assert sweep.deviations(defect, record, same) == pytest.approx([3.0])
+    # At another place, or as another finding that counts, a size is not the true one.
+    assert sweep.deviations(truth("defect", replace(heavy, place="J1")), record, same) == []
+    also = replace(LOOSE, also=("added-mass@rung-middle@0.5",), size=0.3, unit="kg")
+    assert sweep.deviations(truth("defect", also), record, same) == []
+    assert sweep.deviations(defect, {**record, "verdict": "unknown"}, same) == []
+    plain = {**said("named", "shear-deformation@all"), "textbook": ["shear-deformation"]}
+    assert sweep.stated(truth("clean"), plain, same) == []
+    assert not any(one.right for one in sweep.stated(truth("clean"), record, same))
+    assert sweep.stated(truth("data-fault", SWAP), record, same) == []
+    assert sweep.stated(defect, {"verdict": "too-long"}, same) == []
+
+
+def test_answers_beside_the_fit_of_the_truth_are_in_the_tables() -> None:
+    name = next(name for name in map(str, range(20)) if not held(name))
+    fits = [{"chi2": c, "unknowns": 1, "log_weight": -c} for c in (50.0, 40.0)]
+    record = said("named", "added-mass@J1") | dict(
+        zip(("leader_fit", "true_fit"), fits, strict=True)
+    )
+    truths = [truth("defect", LOOSE, name=name)]
+    (case,) = sweep.scored({name: record}, truths, ROOT / "scenarios")
+    assert case.fits == (True, True)
+    text = " ".join(sweep.tables([case], truths).split())
+    assert "| defect | 1 | 1 | 1 | 100.0 % |" in text
+    assert "| 0.8 to 0.95 | 1 | 0.0 % |" in text
 
 
 def test_records_cut_off_are_left_out(tmp_path: Path) -> None:

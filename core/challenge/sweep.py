@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, astuple, dataclass
+from functools import partial
 from typing import Any
 
 from femubench.core.case.case import Case
 from femubench.core.challenge.answer import Answer
+from femubench.core.challenge.calibration import Statement, percent, statements
 from femubench.core.challenge.draw import BlindCase, draw_case, registered_effects
 from femubench.core.challenge.score import Judgement, judge_answer
-from femubench.core.challenge.structures import STRUCTURES
-from femubench.core.challenge.truth import DataKind, Hidden
+from femubench.core.challenge.structures import STRUCTURES, structure_named
+from femubench.core.challenge.true_fit import Finding, fits_of, fits_worse, is_search_fault
+from femubench.core.challenge.truth import DataKind, Hidden, Truth
 from femubench.core.challenge.visibility import delta_chi2
 from femubench.core.diagnosis.result import Diagnosis
+from femubench.core.effect.places import match
 from femubench.core.errors import FemubenchError
 
 Diagnose = Callable[[Case], Diagnosis]
@@ -132,10 +135,38 @@ def run_task(task: Task, diagnose: Diagnose) -> Record:
     return {
         **record,
         **_said(answer, judged),
+        "stated": [list(astuple(one)) for one in _stated_of(answer, blind.truth)],
         "gain": {"held_out": gain.held_out_percent, "modified": gain.modified_percent},
+        **_fits(diagnosis, blind.truth),
         "adequacy_p": diagnosis.adequacy_p,
         "chi2": list(diagnosis.chi2),
     }
+
+
+def _fits(diagnosis: Diagnosis, truth: Truth) -> Record:
+    """Return how the truth fits beside what was found; nothing where nothing is to be found."""
+    if diagnosis.examination is None or not truth.causes:
+        return {}
+    frame = structure_named(truth.structure).frame
+    causes = [[Finding(cause.effect, cause.place, cause.values)] for cause in truth.causes]
+    return fits_of(diagnosis.examination, causes, registered_effects(), partial(match, frame))
+
+
+def _stated_of(answer: Answer, truth: Truth) -> list[Statement]:
+    frame = structure_named(truth.structure).frame
+
+    def is_named(effect: str) -> bool:
+        return any(effect == cause.effect for cause in truth.causes)
+
+    def is_placed(effect: str, place: str) -> bool:
+        return any(effect == c.effect and match(frame, place, c.place) for c in truth.causes)
+
+    return statements(answer, is_named, is_placed)
+
+
+def stated(records: Iterable[Record]) -> list[Statement]:
+    """Return every probability that was stated in some records."""
+    return [Statement(*one) for record in records for one in record.get("stated", ())]
 
 
 def _said(answer: Answer, judged: Judgement) -> Record:
@@ -153,17 +184,6 @@ def _said(answer: Answer, judged: Judgement) -> Record:
         "size_deviations": [s.deviations for s in judged.sizes if s.deviations is not None],
         "reason": judged.reason,
     }
-
-
-def wilson(hits: int, count: int, z: float = 1.96) -> tuple[float, float]:
-    """Return the confidence interval of a proportion, 95 % by default (Wilson 1927, (17))."""
-    if count == 0:
-        return 0.0, 1.0
-    share, square = hits / count, z * z / count
-    middle = share + square / 2.0
-    half = z * math.sqrt(share * (1.0 - share) / count + square / (4.0 * count))
-    scale = 1.0 + square
-    return max(0.0, (middle - half) / scale), min(1.0, (middle + half) / scale)
 
 
 @dataclass(frozen=True)
@@ -248,6 +268,13 @@ BARS = (
     Bar("Outside the catalogue: flagged", _in("outside"), _right, 0.90, prototype="80 %"),
     Bar("Pairs: both named", _in("pairs"), _right, 0.90, prototype="82.5 %"),
     Bar("Stated P >= 0.99: wrong", _stated(0.99, 2.0), _wrong, 0.01, False, "1 of 185"),
+    Bar(
+        "Faults of search",
+        lambda r: fits_worse(r) is not None,
+        lambda r: bool(is_search_fault(r)),
+        0.01,
+        at_least=False,
+    ),
     Bar("Stated 0.9 <= P < 0.99: wrong", _stated(0.9, 0.99), _wrong, 0.10, False, "25 %"),
 )
 
@@ -257,14 +284,14 @@ def bars_table(records: Sequence[Record], bars: Sequence[Bar] = BARS) -> list[di
     rows = []
     for bar in bars:
         hits, count = bar.counts(records)
-        low, high = wilson(hits, count)
+        cells = percent(hits, count)
         sign = ">=" if bar.at_least else "<="
         rows.append(
             {
                 "figure": bar.what,
                 "cases": str(count),
-                "measured": f"{100.0 * hits / count:.1f} %" if count else "-",
-                "95 % interval": f"{100.0 * low:.1f} to {100.0 * high:.1f} %" if count else "-",
+                "measured": cells["right"],
+                "95 % interval": cells["95 % interval"],
                 "must be": f"{sign} {100.0 * bar.target:.1f} %",
                 "reached": "yes" if bar.reached(hits, count) else "no",
                 "prototype": bar.prototype,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from femubench.core.cli import options
-from femubench.core.cli.progress import waiting
+from femubench.core.cli.progress import time_left
 from femubench.core.cli.registry import plugins_for
 from femubench.core.errors import FemubenchError, InputError, require
 from femubench.core.files import check_new, write_atomically
@@ -30,6 +30,13 @@ def _share(ctx: click.Context, param: click.Parameter, value: float | None) -> f
     return value
 
 
+def _seconds(ctx: click.Context, param: click.Parameter, value: float | None) -> float | None:
+    """Return the value; a callback of click, whose own range lets nan pass."""
+    if value is not None and not value >= 0.0:
+        raise click.BadParameter(f"{value!r} is no number >= 0")
+    return value
+
+
 @click.command("diagnose")
 @click.argument("case")
 @options.json_file("Write the diagnosis as JSON; - prints it.", options.OUTPUT_OR_SCREEN)
@@ -42,6 +49,10 @@ def _share(ctx: click.Context, param: click.Parameter, value: float | None) -> f
 )  # fmt: skip
 @click.option("--no-pairs", is_flag=True, help="Look for single effects only, which is quicker.")
 @click.option("--no-faults", is_flag=True, help="Take data and input as they are.")
+@click.option(
+    "--budget", type=float, callback=_seconds, metavar="SECONDS",
+    help="End the search for several causes after so long; a note says so. Default: no end.",
+)  # fmt: skip
 @click.option(
     "--effects", metavar="A,B,...", help="Try these effects only. Default: all that apply."
 )
@@ -61,6 +72,7 @@ def diagnose(
     tolerance: float | None,
     no_pairs: bool,
     no_faults: bool,
+    budget: float | None,
     effects: str | None,
     style: str,
     report_file: Path | None,
@@ -88,9 +100,14 @@ def diagnose(
     from femubench.core.library.diagnose import diagnosis_of, has_model
     from femubench.core.library.report import rendering
 
-    with waiting(f"looking for what {read.name} lacks", quiet=quiet):
+    with time_left(f"looking for what {read.name} lacks", quiet=quiet) as told:
         found = diagnosis_of(
-            read, names, plugins, pairs=not no_pairs, faults=not no_faults, tolerance=tolerance
+            *(read, names, plugins),
+            pairs=not no_pairs,
+            faults=not no_faults,
+            tolerance=tolerance,
+            budget=budget,
+            told=told,
         )
     written = output if output is not None and has_model(found) else None
     fault = None if written is None else _fault(found, written)

@@ -5,10 +5,15 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from femubench.core.schema.results import JobResult
 
+if TYPE_CHECKING:
+    from rich.progress import Progress as Bar
+
 Progress = Callable[[JobResult, int, int], None]
+Counted = Callable[[int, int], None]
 
 
 @contextmanager
@@ -17,6 +22,34 @@ def progress_bar(*, quiet: bool = False) -> Iterator[Progress | None]:
     if quiet or not sys.stderr.isatty():
         yield None
         return
+    with _bar() as bar:
+        task = bar.add_task("jobs", total=None)
+
+        def advance(result: JobResult, done: int, total: int) -> None:
+            label = f"{result.case} {result.strategy}"[:36]
+            bar.update(task, completed=done, total=total, description=f"{label:36}")
+
+        yield advance
+
+
+@contextmanager
+def time_left(what: str, *, quiet: bool = False) -> Iterator[Counted | None]:
+    """Give the function that says how many steps are done, of how many; None as above.
+
+    Arguments:
+        what: a clause such as ``looking for causes``.
+        quiet: show nothing.
+    """
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    with _bar() as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def _bar() -> Bar:
+    """Return a bar with a count and the time left, which takes itself away."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -33,14 +66,7 @@ def progress_bar(*, quiet: bool = False) -> Iterator[Progress | None]:
         TimeRemainingColumn(),
         TextColumn("left"),
     )
-    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("jobs", total=None)
-
-        def advance(result: JobResult, done: int, total: int) -> None:
-            label = f"{result.case} {result.strategy}"[:36]
-            bar.update(task, completed=done, total=total, description=f"{label:36}")
-
-        yield advance
+    return Bar(*columns, console=Console(stderr=True), transient=True)
 
 
 @contextmanager

@@ -34,6 +34,7 @@ from femubench.core.diagnosis.tables import (
 from femubench.core.diagnosis.verdict import Decision, decide, elsewhere, overstatement
 from femubench.core.diagnosis.words import sentence_of
 from femubench.core.fem.model import Model
+from femubench.core.inference.effort import Effort
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.extended_model import departure
 from femubench.core.inference.fault_search import Depth, inquire
@@ -89,6 +90,7 @@ def diagnose(
     faults: Iterable[Fault] | None = None,
     pairs: bool = True,
     tolerance: float | None = None,
+    effort: Effort | None = None,
 ) -> Diagnosis:
     """Return what is missing in a case's model, where, how sure, and what it gains.
 
@@ -100,14 +102,14 @@ def diagnose(
         faults: what may be wrong with data or input; all registered faults by default.
         pairs: whether more than one cause is sought.
         tolerance: standard deviation of every element's relative scatter; the case's by default.
+        effort: counts the fits; the search for several causes ends with its time. None: never.
 
     Raises:
         NotApplicable: when a used frequency has no standard deviation.
         ModelError: when the model has no modes.
     """
-    begin = time.perf_counter()
+    begin, effort = time.perf_counter(), effort or Effort()
     used = case.measurement.select(case.used)
-    scatter = case.tolerance if tolerance is None else tolerance
     registered = registered_effects()
     known = registered if effects is None else tuple(effects)
     wrong = registered_faults() if faults is None else tuple(faults)
@@ -117,11 +119,12 @@ def diagnose(
             model,
             measurement,
             known,
-            tolerance=scatter,
+            tolerance=case.tolerance if tolerance is None else tolerance,
             pairs=pairs and depth == "several",
             reference=case.used_reference,
             width=case.error_width,
             beam=case.beam_share,
+            effort=effort,
         )
 
     inquiry = inquire(
@@ -134,21 +137,27 @@ def diagnose(
     )
     examination, given = inquiry.examination, case
     case = mended_case(case, inquiry.mended)
-    proof = _proof(case, examination, known, given)
+    proof = _proof(case, examination, known, given, effort)
     leader = proof.leader
     adequate = adequacy(leader.fit.state, leader.unknowns)
     decision = decide(examination.posterior, adequate, leader, proof.log_bayes, proof.confirmed)
     # The look is no part of the search: whatever is sought, every effect may have its say.
-    all_known = {effect.name: effect for effect in (*registered, *known)}
-    looks = look(given.model, used, effects=all_known.values())
+    looks = look(given.model, used, effects={e.name: e for e in (*registered, *known)}.values())
     if case.band is not None:
         # All modes that were found, used or not: what is not among them is not in the structure.
         looks += tuple(look_at_band(Seen(case.model, case.measurement), case.band))
     faults_told = fault_causes(inquiry.mended), fault_causes(inquiry.loose)
-    return _written(case, examination, decision, adequate, proof, looks, faults_told, begin)
+    found = _written(case, examination, decision, adequate, proof, looks, faults_told, begin)
+    return replace(found, notes=(*found.notes, *_cut_short(effort)))
 
 
-def _proof(case: Case, examination: Examination, effects: Sequence[Effect], given: Case) -> _Proof:
+def _proof(
+    case: Case,
+    examination: Examination,
+    effects: Sequence[Effect],
+    given: Case,
+    effort: Effort,
+) -> _Proof:
     best = examination.best
     model = extended_by(case.model, best)
     unseen = unseen_of(case, examination, best, model)
@@ -160,7 +169,7 @@ def _proof(case: Case, examination: Examination, effects: Sequence[Effect], give
             best, model = found, extended_by(case.model, found)
             unseen = unseen_of(case, examination, best, model)
     else:
-        crossed = left_out(examination, effects)
+        crossed = left_out(examination, effects, effort)
         unseen = (crossed,)
         confirmed = crossed.confirms(len(best.parts))
     gain = gain_of(score_model(given, given.model), score_model(case, model), crossed)
@@ -223,6 +232,16 @@ def _written(
         model_error=error_scales(examination, leader),
         like_a_beam=examination.like_a_beam,
         subject=case,
+        examination=examination,
+    )
+
+
+def _cut_short(effort: Effort) -> tuple[str, ...]:
+    if not effort.cut:
+        return ()
+    return (
+        f"The search for several causes was ended after its budget of {effort.budget:g} s: causes "
+        "that explain the data together may have been overlooked.",
     )
 
 

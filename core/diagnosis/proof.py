@@ -13,6 +13,7 @@ from scipy.special import chdtrc, logsumexp
 from femubench.core.case.case import Case, Modification
 from femubench.core.diagnosis.verdict import inseparable
 from femubench.core.fem.model import Model
+from femubench.core.inference.effort import Effort
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.extended_model import extended, raw_residual
 from femubench.core.inference.fit import Fit, Problem, bounds_of, state_at
@@ -250,7 +251,9 @@ def _relative_std(measurement: Measurement) -> FloatArray:
     return np.where(known, std, typical)
 
 
-def left_out(examination: Examination, effects: Iterable[Effect]) -> Unseen:
+def left_out(
+    examination: Examination, effects: Iterable[Effect], effort: Effort | None = None
+) -> Unseen:
     """Return the errors of every used mode, predicted from the others alone.
 
     The causes are chosen anew without the mode, so that it has no part in what predicts it.
@@ -258,6 +261,7 @@ def left_out(examination: Examination, effects: Iterable[Effect]) -> Unseen:
     Arguments:
         examination: of all used modes.
         effects: what may be missing.
+        effort: as in `examine`.
     """
     data = examination.problem.data
     numbers = data.measurement.numbers
@@ -278,6 +282,7 @@ def left_out(examination: Examination, effects: Iterable[Effect]) -> Unseen:
             reference=examination.reference,
             width=examination.width,
             beam=examination.beam,
+            effort=effort,
         )
         found, problem = again.best.fit, again.problem_of(again.best)
         point = state_at(replace(problem, data=data, noise=noise), found.parts, found.state.x)

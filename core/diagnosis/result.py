@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from femubench.core.case.case import Case
 from femubench.core.display import Shown
 from femubench.core.fem.model import Model
+from femubench.core.inference.examine import Examination
 from femubench.core.schema.diagnosis import (
     Advice,
     Cause,
@@ -58,6 +59,7 @@ class Diagnosis(Shown):
             structure is taken for a beam model.
         like_a_beam: probability that it is one, but for ordinary scatter.
         subject: the case itself, for drawings of its structure.
+        examination: every explanation that was tried; None where it was read from a file.
     """
 
     case: str
@@ -84,6 +86,7 @@ class Diagnosis(Shown):
     model_error: tuple[ErrorScale, ...] = ()
     like_a_beam: float = 1.0
     subject: Case | None = field(default=None, repr=False)
+    examination: Examination | None = field(default=None, repr=False, compare=False)
 
     def rows(self) -> Sequence[tuple[str, str]]:
         """Return verdict, causes, rivals and gain."""

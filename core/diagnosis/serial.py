@@ -42,7 +42,7 @@ def diagnosis_to_json(
         written: folder of the extended case, if it was written.
         case: what was diagnosed, for the drawing of its structure; a model has no sensors.
     """
-    names = [f.name for f in fields(diagnosis) if f.name not in ("extended", "subject")]
+    names = [f.name for f in fields(diagnosis) if f.name not in _UNTOLD]
     tables = {name: _plain(getattr(diagnosis, name)) for name in names}
     for look in tables["looks"]:
         look["changes"] = [{"mode": mode, "percent": change} for mode, change in look["changes"]]
@@ -139,7 +139,7 @@ def _record(kind: type, **more: tuple[Any, Any]) -> type[BaseModel]:
     return create_model(kind.__name__, __config__=_CONFIG, **parts)
 
 
-_UNTOLD = ("extended", "subject")
+_UNTOLD = ("extended", "subject", "examination")
 # What older versions did not write, by the data class; a type goes with what is no field of it.
 _OPTIONAL: dict[Any, dict[str, Any]] = {
     **{k: {} for k in (Advice, Cause, CauseParameter, Evidence, Gain)},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import log
@@ -12,6 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.model import Model
+from femubench.core.inference.effort import Effort
 from femubench.core.inference.fit import Fit, Problem, State, fit, log_evidence, state_at
 from femubench.core.inference.hypothesis import Hypothesis, hypotheses_of
 from femubench.core.inference.mesh_error import mesh_bias
@@ -29,7 +31,7 @@ from femubench.core.inference.noise import Noise
 from femubench.core.inference.posterior import LIKELY_NOTHING, Explanation, Posterior, by_weight
 from femubench.core.inference.residuals import Data
 from femubench.core.inference.screening import with_shortlist
-from femubench.core.inference.search import Found, Search, adequacy
+from femubench.core.inference.search import Found, Search, adequacy, most_fits
 from femubench.core.inference.static_response import Basis, placed
 from femubench.core.modal.eigen import Modes, zero_tolerance
 from femubench.core.modal.measurement import Measurement
@@ -173,6 +175,7 @@ def examine(
     reference: Measurement | None = None,
     width: float = 0.0,
     beam: float = 0.5,
+    effort: Effort | None = None,
 ) -> Examination:
     """Weigh every explanation of what a model gets wrong.
 
@@ -185,6 +188,7 @@ def examine(
         reference: modes of the structure as it was, without the causes that are sought.
         width: factor on the widths of the model error; 0 takes the structure for a beam model.
         beam: prior probability that it is one, but for the scatter of its elements.
+        effort: that is counted; the search for several causes ends with its time.
 
     Raises:
         NotApplicable: when a used frequency has no standard deviation.
@@ -195,8 +199,9 @@ def examine(
         >>> seen.best.base.names == (torsion.name,)
         True
     """
+    effort = effort or Effort()
     # Thousands of small matrices: threads would wait for each other most of the time.
-    with threadpool_limits(1):
+    with threadpool_limits(1), ExitStack() as stages:
         known = tuple(effects)
         hypotheses = hypotheses_of(model, known)
         if reference is not None:
@@ -205,15 +210,15 @@ def examine(
         basis = Basis.of(model, measurement)
         problem, slopes = posed(model, measurement, hypotheses, tolerance, basis)
         before = None if reference is None else before_of(problem, reference)
+        stages.enter_context(effort.stage(most_fits(problem, pairs, 1 + _ROUNDS * (width > 0.0))))
         explanations: list[Explanation] = []
-        error: ModelError | None = None
+        error = None
         if width > 0.0:
             error = model_error_of(problem, basis, before, width, log(1.0 - beam))
-            explanations = searched(problem, error, known, pairs)
-        noise = beam_noise(basis, slopes, before, tolerance, log(beam))
-        own = replace(problem, noise=noise)
+            explanations = searched(problem, error, known, pairs, effort)
+        own = replace(problem, noise=beam_noise(basis, slopes, before, tolerance, log(beam)))
         floor = max((e.log_weight for e in explanations), default=-np.inf) - _HOPELESS
-        more, atlas = Search(own, known, pairs=pairs, floor=floor).run()
+        more, atlas = Search(own, known, pairs=pairs, floor=floor, effort=effort).run()
     posterior = Posterior.of([*explanations, *more])
     return Examination(
         *(model, own, slopes, tolerance, posterior, tuple(atlas), basis.modes),
@@ -239,7 +244,7 @@ def before_of(problem: Problem, reference: Measurement) -> State:
 
 
 def searched(
-    problem: Problem, error: ModelError, effects: Sequence[Effect], pairs: bool
+    problem: Problem, error: ModelError, effects: Sequence[Effect], pairs: bool, effort: Effort
 ) -> list[Explanation]:
     """Return explanations beside a model error, each with scales of its own where it matters.
 
@@ -251,7 +256,7 @@ def searched(
     explanations: list[Explanation] = []
     for _ in range(_ROUNDS):
         own = replace(problem, noise=error.noise(scales))
-        explanations += Search(own, effects, pairs=pairs).run()[0]
+        explanations += Search(own, effects, pairs=pairs, effort=effort).run()[0]
         best = by_weight(explanations)[0].fit.state
         before, scales = scales, error.fitted(best, scales)
         if error.log_density(best, scales.v) - error.log_density(best, before.v) < _WORTH:

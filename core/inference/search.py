@@ -10,6 +10,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from femubench.core.errors import ModelError
+from femubench.core.inference.effort import Effort
 from femubench.core.inference.extended_model import agreed, extended
 from femubench.core.inference.fit import Fit, Problem, State, fit, log_evidence, state_at
 from femubench.core.inference.grid_search import Screened, likely, screen
@@ -53,6 +54,7 @@ def _tail(residual: FloatArray, unknowns: int) -> float:
     return float(chdtrc(dof, residual @ residual)) if len(residual) else 1.0
 
 
+_GROUNDS = 2  # the model as drawn and a textbook set, on which causes are mostly sought
 _REFINED = 40  # hypotheses that are fitted exactly at most
 _NEAR = 16.0  # of the cost, below which the interpolation may have ranked wrongly
 _CURVED = 0.05  # share of the explained chi-square that the interpolation may miss
@@ -62,6 +64,12 @@ _PROMISE = 0.3  # of the chi-square that a partner must explain, were effects to
 _MOST_CAUSES = 4
 _ADEQUATE = 0.05
 _SPLIT = 4  # single causes that are tried with more values at their places
+
+
+def most_fits(problem: Problem, pairs: bool, searches: int = 1) -> int:
+    """Return how many fits searches are known to do at most; greedy steps may add some."""
+    singles = _GROUNDS * min(_REFINED, len(problem.space.projections))
+    return searches * (singles + pairs * (_SINGLES_FOR_PAIRS + 2) * _PARTNERS)
 
 
 @dataclass(frozen=True)
@@ -94,6 +102,7 @@ class Search:
         effects: what may be missing.
         pairs: whether more than one cause is sought.
         floor: of ln weight; where no single cause comes near it, no pairs are sought.
+        effort: that is counted; the search for several causes ends with its time.
     """
 
     def __init__(
@@ -103,8 +112,10 @@ class Search:
         *,
         pairs: bool = True,
         floor: float = -np.inf,
+        effort: Effort | None = None,
     ) -> None:
         self.problem, self.effects, self.pairs, self.floor = problem, effects, pairs, floor
+        self.effort = effort or Effort()
         places = {p.hypothesis.name: p.hypothesis.places for p in problem.space.projections}
         self.names = len(places)
         self.places = sum(places.values()) / max(self.names, 1)
@@ -112,6 +123,10 @@ class Search:
 
     def run(self) -> tuple[list[Explanation], list[Found]]:
         """Return all explanations and the atlas of every base that was searched."""
+        with self.effort.stage(most_fits(self.problem, self.pairs)):
+            return self._run()
+
+    def _run(self) -> tuple[list[Explanation], list[Found]]:
         bases = textbook_bases(self.problem.space.projections)
         found = [self.on(bases[0])]
         bare = [self.bare(base) for base in bases[1:]]
@@ -213,6 +228,7 @@ class Search:
         for item in near[:_REFINED]:
             own, parts = enriched(problem, (item.projection,))
             result = fit(own, parts, item.x, give_up=best + _LOST)
+            self.effort.step()
             if result is not None:
                 fits.append(result)
                 best = min(best, result.state.cost)
@@ -252,6 +268,8 @@ class Search:
         self, found: Found, seed: Explanation, tried: set[tuple[object, ...]]
     ) -> list[Explanation]:
         """Return an explanation with one cause more, for every partner that is worth it."""
+        if self.effort.stops():
+            return []
         problem, state = found.problem, seed.fit.state
         floor = 0.5 * selection_cost(self.names, self.places)
         above = beside(worthwhile(found, seed, _PROMISE * floor), seed.fit)
@@ -264,10 +282,11 @@ class Search:
         ranked = in_order(screen(above, start.state, free, state.jacobian), lambda s: s.cost)
         result = []
         for item in ranked[:_PARTNERS]:
-            if start.state.chi2 - item.cost < floor:
+            if start.state.chi2 - item.cost < floor or self.effort.stops():
                 break
             partner = originals.get(id(item.projection.hypothesis), item.projection)
             joint = self.joint(problem, (*seed.parts, partner), state.x, item.x, tried)
+            self.effort.step()
             if joint is not None:
                 result.append(Explanation(found.base, joint, self.names))
         return result

@@ -16,6 +16,7 @@ from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.serial import diagnosis_to_json
 from femubench.core.errors import InputError, NotApplicable
 from femubench.core.files import check_new, make_folder
+from femubench.core.inference.effort import Effort, Told
 from femubench.core.library.cases import CaseLike, listed, one_case, usable_plugins
 from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import check_effect, chosen
@@ -33,6 +34,7 @@ def diagnose(
     pairs: bool = True,
     faults: bool = True,
     tolerance: float | None = None,
+    budget: float | None = None,
     output: str | PathLike[str] | None = None,
 ) -> Diagnosis:
     """Return what is missing in a case's model, where, how sure, and what it gains.
@@ -45,6 +47,8 @@ def diagnose(
         pairs: whether more than one cause is sought.
         faults: whether faults of the data and of what was typed in are sought too.
         tolerance: standard deviation of every element's relative scatter; the case's by default.
+        budget: seconds after which the search for several causes ends, and a note says so; None
+            for no end. What is found then depends on how fast the machine is.
         output: new folder for the extended model as a case, where one was found.
 
     Raises:
@@ -58,7 +62,11 @@ def diagnose(
     if output is not None:
         check_new(Path(output))
     found = diagnosis_of(
-        case, effects, usable_plugins(), pairs=pairs, faults=faults, tolerance=tolerance
+        *(case, effects, usable_plugins()),
+        pairs=pairs,
+        faults=faults,
+        tolerance=tolerance,
+        budget=budget,
     )
     if output is not None and has_model(found):
         write_extended(found, Path(output))
@@ -73,8 +81,15 @@ def diagnosis_of(
     pairs: bool = True,
     faults: bool = True,
     tolerance: float | None = None,
+    budget: float | None = None,
+    told: Told | None = None,
 ) -> Diagnosis:
-    """Return the diagnosis; see `diagnose`."""
+    """Return the diagnosis; see `diagnose`.
+
+    `told` is called after every fit with how many are done, and how many are known so far.
+    """
+    if budget is not None and not budget >= 0.0:
+        raise InputError(f"budget = {budget!r}", expected="seconds >= 0")
     wanted = _effects(effects, plugins)
     read = one_case(case, plugins)
     if tolerance is not None:
@@ -82,7 +97,9 @@ def diagnosis_of(
     try:
         # Many small matrices: threads would only wait for each other.
         with threadpool_limits(1):
-            return search(read, effects=wanted, faults=None if faults else (), pairs=pairs)
+            effort = Effort(budget, told)
+            wrong = None if faults else ()
+            return search(read, effects=wanted, faults=wrong, pairs=pairs, effort=effort)
     except NotApplicable as fault:
         raise InputError(f"cannot be diagnosed: {fault}", file=read.folder) from fault
 
