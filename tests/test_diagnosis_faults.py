@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from femubench import Case, Diagnosis, Measurement, Model, hookimpl
+from femubench import Case, Diagnosis, Measurement, Model, hookimpl, read_case
 from femubench.core.challenge.answer import Answer, AnswerCause
 from femubench.core.challenge.draw import draw_case
 from femubench.core.challenge.score import candidates
@@ -24,6 +24,7 @@ from femubench.plugins.faults.readings import multiplied, swapped
 from femubench.plugins.faults.section_turned import SectionTurned
 from femubench.plugins.faults.sections import resized, sections_of
 from femubench.plugins.faults.unit_slip import UnitSlip
+from femubench.scenarios import SUITE
 from tests.diagnosis_problems import effects_named
 
 FEW = effects_named("youngs-modulus", "added-mass", "member-stiffness", "joint-rotation")
@@ -33,6 +34,11 @@ Edit = Callable[[Case], Case]
 @cache
 def clean(structure: str, seed: int) -> Case:
     return draw_case(seed, "A", structure=structure, hidden="none").case
+
+
+def solid(name: str) -> Case:
+    """Return a structure of the suite, whose truth is a solid, without its design changes."""
+    return replace(read_case(SUITE / name), modifications=())
 
 
 def diagnosed(case: Case) -> Diagnosis:
@@ -167,6 +173,43 @@ def test_a_fault_of_what_was_typed_in_is_named(
 @pytest.mark.parametrize("structure", ["ladder", "portal"])
 def test_clean_data_have_no_fault(structure: str) -> None:
     assert [faults_of(diagnosed(clean(structure, seed))) for seed in range(10)] == [[]] * 10
+
+
+@pytest.mark.parametrize("name", ["bracket", "gusset-truss", "h-tube", "stiffened-strip"])
+def test_what_a_drawing_gets_wrong_of_a_solid_is_no_fault(name: str) -> None:
+    """Stubby members as if turned, frequencies off by a fifth: still no typing error."""
+    assert faults_of(diagnosed(solid(name))) == []
+
+
+@pytest.mark.parametrize(("name", "sensor"), [("h-tube", "9Z"), ("stiffened-strip", "3Z")])
+def test_a_wrong_sign_stands_out_of_what_a_drawing_gets_wrong(name: str, sensor: str) -> None:
+    found = diagnosed(edited(lambda m: multiplied(m, sensor, -1.0), solid(name)))
+    assert faults_of(found) == [("sensor-sign", f"sensor:{sensor}")]
+
+
+def test_a_frequency_that_is_off_like_the_others_is_not_called_wrong() -> None:
+    """Four percent beside errors of twenty is nothing; beside none it is."""
+    case = solid("h-tube")
+    off = edited(partial(multiply, "frequencies", [1.0, 1.0, 0.96]), case)
+    assert faults_of(diagnosed(off)) == []
+
+
+def test_deviations_stated_too_large_are_told_and_the_data_stay() -> None:
+    sound = clean("ladder", 1)
+    found = diagnosed(edited(lambda m: replace(m, shape_std=3.0 * m.shape_std), sound))
+    assert isinstance(found.subject, Case)
+    np.testing.assert_array_equal(
+        found.subject.measurement.shape_std, 3.0 * sound.measurement.shape_std
+    )
+    assert found.sentence.endswith("are stated wrongly (probability > 99.9 %).")
+    twice = diagnosed(edited(lambda m: replace(m, shape_std=1.5 * m.shape_std), sound))
+    assert faults_of(twice) == []
+
+
+def test_faults_can_be_left_out() -> None:
+    found = diagnose(SIGN(clean("ladder", 1)), FEW, faults=(), pairs=False)
+    assert faults_of(found) == []
+    assert found.verdict == "unknown"
 
 
 def test_a_cause_beside_a_fault_is_still_named() -> None:
