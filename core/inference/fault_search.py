@@ -98,7 +98,8 @@ def inquire(
         NotApplicable: when a used frequency has no standard deviation.
         ModelError: when the model has no modes.
     """
-    known = tuple(faults)
+    # What was typed in is wrong in both states, and so no part of what differs.
+    known = tuple(f for f in faults if reference is None or f.side == "data")
     mended: list[Mended] = []
     model, measurement = _possible(model, measurement, known, mended)
     now = _Drawn(model, measurement, reference, width)
