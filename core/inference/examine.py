@@ -38,7 +38,7 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect
 from femubench.core.typing import FloatArray
 
-_ROUNDS, _STEPS = 2, 3
+_ROUNDS, _STEPS, _SINGLES = 2, 3, 8
 # Explanations that are given scales of their own: so many at most, and so much behind in ln weight.
 _REFINED, _NEAR = 12, 8.0
 _WORTH = 1.0  # ln, by which other scales must suit the leading explanation better
@@ -252,23 +252,41 @@ def searched(
     sought with its own.
     """
     nothing = state_at(problem, (), np.zeros(0))
+
+    def sought(scales: Fitted, pairs: bool) -> list[Explanation]:
+        own = replace(problem, noise=error.noise(scales))
+        return Search(own, effects, pairs=pairs, effort=effort).run()[0]
+
     scales = error.fitted(nothing)
     explanations: list[Explanation] = []
+    if len(error.residual):
+        # Scales that do without a cause see none: those of the structure as it was do.
+        earlier = error.before()
+        single = by_weight(e for e in sought(earlier, False) if e.parts)[:_SINGLES]
+        explanations += [with_scales(error, e, scales, nothing) for e in single]
     for _ in range(_ROUNDS):
-        own = replace(problem, noise=error.noise(scales))
-        explanations += Search(own, effects, pairs=pairs, effort=effort).run()[0]
+        explanations += sought(scales, pairs)
         best = by_weight(explanations)[0].fit.state
         before, scales = scales, error.fitted(best, scales)
         if error.log_density(best, scales.v) - error.log_density(best, before.v) < _WORTH:
             break
-    ranked = by_weight(explanations)
+    ranked = list({_causes(e): e for e in reversed(by_weight(explanations))}.values())[::-1]
     close = [i for i, e in enumerate(ranked) if e.log_weight > ranked[0].log_weight - _NEAR]
     # One cause and its own error may do what otherwise takes a second one.
-    single = [i for i, e in enumerate(ranked) if len(e.parts) < 2]
-    near = {*close[:_REFINED], *single[:_REFINED]}
+    few = [i for i, e in enumerate(ranked) if len(e.parts) < 2]
+    near = {*close[:_REFINED], *few[:_REFINED]}
     return [
         with_scales(error, e, scales, nothing) if i in near else e for i, e in enumerate(ranked)
     ]
+
+
+def _causes(explanation: Explanation) -> tuple[object, ...]:
+    """Return what is the same of explanations that differ in their scales alone."""
+    places = (
+        (p.hypothesis.name, p.hypothesis.place, len(p.hypothesis.parameters))
+        for p in explanation.parts
+    )
+    return (explanation.base.names, *sorted(places))
 
 
 def with_scales(

@@ -37,7 +37,7 @@ from femubench.core.inference.residuals import Data
 from femubench.core.inference.static_response import Basis, placed
 from femubench.core.modal.eigen import DENSE_LIMIT
 from femubench.core.modal.measurement import Measurement
-from femubench.core.roles import Fault
+from femubench.core.roles import EffectParameter, Fault
 from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray
 
@@ -52,7 +52,7 @@ _ROUNDS = 3
 _TWICE = 2.0  # by which deviations must be stated too large to be told
 _LITTLE = 0.3  # share of the squared misfit that is left, where a fault is most of it
 _FIT, _GROSS = 0.05, 0.05
-_GRID, _EDGE, _CURVED = 13, 0.02, 0.02
+_GRID, _FAR, _EDGE, _CURVED = 13, 3.0, 0.02, 0.02
 
 Depth = Literal["one", "several"]
 Weighed = list[tuple[Charge, float]]
@@ -140,7 +140,8 @@ def _definite(now: _Drawn, ranked: Weighed, examine: Examine) -> Mended | None:
     best = int(np.argmax(densities))
     rest = [now.log_density + gain for _, gain in pairs[len(tried) :]]
     probability = exp(densities[best] - float(logsumexp([without, *densities, *rest])))
-    return Mended(now.refined(tried[best][0]), probability) if probability > _SURE else None
+    found = now.refined(tried[best][0])
+    return Mended(found, probability) if probability > _SURE and _inside(found) else None
 
 
 def _reweighed(
@@ -250,7 +251,7 @@ class _Drawn:
         if gain <= _PROMISING:
             return charge, -np.inf
         found = charge if charge.single else self.refined(charge)
-        return found, self.gain(found)
+        return found, self.gain(found) if _inside(found) else -np.inf
 
     def refined(self, charge: Charge) -> Charge:
         """Return a fault with its parameter at the scales that suit the data without it."""
@@ -327,9 +328,7 @@ class _Drawn:
         if charge.suspect.parameter is None or charge.single:
             return charge, self.first(charge.mended[1]) + charge.log_prior
         found = self.estimated(charge)
-        low, high = charge.suspect.parameter.range
-        # At its bounds a parameter makes up for something else.
-        if not low + _EDGE < found.x < high - _EDGE:
+        if not _inside(found):
             return found, -np.inf
         return found, self.first(found.mended[1]) + self.prior(found)
 
@@ -342,8 +341,7 @@ class _Drawn:
             gain = self.first(charge.corrected(x)[1])
             return 0.5 * x**2 - (gain if np.isfinite(gain) else -1e300)
 
-        low, high = charge.suspect.parameter.range
-        grid = np.linspace(max(low, -3.0), min(high, 3.0), _GRID)
+        grid = np.linspace(*_between(charge.suspect.parameter), _GRID)
         nearest = int(np.argmin([cost(x) for x in grid]))
         between = grid[max(nearest - 1, 0)], grid[min(nearest + 1, _GRID - 1)]
         found = minimize_scalar(cost, bounds=between, method="bounded", options={"xatol": 1e-3})
@@ -367,6 +365,20 @@ class _Drawn:
             gain = 0.5 * (self.state.chi2 - float(rest @ rest))
             found.append((charge, gain + charge.log_prior))
         return found
+
+
+def _between(parameter: EffectParameter) -> tuple[float, float]:
+    """Return the coordinates between which a parameter is sought."""
+    low, high = parameter.range
+    return max(low, -_FAR), min(high, _FAR)
+
+
+def _inside(charge: Charge) -> bool:
+    """Tell whether a parameter is off its bounds, where it makes up for something else."""
+    if charge.suspect.parameter is None:
+        return True
+    low, high = _between(charge.suspect.parameter)
+    return low + _EDGE < charge.x < high - _EDGE
 
 
 def _weighed(now: _Drawn, charges: Sequence[Charge]) -> Weighed:

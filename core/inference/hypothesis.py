@@ -16,7 +16,7 @@ from femubench.core.roles import Effect, EffectParameter
 from femubench.core.typing import FloatArray
 
 _SLOPE_STEP = 1e-5
-_SINGLE = (0.12, 0.5, 1.3, 2.6)
+_SINGLE = (0.12, 0.5, 1.3, 2.6, 4.6)
 _DOUBLE = (0.03, 0.2, 0.7, 1.8)
 _OSCILLATOR = (0.4, 1.2, 2.2)
 _STIFF = 0.01

@@ -45,6 +45,7 @@ CHANGE = 0.3  # of what an explanation moves: width of its own error
 UNSHARED = 0.02  # of the scale, median: what the states do not share
 _MEDIAN, _SPREAD = 0.3, 1.0  # of u, log-normal
 _LEAST, _MOST = 0.01, 10.0  # of u
+_UNKNOWN = 1e8  # variance of what is not looked at
 _STEPS, _FEW_STEPS, _SETTLED = 40, 10, 1e-5
 _GENERAL = 20  # elastic modes that a general change couples
 _TURNED = 1e-9  # below which a mode has no part in another
@@ -348,7 +349,19 @@ class ModelError:
         first = np.zeros(self._count + (len(self.change) > 0))
         if near is not None:
             first[: self._count] = near.v[: self._count]
-        y, free = self._linear(state)
+        return self._fitted(*self._linear(state), first, near)
+
+    def before(self) -> Fitted:
+        """Return the scales that the reference alone asks for, whatever the present data say."""
+        r, n = len(self.residual), self.present.shape[1]
+        unknown = np.diag(np.concatenate([np.zeros(r), np.full(n, _UNKNOWN)]))
+        y = np.concatenate([self.residual, np.zeros(n)])
+        return self._fitted(y, unknown, np.zeros(self._count), None)
+
+    def _fitted(
+        self, y: FloatArray, free: FloatArray, first: FloatArray, near: Fitted | None
+    ) -> Fitted:
+        """Return the most probable scales of data with a covariance of their own besides."""
 
         def cost(v: FloatArray) -> tuple[float, FloatArray]:
             inverse, log_det = _inverse(self.covariance(v) + free)

@@ -56,6 +56,7 @@ def _tail(residual: FloatArray, unknowns: int) -> float:
 
 _GROUNDS = 2  # the model as drawn and a textbook set, on which causes are mostly sought
 _REFINED = 40  # hypotheses that are fitted exactly at most
+_OF_A_NAME = 2  # hypotheses of every effect that are fitted where the atlas explains nothing
 _NEAR = 16.0  # of the cost, below which the interpolation may have ranked wrongly
 _CURVED = 0.05  # share of the explained chi-square that the interpolation may miss
 _LOST = 20.0  # behind the best by so much, a fit is not brought to its end
@@ -222,12 +223,18 @@ class Search:
         near = in_order(
             (s for s in screened if s.cost <= limit),
             lambda s: np.log(s.projection.hypothesis.places) - s.log_evidence,
-        )
+        )[:_REFINED]
+        known = {id(item) for item in near}
+        chances = [item for item in _first_of_a_name(screened) if id(item) not in known]
+        # Where large changes exchange modes the atlas may err by any amount.
+        if chdtrc(len(start.state.residual), lowest) > _ADEQUATE:
+            chances = []
         fits: list[Fit] = []
         best = start.state.cost
-        for item in near[:_REFINED]:
+        for item in (*near, *chances):
             own, parts = enriched(problem, (item.projection,))
-            result = fit(own, parts, item.x, give_up=best + _LOST)
+            give_up = best + _LOST if id(item) in known else np.inf
+            result = fit(own, parts, item.x, give_up=give_up)
             self.effort.step()
             if result is not None:
                 fits.append(result)
@@ -325,6 +332,14 @@ class Search:
                 seed = Explanation(found.base, alone, self.names)
                 result += self.grown(found, seed, tried)
         return result
+
+
+def _first_of_a_name(screened: Sequence[Screened]) -> list[Screened]:
+    """Return the best places of every effect."""
+    found: dict[str, list[Screened]] = {}
+    for item in in_order(screened, lambda s: s.cost):
+        found.setdefault(item.projection.hypothesis.name, []).append(item)
+    return [item for own in found.values() for item in own[:_OF_A_NAME]]
 
 
 def _fit_from_grid(
