@@ -141,14 +141,20 @@ def diagnose(
     leader = proof.leader
     adequate = adequacy(leader.fit.state, leader.unknowns)
     decision = decide(examination.posterior, adequate, leader, proof.log_bayes, proof.confirmed)
-    # The look is no part of the search: whatever is sought, every effect may have its say.
-    looks = look(given.model, used, effects={e.name: e for e in (*registered, *known)}.values())
-    if case.band is not None:
-        # All modes that were found, used or not: what is not among them is not in the structure.
-        looks += tuple(look_at_band(Seen(case.model, case.measurement), case.band))
+    looks = _looks(given.model, case, (*registered, *known))
     faults_told = fault_causes(inquiry.mended), fault_causes(inquiry.loose)
     found = _written(case, examination, decision, adequate, proof, looks, faults_told, begin)
     return replace(found, notes=(*found.notes, *_cut_short(effort)))
+
+
+def _looks(drawn: Model, case: Case, effects: Iterable[Effect]) -> tuple[LookWarning, ...]:
+    """Return what a plain look finds, with every effect, whatever is sought."""
+    used = case.measurement.select(case.used)
+    found = look(drawn, used, effects={e.name: e for e in effects}.values())
+    if case.band is None:
+        return found
+    # All modes that were found, used or not: what is not among them is not in the structure.
+    return (*found, *look_at_band(Seen(case.model, case.measurement), case.band))
 
 
 def _proof(

@@ -43,10 +43,12 @@ def _nodes_at(structure: MeshedFrame, xyz: FloatArray) -> IntArray:
     """
     mesh = structure.mesh
     plain = len(mesh.xyz) - len(mesh.oscillators)  # which come last
-    nodes = mesh.xyz[: len(structure.frame.joints) if mesh.connections else plain]
-    distance = np.linalg.norm(xyz[:, None] - nodes, axis=2)
-    nearest = distance.argmin(axis=1)
-    return np.where(distance[np.arange(len(xyz)), nearest] <= SAME_STATION, nearest, -1)
+    joints = len(structure.frame.joints)
+    distance = np.linalg.norm(xyz[:, None] - mesh.xyz[:plain], axis=2)
+    there = distance <= SAME_STATION
+    sure = (there.sum(axis=1) == 1) | there[:, :joints].any(axis=1)
+    # Joints are the first nodes, and of what is there the first one.
+    return np.where(sure, there.argmax(axis=1), -1)
 
 
 def _between_nodes(structure: MeshedFrame, sensors: Sensors, i: int) -> SparseArray:

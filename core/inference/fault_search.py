@@ -157,6 +157,8 @@ def _reweighed(
     charge, density = max(found, key=lambda pair: pair[1], default=(None, -np.inf))
     if charge is None or density < without - _CLEARLY:
         return None
+    if charge.loosens < 1.0 and seen.adequacy > _FIT:
+        return None
     # Wrong deviations lead to wrong causes, and these to wrong deviations: to and fro.
     for _ in range(_ROUNDS if charge.loosens < 1.0 else 0):
         mended = examine(*charge.mended, "one")

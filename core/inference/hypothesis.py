@@ -12,6 +12,7 @@ import numpy as np
 from femubench.core.effect.change import Change
 from femubench.core.effect.tabulated_change import tabulated_change
 from femubench.core.fem.model import Model
+from femubench.core.modal.eigen import once_for
 from femubench.core.roles import Effect, EffectParameter
 from femubench.core.typing import FloatArray
 
@@ -136,6 +137,13 @@ def _points(parameter: EffectParameter, sizes: Sequence[float]) -> list[float]:
 
 def hypotheses_of(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ...]:
     """Return every effect at every place where it may sit in a model."""
+    known = tuple(effects)
+    # Kept with the effects, so that no other one has their addresses meanwhile.
+    key = "hypotheses", *map(id, known)
+    return once_for(model, key, lambda: (known, _hypotheses(model, known)))[1]
+
+
+def _hypotheses(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ...]:
     found = []
     for effect in effects:
         places = tuple(dict.fromkeys(effect.places(model)))
