@@ -7,7 +7,9 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import ClassVar
 
-from femubench import Model
+import numpy as np
+
+from femubench import Model, solve_modes
 from femubench.effect import (
     Change,
     EffectParameter,
@@ -22,6 +24,7 @@ from femubench.fem import Frame, ModelError, SparseArray, gravity_stiffness
 # Beyond the own weight there may be loads that stand on it; what stands is safe from buckling
 # by three times its weight and more.
 _MOST = 3.0
+_LEAST, _MODES = 5e-3, 6  # less of any of these frequencies is lost in what a model is off
 
 
 class GravityStiffness(FrameEffect):
@@ -38,11 +41,11 @@ class GravityStiffness(FrameEffect):
     sizes: ClassVar[Sequence[Size]] = (Size(0.5, 2.0),)
 
     def places(self, model: Model) -> Sequence[str]:
-        """Return the whole frame where it stands or hangs, in plane or in space."""
+        """Return the whole frame where it stands or hangs, and where a test can feel it."""
         if model.structure is None or model.structure.frame.plane == "out-of-plane":
             return ()
         with suppress(ModelError):
-            return ("all",) if abs(_unit(model)).max() > 0.0 else ()
+            return ("all",) if _MOST * _felt(model) > _LEAST else ()
         return ()
 
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
@@ -61,6 +64,16 @@ class GravityStiffness(FrameEffect):
         """Return the geometric stiffness of the weight."""
         now = model.frame_structure.frame.gravity
         return proportional(sparse_term("stiffness", _unit(model)), neutral=now)
+
+
+def _felt(model: Model) -> float:
+    """Return by how much the weight changes one of the lowest elastic frequencies, relative."""
+    unit = _unit(model)
+    modes = once_for(model, "modes under weight", lambda: solve_modes(model).elastic)
+    few = modes.take(np.arange(min(_MODES, len(modes))))
+    work = np.einsum("ij,ij->j", few.shapes, unit @ few.shapes)
+    scale = np.einsum("ij,ij->j", few.shapes, model.mass_times(few.shapes)) * few.eigenvalues
+    return float(np.abs(0.5 * work / scale).max(initial=0.0))
 
 
 def _unit(model: Model) -> SparseArray:
