@@ -32,7 +32,12 @@ from femubench.core.fem.frame import (
 from femubench.core.fem.mesh import member_axes
 from femubench.core.fem.model import LowRank
 from femubench.core.fem.parameters import Parameter
-from femubench.core.fem.preload import preload_stiffness, preload_stiffnesses, redundant_members
+from femubench.core.fem.preload import (
+    gravity_stiffness,
+    preload_stiffness,
+    preload_stiffnesses,
+    redundant_members,
+)
 from femubench.core.fem.sections import (
     Section,
     bredt,
@@ -77,6 +82,7 @@ __all__ = [
     "constant_kappa",
     "coupling_matrices",
     "eccentric_mass_parts",
+    "gravity_stiffness",
     "mass_matrices",
     "member_axes",
     "preload_stiffness",

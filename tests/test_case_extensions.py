@@ -145,6 +145,17 @@ class TestReading:
         assert expected in error.expected
         assert error.line is not None
 
+    @pytest.mark.parametrize(("value", "what"), [("1.0", "out of plane"), ("-1.0", "-1")])
+    def test_weight_needs_something_to_act_on(self, tmp_path: Path, value: str, what: str) -> None:
+        path = case_with(tmp_path / "case", "", "out-of-plane")
+        text = (path / "case.toml").read_text()
+        plane = 'plane = "out-of-plane"'
+        (path / "case.toml").write_text(text.replace(plane, f"{plane}\ngravity = {value}"))
+        with pytest.raises(InputError, match=what) as caught:
+            read_case(path)
+        assert caught.value.key == "model.gravity"
+        assert caught.value.expected is not None
+
     @pytest.mark.parametrize("table", ["preloads", "eccentricities", "couplings"])
     def test_unknown_members_are_named(self, tmp_path: Path, table: str) -> None:
         rest = {"preloads": "force = 1.0", "eccentricities": "", "couplings": "coefficient = 0.1"}

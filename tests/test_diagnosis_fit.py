@@ -37,7 +37,7 @@ FrameBuilder = Callable[..., Frame]
 NOTHING = np.zeros(0)
 STRUCTURES = ("ladder", "hframe")
 # Springs at member ends are condensed statically: of an eigenvalue, below the noise of 4e-3.
-CONDENSED = {"joint-rotation": 2e-3}
+CONDENSED = {"joint-rotation": 2e-3, "joint-flexibility": 4e-3}
 
 
 def truth_of(frame: Frame) -> Model:
@@ -106,7 +106,7 @@ def test_only_what_has_weight_moves_the_mass(problems: dict[str, Problem], struc
     problem = problems[structure]
     # The arms of flexible joints are massless.
     heavy = {"density", "member-mass", "joint-mass", "added-mass", "attached-oscillator"}
-    heavy |= {"joint-rotation", "wall-thickness"}
+    heavy |= {"joint-rotation", "joint-flexibility", "wall-thickness"}
     nominal = total_mass(problem.model)
     for part in of_each_kind(problem):
         h = part.hypothesis

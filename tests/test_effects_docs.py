@@ -19,7 +19,7 @@ from femubench.core.conformance.checking import findings, subjects
 from femubench.core.inference.hypothesis import hypotheses_of
 from femubench.core.plugin.loader import Plugins, load_plugins
 from femubench.effect import member_length
-from femubench.fem import Frame, Place, Support
+from femubench.fem import Frame, Place, PointMass, Support
 from femubench.plugins.effects import femubench_effects
 
 TEXT = (Path(__file__).parents[1] / "docs" / "effects.md").read_text(encoding="utf-8")
@@ -39,10 +39,11 @@ def rows_of(heading: str) -> dict[str, list[str]]:
 
 @pytest.fixture(scope="module")
 def models(ladder: FrameBuilder, hframe: FrameBuilder, portal: FrameBuilder) -> list[Model]:
-    """Return a frame of each plane, none with shear deformation, and one on a support."""
+    """Return a frame of each plane, none with shear deformation, and one that carries a weight."""
     frames = [ladder(), hframe(mesh=(4, 2, 4)), portal(3, "euler-bernoulli")]
     clamp = Support(Place(joint="L1"), ("x", "z", "ry"))
-    frames.append(replace(frames[1], supports=(clamp,)))
+    weight = PointMass(Place(joint="U2"), 1000.0)
+    frames.append(replace(frames[1], supports=(clamp,), masses=(weight,)))
     return [Model.of(frame) for frame in frames]
 
 
@@ -57,7 +58,7 @@ def changed_keys(frame: Frame, other: Frame) -> set[str]:
 
 
 def test_every_effect_is_in_both_tables() -> None:
-    assert len(EFFECTS) == 23
+    assert len(EFFECTS) == 24
     assert list(rows_of(THERE)) == list(rows_of(WRITES))
     assert set(rows_of(THERE)) == set(EFFECTS)
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import scipy.linalg as la
 
+from femubench import diagnose
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import (
     Brace,
@@ -20,6 +23,7 @@ from femubench.core.fem.frame import (
     Member,
     Oscillator,
     Place,
+    PointMass,
     Preload,
     RigidEnd,
     Support,
@@ -29,6 +33,7 @@ from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.preload import (
     StressState,
     geometric_matrices,
+    gravity_stiffness,
     preload_stiffness,
     redundant_members,
     statics_of,
@@ -38,6 +43,11 @@ from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
+from femubench.plugins.effects.gravity_stiffness import GravityStiffness
+
+sys.path.insert(0, str(Path(__file__).parent))
+from diagnosis_problems import case_of, measured
+from effect_checks import check_neutral, compare
 
 STEEL = Material(210e9, 0.3, 7850.0)
 SECTION = Section(A=4e-4, Iy=3e-9, Iz=5e-8, J=2e-9, Jp=5.3e-8)
@@ -298,3 +308,120 @@ def test_what_cannot_be_stressed_is_refused(hframe: Any, ladder: Any) -> None:
     members = tuple(replace(member, section=flat) for member in ladder().members)
     with pytest.raises(ModelError, match="needs Iz"):
         Model.of(replace(ladder(), members=members, preloads=(Preload("BE", 1.0),)))
+
+
+def upright(plane: str, elements: int, down: float = 1.0, **parts: Any) -> Frame:
+    """Return a column on a clamp that stands, or hangs where `down` is -1."""
+    fixed = tuple(d for d in ("x", "y", "z", "rx", "ry", "rz") if plane == "3d" or d in "x z ry")
+    joints = (Joint("A", (0.0, 0.0, 0.0)), Joint("B", (0.0, 0.0, down * LENGTH)))
+    member = (Member("m", ("A", "B"), elements, SECTION, STEEL),)
+    supports = parts.pop("supports", (Support(Place(joint="A"), fixed),))
+    return Frame(plane, "euler-bernoulli", joints, member, supports=supports, **parts)
+
+
+class TestWeight:
+    @pytest.mark.parametrize("plane", ["in-plane", "3d"])
+    def test_a_column_buckles_under_its_own_weight(self, plane: str) -> None:
+        """Greenhill (1881): q L^3 / EI = 7.8373, the square of 1.5 times the zero of J_-1/3."""
+        frame = upright(plane, 40)
+        structure = Structure.build(frame)
+        weight = gravity_stiffness(structure).toarray()
+        stiffness = structure.matrices()[1].toarray()
+        factors = la.eigh(-weight, stiffness, eigvals_only=True)
+        q = 9.80665 * STEEL.rho * SECTION.A
+        least = min(SECTION.Iy, SECTION.Iz) if plane == "3d" else SECTION.Iy
+        critical = q * LENGTH**3 / (STEEL.E * least * factors.max())
+        assert critical == pytest.approx(7.8373, rel=5e-4)
+
+    @pytest.mark.parametrize("plane", ["in-plane", "3d"])
+    def test_a_bar_that_hangs_swings_as_a_pendulum(self, plane: str) -> None:
+        """By hand: w^2 = 3 g / 2 L about a hinge, (M/2 + m) g L / (M/3 + m) L^2 with a bob."""
+        hinge = ("x", "z") if plane == "in-plane" else ("x", "y", "z", "rz")
+        supports = (Support(Place(joint="A"), hinge),)
+        rod, bob = STEEL.rho * SECTION.A * LENGTH, 0.7
+        for mass in (0.0, bob):
+            masses = (PointMass(Place(joint="B"), mass),) if mass else ()
+            frame = upright(plane, 8, -1.0, supports=supports, masses=masses, gravity=1.0)
+            square = (rod / 2 + mass) * 9.80665 / ((rod / 3 + mass) * LENGTH)
+            found = np.linalg.eigvals(
+                np.linalg.solve(*(m.toarray() for m in Structure.build(frame).matrices()))
+            )
+            swing = np.sort(found.real)[: 1 if plane == "in-plane" else 2]
+            assert swing == pytest.approx(square, rel=2e-3)
+
+    def test_a_hung_mass_pulls_as_a_preload_does(self) -> None:
+        """Far heavier than the bar, it leaves N everywhere."""
+        heavy = (PointMass(Place(joint="B"), 1e5),)
+        frame = upright("in-plane", 6, -1.0, masses=heavy)
+        structure = Structure.build(frame)
+        count = len(structure.mesh.ends)
+        state = statics_of(structure).under_weight(frame)
+        np.testing.assert_allclose(state.force[:, 0], np.full(count, 1e5 * 9.80665), rtol=1e-4)
+        hung = (Oscillator(Place(joint="B"), "x", 1e5, 3.0),)
+        other = upright("in-plane", 6, -1.0, oscillators=hung)
+        again = statics_of(Structure.build(other)).under_weight(other)
+        np.testing.assert_allclose(again.force, state.force, rtol=1e-9, atol=1e-3)
+
+    def test_what_stands_inclined_bends(self) -> None:
+        """By hand: a cantilever along x has M = q (L - x)^2 / 2, and no normal force."""
+        frame = beam("in-plane", (("x", "z", "ry"), ()), elements=10)
+        state = statics_of(Structure.build(frame)).under_weight(frame)
+        q = 9.80665 * STEEL.rho * SECTION.A
+        x = (np.arange(10) + 0.5) * LENGTH / 10
+        np.testing.assert_allclose(state.force[:, 0], 0.0, atol=1e-9)
+        np.testing.assert_allclose(np.abs(state.force[:, 2]), q * (LENGTH - x), rtol=1e-9)
+        middle = state.moment + 0.5 * LENGTH / 10 * np.cross([1.0, 0.0, 0.0], state.force)
+        exact = q * (LENGTH - x) ** 2 / 2
+        np.testing.assert_allclose(np.abs(middle[:, 1]), exact, atol=q * (LENGTH / 10) ** 2 / 6)
+
+    def test_what_falls_or_has_no_weight_in_its_plane_is_refused(self, ladder: Any) -> None:
+        free = Structure.build(beam("in-plane", ((), ())))
+        with pytest.raises(ModelError, match="nothing holds"):
+            gravity_stiffness(free)
+        tipping = beam("in-plane", (("x", "z"), ()))  # a bar on one hinge, lying
+        with pytest.raises(ModelError, match="nothing holds"):
+            gravity_stiffness(Structure.build(tipping))
+        with pytest.raises(ModelError, match="out of plane"):
+            Structure.build(replace(ladder(), gravity=1.0)).matrices()
+
+    def test_the_effect_is_the_key(self) -> None:
+        effect = GravityStiffness()
+        for plane in ("in-plane", "3d"):
+            model = Model.of(upright(plane, 4, -1.0))
+            assert tuple(effect.places(model)) == ("all",)
+            assert 1e-3 < compare(effect, model, "all", [0.7]).effect < 0.1
+            assert compare(effect, model, "all", [0.7]).frequency < 1e-9
+            check_neutral(effect, model, "all")
+            already = effect.extend(model, "all", [1.0])
+            assert compare(effect, already, "all", [2.5]).frequency < 1e-9
+            (now,) = effect.parameters(already, "all")
+            assert (now.neutral, now.one_sided) == (1.0, False)
+        assert effect.places(Model.of(beam("in-plane", ((), ())))) == ()
+        assert effect.places(Model.of(beam("out-of-plane", CLAMPED_OUT))) == ()
+
+    def test_the_weight_of_what_slender_legs_carry_is_named(self) -> None:
+        """Two lumps on a portal of thin tubes, which lower its sway by 1.6 %."""
+        test_frame = slender(4)
+        truth = Model.of(replace(slender(12), gravity=1.0))
+        test = measured(truth, test_frame, count=5, rng=np.random.default_rng(0))
+        found = diagnose(case_of(Model.of(test_frame), test, 4))
+        (cause,) = found.causes
+        assert (cause.effect, cause.place, found.verdict) == ("gravity-stiffness", "all", "named")
+        (multiple,) = cause.parameters
+        assert multiple.std is not None
+        assert abs(multiple.value - 1.0) < 2.0 * multiple.std < 0.5
+
+
+def slender(elements: int) -> Frame:
+    """Return a portal on clamps with a mass at either corner."""
+    places = {"fl": (0.0, 0.0), "fr": (1.2, 0.0), "el": (0.0, 1.0), "er": (1.2, 1.0)}
+    ends = {"left": ("fl", "el"), "right": ("fr", "er"), "beam": ("el", "er")}
+    tube = rectangular_tube(0.012, 0.012, 0.001)
+    return Frame(
+        "in-plane",
+        "euler-bernoulli",
+        tuple(Joint(name, (x, 0.0, z)) for name, (x, z) in places.items()),
+        tuple(Member(name, pair, elements, tube, STEEL) for name, pair in ends.items()),
+        masses=tuple(PointMass(Place(joint=j), 4.0) for j in ("el", "er")),
+        supports=tuple(Support(Place(joint=j), ("x", "z", "ry")) for j in ("fl", "fr")),
+    )

@@ -181,7 +181,7 @@ def frame_of(model: FrameSpec) -> Frame:
             made = section_of(spec, model.plane, model.beam)
             sections[name] = replace(made, name=name)
     materials = {n: Material(m.E, m.nu, m.rho, n) for n, m in model.materials.items()}
-    own = ("plane", "beam", "rotary_inertia", "bending_mass")
+    own = ("plane", "beam", "rotary_inertia", "bending_mass", "gravity")
     parts: dict[str, Any] = {key: getattr(model, key) for key in own}
     for key, kind in _PARTS.items():
         parts[key] = tuple(_made(kind, spec) for spec in getattr(model, key))

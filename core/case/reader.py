@@ -49,6 +49,7 @@ _MESHED = "a frame that can be meshed"
 _EXPECTED = {
     "joint_springs": "a shorter one",
     "rigid_ends": "a shorter one",
+    "gravity": "a frame in plane or in space that stands or hangs",
     "preloads": "a member of a ring with all constants of its section",
 }
 _MOST_CHANGED = 5_000_000  # every change is built once while the case is read
@@ -309,6 +310,8 @@ def check_labels(
 def _key_of(item: object, frame: Frame) -> tuple[KeyPath, str]:
     """Return the key, below `model`, of a part of the frame, and what would have been right."""
     for key, parts in vars(frame).items():
+        if key == item:
+            return (key,), _EXPECTED[key]
         for i, part in enumerate(parts if isinstance(parts, tuple) else ()):
             if part is item:
                 return (key, i), _EXPECTED.get(key, _MESHED)

@@ -276,6 +276,7 @@ class FrameSpec(Table):
     beam: BeamTheory = Field("euler-bernoulli", description="'euler-bernoulli' or 'timoshenko'")
     rotary_inertia: Share | None = Field(None, description=_SHARE)
     bending_mass: BendingMass = Field("cubic", description="'cubic' or 'shear-consistent'")
+    gravity: NotNegative = Field(0.0, description="a multiple of the own weight, a number >= 0")
     materials: dict[Name, MaterialSpec] = Field(description="tables [model.materials.NAME]")
     sections: dict[Name, SectionSpec] = Field(description="tables [model.sections.NAME]")
     joints: Annotated[Many[JointSpec], Field(min_length=2, max_length=20_000)] = Field(

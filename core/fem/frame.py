@@ -239,6 +239,7 @@ class Frame:
             theory.
         bending_mass: ``cubic`` takes Hermite's functions in every theory; ``shear-consistent``
             takes those of the Timoshenko element (Friedman & Kosmatka 1993).
+        gravity: multiple of the own weight, down along z, that acts on its stiffness.
         sets: named by the user.
         families: the members of every section and of every material, by the names that these have
             in the case; empty for a frame that was not read.
@@ -255,6 +256,7 @@ class Frame:
     rigid_ends: tuple[RigidEnd, ...] = ()
     rotary_inertia: bool | float | None = None
     bending_mass: BendingMass = "cubic"
+    gravity: float = 0.0
     factors: tuple[Factor, ...] = ()
     preloads: tuple[Preload, ...] = ()
     eccentricities: tuple[Eccentricity, ...] = ()

@@ -1,4 +1,4 @@
-"""Geometric stiffness of the self-equilibrated stress that a lack of fit of one member leaves.
+"""Geometric stiffness of the stress that a lack of fit of one member or the own weight leaves.
 
 The second variation of a geometrically exact beam under the internal forces n = (N, Vy, Vz) and
 moments m = (T, My, Mz) is the integral of
@@ -30,12 +30,13 @@ from femubench.core.fem.beam import (
     GAUSS,
     cubic_rates,
     interpolation,
+    mass_matrices,
     rigid_transform,
     stiffness_matrices,
 )
 from femubench.core.fem.elastic_stiffness import elastic_stiffness
 from femubench.core.fem.frame import ACTIVE, Frame, Support
-from femubench.core.fem.kinematics import build_kinematics, rigid_motions
+from femubench.core.fem.kinematics import build_kinematics, point_rows, rigid_arm, rigid_motions
 from femubench.core.fem.meshed_frame import MeshedFrame
 from femubench.core.fem.nominal import meshed
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
@@ -45,6 +46,8 @@ _HELD = 1e-9
 # Without redundancy rounding leaves some 1e-13 of EA times the misfit strain.
 _NO_FORCE = 1e-10
 _DRAWS = 2
+GRAVITY = 9.80665  # m/s2, the standard acceleration of free fall
+_FALLS = 1e-6  # of all weights, of what nothing holds
 # The pull of a misfit is far larger than the forces it leaves, so that the balance of these needs
 # the digits of one step of iterative refinement (Higham 2002, chapter 12).
 _REFINED = 2
@@ -86,6 +89,7 @@ class Statics:
         stiffness: element matrices, (n_elements, 12, 12).
         factor, matrix: of the stiffness on the dofs `free`.
         free: the dofs but those that stop the rigid motions, where nothing reacts.
+        loose: the rigid motions that nothing holds, (n, r).
     """
 
     structure: MeshedFrame
@@ -93,6 +97,7 @@ class Statics:
     factor: Any
     matrix: SparseArray
     free: IntArray
+    loose: FloatArray
 
     def state(self, member: str) -> StressState:
         """Return the state with 1 N as its largest normal force and tension in the member.
@@ -106,7 +111,7 @@ class Statics:
         own = mesh.member == structure.frame.member_index[member]
         own &= np.isnan(mesh.arm_factor)
         misfit = self._misfit(own.astype(float))
-        motion = self._motion(misfit)
+        motion = self._motion(self.structure.gather.T @ misfit.ravel())
         state = self._state(self._internal(motion, misfit), motion)
         tension = float(state.force[own, 0].mean())
         scale = float(np.abs(misfit).max())
@@ -116,6 +121,35 @@ class Statics:
                 next((item for item in structure.frame.preloads if item.member == member), None),
             )
         return state.scaled(np.sign(tension) / state.largest)
+
+    def under_weight(self, frame: Frame) -> StressState:
+        """Return the state under the weight of all that the frame consists of, down along z.
+
+        Raises:
+            ModelError: when it would fall or tip over.
+        """
+        structure, mesh = self.structure, self.structure.mesh
+        fall = np.zeros((len(mesh.ends), 12))
+        fall[:, 0:3] = fall[:, 6:9] = -GRAVITY * mesh.axes[:, :, 2]
+        weight = (mass_matrices(structure.properties) @ fall[:, :, None])[:, :, 0]
+        load = structure.gather.T @ weight.ravel()
+        hung = [(item.at, item.mass, item.offset) for item in frame.masses]
+        hung += [(item.at, item.mass, (0.0, 0.0, 0.0)) for item in frame.oscillators]
+        for at, mass, offset in hung:
+            point = (
+                point_rows(frame, mesh, structure.properties, at) @ structure.kinematics.transform
+            )
+            load -= mass * GRAVITY * (rigid_arm(np.array(offset))[2] @ point)
+        largest = np.abs(load).sum() * np.abs(self.loose).max(axis=0, initial=0.0)
+        if np.any(np.abs(load @ self.loose) > _FALLS * largest):
+            raise ModelError("nothing holds the frame against its weight along z", "gravity")
+        motion = self._motion(load)
+        ends = self._internal(motion, weight)
+        # Force and moment in the middle stand for those that grow along the element.
+        axis, length = [1.0, 0.0, 0.0], structure.properties.length[:, None]
+        force, moment = (0.5 * (ends[:, k + 6 : k + 9] - ends[:, k : k + 3]) for k in (0, 3))
+        moment = moment - 0.5 * length * np.cross(axis, force)
+        return replace(self._state(ends, motion), force=force, moment=moment)
 
     def resisting(self) -> BoolArray:
         """Tell which members cannot be fitted without stress, (n_members,).
@@ -128,7 +162,8 @@ class Statics:
         found = np.zeros(count, dtype=bool)
         for _ in range(_DRAWS):
             misfit = self._misfit(rng.normal(size=count)[mesh.member])
-            tension = self._internal(self._motion(misfit), misfit)[:, 6]
+            motion = self._motion(self.structure.gather.T @ misfit.ravel())
+            tension = self._internal(motion, misfit)[:, 6]
             scale = self._misfit(np.ones(len(tension)))[:, 6]
             found[mesh.member[np.abs(tension) > _NO_FORCE * scale]] = True
         return found
@@ -141,19 +176,18 @@ class Statics:
         misfit[:, 0], misfit[:, 6] = -pull, pull
         return misfit
 
-    def _motion(self, misfit: FloatArray) -> FloatArray:
-        """Return the displacements under a misfit, (n,)."""
-        load = self.structure.gather.T @ misfit.ravel()
+    def _motion(self, load: FloatArray) -> FloatArray:
+        """Return the displacements under a load, (n,)."""
         motion = np.zeros(len(load))
         for _ in range(_REFINED):
             left = load[self.free] - self.matrix @ motion[self.free]
             motion[self.free] += self.factor.solve(left)
         return motion
 
-    def _internal(self, motion: FloatArray, misfit: FloatArray) -> FloatArray:
-        """Return the end forces of the elements, (n_elements, 12)."""
+    def _internal(self, motion: FloatArray, loads: FloatArray) -> FloatArray:
+        """Return the end forces of the elements from what pulls at their ends, (n_elements, 12)."""
         local = (self.structure.gather @ motion).reshape(-1, 12, 1)
-        return np.asarray((self.stiffness @ local)[:, :, 0] - misfit)
+        return np.asarray((self.stiffness @ local)[:, :, 0] - loads)
 
     def _state(self, ends: FloatArray, motion: FloatArray) -> StressState:
         mesh, frame = self.structure.mesh, self.structure.frame
@@ -193,14 +227,17 @@ def _prepare(structure: MeshedFrame) -> Statics:
             raise ModelError(what, next(iter(frame.preloads), None))
     kinematics = build_kinematics(frame, structure.mesh, directions)
     flat_structure = replace(structure, frame=frame, kinematics=kinematics)
-    free = _free(flat_structure)
+    loose = _loose(flat_structure)
+    # As few dofs as possible stop the rigid motions.
+    stopped = la.qr(loose.T, mode="r", pivoting=True)[1][: loose.shape[1]]
+    free = np.setdiff1d(np.arange(len(loose)), stopped)
     matrix = sp.csc_array(elastic_stiffness(flat_structure))[free][:, free]
     try:
         factor = splu(sp.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0)
     except RuntimeError:
         raise ModelError("the frame is a mechanism in its plane") from None
     stiffness = stiffness_matrices(flat_structure.properties)
-    return Statics(flat_structure, stiffness, factor, matrix, free)
+    return Statics(flat_structure, stiffness, factor, matrix, free, loose)
 
 
 def _clamps(frame: Frame) -> tuple[Support, ...]:
@@ -209,8 +246,8 @@ def _clamps(frame: Frame) -> tuple[Support, ...]:
     return tuple(Support(s.at, _IN_PLANE) for s in frame.supports if set(s.fixed) == whole)
 
 
-def _free(structure: MeshedFrame) -> IntArray:
-    """Return the dofs that are left when as few as possible stop the rigid motions."""
+def _loose(structure: MeshedFrame) -> FloatArray:
+    """Return the rigid motions that nothing holds, (n, r)."""
     kinematics, xyz = structure.kinematics, structure.mesh.xyz
     centre, size = xyz.mean(axis=0), max(float(np.ptp(xyz, axis=0).max()), 1e-12)
 
@@ -222,9 +259,7 @@ def _free(structure: MeshedFrame) -> IntArray:
     moving = np.abs(own).max(axis=0, initial=0.0) > _HELD
     _, singular, turn = la.svd(np.linalg.qr(structure.held(motion)[:, moving], mode="r"))
     rank = int(np.sum(singular > _HELD))
-    loose = own[:, moving] @ turn[rank:].T
-    stopped = la.qr(loose.T, mode="r", pivoting=True)[1][: loose.shape[1]]
-    return np.setdiff1d(np.arange(len(own)), stopped)
+    return np.asarray(own[:, moving] @ turn[rank:].T)
 
 
 _AT_ONCE = 20000  # elements whose matrices are held, all states together
@@ -267,7 +302,24 @@ def preload_stiffnesses(structure: MeshedFrame, members: Sequence[str]) -> tuple
         >>> unit.shape
         (81, 81)
     """
-    states = [statics_of(structure).state(member) for member in members]
+    return _stiffnesses(structure, [statics_of(structure).state(member) for member in members])
+
+
+def gravity_stiffness(structure: MeshedFrame) -> SparseArray:
+    """Return the geometric stiffness of the weight, down along z, on the free dofs, sparse (n, n).
+
+    Arguments:
+        structure: a meshed frame in plane or in space that stands or hangs.
+
+    Raises:
+        ModelError: when the frame moves out of plane, or nothing holds it against its weight.
+    """
+    if structure.frame.plane == "out-of-plane":
+        raise ModelError("out of plane the weight leaves no stress in the plane", "gravity")
+    return _stiffnesses(structure, [statics_of(structure).under_weight(structure.frame)])[0]
+
+
+def _stiffnesses(structure: MeshedFrame, states: Sequence[StressState]) -> tuple[SparseArray, ...]:
     count = len(structure.mesh.ends)
     together = max(_AT_ONCE // count, 1)
     found = []

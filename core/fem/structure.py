@@ -15,7 +15,7 @@ from femubench.core.fem.frame import Frame
 from femubench.core.fem.meshed_frame import MeshedFrame
 from femubench.core.fem.nominal import meshed
 from femubench.core.fem.parameters import Parameter
-from femubench.core.fem.preload import preload_stiffness
+from femubench.core.fem.preload import gravity_stiffness, preload_stiffness
 from femubench.core.fem.sensing import sensor_rows
 from femubench.core.fem.sensors import Sensors
 from femubench.core.typing import FloatArray, SparseArray
@@ -59,15 +59,17 @@ class Structure(MeshedFrame):
 
     @cached_property
     def preload(self) -> SparseArray | None:
-        """Return the geometric stiffness of all preloads on the free dofs, (n, n), or None."""
+        """Return the geometric stiffness of preloads and weight, (n, n), or None."""
         parts = [preload_stiffness(self, p.member, p.force) for p in self.frame.preloads]
+        if self.frame.gravity:
+            parts.append(self.frame.gravity * gravity_stiffness(self))
         return sum(parts[1:], start=parts[0]) if parts else None
 
     def matrices(self) -> tuple[SparseArray, SparseArray]:
         """Return mass and stiffness on the free dofs, sparse, (n, n) each.
 
         Raises:
-            ModelError: when a preload has no redundancy to live on.
+            ModelError: when a preload has no redundancy to live on, or nothing bears the weight.
         """
         mass = self.plan.assemble(mass_matrices(self.properties))
         if self.frame.masses:

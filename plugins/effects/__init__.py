@@ -22,6 +22,7 @@ CLASSES = {
     "wall-thickness": "wall_thickness:WallThickness",
     "local-stiffness-loss": "local_stiffness_loss:LocalStiffnessLoss",
     "axial-preload": "axial_preload:AxialPreload",
+    "gravity-stiffness": "gravity_stiffness:GravityStiffness",
     "mass-eccentricity": "mass_eccentricity:MassEccentricity",
     "bending-torsion-coupling": "bending_torsion_coupling:BendingTorsionCoupling",
     "brace-spring": "brace_spring:BraceSpring",

@@ -38,7 +38,8 @@ class JointFlexibility(FrameEffect):
     name: ClassVar[str] = "joint-flexibility"
     summary: ClassVar[str] = "all joints give"
     softens: ClassVar[bool] = True
-    sizes: ClassVar[Sequence[Size]] = (Size(0.3, 30.0, log=True),)
+    # EN 1993-1-8, 5.2.2: semi-rigid up to 25 EI/L, and no frame stands on hinges alone.
+    sizes: ClassVar[Sequence[Size]] = (Size(1.0, 30.0, log=True),)
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the whole frame, where there are joints of several types."""
