@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from femubench import read_case
+from femubench.core.challenge.truth_file import TrueCause, Truth, held, truth_text
 from femubench.core.diagnosis import diagnose as diagnosing
-from truths.truth import TrueCause, Truth, held, truth_text
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 import truth_sweep as sweep
@@ -236,12 +236,13 @@ def test_stated_probabilities_and_sizes(same: sweep.Same) -> None:
     defect = truth("defect", heavy)
     found = [(one.matter, one.right) for one in sweep.stated(defect, record, same)]
     assert found == [("name", True), ("place", True), ("name", False), ("place", False)]
-    assert sweep.deviations(defect, record, same) == pytest.approx([3.0])
+    (size,) = sweep.size_errors(defect, record, same)
+    assert size.deviations == pytest.approx(3.0)
     # At another place, or as another finding that counts, a size is not the true one.
-    assert sweep.deviations(truth("defect", replace(heavy, place="J1")), record, same) == []
+    assert sweep.size_errors(truth("defect", replace(heavy, place="J1")), record, same) == ()
     also = replace(LOOSE, also=("added-mass@rung-middle@0.5",), size=0.3, unit="kg")
-    assert sweep.deviations(truth("defect", also), record, same) == []
-    assert sweep.deviations(defect, {**record, "verdict": "unknown"}, same) == []
+    assert sweep.size_errors(truth("defect", also), record, same) == ()
+    assert sweep.size_errors(defect, {**record, "verdict": "unknown"}, same) == ()
     plain = {**said("named", "shear-deformation@all"), "textbook": ["shear-deformation"]}
     assert sweep.stated(truth("clean"), plain, same) == []
     assert not any(one.right for one in sweep.stated(truth("clean"), record, same))
