@@ -2,7 +2,8 @@
 
 python benchmarks/truth_sweep.py run --jobs 2         # appends, goes on where it stopped
 python benchmarks/truth_sweep.py run --reference      # with the healthy structure beside it
-python benchmarks/truth_sweep.py tables               # of either run: [--reference]
+python benchmarks/truth_sweep.py run --set opensees   # the second generator
+python benchmarks/truth_sweep.py tables               # of each run: [--reference] [--set opensees]
 """
 
 from __future__ import annotations
@@ -59,13 +60,18 @@ from femubench.core.challenge.truth_file import TRUTH_FILE, Truth, read_truth
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import FemubenchError
 from femubench.core.plugin.loader import load_plugins
-from truths.posing import DEFECTS, FAULTS, SUITE, pose
+from truths.posing import DEFECTS, FAULTS, OPENSEES, STRUCTURES, SUITE, pose
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "femubench-results" / "truth-sweep.jsonl"
 PAGE = ROOT / "docs" / "truth-sweep.md"
 MARK = "truth-sweep"
 SURE = 0.99
+# Truths, their structures, and what is added to headings.
+SETS = {
+    "solids": ((DEFECTS, FAULTS), SUITE, ""),
+    "opensees": ((OPENSEES,), STRUCTURES, ", second generator"),
+}
 # Upper ends of the ranges of chi-square.
 EDGES = (9.0, 30.0, 100.0, 1000.0, math.inf)
 RANGES = ("< 9", "9 to 30", "30 to 100", "100 to 1000", "> 1000")
@@ -396,18 +402,26 @@ def _beside(cases: Sequence[Scored]) -> str:
     return str(pd.DataFrame(rows).fillna("0").to_markdown(index=False, disable_numparse=True))
 
 
-def tables(cases: Sequence[Scored], truths: Sequence[Truth], *, reference: bool = False) -> str:
+def tables(
+    cases: Sequence[Scored],
+    truths: Sequence[Truth],
+    *,
+    reference: bool = False,
+    generator: str = "",
+) -> str:
     """Return all tables: visibility, then the outcomes of both halves apart.
 
     Arguments:
         cases: what has a record.
         truths: all that there are.
         reference: whether the healthy structure was beside them.
+        generator: what is added to headings.
     """
-    parts = [] if reference else ["## How visible the cases are", visibility_table(truths)]
-    beside = " with reference" if reference else ""
+    parts = [f"## How visible the cases are{generator}", visibility_table(truths)]
+    parts = [] if reference else parts
+    which = generator + (" with reference" if reference else "")
     for name, is_held in (("Development half", False), ("Held half", True)):
-        title = name + beside
+        title = name + which
         own = [case for case in cases if case.truth.held is is_held]
         parts += [half(title, own)] if own else [f"## {title}", "No case was diagnosed yet."]
     return "\n\n".join(parts)
@@ -429,8 +443,9 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--reference", action="store_true", help="with the healthy structure")
     found.add_argument("--seconds", type=float, default=120.0, help="processor time a case")
     found.add_argument("--results", type=Path, help=f"{RESULTS.relative_to(ROOT)} by default")
-    found.add_argument("--suite", type=Path, default=SUITE)
-    found.add_argument("--truths", type=Path, nargs="*", default=(DEFECTS, FAULTS))
+    found.add_argument("--set", choices=tuple(SETS), default="solids", help="of truths")
+    found.add_argument("--suite", type=Path, help="where the structures are; that of the set")
+    found.add_argument("--truths", type=Path, nargs="*", help="folders of truths; the set's")
     found.add_argument("--page", type=Path, default=PAGE)
     return found
 
@@ -439,6 +454,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the sweep, or write its page."""
     known = parser()
     options: Any = known.parse_args(arguments)
+    rooms, suite, generator = SETS[options.set]
+    options.truths, options.suite = options.truths or rooms, options.suite or suite
     folders = truth_folders(*options.truths)
     if unknown := set(options.names) - {folder.name for folder in folders}:
         known.error(f"no case {sorted(unknown)[0]!r} in {', '.join(map(str, options.truths))}")
@@ -446,8 +463,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         folders = [folder for folder in folders if folder.name in options.names]
     if options.reference:
         folders = [folder for folder in folders if (folder / HEALTHY).is_file()]
-    stem = RESULTS.stem + ("-reference" if options.reference else "")
-    results = options.results or RESULTS.with_stem(stem)
+    run_of = ("" if options.set == "solids" else f"-{options.set}") + (
+        "-reference" if options.reference else ""
+    )
+    results = options.results or RESULTS.with_stem(RESULTS.stem + run_of)
     tasks = [Task(f, options.suite, options.reference, options.seconds) for f in folders]
     if options.what == "run":
         run(results, tasks, options.jobs)
@@ -459,8 +478,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     cases = scored(records, truths, options.suite)
     if not cases:
         known.error(f"no results in {results}: run the sweep first")
-    text = tables(cases, truths, reference=options.reference)
-    mark = MARK + ("-reference" if options.reference else "")
+    text = tables(cases, truths, reference=options.reference, generator=generator)
+    mark = MARK + run_of
     page = filled(options.page.read_text(encoding="utf-8"), text, mark)
     options.page.write_text(page, encoding="utf-8")
     print(f"{len(cases)} of {len(truths)} cases, {options.page}")

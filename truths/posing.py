@@ -11,6 +11,9 @@ ROOT = Path(__file__).parents[1]
 SUITE = ROOT / "scenarios" / "suite"
 DEFECTS = ROOT / "truths" / "data" / "defects"
 FAULTS = ROOT / "truths" / "data" / "faults"
+# Of a second generator, with structures of their own.
+OPENSEES = ROOT / "truths" / "data" / "opensees"
+STRUCTURES = OPENSEES / "structures"
 
 
 def pose(
