@@ -24,6 +24,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from statistics import median
 from types import FrameType
 from typing import Any, TypeVar
 
@@ -39,6 +40,7 @@ from femubench.core.challenge.calibration import (
     calibration_rows,
     coverage_rows,
     fault_rows,
+    percent,
     statements,
     wilson,
 )
@@ -244,6 +246,7 @@ class Scored:
         deviations: of sizes that were found, from the true ones, in stated deviations.
         fits: whether the answer fits worse than the truth, and whether by a fault of the search;
             None where the truth was not fitted.
+        seconds: of one core.
     """
 
     truth: Truth
@@ -253,6 +256,7 @@ class Scored:
     stated: tuple[Statement, ...] = ()
     deviations: tuple[float, ...] = ()
     fits: tuple[bool, bool] | None = None
+    seconds: float = 0.0
 
 
 def scored(records: Mapping[str, Record], truths: Iterable[Truth], suite: Path) -> list[Scored]:
@@ -281,6 +285,7 @@ def scored(records: Mapping[str, Record], truths: Iterable[Truth], suite: Path) 
                         if size.deviations is not None
                     ),
                     fits=None if worse is None else (worse, bool(is_search_fault(record))),
+                    seconds=record.get("seconds", 0.0),
                 )
             )
     return found
@@ -361,7 +366,8 @@ def half(title: str, cases: Sequence[Scored]) -> str:
     """Return the tables of one half of the cases."""
     single = [case for case in cases if case.truth.kind == "defect"]
     found = [case for case in cases if case.truth.chi2 is not None and case.truth.causes]
-    parts = [f"## {title}", outcome_table("kind", kind_of, cases, KIND_ORDER)]
+    parts = [f"## {title}", strict_table(cases)]
+    parts += ["What is said, kind by kind:", outcome_table("kind", kind_of, cases, KIND_ORDER)]
     if single:
         effects = outcome_table("effect", lambda truth: truth.causes[0].effect, single)
         parts += ["Single defects by effect:", effects]
@@ -379,6 +385,43 @@ def half(title: str, cases: Sequence[Scored]) -> str:
     if faults := fault_rows(fits):
         parts += ["Answers beside the fit of the truth itself:", _markdown(faults)]
     return "\n\n".join(parts)
+
+
+def strict_table(cases: Sequence[Scored]) -> str:
+    """Return the shares that matter: one name at one place, groups apart, and the seconds."""
+
+    def of(*kinds: str) -> list[Scored]:
+        return [case for case in cases if case.truth.kind in kinds]
+
+    faults = of("data-fault", "input-fault")
+    named, grouped = ("right",), ("right", "in the group")
+    # A pair that is named by half says nothing that is not so.
+    untrue = ("wrong", "other place", "with others")
+    figures = (
+        ("one defect: named with its place, alone", of("defect"), named),
+        ("one defect: so, or in a group", of("defect"), grouped),
+        ("two defects: both so, or in a group", of("pair"), grouped),
+        ("sound: none", of("clean"), ("none",)),
+        ("outside the catalogue: flagged", of("outside"), (*grouped, "unknown", "not confirmed")),
+        ("fault of data or input: named with its place", faults, named),
+    )
+    rows = [
+        {
+            "figure": name,
+            "cases": str(len(own)),
+            **percent(sum(c.said in said for c in own), len(own)),
+        }
+        for name, own, said in figures
+        if own
+    ]
+    sure = sum(case.sure and case.said in untrue for case in cases)
+    head = f"all: not so, with P >= {SURE:g} stated"
+    rows.append({"figure": head, "cases": str(len(cases)), **percent(sure, len(cases))})
+    seconds = sorted(case.seconds for case in cases)
+    taken = f"median {median(seconds):.1f}, slowest {seconds[-1]:.0f}"
+    rows.append({"figure": "seconds of one core", "cases": str(len(cases)), "right": taken})
+    shares = [{("share" if key == "right" else key): v for key, v in r.items()} for r in rows]
+    return str(pd.DataFrame(shares).fillna("").to_markdown(index=False, disable_numparse=True))
 
 
 V = TypeVar("V")

@@ -250,6 +250,40 @@ def test_stated_probabilities_and_sizes(same: sweep.Same) -> None:
     assert sweep.stated(defect, {"verdict": "too-long"}, same) == []
 
 
+def test_strict_figures_part_names_from_groups() -> None:
+    names = [name for name in map(str, range(40)) if not held(name)][:6]
+    here, there = "joint-rotation@J1", "joint-rotation@J5"
+    records = dict(
+        zip(
+            names,
+            (
+                said("named", here),
+                said("ambiguous", here, "added-mass@J5"),
+                said("named", there, p=0.995),
+                said("unknown", here),
+                said("none"),
+                said("named", there, p=0.98),
+            ),
+            strict=True,
+        )
+    )
+    kinds = ("defect", "defect", "defect", "defect", "clean", "clean")
+    truths = [
+        truth(kind, *((LOOSE,) if kind == "defect" else ()), name=name)
+        for name, kind in zip(names, kinds, strict=True)
+    ]
+    cases = sweep.scored(records, truths, ROOT / "scenarios")
+    rows = {
+        row.split("|")[1].strip(): [cell.strip() for cell in row.split("|")[2:4]]
+        for row in sweep.strict_table(cases).splitlines()
+    }
+    assert rows["one defect: named with its place, alone"] == ["4", "25.0 %"]
+    assert rows["one defect: so, or in a group"] == ["4", "50.0 %"]
+    assert rows["sound: none"] == ["2", "50.0 %"]
+    assert rows["all: not so, with P >= 0.99 stated"] == ["6", "16.7 %"]
+    assert not any(name.startswith("two defects") for name in rows)
+
+
 def test_answers_beside_the_fit_of_the_truth_are_in_the_tables() -> None:
     name = next(name for name in map(str, range(20)) if not held(name))
     fits = [{"chi2": c, "unknowns": 1, "log_weight": -c} for c in (50.0, 40.0)]
