@@ -130,6 +130,7 @@ def group_rows(records: Sequence[Record]) -> list[dict[str, str]]:
                 "cases": group.name,
                 "number": str(len(own)),
                 **percent(right, len(own)),
+                "strict": _strict(own),
                 "place right": f"{100.0 * np.mean(placed):.1f} %" if placed else "-",
                 "too small": str(sum(bool(r.get("too_small")) for r in own)),
                 "groups": f"{len(in_group)}, {np.mean(in_group):.1f} names" if in_group else "-",
@@ -137,6 +138,14 @@ def group_rows(records: Sequence[Record]) -> list[dict[str, str]]:
             }
         )
     return rows
+
+
+def _strict(records: Sequence[Record]) -> str:
+    """Return the share of answers that are right alone: one name at one place for every cause."""
+    if records[0]["hidden"] not in ("one", "pair"):
+        return "-"
+    hits = [r["verdict"] == "named" and bool(r["right"] and r.get("place_right")) for r in records]
+    return f"{100.0 * np.mean(hits):.1f} %"
 
 
 def effect_rows(records: Sequence[Record]) -> list[dict[str, str]]:
@@ -284,8 +293,9 @@ name is still wrong. Intervals are Wilson's.
 
 {groups}
 
-`too small`: cases whose effect lowers chi-square by less than 12. `groups`: verdicts that name
-several effects which the data cannot distinguish, and how many on average.
+`strict`: named alone, with every place right, whether or not it can be seen. `too small`: cases
+whose effect lowers chi-square by less than 12. `groups`: verdicts that name several effects which
+the data cannot distinguish, and how many on average.
 
 ## By hidden effect
 

@@ -2,7 +2,8 @@
 
 python benchmarks/truth_sweep.py run --jobs 2         # appends, goes on where it stopped
 python benchmarks/truth_sweep.py run --reference      # with the healthy structure beside it
-python benchmarks/truth_sweep.py tables               # of either run: [--reference]
+python benchmarks/truth_sweep.py run --set opensees   # the second generator
+python benchmarks/truth_sweep.py tables               # of each run: [--reference] [--set opensees]
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
-from itertools import permutations
 from pathlib import Path
+from statistics import median
 from types import FrameType
 from typing import Any, TypeVar
 
@@ -39,42 +40,44 @@ from femubench.core.challenge.calibration import (
     calibration_rows,
     coverage_rows,
     fault_rows,
+    percent,
     statements,
     wilson,
 )
-from femubench.core.challenge.score import LARGEST_GROUP, Parts, candidates, faults_in
+from femubench.core.challenge.outcome import (
+    OUTCOMES,
+    Same,
+    beside,
+    counts_as_right,
+    is_finding,
+    outcome,
+    record_of,
+    same_place,
+    size_errors,
+)
+from femubench.core.challenge.posing import HEALTHY
 from femubench.core.challenge.sweep import Record
 from femubench.core.challenge.true_fit import Finding, fits_of, fits_worse, is_search_fault
+from femubench.core.challenge.truth_file import TRUTH_FILE, Truth, read_truth
 from femubench.core.diagnosis.result import Diagnosis
-from femubench.core.effect.places import match
 from femubench.core.errors import FemubenchError
-from femubench.core.fem.frame import Frame
 from femubench.core.plugin.loader import load_plugins
-from truths.posing import DEFECTS, FAULTS, HEALTHY, SUITE, pose
-from truths.truth import TRUTH_FILE, TrueCause, Truth, read_truth
+from truths.posing import DEFECTS, FAULTS, OPENSEES, STRUCTURES, SUITE, pose
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "femubench-results" / "truth-sweep.jsonl"
 PAGE = ROOT / "docs" / "truth-sweep.md"
 MARK = "truth-sweep"
 SURE = 0.99
+# Truths, their structures, and what is added to headings.
+SETS = {
+    "solids": ((DEFECTS, FAULTS), SUITE, ""),
+    "opensees": ((OPENSEES,), STRUCTURES, ", second generator"),
+}
 # Upper ends of the ranges of chi-square.
 EDGES = (9.0, 30.0, 100.0, 1000.0, math.inf)
 RANGES = ("< 9", "9 to 30", "30 to 100", "100 to 1000", "> 1000")
 KIND_ORDER = ("defect", "pair", "clean", "outside")
-OUTCOMES = (
-    "right",
-    "other place",
-    "in the group",
-    "with others",
-    "one of two",
-    "none",
-    "unknown",
-    "not confirmed",
-    "wrong",
-    "error",
-    "too long",
-)
 
 
 class TooLong(BaseException):
@@ -141,14 +144,7 @@ def diagnosed(task: Task, key: tuple[str, str]) -> Record:
                 warnings.simplefilter("default")
                 diagnosis = diagnose(read_case(target))
             record["warnings"] = sorted({str(warning.message)[:80] for warning in told})
-            answer = Answer.of(diagnosis)
-            record["answer"] = answer.model_dump(mode="json")
-            record["verdict"], record["probability"] = answer.verdict, answer.probability
-            record["textbook"] = [
-                cause.effect
-                for cause in diagnosis.causes
-                if all(parameter.textbook for parameter in cause.parameters)
-            ]
+            record |= record_of(Answer.of(diagnosis))
             record["chi2"] = list(diagnosis.chi2)
             record["adequacy_p"] = diagnosis.adequacy_p
         except TooLong:
@@ -220,130 +216,6 @@ def is_of(record: Record | None, key: tuple[str, str]) -> bool:
     return record is not None and (record["name"], record["digest"]) == key
 
 
-Same = Callable[[str, str], bool]
-
-
-def _in_order(place: str) -> str:
-    """Return a place with the two of a swap sorted: ``sensor:S5+S7``."""
-    head, colon, tail = place.partition(":")
-    return head + colon + "+".join(sorted(tail.split("+")))
-
-
-def same_place(frame: Frame | None) -> Same:
-    """Return what tells whether two words stand for one place.
-
-    Arguments:
-        frame: of the structure; None compares words.
-    """
-
-    def same(first: str, second: str) -> bool:
-        one, two = _in_order(first), _in_order(second)
-        return one == two if frame is None else match(frame, one, two)
-
-    return same
-
-
-def anywhere(first: str, second: str) -> bool:
-    """Take every two places for the same."""
-    return True
-
-
-def _names(part: tuple[str, str], cause: TrueCause, same: Same) -> bool:
-    effect, place = part
-    return any(effect == known and same(place, where) for known, where in cause.findings)
-
-
-def _holds(truth: Truth, parts: Parts, same: Same) -> bool:
-    """Tell whether every cause is among the parts, each by a part of its own."""
-    return any(
-        all(_names(part, cause, same) for part, cause in zip(chosen, truth.causes, strict=True))
-        for chosen in permutations(parts, len(truth.causes))
-    )
-
-
-def _only(truth: Truth, parts: Parts, same: Same) -> bool:
-    """Tell whether every part is a finding of some cause: one cause may show as two, a thinner
-    wall as less stiffness and less mass."""
-    return all(any(_names(part, cause, same) for cause in truth.causes) for part in parts)
-
-
-def _half(truth: Truth, parts: Parts, same: Same) -> bool:
-    """Tell whether parts are just one of two causes."""
-    if len(truth.causes) != 2 or len(parts) != 1:
-        return False
-    return any(_names(parts[0], cause, same) for cause in truth.causes)
-
-
-def said_sets(truth: Truth, record: Record) -> list[Parts]:
-    """Return what a record takes for possible, without what it takes at the textbook value.
-
-    What handbooks give a drawn model lacks whether the structure has a defect or not.
-    """
-    wanted = {effect for cause in truth.causes for effect, _ in cause.findings}
-    textbook = set(record.get("textbook", ())) - wanted
-    return [
-        tuple(part for part in parts if part[0] not in textbook)
-        for parts in candidates(Answer.model_validate(record["answer"]))
-    ]
-
-
-def outcome(truth: Truth, record: Record, same: Same) -> str:
-    """Return which of `OUTCOMES` a record is.
-
-    A name is right with effect and place, or as an entry of `also`. A group holds the truth when
-    one of its members is right by itself.
-    """
-    verdict = str(record["verdict"]).replace("-", " ")
-    if truth.kind.endswith("-fault") and (found := faults_said(record)):
-        return fault_outcome(truth, found, same)
-    if verdict not in ("named", "ambiguous"):
-        return verdict
-    sets = said_sets(truth, record)
-    if not any(sets):
-        return "none"
-    if not truth.causes:
-        return "none" if verdict == "ambiguous" and () in sets else "wrong"
-    if verdict == "ambiguous" and len(sets) > LARGEST_GROUP:
-        return "unknown"
-    exact = [parts for parts in sets if _only(truth, parts, same)]
-    if any(_holds(truth, parts, same) for parts in exact):
-        return "right" if verdict == "named" else "in the group"
-    if any(_holds(truth, parts, anywhere) for parts in sets if _only(truth, parts, anywhere)):
-        return "other place"
-    if any(_holds(truth, parts, same) for parts in sets):
-        return "with others"
-    return "one of two" if any(_half(truth, parts, same) for parts in sets) else "wrong"
-
-
-def faults_said(record: Record) -> Parts:
-    """Return the faults of data and input that a record names."""
-    return faults_in(Answer.model_validate(record["answer"])) if "answer" in record else ()
-
-
-def fault_outcome(truth: Truth, found: Parts, same: Same) -> str:
-    """Return which of `OUTCOMES` the faults are that were named, whatever else was."""
-    if _holds(truth, found, same):
-        return "right" if _only(truth, found, same) else "with others"
-    return "other place" if _holds(truth, found, anywhere) else "wrong"
-
-
-def beside(record: Record) -> str:
-    """Return what is said of the structure beside the faults of data and input."""
-    verdict = str(record["verdict"])
-    if verdict not in ("named", "ambiguous"):
-        return verdict.replace("-", " ")
-    causes = Answer.model_validate(record["answer"]).causes
-    return "a cause" if any(cause.side == "model" for cause in causes) else "none"
-
-
-def counts_as_right(truth: Truth, said: str) -> bool:
-    """Tell whether an outcome is the best that can be said of a truth."""
-    if truth.kind == "clean":
-        return said == "none"
-    good = ("right", "in the group")
-    return said in (*good, "unknown", "not confirmed") if truth.kind == "outside" else said in good
-
-
 def reach(truth: Truth) -> str:
     """Return the range of the visibility of a truth; a dash where it has none.
 
@@ -374,6 +246,7 @@ class Scored:
         deviations: of sizes that were found, from the true ones, in stated deviations.
         fits: whether the answer fits worse than the truth, and whether by a fault of the search;
             None where the truth was not fitted.
+        seconds: of one core.
     """
 
     truth: Truth
@@ -383,6 +256,7 @@ class Scored:
     stated: tuple[Statement, ...] = ()
     deviations: tuple[float, ...] = ()
     fits: tuple[bool, bool] | None = None
+    seconds: float = 0.0
 
 
 def scored(records: Mapping[str, Record], truths: Iterable[Truth], suite: Path) -> list[Scored]:
@@ -405,8 +279,13 @@ def scored(records: Mapping[str, Record], truths: Iterable[Truth], suite: Path) 
                 Scored(
                     *(truth, said, sure, beside(record)),
                     stated=tuple(stated(truth, record, places)),
-                    deviations=tuple(deviations(truth, record, places)),
+                    deviations=tuple(
+                        size.deviations
+                        for size in size_errors(truth, record, places)
+                        if size.deviations is not None
+                    ),
                     fits=None if worse is None else (worse, bool(is_search_fault(record))),
+                    seconds=record.get("seconds", 0.0),
                 )
             )
     return found
@@ -424,7 +303,7 @@ def stated(truth: Truth, record: Record, same: Same) -> list[Statement]:
     textbook = set(record.get("textbook", ())) - wanted
 
     def is_placed(effect: str, place: str) -> bool:
-        return any(_names((effect, place), cause, same) for cause in truth.causes)
+        return any(is_finding((effect, place), cause, same) for cause in truth.causes)
 
     def counts(cause: AnswerCause) -> bool:
         faulty = truth.kind.endswith("-fault")
@@ -432,22 +311,6 @@ def stated(truth: Truth, record: Record, same: Same) -> list[Statement]:
 
     answer = Answer.model_validate(record["answer"])
     return statements(answer, wanted.__contains__, is_placed, counts)
-
-
-def deviations(truth: Truth, record: Record, same: Same) -> list[float]:
-    """Return how far sizes are from the true ones, of causes that are named where they sit."""
-    if record["verdict"] not in ("named", "ambiguous"):
-        return []
-    found = []
-    for said in Answer.model_validate(record["answer"]).causes:
-        for cause in truth.causes:
-            sizes = [p for p in said.parameters if p.std and p.unit == cause.unit]
-            here = said.effect == cause.effect and same(said.place, cause.place)
-            if here and cause.size is not None and len(sizes) == 1:
-                (size,) = sizes
-                assert size.std is not None
-                found.append((size.value - cause.size) / size.std)
-    return found
 
 
 def outcome_row(first: Mapping[str, str], cases: Sequence[Scored]) -> dict[str, str]:
@@ -503,7 +366,8 @@ def half(title: str, cases: Sequence[Scored]) -> str:
     """Return the tables of one half of the cases."""
     single = [case for case in cases if case.truth.kind == "defect"]
     found = [case for case in cases if case.truth.chi2 is not None and case.truth.causes]
-    parts = [f"## {title}", outcome_table("kind", kind_of, cases, KIND_ORDER)]
+    parts = [f"## {title}", strict_table(cases)]
+    parts += ["What is said, kind by kind:", outcome_table("kind", kind_of, cases, KIND_ORDER)]
     if single:
         effects = outcome_table("effect", lambda truth: truth.causes[0].effect, single)
         parts += ["Single defects by effect:", effects]
@@ -521,6 +385,43 @@ def half(title: str, cases: Sequence[Scored]) -> str:
     if faults := fault_rows(fits):
         parts += ["Answers beside the fit of the truth itself:", _markdown(faults)]
     return "\n\n".join(parts)
+
+
+def strict_table(cases: Sequence[Scored]) -> str:
+    """Return the shares that matter: one name at one place, groups apart, and the seconds."""
+
+    def of(*kinds: str) -> list[Scored]:
+        return [case for case in cases if case.truth.kind in kinds]
+
+    faults = of("data-fault", "input-fault")
+    named, grouped = ("right",), ("right", "in the group")
+    # A pair that is named by half says nothing that is not so.
+    untrue = ("wrong", "other place", "with others")
+    figures = (
+        ("one defect: named with its place, alone", of("defect"), named),
+        ("one defect: so, or in a group", of("defect"), grouped),
+        ("two defects: both so, or in a group", of("pair"), grouped),
+        ("sound: none", of("clean"), ("none",)),
+        ("outside the catalogue: flagged", of("outside"), (*grouped, "unknown", "not confirmed")),
+        ("fault of data or input: named with its place", faults, named),
+    )
+    rows = [
+        {
+            "figure": name,
+            "cases": str(len(own)),
+            **percent(sum(c.said in said for c in own), len(own)),
+        }
+        for name, own, said in figures
+        if own
+    ]
+    sure = sum(case.sure and case.said in untrue for case in cases)
+    head = f"all: not so, with P >= {SURE:g} stated"
+    rows.append({"figure": head, "cases": str(len(cases)), **percent(sure, len(cases))})
+    seconds = sorted(case.seconds for case in cases)
+    taken = f"median {median(seconds):.1f}, slowest {seconds[-1]:.0f}"
+    rows.append({"figure": "seconds of one core", "cases": str(len(cases)), "right": taken})
+    shares = [{("share" if key == "right" else key): v for key, v in r.items()} for r in rows]
+    return str(pd.DataFrame(shares).fillna("").to_markdown(index=False, disable_numparse=True))
 
 
 V = TypeVar("V")
@@ -544,18 +445,26 @@ def _beside(cases: Sequence[Scored]) -> str:
     return str(pd.DataFrame(rows).fillna("0").to_markdown(index=False, disable_numparse=True))
 
 
-def tables(cases: Sequence[Scored], truths: Sequence[Truth], *, reference: bool = False) -> str:
+def tables(
+    cases: Sequence[Scored],
+    truths: Sequence[Truth],
+    *,
+    reference: bool = False,
+    generator: str = "",
+) -> str:
     """Return all tables: visibility, then the outcomes of both halves apart.
 
     Arguments:
         cases: what has a record.
         truths: all that there are.
         reference: whether the healthy structure was beside them.
+        generator: what is added to headings.
     """
-    parts = [] if reference else ["## How visible the cases are", visibility_table(truths)]
-    beside = " with reference" if reference else ""
+    parts = [f"## How visible the cases are{generator}", visibility_table(truths)]
+    parts = [] if reference else parts
+    which = generator + (" with reference" if reference else "")
     for name, is_held in (("Development half", False), ("Held half", True)):
-        title = name + beside
+        title = name + which
         own = [case for case in cases if case.truth.held is is_held]
         parts += [half(title, own)] if own else [f"## {title}", "No case was diagnosed yet."]
     return "\n\n".join(parts)
@@ -577,8 +486,9 @@ def parser() -> argparse.ArgumentParser:
     found.add_argument("--reference", action="store_true", help="with the healthy structure")
     found.add_argument("--seconds", type=float, default=120.0, help="processor time a case")
     found.add_argument("--results", type=Path, help=f"{RESULTS.relative_to(ROOT)} by default")
-    found.add_argument("--suite", type=Path, default=SUITE)
-    found.add_argument("--truths", type=Path, nargs="*", default=(DEFECTS, FAULTS))
+    found.add_argument("--set", choices=tuple(SETS), default="solids", help="of truths")
+    found.add_argument("--suite", type=Path, help="where the structures are; that of the set")
+    found.add_argument("--truths", type=Path, nargs="*", help="folders of truths; the set's")
     found.add_argument("--page", type=Path, default=PAGE)
     return found
 
@@ -587,6 +497,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the sweep, or write its page."""
     known = parser()
     options: Any = known.parse_args(arguments)
+    rooms, suite, generator = SETS[options.set]
+    options.truths, options.suite = options.truths or rooms, options.suite or suite
     folders = truth_folders(*options.truths)
     if unknown := set(options.names) - {folder.name for folder in folders}:
         known.error(f"no case {sorted(unknown)[0]!r} in {', '.join(map(str, options.truths))}")
@@ -594,8 +506,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         folders = [folder for folder in folders if folder.name in options.names]
     if options.reference:
         folders = [folder for folder in folders if (folder / HEALTHY).is_file()]
-    stem = RESULTS.stem + ("-reference" if options.reference else "")
-    results = options.results or RESULTS.with_stem(stem)
+    run_of = ("" if options.set == "solids" else f"-{options.set}") + (
+        "-reference" if options.reference else ""
+    )
+    results = options.results or RESULTS.with_stem(RESULTS.stem + run_of)
     tasks = [Task(f, options.suite, options.reference, options.seconds) for f in folders]
     if options.what == "run":
         run(results, tasks, options.jobs)
@@ -607,8 +521,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     cases = scored(records, truths, options.suite)
     if not cases:
         known.error(f"no results in {results}: run the sweep first")
-    text = tables(cases, truths, reference=options.reference)
-    mark = MARK + ("-reference" if options.reference else "")
+    text = tables(cases, truths, reference=options.reference, generator=generator)
+    mark = MARK + run_of
     page = filled(options.page.read_text(encoding="utf-8"), text, mark)
     options.page.write_text(page, encoding="utf-8")
     print(f"{len(cases)} of {len(truths)} cases, {options.page}")

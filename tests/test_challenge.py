@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import json
+import shutil
 import zlib
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,7 +21,7 @@ from femubench.core.challenge.draw import draw_case, registered_effects
 from femubench.core.challenge.measuring import QUALITY, chi2, see
 from femubench.core.challenge.outside import OUTSIDE
 from femubench.core.challenge.score import judge_answer
-from femubench.core.challenge.sealed import SEALED_FILE, seal, unseal
+from femubench.core.challenge.sealed import SEALED_FILE, read_sealed, seal, unseal
 from femubench.core.challenge.structures import STRUCTURES, structure_named
 from femubench.core.challenge.sweep import bars_table, run_task, tasks
 from femubench.core.challenge.truth import (
@@ -32,12 +33,19 @@ from femubench.core.challenge.truth import (
     finer,
     scattered,
 )
+from femubench.core.challenge.truth_file import (
+    TrueCause as GivenCause,
+    Truth as GivenTruth,
+    truth_text,
+)
 from femubench.core.challenge.visibility import delta_chi2
 from femubench.core.cli.main import bench
 from femubench.core.errors import FemubenchError, ModelError
 from femubench.core.fem.frame import Place
+from femubench.core.library.cases import read_cases
 from femubench.core.library.challenge import any_hidden, challenge, score_challenge
 from femubench.core.modal.eigen import solve_modes
+from femubench.core.plugin.loader import load_plugins
 from femubench.effect import EffectParameter, FrameEffect, Site, Size
 from femubench.fem import Frame, PointMass
 from femubench.plugins.effects.local_stiffness_loss import LocalStiffnessLoss
@@ -553,6 +561,87 @@ def test_the_command_writes_and_scores(tmp_path: Path) -> None:
     done = run(bench, ["challenge", "score", str(case), str(said)])
     assert done.exit_code == 2
     assert "truth.sealed: cannot be read" in done.output
+
+
+@pytest.fixture
+def outside(tmp_path: Path) -> Path:
+    """Write a folder of one truth, on a built-in structure, and one on a structure beside it."""
+    room = tmp_path / "truths"
+    frame = read_cases("frame-solid", load_plugins())[0].folder
+    loose = GivenCause(
+        "a loose joint", "joint-rotation", "J1", ("joint-offset@J1",), 4e3, "N m/rad"
+    )
+    for name, structure, causes in (
+        ("a", frame.name, (loose,)),
+        ("b", "ours", ()),
+    ):
+        (room / name).mkdir(parents=True)
+        kind = "defect" if causes else "clean"
+        told = GivenTruth(name, structure, kind, 1, causes, 50.0, 40.0)
+        (room / name / "truth.toml").write_text(truth_text(told), encoding="utf-8")
+        shutil.copyfile(frame / "modes.csv", room / name / "modes.csv")
+    shutil.copytree(frame, room / "structures" / "ours")
+    shutil.copyfile(frame / "modes.csv", room / "a" / "healthy.csv")
+    return room
+
+
+def test_truths_from_outside_are_posed_and_scored(outside: Path, tmp_path: Path) -> None:
+    case = tmp_path / "case"
+    made = challenge(case, 3, truths=outside, reference=True)  # only one has the healthy structure
+    assert read_case(case).reference is not None
+    assert not any("joint-rotation" in p.read_text() for p in case.glob("*.*") if p != made.truth)
+    said = tmp_path / "answer.json"
+
+    def scored(verdict: str, effect: str, place: str) -> tuple[bool, bool | None, bool | None]:
+        sizes = [{"name": "stiffness", "value": 5e3, "std": 500.0, "unit": "N m/rad"}]
+        causes = [{"effect": effect, "place": place, "parameters": sizes}]
+        said.write_text(json.dumps({"verdict": verdict, "causes": causes}), encoding="utf-8")
+        found = made.score(said)
+        assert found.delta_chi2 == (50.0,)
+        if found.judgement.sizes:
+            assert found.judgement.sizes[0].deviations == pytest.approx(2.0)
+        return found.judgement.right, found.judgement.names, found.judgement.places
+
+    assert scored("named", "joint-rotation", "rung-right@J1") == (True, True, True)
+    assert scored("named", "joint-offset", "J1") == (True, True, True)
+    assert scored("named", "joint-rotation", "J5") == (False, True, False)
+    assert scored("named", "added-mass", "J1") == (False, False, False)
+    assert scored("unknown", "joint-rotation", "J1") == (False, False, False)
+
+
+def test_a_truth_on_no_known_structure_is_refused(outside: Path, tmp_path: Path) -> None:
+    shutil.rmtree(outside / "structures")
+    shutil.rmtree(outside / "a")
+    with pytest.raises(InputError, match=r"b/truth\.toml: structure: no structure 'ours'"):
+        challenge(tmp_path / "case", 1, truths=outside)
+    assert not (tmp_path / "case").exists()
+
+
+def test_every_truth_of_a_folder_is_drawn_by_some_seed(outside: Path, tmp_path: Path) -> None:
+    found = {
+        str(read_sealed(challenge(tmp_path / f"{seed}", seed, truths=outside).truth)[0])
+        for seed in range(8)
+    }
+    assert found == {"nothing", "a loose joint: joint-rotation at J1 (4000 N m/rad)"}
+
+
+def test_the_command_poses_truths_from_outside(outside: Path, tmp_path: Path) -> None:
+    case, said = tmp_path / "case", tmp_path / "answer.json"
+    run = CliRunner().invoke
+    new = ["challenge", "new", "--seed", "1", "--truths", str(outside)]
+    done = run(bench, [*new, "--reference", str(case)])
+    assert done.exit_code == 0, done.output
+    said.write_text('{"verdict": "none"}', encoding="utf-8")
+    done = run(bench, ["challenge", "score", str(case), str(said)])
+    assert "hidden: a loose joint: joint-rotation at J1" in done.output
+    assert "wrong: none; hidden is a loose joint" in done.output
+    for words, expected in (
+        ([*new, "--kind", "A"], "--kind says nothing beside --truths"),
+        (["challenge", "new", "--seed", "1", "--reference"], "--reference goes with --truths"),
+        ([*new[:-1], str(tmp_path / "none")], "no folder with truth.toml"),
+    ):
+        done = run(bench, [*words, str(tmp_path / "other")])
+        assert (done.exit_code, expected in done.output) == (2, True), done.output
 
 
 def test_figures_of_a_sweep() -> None:

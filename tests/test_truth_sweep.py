@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from femubench import read_case
+from femubench.core.challenge.truth_file import TrueCause, Truth, held, truth_text
 from femubench.core.diagnosis import diagnose as diagnosing
-from truths.truth import TrueCause, Truth, held, truth_text
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 import truth_sweep as sweep
@@ -236,17 +236,52 @@ def test_stated_probabilities_and_sizes(same: sweep.Same) -> None:
     defect = truth("defect", heavy)
     found = [(one.matter, one.right) for one in sweep.stated(defect, record, same)]
     assert found == [("name", True), ("place", True), ("name", False), ("place", False)]
-    assert sweep.deviations(defect, record, same) == pytest.approx([3.0])
+    (size,) = sweep.size_errors(defect, record, same)
+    assert size.deviations == pytest.approx(3.0)
     # At another place, or as another finding that counts, a size is not the true one.
-    assert sweep.deviations(truth("defect", replace(heavy, place="J1")), record, same) == []
+    assert sweep.size_errors(truth("defect", replace(heavy, place="J1")), record, same) == ()
     also = replace(LOOSE, also=("added-mass@rung-middle@0.5",), size=0.3, unit="kg")
-    assert sweep.deviations(truth("defect", also), record, same) == []
-    assert sweep.deviations(defect, {**record, "verdict": "unknown"}, same) == []
+    assert sweep.size_errors(truth("defect", also), record, same) == ()
+    assert sweep.size_errors(defect, {**record, "verdict": "unknown"}, same) == ()
     plain = {**said("named", "shear-deformation@all"), "textbook": ["shear-deformation"]}
     assert sweep.stated(truth("clean"), plain, same) == []
     assert not any(one.right for one in sweep.stated(truth("clean"), record, same))
     assert sweep.stated(truth("data-fault", SWAP), record, same) == []
     assert sweep.stated(defect, {"verdict": "too-long"}, same) == []
+
+
+def test_strict_figures_part_names_from_groups() -> None:
+    names = [name for name in map(str, range(40)) if not held(name)][:6]
+    here, there = "joint-rotation@J1", "joint-rotation@J5"
+    records = dict(
+        zip(
+            names,
+            (
+                said("named", here),
+                said("ambiguous", here, "added-mass@J5"),
+                said("named", there, p=0.995),
+                said("unknown", here),
+                said("none"),
+                said("named", there, p=0.98),
+            ),
+            strict=True,
+        )
+    )
+    kinds = ("defect", "defect", "defect", "defect", "clean", "clean")
+    truths = [
+        truth(kind, *((LOOSE,) if kind == "defect" else ()), name=name)
+        for name, kind in zip(names, kinds, strict=True)
+    ]
+    cases = sweep.scored(records, truths, ROOT / "scenarios")
+    rows = {
+        row.split("|")[1].strip(): [cell.strip() for cell in row.split("|")[2:4]]
+        for row in sweep.strict_table(cases).splitlines()
+    }
+    assert rows["one defect: named with its place, alone"] == ["4", "25.0 %"]
+    assert rows["one defect: so, or in a group"] == ["4", "50.0 %"]
+    assert rows["sound: none"] == ["2", "50.0 %"]
+    assert rows["all: not so, with P >= 0.99 stated"] == ["6", "16.7 %"]
+    assert not any(name.startswith("two defects") for name in rows)
 
 
 def test_answers_beside_the_fit_of_the_truth_are_in_the_tables() -> None:

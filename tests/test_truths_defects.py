@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from femubench import read_case
+from femubench.core.challenge.truth_file import read_truth
 from truths.posing import DEFECTS, pose
-from truths.truth import read_truth
 
 FOLDERS = sorted(path.parent for path in DEFECTS.glob("*/truth.toml"))
 TRUTHS = [read_truth(folder) for folder in FOLDERS]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from femubench import InputError, read_case
+from femubench.core.challenge.truth_file import TrueCause, Truth, held, read_truth, truth_text
 from truths.posing import DEFECTS, SUITE, pose
-from truths.truth import TrueCause, Truth, held, read_truth, truth_text
 
 sys.path.insert(0, str(Path(__file__).parent))
 from small_suite import write_suite

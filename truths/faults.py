@@ -26,11 +26,19 @@ import tomlkit
 
 from femubench import Case, read_case
 from femubench.core.case.tables import RESERVED
+from femubench.core.challenge.posing import CASE_FILE, overlay
+from femubench.core.challenge.truth_file import (
+    TRUTH_FILE,
+    TrueCause,
+    Truth,
+    read_truth,
+    rounded,
+    truth_text,
+)
 from femubench.core.errors import InputError
 from femubench.core.inference.residuals import Data
 from femubench.core.modal.eigen import enough_modes, solve_modes
-from truths.posing import CASE_FILE, FAULTS, SUITE, overlay
-from truths.truth import TRUTH_FILE, TrueCause, Truth, read_truth, rounded, truth_text
+from truths.posing import FAULTS, SUITE
 
 SEED = 12_000
 TURNED = 0.02  # a section whose sizes differ by less looks the same when turned

@@ -1,87 +1,29 @@
-"""Pose a truth as a case: its files over those of its structure, as a user would hand them in."""
+"""Where truths and their structures are; pose one as a case."""
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
-import tomlkit
-from tomlkit.exceptions import TOMLKitError
-
-from femubench.core.errors import InputError
-from femubench.core.files import MIB, check_new, read_text
-from truths.truth import TRUTH_FILE, Truth, read_truth
+from femubench.core.challenge import posing
+from femubench.core.challenge.truth_file import Truth, read_truth
 
 ROOT = Path(__file__).parents[1]
 SUITE = ROOT / "scenarios" / "suite"
 DEFECTS = ROOT / "truths" / "data" / "defects"
 FAULTS = ROOT / "truths" / "data" / "faults"
-CASE_FILE, HEALTHY = "case.toml", "healthy.csv"
-_ABOUT = (".md", ".svg")  # what tells of a structure and is no data
+# Of a second generator, with structures of their own.
+OPENSEES = ROOT / "truths" / "data" / "opensees"
+STRUCTURES = OPENSEES / "structures"
 
 
 def pose(
     truth_folder: Path, target: Path, reference: bool = False, *, suite: Path = SUITE
 ) -> Truth:
-    """Write the case of a truth into a new folder, and return the truth, which stays outside.
+    """Write the case of a truth on a structure of the suite; see `femubench.core.challenge.posing`.
 
     Arguments:
-        truth_folder: with a `truth.toml` and whatever differs from the structure's folder.
-        target: a new or an empty folder.
-        reference: whether the case brings the healthy structure's measurement.
+        truth_folder, target, reference: of the truth, of the case, and whether with the healthy.
         suite: where the structures are.
-
-    Raises:
-        InputError: for a faulty truth, an unknown structure, a reference that is not there.
     """
-    truth = read_truth(truth_folder)
-    structure = suite / truth.structure
-    if not (structure / CASE_FILE).is_file():
-        file = truth_folder / TRUTH_FILE
-        what, expected = f"no structure {truth.structure!r}", f"a folder in {suite}"
-        raise InputError(what, file=file, key="structure", expected=expected)
-    overlay(structure, truth_folder, target, reference, truth.mass)
-    return truth
-
-
-def overlay(
-    structure: Path,
-    truth_folder: Path,
-    target: Path,
-    reference: bool = False,
-    mass: tuple[float, float] | None = None,
-) -> None:
-    """Write the case of a structure with the files of a truth over its own.
-
-    Modifications are dropped: those of the structure were computed on the healthy one. `mass` is
-    what a balance reads of the structure as it is, and its deviation, in kg.
-
-    Raises:
-        InputError: when the target is not empty, or the reference is not there.
-    """
-    if reference and not (truth_folder / HEALTHY).is_file():
-        raise InputError("there is no reference", file=truth_folder, expected=f"a file {HEALTHY}")
-    check_new(target)
-    changed = truth_folder / CASE_FILE
-    file = changed if changed.is_file() else structure / CASE_FILE
-    try:
-        document = tomlkit.parse(read_text(file, MIB))
-    except TOMLKitError as error:
-        raise InputError(str(error), file=file, expected="valid TOML") from None
-    changes = document.pop("modification", [])
-    left_out = {CASE_FILE, TRUTH_FILE, *(str(change["modes"]) for change in changes)}
-    left_out |= set() if reference else {HEALTHY}
-    target.mkdir(parents=True, exist_ok=True)
-    for folder in (structure, truth_folder):
-        for path in sorted(folder.iterdir()):
-            if path.is_file() and path.name not in left_out and path.suffix not in _ABOUT:
-                shutil.copyfile(path, target / path.name)
-    healthy = document["measurement"].get("mass")
-    if mass is not None:
-        document["measurement"]["mass"] = {"value": mass[0], "std": mass[1]}
-    if reference:
-        document["reference"] = {"modes": HEALTHY}
-        if healthy is not None:
-            document["reference"]["mass"] = healthy
-    text = tomlkit.dumps(document).rstrip("\n") + "\n"
-    (target / CASE_FILE).write_text(text, encoding="utf-8")
+    structure = suite / read_truth(truth_folder).structure
+    return posing.pose(truth_folder, structure, target, reference)

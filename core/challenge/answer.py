@@ -34,12 +34,13 @@ class _Part(BaseModel):
 
 
 class AnswerParameter(_Part):
-    """A size: `std` is None where it was not fitted."""
+    """A size: `std` is None where it was not fitted; `textbook` where a handbook gives it."""
 
     name: Word
     value: Finite
     std: Annotated[float, Field(ge=0.0, allow_inf_nan=False)] | None = None
     unit: Word = ""
+    textbook: bool = False
 
 
 class AnswerCause(_Part):

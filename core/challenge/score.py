@@ -79,7 +79,7 @@ def judge_answer(truth: Truth, answer: Answer, delta_chi2: Sequence[float]) -> J
     """
     if truth.outside:
         return _judge_outside(truth, answer, min(delta_chi2, default=0.0))
-    group = _group_size(answer)
+    group = group_size(answer)
     if not truth.causes:
         right = answer.verdict == "none"
         reason = "nothing is hidden" if right else f"nothing is hidden, but it says {_said(answer)}"
@@ -129,7 +129,7 @@ def _judge_outside(truth: Truth, answer: Answer, excess: float) -> Judgement:
     right = right or (in_data and truth.outside.startswith("sensor"))
     reason = "the cause is outside the catalogue"
     reason = reason if right else f"{reason}, but it says {_said(answer)}"
-    return Judgement(right, None, None, _group_size(answer), 0, too_small, False, (), reason)
+    return Judgement(right, None, None, group_size(answer), 0, too_small, False, (), reason)
 
 
 def candidates(answer: Answer) -> tuple[Parts, ...]:
@@ -152,7 +152,7 @@ def _effects(parts: Parts) -> frozenset[str]:
     return frozenset(effect for effect, _ in parts)
 
 
-def _group_size(answer: Answer) -> int:
+def group_size(answer: Answer) -> int:
     """Return the number of different names in the answer's group; 0 without one."""
     if answer.verdict != "ambiguous":
         return 0

@@ -15,17 +15,23 @@ import secrets
 import zlib
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from femubench.core.challenge.truth import Truth
+from femubench.core.challenge.truth_file import GivenTruth
 from femubench.core.errors import InputError
 from femubench.core.files import read_bytes
 
 SEALED_FILE = "truth.sealed"
 _FORMAT = "femubench-sealed-1"
 _LARGEST = 2**20  # bytes
-_TRUTH = TypeAdapter(Truth)
+# What was drawn here, and what was given from outside.
+_TRUTHS: dict[str, TypeAdapter[Any]] = {
+    "truth": TypeAdapter(Truth),
+    "given": TypeAdapter(GivenTruth),
+}
 
 
 class _Seal(BaseModel):
@@ -36,7 +42,7 @@ class _Seal(BaseModel):
     sealed: str
 
 
-def seal(truth: Truth, nonce: str | None = None) -> tuple[str, str]:
+def seal(truth: Truth | GivenTruth, nonce: str | None = None) -> tuple[str, str]:
     """Return the text of a sealed file and the commitment to it.
 
     Arguments:
@@ -44,8 +50,9 @@ def seal(truth: Truth, nonce: str | None = None) -> tuple[str, str]:
         nonce: hexadecimal; None for a random one, so that a truth cannot be guessed from its
             commitment.
     """
+    key = "given" if isinstance(truth, GivenTruth) else "truth"
     content = json.dumps(
-        {"nonce": nonce or secrets.token_hex(16), "truth": asdict(truth)}, sort_keys=True
+        {"nonce": nonce or secrets.token_hex(16), key: asdict(truth)}, sort_keys=True
     ).encode()
     commitment = hashlib.sha256(content).hexdigest()
     text = base64.b64encode(zlib.compress(content, 9)).decode()
@@ -53,7 +60,7 @@ def seal(truth: Truth, nonce: str | None = None) -> tuple[str, str]:
     return json.dumps(file, indent=1) + "\n", commitment
 
 
-def unseal(text: str, file: Path | None = None) -> tuple[Truth, str]:
+def unseal(text: str, file: Path | None = None) -> tuple[Truth | GivenTruth, str]:
     """Return the truth of a sealed file and the commitment that it keeps.
 
     Arguments:
@@ -75,13 +82,15 @@ def unseal(text: str, file: Path | None = None) -> tuple[Truth, str]:
     if hashlib.sha256(raw).hexdigest() != content.commitment:
         raise InputError("changed since it was sealed", file=file, expected=wanted)
     try:
-        truth = _TRUTH.validate_python(json.loads(raw)["truth"])
-    except (ValidationError, ValueError, KeyError, TypeError, RecursionError):
+        told = json.loads(raw)
+        (key,) = told.keys() & _TRUTHS.keys()
+        truth: Truth | GivenTruth = _TRUTHS[key].validate_python(told[key])
+    except (ValidationError, ValueError, AttributeError, TypeError, RecursionError):
         raise InputError("not a sealed truth", file=file, expected=wanted) from None
     return truth, content.commitment
 
 
-def read_sealed(path: Path) -> tuple[Truth, str]:
+def read_sealed(path: Path) -> tuple[Truth | GivenTruth, str]:
     """Return the truth in a sealed file and its commitment.
 
     Raises:

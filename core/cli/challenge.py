@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
+from click.core import ParameterSource
 
 from femubench.core.cli import options
 
@@ -41,21 +42,45 @@ def challenge() -> None:
     "--scatter", type=click.FloatRange(0.0, 0.05), default=0.0, show_default=True,
     help="Standard deviation of each element's stiffness and mass, relative.",
 )  # fmt: skip
+@click.option(
+    "--truths", type=options.PATH, metavar="DIR",
+    help="Pose one of the truths in this folder, drawn by the seed, in place of drawing one.",
+)  # fmt: skip
+@click.option(
+    "--reference", is_flag=True, help="With --truths: with the healthy structure beside it."
+)
 @_truth("Where the sealed truth goes; FOLDER/truth.sealed by default.")
+@click.pass_context
 def new(
+    ctx: click.Context,
     folder: Path,
     seed: int,
     kind: DataKind,
     structure: str,
     hidden: Hidden | Literal["any"],
     scatter: float,
+    truths: Path | None,
+    reference: bool,
     sealed: Path | None,
 ) -> None:
     """Write a blind case into FOLDER, which must be new or empty, and a sealed truth."""
     from femubench.core.library.challenge import challenge as blind
 
+    if reference and truths is None:
+        raise click.UsageError("--reference goes with --truths")
+    for name in ("kind", "structure", "hidden", "scatter") if truths is not None else ():
+        if ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE:
+            raise click.UsageError(f"--{name} says nothing beside --truths")
     made = blind(
-        folder, seed, kind=kind, structure=structure, hidden=hidden, scatter=scatter, truth=sealed
+        folder,
+        seed,
+        kind=kind,
+        structure=structure,
+        hidden=hidden,
+        scatter=scatter,
+        truths=truths,
+        reference=reference,
+        truth=sealed,
     )
     click.echo(f"wrote {folder}")
     click.echo(f"wrote {made.truth}, the sealed truth, sha256 {made.commitment}")
@@ -76,7 +101,9 @@ def score(folder: Path, answer: Path, sealed: Path | None, json_file: Path | Non
     if json_file is not None:
         write_atomically(json_file, scored.to_json())
     click.echo(f"hidden: {scored.truth}")
-    click.echo(f"chi-square falls by {', '.join(f'{d:.1f}' for d in scored.delta_chi2) or '0'}")
+    click.echo(
+        f"chi-square of what is hidden: {', '.join(f'{d:.1f}' for d in scored.delta_chi2) or '0'}"
+    )
     for line in _lines(scored.judgement):
         click.echo(line)
     click.echo(f"sealed truth sha256 {scored.commitment}")

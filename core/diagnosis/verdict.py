@@ -116,10 +116,10 @@ def most_believed(p: float) -> float:
 def mostly_common(posterior: Posterior, group: Sequence[Key]) -> bool:
     """Tell whether the first name of a group stands, but for what hardly matters.
 
-    What all names of the group share must be the first name as a whole, or rest on textbook physics,
-    and carry most of what is explained, and all but few of them must be the first name with more
-    beside it, or with one cause for another that acts alike: what is left of a real structure then
-    goes by any name.
+    What all names of the group share must be the first name as a whole, or rest on textbook
+    physics, and carry most of what is explained, and all but few of them must be the first name
+    with more beside it, or with one cause for another that acts alike: what is left of a real
+    structure then goes by any name.
     """
     common = set(group[0]).intersection(*group[1:])
     best = posterior.best(group[0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -15,21 +16,33 @@ from femubench.core.case.reader import read_case
 from femubench.core.case.writing import write_case
 from femubench.core.challenge.answer import Answer, read_answer
 from femubench.core.challenge.draw import Effects, draw_case, registered_effects
+from femubench.core.challenge.outcome import judge_by_truth, same_place
+from femubench.core.challenge.posing import HEALTHY, pose
 from femubench.core.challenge.score import Judgement, judge_answer
 from femubench.core.challenge.sealed import SEALED_FILE, read_sealed, seal
 from femubench.core.challenge.truth import HIDDEN, DataKind, Hidden, Truth
+from femubench.core.challenge.truth_file import TRUTH_FILE, GivenTruth, read_truth
 from femubench.core.challenge.visibility import delta_chi2
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import InputError
+from femubench.core.library.cases import scenarios_of, usable_plugins
 
 _SHARES = (0.6, 0.15, 0.125, 0.125)  # of one, none, pair, outside where any may be hidden
 
 
 @dataclass(frozen=True)
 class Scored:
-    """A judged answer with all that it was judged by."""
+    """A judged answer with all that it was judged by.
 
-    truth: Truth
+    Arguments:
+        truth: what was hidden.
+        delta_chi2: by how much each cause lowers chi-square; of a truth from outside the
+            chi-square of what it changes.
+        judgement: what the answer is worth.
+        commitment: sha256 of the truth.
+    """
+
+    truth: Truth | GivenTruth
     delta_chi2: tuple[float, ...]
     judgement: Judgement
     commitment: str
@@ -74,6 +87,8 @@ def challenge(
     scatter: float = 0.0,
     truth: str | PathLike[str] | None = None,
     effects: Effects | None = None,
+    truths: str | PathLike[str] | None = None,
+    reference: bool = False,
 ) -> Challenge:
     """Write a blind case with a hidden fault, and its sealed truth.
 
@@ -86,6 +101,9 @@ def challenge(
         scatter: standard deviation of each element's stiffness and mass, relative.
         truth: where the sealed truth goes; ``truth.sealed`` in the folder by default.
         effects: the catalogue by name; None for those of all plugins.
+        truths: a folder of truths from outside, one of which is posed in place of drawing one;
+            kind, structure, hidden, scatter and effects then say nothing.
+        reference: whether the case of such a truth brings the healthy structure.
 
     Raises:
         InputError: when the folder is not empty, the truth exists, or nothing can be drawn.
@@ -94,19 +112,76 @@ def challenge(
         >>> femubench.challenge("blind", seed=3, hidden="none").folder.name
         'blind'
     """
+    case, path = _free(folder, truth)
+    if truths is not None:
+        return _given(case, path, seed, Path(truths), reference)
+    if reference:
+        raise InputError("a reference goes with truths", expected="a folder of truths")
+    much = any_hidden(seed) if hidden == "any" else hidden
+    blind = draw_case(
+        seed, kind, structure=structure, hidden=much, scatter=scatter, effects=effects
+    )
+    return _sealed(case, path, lambda: write_case(case, blind.case), blind.truth)
+
+
+def _given(case: Path, path: Path, seed: int, truths: Path, reference: bool) -> Challenge:
+    """Pose one of the truths in a folder, at any depth.
+
+    Their structures are folders in ``structures`` there, or built-in cases.
+
+    Raises:
+        InputError: when there is no truth, one is faulty, or something cannot be written.
+    """
+    rooms = [file.parent for file in sorted(truths.rglob(TRUTH_FILE))]
+    rooms = [room for room in rooms if not reference or (room / HEALTHY).is_file()]
+    if not rooms:
+        what = f"no folder with {TRUTH_FILE}" + (f" and {HEALTHY}" if reference else "")
+        raise InputError(what, file=truths, expected="a folder of truths")
+    room = rooms[int(np.random.default_rng(seed).integers(len(rooms)))]
+    told = read_truth(room)
+    structure = truths / "structures" / told.structure
+    if not structure.is_dir():
+        structure = _structure(told.structure, room)
+    hidden = GivenTruth(told, seed, reference, digest="")
+    return _sealed(case, path, lambda: pose(room, structure, case, reference), hidden)
+
+
+def _structure(name: str, room: Path) -> Path:
+    """Return the folder of a built-in case by the last word of its name.
+
+    Raises:
+        InputError: when there is none.
+    """
+    owners = scenarios_of(usable_plugins().scenarios)
+    for case, scenario in owners.items():
+        if case.rpartition("/")[2] == name:
+            return scenario.folder(case)
+    what, expected = f"no structure {name!r}", "a folder in `structures`, or a built-in case"
+    raise InputError(what, file=room / TRUTH_FILE, key="structure", expected=expected)
+
+
+def _free(folder: str | PathLike[str], truth: str | PathLike[str] | None) -> tuple[Path, Path]:
+    """Return where case and sealed truth go.
+
+    Raises:
+        InputError: when something is there.
+    """
     case, path = Path(folder), Path(folder, SEALED_FILE) if truth is None else Path(truth)
     if case.exists() and (not case.is_dir() or any(case.iterdir())):
         raise InputError("is not empty", file=case, expected="a new or an empty folder")
     if path.exists():
         raise InputError("exists", file=path, expected="a new file for the sealed truth")
-    much = any_hidden(seed) if hidden == "any" else hidden
-    blind = draw_case(
-        seed, kind, structure=structure, hidden=much, scatter=scatter, effects=effects
-    )
+    return case, path
+
+
+def _sealed(
+    case: Path, path: Path, write: Callable[[], object], hidden: Truth | GivenTruth
+) -> Challenge:
+    """Write a case and seal its truth; what was begun is removed where that fails."""
     new = not case.exists()
     try:
-        write_case(case, blind.case)
-        text, commitment = seal(replace(blind.truth, digest=read_case(case).digest))
+        write()
+        text, commitment = seal(replace(hidden, digest=read_case(case).digest))
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         if new:
@@ -144,6 +219,11 @@ def score_challenge(
     case = read_case(folder)
     if case.digest != hidden.digest:
         raise InputError("the case was changed since its truth was sealed", file=folder)
+    if isinstance(hidden, GivenTruth):
+        structure = case.model.structure
+        same = same_place(None if structure is None else structure.frame)
+        chi2 = () if hidden.truth.chi2 is None else (hidden.truth.chi2,)
+        return Scored(hidden, chi2, judge_by_truth(hidden.truth, given, same), commitment)
     known = registered_effects() if effects is None else effects
     missing = [cause.effect for cause in hidden.causes if cause.effect not in known]
     if missing:

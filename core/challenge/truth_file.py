@@ -54,6 +54,10 @@ class TrueCause:
         own = ((self.effect, self.place),) if self.effect else ()
         return (*own, *((word.partition("@")[0], word.partition("@")[2]) for word in self.also))
 
+    def __str__(self) -> str:
+        size = "" if self.size is None else f" ({self.size:.4g} {self.unit}".rstrip() + ")"
+        return f"{self.what}: {self.effect or 'no effect'} at {self.place}{size}"
+
 
 @dataclass(frozen=True)
 class Truth:
@@ -87,6 +91,29 @@ class Truth:
     def held(self) -> bool:
         """Tell whether it is in the held half."""
         return held(self.name)
+
+    def __str__(self) -> str:
+        return " + ".join(map(str, self.causes)) or "nothing"
+
+
+@dataclass(frozen=True)
+class GivenTruth:
+    """A truth from outside that was posed as a blind case.
+
+    Arguments:
+        truth: as its file says.
+        seed: of the draw.
+        reference: whether the case brings the healthy structure.
+        digest: of the case.
+    """
+
+    truth: Truth
+    seed: int
+    reference: bool
+    digest: str
+
+    def __str__(self) -> str:
+        return str(self.truth)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,218 @@
+"""What an answer is to a truth from outside, whose causes may be said in several ways."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from itertools import permutations
+from typing import Any
+
+from femubench.core.challenge.answer import Answer
+from femubench.core.challenge.score import (
+    LARGEST_GROUP,
+    Judgement,
+    Parts,
+    SizeError,
+    candidates,
+    faults_in,
+    group_size,
+)
+from femubench.core.challenge.truth_file import TrueCause, Truth
+from femubench.core.effect.places import match
+from femubench.core.fem.frame import Frame
+
+OUTCOMES = (
+    "right",
+    "other place",
+    "in the group",
+    "with others",
+    "one of two",
+    "none",
+    "unknown",
+    "not confirmed",
+    "wrong",
+    "error",
+    "too long",
+)
+
+Same = Callable[[str, str], bool]
+Record = Mapping[str, Any]
+
+
+def _in_order(place: str) -> str:
+    """Return a place with the two of a swap sorted: ``sensor:S5+S7``."""
+    head, colon, tail = place.partition(":")
+    return head + colon + "+".join(sorted(tail.split("+")))
+
+
+def same_place(frame: Frame | None) -> Same:
+    """Return what tells whether two words stand for one place.
+
+    Arguments:
+        frame: of the structure; None compares words.
+    """
+
+    def same(first: str, second: str) -> bool:
+        one, two = _in_order(first), _in_order(second)
+        return one == two if frame is None else match(frame, one, two)
+
+    return same
+
+
+def anywhere(first: str, second: str) -> bool:
+    """Take every two places for the same."""
+    return True
+
+
+def is_finding(part: tuple[str, str], cause: TrueCause, same: Same) -> bool:
+    """Tell whether an effect at a place counts as a cause."""
+    effect, place = part
+    return any(effect == known and same(place, where) for known, where in cause.findings)
+
+
+def _holds(truth: Truth, parts: Parts, same: Same) -> bool:
+    """Tell whether every cause is among the parts, each by a part of its own."""
+    return any(
+        all(is_finding(part, cause, same) for part, cause in zip(chosen, truth.causes, strict=True))
+        for chosen in permutations(parts, len(truth.causes))
+    )
+
+
+def _only(truth: Truth, parts: Parts, same: Same) -> bool:
+    """Tell whether every part is a finding of some cause: one cause may show as two, a thinner
+    wall as less stiffness and less mass."""
+    return all(any(is_finding(part, cause, same) for cause in truth.causes) for part in parts)
+
+
+def _half(truth: Truth, parts: Parts, same: Same) -> bool:
+    """Tell whether parts are just one of two causes."""
+    if len(truth.causes) != 2 or len(parts) != 1:
+        return False
+    return any(is_finding(parts[0], cause, same) for cause in truth.causes)
+
+
+def said_sets(truth: Truth, record: Record) -> list[Parts]:
+    """Return what a record takes for possible, without what it takes at the textbook value.
+
+    What handbooks give a drawn model lacks whether the structure has a defect or not.
+    """
+    wanted = {effect for cause in truth.causes for effect, _ in cause.findings}
+    textbook = set(record.get("textbook", ())) - wanted
+    return [
+        tuple(part for part in parts if part[0] not in textbook)
+        for parts in candidates(Answer.model_validate(record["answer"]))
+    ]
+
+
+def outcome(truth: Truth, record: Record, same: Same) -> str:
+    """Return which of `OUTCOMES` a record is.
+
+    A name is right with effect and place, or as an entry of `also`. A group holds the truth when
+    one of its members is right by itself.
+    """
+    verdict = str(record["verdict"]).replace("-", " ")
+    if truth.kind.endswith("-fault") and (found := faults_said(record)):
+        return fault_outcome(truth, found, same)
+    if verdict not in ("named", "ambiguous"):
+        return verdict
+    sets = said_sets(truth, record)
+    if not any(sets):
+        return "none"
+    if not truth.causes:
+        return "none" if verdict == "ambiguous" and () in sets else "wrong"
+    if verdict == "ambiguous" and len(sets) > LARGEST_GROUP:
+        return "unknown"
+    exact = [parts for parts in sets if _only(truth, parts, same)]
+    if any(_holds(truth, parts, same) for parts in exact):
+        return "right" if verdict == "named" else "in the group"
+    if any(_holds(truth, parts, anywhere) for parts in sets if _only(truth, parts, anywhere)):
+        return "other place"
+    if any(_holds(truth, parts, same) for parts in sets):
+        return "with others"
+    return "one of two" if any(_half(truth, parts, same) for parts in sets) else "wrong"
+
+
+def faults_said(record: Record) -> Parts:
+    """Return the faults of data and input that a record names."""
+    return faults_in(Answer.model_validate(record["answer"])) if "answer" in record else ()
+
+
+def fault_outcome(truth: Truth, found: Parts, same: Same) -> str:
+    """Return which of `OUTCOMES` the faults are that were named, whatever else was."""
+    if _holds(truth, found, same):
+        return "right" if _only(truth, found, same) else "with others"
+    return "other place" if _holds(truth, found, anywhere) else "wrong"
+
+
+def beside(record: Record) -> str:
+    """Return what is said of the structure beside the faults of data and input."""
+    verdict = str(record["verdict"])
+    if verdict not in ("named", "ambiguous"):
+        return verdict.replace("-", " ")
+    causes = Answer.model_validate(record["answer"]).causes
+    return "a cause" if any(cause.side == "model" for cause in causes) else "none"
+
+
+def counts_as_right(truth: Truth, said: str) -> bool:
+    """Tell whether an outcome is the best that can be said of a truth."""
+    if truth.kind == "clean":
+        return said == "none"
+    good = ("right", "in the group")
+    return said in (*good, "unknown", "not confirmed") if truth.kind == "outside" else said in good
+
+
+def record_of(answer: Answer) -> dict[str, Any]:
+    """Return what is judged of an answer: verdict, causes, what it takes at a textbook value."""
+    return {
+        "verdict": answer.verdict,
+        "probability": answer.probability,
+        "answer": answer.model_dump(mode="json"),
+        "textbook": [
+            cause.effect
+            for cause in answer.causes
+            if cause.parameters and all(parameter.textbook for parameter in cause.parameters)
+        ],
+    }
+
+
+def size_errors(truth: Truth, record: Record, same: Same) -> tuple[SizeError, ...]:
+    """Return true and stated sizes of causes that are named where they sit, by their own name."""
+    if record["verdict"] not in ("named", "ambiguous"):
+        return ()
+    found = []
+    for said in Answer.model_validate(record["answer"]).causes:
+        for cause in truth.causes:
+            sizes = [p for p in said.parameters if p.std and p.unit == cause.unit]
+            here = said.effect == cause.effect and same(said.place, cause.place)
+            if here and cause.size is not None and len(sizes) == 1:
+                (size,) = sizes
+                off = (size.value - cause.size) / size.std if size.std else None
+                words = cause.effect, size.name, size.unit
+                found.append(SizeError(*words, cause.size, size.value, off))
+    return tuple(found)
+
+
+def judge_by_truth(truth: Truth, answer: Answer, same: Same) -> Judgement:
+    """Judge an answer to a truth from outside.
+
+    Arguments:
+        truth: what is wrong.
+        answer: what is said.
+        same: whether two places are one.
+    """
+    record = record_of(answer)
+    said = outcome(truth, record, same)
+    right = counts_as_right(truth, said)
+    named = {effect for parts in candidates(answer) for effect, _ in parts}
+    found = sum(any(effect in named for effect, _ in cause.findings) for cause in truth.causes)
+    hidden = bool(truth.causes) and truth.kind != "outside"
+    return Judgement(
+        right=right,
+        names=said in ("right", "in the group", "other place") if hidden else None,
+        places=said in ("right", "in the group") if hidden else None,
+        group=group_size(answer),
+        found=found,
+        too_small=False,
+        false_alarm=not truth.causes and not right,
+        sizes=size_errors(truth, record, same),
+        reason=said if right else f"{said}; hidden is {truth}",
+    )
