@@ -62,11 +62,15 @@ class Search:
         self.found: Diagnosis | Exception = toys.made()
         self.calls: list[tuple[Case, list[str], bool]] = []
         self.budgets: list[float | None] = []
+        self.faults: list[object] = []
         self.written: list[tuple[Path, Case, object, list[str], str]] = []
         self.fault: Exception | None = None
 
-    def diagnose(self, case: Case, *, effects: Any, pairs: bool, effort: Effort) -> Diagnosis:
+    def diagnose(
+        self, case: Case, *, effects: Any, faults: object, pairs: bool, effort: Effort
+    ) -> Diagnosis:
         self.budgets.append(effort.budget)
+        self.faults.append(faults)
         self.calls.append((case, [effect.name for effect in effects], pairs))
         if isinstance(self.found, Exception):
             raise self.found
@@ -136,6 +140,8 @@ class TestAsking:
         assert (case.tolerance, effects, pairs) == (0.02, ["test-moss", "test-rust"], False)
         assert invoke("case", "--budget", "0.5").exit_code == 0
         assert search.budgets == [None, 0.5]
+        assert invoke("case", "--no-faults").exit_code == 0
+        assert search.faults == [None, None, ()]
 
     def test_built_in_case_and_no_tolerance(self, invoke: Invoke, search: Search) -> None:
         assert invoke("hframe", "--tolerance", "0").exit_code == 0
