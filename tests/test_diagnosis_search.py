@@ -136,6 +136,22 @@ def test_two_causes_are_found_together_and_one_is_not_split_in_two() -> None:
     assert max(len(e.parts) for e in alone.explanations) == 1
 
 
+@pytest.mark.parametrize("x", [3.5, 4.7, 5.3])
+def test_a_size_far_beyond_what_is_usual_is_found(x: float) -> None:
+    """A weld that hardly holds: modes change places, and no interpolation leads there."""
+    (effect,) = effects_named("joint-rotation")
+    place = "rung-middle@J5"
+    assert place in effect.places(MODEL)
+    (stiffness,) = effect.parameters(MODEL, place)
+    truth = effect.extend(MODEL, place, (float(stiffness.value(np.array(x))),))
+    test = measured(truth, FRAME, rng=np.random.default_rng(5))
+    others = effects_named("joint-rotation", "member-stiffness", "added-mass", "member-mass")
+    posterior = examine(MODEL, test, others, tolerance=0.005).posterior
+    best = posterior.explanations[0]
+    assert (best.searched, best.place) == (("joint-rotation",), place)
+    assert abs(best.fit.state.x[0] - x) < 0.5
+
+
 def test_several_causes_agree_with_the_model_that_they_make() -> None:
     """A spring at the end of a stiffer member: the two changes do not add up."""
     rotation, stiffness = effects_named("joint-rotation", "member-stiffness")
