@@ -60,7 +60,6 @@ from femubench.core.challenge.sweep import Record
 from femubench.core.challenge.true_fit import Finding, fits_of, fits_worse, is_search_fault
 from femubench.core.challenge.truth_file import TRUTH_FILE, Truth, read_truth
 from femubench.core.diagnosis.result import Diagnosis
-from femubench.core.errors import FemubenchError
 from femubench.core.plugin.loader import load_plugins
 from truths.posing import DEFECTS, FAULTS, OPENSEES, STRUCTURES, SUITE, pose
 
@@ -153,7 +152,7 @@ def diagnosed(task: Task, key: tuple[str, str]) -> Record:
             record["error"] = f"{type(error).__name__}: {error}"
     record["seconds"] = round(time.process_time() - begin, 2)
     if diagnosis is not None:
-        with suppress(TooLong, FemubenchError), limited(task.seconds), threadpool_limits(1):
+        with suppress(TooLong), limited(task.seconds), threadpool_limits(1):
             record |= _fits(diagnosis, read_truth(task.folder))
     return record
 

@@ -27,7 +27,7 @@ from truths.structure import STEEL, Change, Clamp, Lump, Member, Oscillator, Spr
 TRUTHS = Path(__file__).parents[1] / "truths"
 # What turns solids into cases knows the project; what makes the solids does not.
 POSING = {
-    *("truth.py", "posing.py", "faults.py", "defect_cases.py"),
+    *("opensees_cases.py", "posing.py", "faults.py", "defect_cases.py"),
     *("published.py", "tables.py", "__main__.py"),
 }
 

@@ -7,8 +7,8 @@ femubench makes it. Structures, effects, places and sizes are drawn from a seed.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +17,8 @@ import tomlkit
 
 from femubench.core.challenge.truth_file import TrueCause, Truth, rounded, truth_text
 from truths.measurement import mac, paired, scaled
-from truths.opensees_frames import AXES, FINER, FREE, NU, RHO, Bar, Beams, E, Plan, cut, plans
+from truths.opensees_faults import OUTSIDE, SINGLES, Fault
+from truths.opensees_frames import AXES, FREE, NU, RHO, Beams, E, Plan, cut, plans
 from truths.opensees_modes import modes
 from truths.posing import OPENSEES, STRUCTURES
 from truths.suite import write_files
@@ -27,222 +28,6 @@ SEED = 41_000
 SCATTER, SHAPE_SCATTER, WEIGHED = 0.002, 0.015, 0.002
 LEAST_HZ = 1.0  # below, a mode is a rigid motion
 NEW_MODE, CLOSENESS = 0.5, 2.0  # as with the solids
-
-
-@dataclass(frozen=True)
-class Fault:
-    """A cause and how it is put into the beams."""
-
-    cause: TrueCause
-    edit: Callable[[Beams], None]
-
-
-Maker = Callable[[Plan, np.random.Generator], Fault | None]
-
-
-def _spread(rng: np.random.Generator, low: float, high: float) -> float:
-    """Return a number between two, its logarithm uniform."""
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-
-def _signed(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(rng.choice((-1.0, 1.0))) * _spread(rng, low, high)
-
-
-def _any(rng: np.random.Generator, items: Sequence[Bar]) -> Bar:
-    return items[int(rng.integers(len(items)))]
-
-
-def _scaled(
-    numbers: Callable[[Beams], Sequence[int]], factor: float, *keys: str
-) -> Callable[[Beams], None]:
-    def edit(beams: Beams) -> None:
-        for i in numbers(beams):
-            for key in keys:
-                beams.elements[i][key] *= factor
-
-    return edit
-
-
-def stiff_member(plan: Plan, rng: np.random.Generator) -> Fault:
-    """Return a member with another modulus."""
-    bar, size = _any(rng, plan.bars), _signed(rng, 0.06, 0.3)
-    what = f"modulus of {bar.name} changed by {100 * size:.0f} %"
-    cause = TrueCause(what, "member-stiffness", bar.name, size=size)
-    return Fault(cause, _scaled(lambda b: b.of[bar.name], 1.0 + size, "E", "G"))
-
-
-def heavy_member(plan: Plan, rng: np.random.Generator) -> Fault:
-    """Return a member that is heavier."""
-    bar, size = _any(rng, plan.bars), _spread(rng, 0.08, 0.5)
-    cause = TrueCause(f"sand in {bar.name}", "member-mass", bar.name, size=size)
-    return Fault(cause, _scaled(lambda b: b.of[bar.name], 1.0 + size, "rhoA"))
-
-
-def soft_all(plan: Plan, rng: np.random.Generator) -> Fault:
-    """Return another modulus everywhere."""
-    size = _signed(rng, 0.02, 0.1)
-    what = f"modulus of all changed by {100 * size:.0f} %"
-    cause = TrueCause(what, "youngs-modulus", "all", ("temperature@all",), size)
-    return Fault(cause, _scaled(lambda b: range(len(b.elements)), 1.0 + size, "E", "G"))
-
-
-def damage(plan: Plan, rng: np.random.Generator) -> Fault:
-    """Return a drawn element that is softer."""
-    bar, size = _any(rng, plan.bars), _spread(rng, 0.2, 0.7)
-    k = int(rng.integers(1, bar.elements + 1))
-    what = f"{bar.name} softer by {100 * size:.0f} % along element {k}"
-    cause = TrueCause(what, "local-stiffness-loss", f"{bar.name}/{k}", size=size)
-
-    def own(beams: Beams) -> Sequence[int]:
-        return beams.of[bar.name][FINER * (k - 1) : FINER * k]
-
-    return Fault(cause, _scaled(own, 1.0 - size, "E", "G"))
-
-
-def clamp_mass(plan: Plan, rng: np.random.Generator) -> Fault:
-    """Return a lump on a member or a joint that is not clamped."""
-    bar = _any(rng, plan.bars)
-    k = int(rng.integers(1, bar.elements))
-    places = [f"{bar.name}@{k / bar.elements:.6g}", *(j for j in bar.ends if j not in plan.clamped)]
-    at = places[int(rng.integers(len(places)))]
-    mass = plan.mass * _spread(rng, 0.005, 0.06)
-    cause = TrueCause(f"clamp of {mass:.3g} kg at {at}", "added-mass", at, size=mass, unit="kg")
-    return Fault(cause, lambda beams: beams.masses.append((beams.node(at), mass)))
-
-
-def cord(plan: Plan, rng: np.random.Generator) -> Fault:
-    """Return a spring to the ground at a joint."""
-    free = [joint for joint in plan.joints if joint not in plan.clamped]
-    at = free[int(rng.integers(len(free)))]
-    direction = int(rng.choice([d for d in FREE[plan.plane] if d <= len(AXES)]))
-    inertia = max(tube.inertia for tube in plan.tubes.values())
-    stiffness = 12.0 * E * inertia / plan.extent**3 * _spread(rng, 0.02, 1.0)
-    word = AXES[direction - 1]
-    what = f"spring to the ground along {word} at {at}"
-    words = [f"{at}:{word}", at]
-    # Out of its plane a frame moves along one axis alone.
-    place, other = reversed(words) if plan.plane == "out-of-plane" else words
-    also = (f"grounding-spring@{other}",)
-    cause = TrueCause(what, "grounding-spring", place, also, stiffness, "N/m")
-    return Fault(
-        cause, lambda beams: beams.grounds.append((beams.node(at), {str(direction): stiffness}))
-    )
-
-
-def loose_joint(plan: Plan, rng: np.random.Generator) -> Fault:
-    """Return a member end that turns at its joint."""
-    bar = _any(rng, plan.bars)
-    inner = [joint for joint in bar.ends if plan.ends_at(joint) > 1]
-    joint = inner[int(rng.integers(len(inner)))]
-    stiffness = 4.0 * E * plan.tubes[bar.tube].inertia / plan.length(bar) * _spread(rng, 0.5, 15.0)
-    k = 1 if bar.ends[0] == joint else bar.elements
-    also = [f"local-stiffness-loss@{bar.name}/{k}", f"joint-flexibility@{joint}"]
-    if plan.ends_at(joint) == 2:
-        other = next(b for b in plan.bars if joint in b.ends and b is not bar)
-        also += [f"joint-rotation@{joint}", f"joint-rotation@{other.name}@{joint}"]
-    cause = TrueCause(
-        f"{bar.name} turns at {joint}",
-        "joint-rotation",
-        f"{bar.name}@{joint}",
-        tuple(also),
-        stiffness,
-        "N m/rad",
-    )
-    turns = {str(d): stiffness for d in FREE[plan.plane] if d > len(AXES)}
-    return Fault(cause, lambda beams: beams.hinges.append((*beams.part(bar.name, joint), turns)))
-
-
-def soft_foot(plan: Plan, rng: np.random.Generator) -> Fault:
-    """Return a clamp that turns."""
-    joint = plan.clamped[int(rng.integers(len(plan.clamped)))]
-    bar = next(bar for bar in plan.bars if joint in bar.ends)
-    stiffness = 4.0 * E * plan.tubes[bar.tube].inertia / plan.length(bar) * _spread(rng, 0.3, 8.0)
-    k = 1 if bar.ends[0] == joint else bar.elements
-    turns = [d for d in FREE[plan.plane] if d > len(AXES)]
-    also = [f"support-flexibility@support:{joint}:r{AXES[d - 4]}" for d in turns]
-    also += [f"local-stiffness-loss@{bar.name}/{k}", f"joint-rotation@{bar.name}@{joint}"]
-    what, unit = f"the clamp at {joint} turns", "N m/rad"
-    place = f"support:{joint}"
-    cause = TrueCause(what, "support-flexibility", place, tuple(also), stiffness, unit)
-    springs = {str(d): stiffness for d in turns}
-    return Fault(cause, lambda beams: beams.hinges.append((*beams.part(bar.name, joint), springs)))
-
-
-def strut(plan: Plan, rng: np.random.Generator) -> Fault | None:
-    """Return a rod between two joints, in whose direction the plane is free."""
-    if plan.plane == "out-of-plane":
-        return None
-    joined = {frozenset(bar.ends) for bar in plan.bars}
-    names = list(plan.joints)
-    pairs = [
-        (a, b)
-        for i, a in enumerate(names)
-        for b in names[i + 1 :]
-        if frozenset((a, b)) not in joined and not {a, b} <= set(plan.clamped)
-    ]
-    a, b = pairs[int(rng.integers(len(pairs)))]
-    stiffness = _bending(plan, plan.bars[0]) * _spread(rng, 0.05, 2.0)
-    also = (f"brace-spring@{b}-{a}",)
-    what = f"a rod from {a} to {b}"
-    cause = TrueCause(what, "brace-spring", f"{a}-{b}", also, stiffness, "N/m")
-
-    def edit(beams: Beams) -> None:
-        ends = beams.joints[a], beams.joints[b]
-        first, last = (np.array(beams.nodes[node]) for node in ends)
-        length = float(np.linalg.norm(last - first))
-        beams.struts.append((*ends, stiffness, length))
-
-    return Fault(cause, edit)
-
-
-def taper(plan: Plan, rng: np.random.Generator) -> Fault:
-    """Return a member whose stiffness changes along it."""
-    bar, low = _any(rng, plan.bars), float(rng.uniform(0.4, 0.7))
-    ends = (low, 2.0 - low) if rng.random() < 0.5 else (2.0 - low, low)
-    what = f"the stiffness of {bar.name} goes from {ends[0]:.2f} to {ends[1]:.2f} along it"
-
-    def edit(beams: Beams) -> None:
-        numbers = beams.of[bar.name]
-        for i, factor in zip(numbers, np.linspace(*ends, len(numbers)), strict=True):
-            for key in ("E", "G"):
-                beams.elements[i][key] *= float(factor)
-
-    return Fault(TrueCause(what, "", bar.name), edit)
-
-
-def slide(plan: Plan, rng: np.random.Generator) -> Fault:
-    """Return a member end that slides across its axis, along one of the axes of the plan."""
-    bars = [bar for bar in plan.bars if np.count_nonzero(plan.along(bar)) == 1]
-    bar = _any(rng, bars)
-    across = set((np.flatnonzero(plan.along(bar) == 0.0) + 1).tolist())
-    springs = {
-        str(d): _bending(plan, bar) * _spread(rng, 0.5, 5.0)
-        for d in FREE[plan.plane]
-        if d in across
-    }
-    joint = bar.ends[int(rng.integers(2))]
-    cause = TrueCause(f"{bar.name} slides across its axis at {joint}", "", f"{bar.name}@{joint}")
-    return Fault(cause, lambda beams: beams.hinges.append((*beams.part(bar.name, joint), springs)))
-
-
-def _bending(plan: Plan, bar: Bar) -> float:
-    """Return 12 E I / L^3 of a member in N/m."""
-    return float(12.0 * E * plan.tubes[bar.tube].inertia / plan.length(bar) ** 3)
-
-
-SINGLES: dict[str, Maker] = {
-    "member-stiffness": stiff_member,
-    "member-mass": heavy_member,
-    "damage": damage,
-    "clamp-mass": clamp_mass,
-    "cord": cord,
-    "loose-joint": loose_joint,
-    "soft-foot": soft_foot,
-    "strut": strut,
-    "modulus": soft_all,
-}
-OUTSIDE: dict[str, Maker] = {"taper": taper, "slide": slide}
 COUNTS = {"defect": 14, "pair": 4, "outside": 3, "clean": 3}
 
 
@@ -363,7 +148,11 @@ def files_of(draw: Draw) -> dict[str, str]:
     before, after = observed(cut(plan)), observed(beams)
     chi2, part, appears = visible(plan, before, after) if draw.faults else (0.0, 0.0, 0)
     causes = tuple(
-        replace(f.cause, size=None if f.cause.size is None else rounded(f.cause.size))
+        TrueCause(
+            *(f.what, f.effect, f.place, f.also),
+            size=None if f.size is None else rounded(f.size),
+            unit=f.unit,
+        )
         for f in draw.faults
     )
     truth = Truth(

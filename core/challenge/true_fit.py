@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from femubench.core.errors import ModelError
+from femubench.core.errors import FemubenchError, ModelError
 from femubench.core.inference.examine import Examination, is_innate
 from femubench.core.inference.extended_model import agreed, extended
 from femubench.core.inference.fit import Fit, Problem, State, bounds_of, fit, state_at
@@ -52,7 +52,7 @@ def fits_of(
     """Return chi-square, unknowns and ln weight of what a search found best, and of the truth.
 
     The truth is fitted in the noise and on the textbook set of the most probable explanation.
-    Nothing where the truth is no explanation of the catalogue.
+    Nothing where the truth is no explanation of the catalogue, or cannot be fitted.
 
     Arguments:
         examination: of the search.
@@ -61,7 +61,10 @@ def fits_of(
         same: whether two places are one.
     """
     leader = examination.posterior.explanations[0]
-    truth = true_fit(examination, causes, effects, same)
+    try:
+        truth = true_fit(examination, causes, effects, same)
+    except (FemubenchError, np.linalg.LinAlgError):  # of a model that the truth cannot stand in
+        truth = None
     return {} if truth is None else {"leader_fit": _of(leader), "true_fit": _of(truth)}
 
 
