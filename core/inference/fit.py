@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
@@ -38,6 +39,7 @@ class Problem:
         noise: their covariance.
         offset: added to every residual, in standard deviations of the measurement, (n_data,);
             what the modal coordinates are known to get wrong near the point of interest.
+        kept: what was worked out for the space and the data, whatever the noise.
     """
 
     model: Model
@@ -45,6 +47,7 @@ class Problem:
     data: Data
     noise: Noise
     offset: FloatArray | float = 0.0
+    kept: dict[object, Any] = field(default_factory=dict, compare=False, repr=False)
 
 
 @dataclass(frozen=True)

@@ -170,9 +170,13 @@ def screen(
         return []
     # Modes beyond the last partner matter as neighbours that may come down among them.
     top = max(problem.space.rigid + len(base.partner), int(base.partner.max(initial=-1)) + 1)
-    residuals, still = _residuals(problem, projections, top), base.residual
-    if yielding is not None:
-        residuals, still = marginal(residuals, yielding), marginal(still, yielding)
+    still = base.residual
+    if yielding is None:
+        residuals = problem.noise.residual(_kept(problem, projections, top) + problem.offset)
+    else:
+        raw = _residuals(problem, projections, top) + problem.offset
+        residuals = marginal(problem.noise.residual(raw), yielding)
+        still = marginal(still, yielding)
     density = problem.noise.log_density
     return [
         replace(item, log_evidence=item.log_evidence + density)
@@ -206,7 +210,7 @@ def likely(
 
 
 def _residuals(problem: Problem, projections: Sequence[Projection], top: int) -> FloatArray:
-    """Return the residuals of all candidates in units of the noise, (sum of g, n_data).
+    """Return the residuals of all candidates in deviations of the measurement, (sum of g, n_data).
 
     Arguments:
         problem: data and modal coordinates.
@@ -236,7 +240,18 @@ def _residuals(problem: Problem, projections: Sequence[Projection], top: int) ->
     each = np.arange(len(partner))[:, None]
     paired = np.moveaxis(np.moveaxis(seen, 2, 1)[each, partner], 1, 2)
     raw = data.residual(hertz[each, partner], paired, np.concatenate(mass))
-    return problem.noise.residual(raw + problem.offset)
+    return np.asarray(raw)
+
+
+def _kept(problem: Problem, projections: Sequence[Projection], top: int) -> FloatArray:
+    """Return the same, worked out once for all kinds of noise."""
+    known = problem.space, problem.data, projections
+    key = "atlas", top, *map(id, known)
+    # Kept with what it is of, so that nothing else has those addresses meanwhile.
+    if key not in problem.kept:
+        problem.kept[key] = (known, _residuals(problem, projections, top))
+    found: FloatArray = problem.kept[key][1]
+    return found
 
 
 def _responses(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.modal.correlation import mac
 from femubench.core.typing import FloatArray, IntArray
 
 
@@ -66,12 +65,19 @@ def turn_towards(space: FloatArray, measured: FloatArray) -> FloatArray | None:
         measured: (n_sensors, m), no cell missing.
     """
     count = space.shape[1]
-    if len(space) < count or np.linalg.matrix_rank(space) < count:
+    if len(space) < count:
         return None
-    coordinates = la.lstsq(space, measured)[0]
-    likeness = np.diagonal(mac(space @ coordinates, measured))
-    best = np.argsort(-likeness, kind="stable")[:count]
-    target = coordinates[:, best] / np.linalg.norm(coordinates[:, best], axis=0)
-    left, _, right = la.svd(target * likeness[best])
-    turn = left[:, : len(best)] @ right
-    return np.column_stack([turn, la.null_space(turn.T)])
+    along, size, across = np.linalg.svd(space, full_matrices=False)
+    if size[-1] <= size[0] * max(space.shape) * np.finfo(float).eps:
+        return None
+    # The share of a shape within the space is its MAC with what the space makes of it.
+    held = along.T @ measured
+    norm = np.square(measured).sum(axis=0)
+    likeness = np.square(held).sum(axis=0) / np.where(norm > 0.0, norm, 1.0)
+    # In the order in which they were measured: of shapes held equally well rounding would choose.
+    best = np.sort(np.argsort(-likeness, kind="stable")[:count])
+    target = across.T @ (held[:, best] / size[:, None])
+    target *= likeness[best] / np.linalg.norm(target, axis=0)
+    left, _, right = np.linalg.svd(target)
+    turn = np.asarray(left[:, : len(best)] @ right)
+    return turn if len(best) == count else np.column_stack([turn, la.null_space(turn.T)])
