@@ -127,14 +127,8 @@ def diagnose(
             effort=effort,
         )
 
-    inquiry = inquire(
-        case.model,
-        used,
-        wrong,
-        search,
-        reference=case.used_reference,
-        width=case.error_width or 1.0,
-    )
+    before, width = case.used_reference, case.error_width or 1.0
+    inquiry = inquire(case.model, used, wrong, search, reference=before, width=width)
     examination, given = inquiry.examination, case
     case = mended_case(case, inquiry.mended)
     proof = _proof(case, examination, known, given, effort)
