@@ -168,7 +168,7 @@ def placed_causes(
     """
     posterior = examination.posterior
     spread = spread_over(posterior, explanation)
-    own = examination.own_share(explanation.fit.state)
+    own = examination.own_error(explanation.fit.state)
     causes = causes_in(explanation, 1.0, posterior.earned, spread=spread, own=own)
     first = len(causes) - len(explanation.parts)
     tied = _tied(posterior, explanation)

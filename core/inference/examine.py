@@ -18,6 +18,7 @@ from femubench.core.inference.fit import Fit, Problem, State, fit, log_evidence,
 from femubench.core.inference.hypothesis import Hypothesis, hypotheses_of
 from femubench.core.inference.mesh_error import mesh_bias
 from femubench.core.inference.model_error import (
+    CHANGE,
     UNSHARED,
     WIDTHS,
     Fitted,
@@ -112,6 +113,14 @@ class Examination:
         """Return which share of what an explanation changes is its own error."""
         scales = state.problem.noise.scales
         return 0.0 if self.error is None or scales is None else self.error.own_share(scales)
+
+    def own_error(self, state: State) -> float:
+        """Return by which share the size of a cause is in error, as an idealisation of what is.
+
+        That a cause fits every datum well does not tell: all data may be moved by one factor.
+        """
+        own = self.own_share(state)
+        return max(own, CHANGE) if own > 0.0 else 0.0
 
     def foreseen(
         self,

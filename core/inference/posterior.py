@@ -19,6 +19,7 @@ from femubench.core.ties import by_probability, in_order
 LIKELY_NOTHING = 0.5
 # A textbook effect is part of a name only where it is likely, and the data made it so.
 _EARNED, _FACTOR = 0.6, 20.0
+_OVERLOOKED = 0.05  # probability that a test does not find a mode among those that it finds
 Key = tuple[str, ...]
 
 
@@ -56,11 +57,22 @@ class Explanation:
         """Return the number of values that were fitted."""
         return len(self.fit.state.x)
 
+    @property
+    def missed(self) -> int:
+        """Return how many modes its causes add among the measured ones that were not measured."""
+        added = sum(part.hypothesis.change.extra for part in self.parts)
+        if not added:
+            return 0
+        state = self.fit.state
+        below = state.eigenvalues[: int(state.partner.max()) + 1]
+        elastic = int((~state.problem.space.still(below)).sum())
+        return max(min(added, elastic - len(set(state.partner.tolist()))), 0)
+
     @cached_property
     def log_weight(self) -> float:
         """Return ln of prior times evidence."""
         counts = PRIOR_BEYOND_TEXTBOOK if self.base.parts else PRIOR_OF_COUNT
-        prior = log_prior(self.parts, self.names, counts)
+        prior = log_prior(self.parts, self.names, counts) + self.missed * log(_OVERLOOKED)
         return self.base.log_prior + prior + self.fit.log_evidence
 
     @property
