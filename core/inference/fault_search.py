@@ -164,6 +164,8 @@ def _reweighed(
         mended = examine(*charge.mended, "one")
         density = log_density(mended, now.measurement) + now.prior(charge)
         charge = now.beside(mended.best).estimated(charge)
+        if not _inside(charge):
+            return None
     odds = density - without
     return Mended(charge, 1.0 / (1.0 + exp(-min(odds, 700.0)))) if odds > _ODDS else None
 
@@ -437,7 +439,7 @@ def log_density(examination: Examination, measured: Measurement) -> float:
     """
     data = examination.problem.data
     before = replace(data, measurement=measured)
-    weights = [e.log_weight for e in examination.posterior.explanations]
+    weights = [e.log_joint for e in examination.posterior.explanations]
     return float(logsumexp(weights)) + jacobian(before, data) - float(np.log(std_of(data)).sum())
 
 

@@ -42,6 +42,9 @@ WIDTHS: Mapping[str, float] = {
     "shapes": 1.0,
 }
 CHANGE = 0.3  # of what an explanation moves: width of its own error
+# Power of the evidence beside model error, which is no more than a model of what is not known.
+# Source: Grünwald (2012), the safe Bayesian; Miller & Dunson (2019), coarsened posteriors.
+TRUST = 0.7
 UNSHARED = 0.02  # of the scale, median: what the states do not share
 _MEDIAN, _SPREAD = 0.3, 1.0  # of u, log-normal
 _LEAST, _MOST = 0.01, 10.0  # of u
@@ -465,7 +468,7 @@ class ModelError:
         total = self.covariance(found.v)
         weight = found.log_volume - 0.5 * float(found.v @ found.v) + self.log_prior
         noise = conditioned(total, self.residual, weight, beam=False)
-        return replace(noise, scales=found.v)
+        return replace(noise, scales=found.v, trust=TRUST)
 
 
 def conditioned(total: FloatArray, known: FloatArray, weight: float, *, beam: bool) -> Noise:

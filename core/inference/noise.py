@@ -22,6 +22,7 @@ class Noise:
         log_weight: ln of the probability of this noise, and of the reference under it.
         beam: whether the structure is taken for a beam model with ordinary scatter.
         scales: of the model error, (k,); None for a beam model.
+        trust: power of the evidence; below 1 where the noise is itself a guess.
     """
 
     factor: FloatArray
@@ -29,6 +30,7 @@ class Noise:
     log_weight: float = 0.0
     beam: bool = True
     scales: FloatArray | None = None
+    trust: float = 1.0
 
     @classmethod
     def of(cls, slopes: FloatArray, tolerance: float) -> Noise:

@@ -69,11 +69,22 @@ class Explanation:
         return max(min(added, elastic - len(set(state.partner.tolist()))), 0)
 
     @cached_property
-    def log_weight(self) -> float:
-        """Return ln of prior times evidence."""
+    def log_prior(self) -> float:
+        """Return ln of the prior, and of what is improbable whatever the readings are."""
         counts = PRIOR_BEYOND_TEXTBOOK if self.base.parts else PRIOR_OF_COUNT
         prior = log_prior(self.parts, self.names, counts) + self.missed * log(_OVERLOOKED)
-        return self.base.log_prior + prior + self.fit.log_evidence
+        return self.base.log_prior + prior
+
+    @property
+    def log_joint(self) -> float:
+        """Return ln of prior times evidence."""
+        return self.log_prior + self.fit.log_evidence
+
+    @cached_property
+    def log_weight(self) -> float:
+        """Return ln of prior times evidence, the latter as far as its noise is to be trusted."""
+        trust = self.fit.state.problem.noise.trust
+        return self.log_prior + trust * self.fit.log_evidence
 
     @property
     def searched(self) -> Key:
