@@ -202,6 +202,8 @@ def run(path: Path, tasks: Sequence[Task], jobs: int) -> None:
     with ProcessPoolExecutor(jobs, mp_context=context) as pool, path.open("a") as stream:
         futures = [pool.submit(diagnosed, task, key) for task, key in rest]
         for i, future in enumerate(as_completed(futures), 1):
+            if future.exception() is not None:
+                pool.shutdown(cancel_futures=True)
             record = future.result()
             stream.write(json.dumps(record) + "\n")
             stream.flush()

@@ -157,7 +157,9 @@ def _starts(hypothesis: Hypothesis, finding: Finding) -> FloatArray:
     if len(finding.values) != len(hypothesis.parameters):
         return grid
     pairs = zip(hypothesis.parameters, finding.values, strict=True)
-    return np.vstack([[parameter.coordinate(value) for parameter, value in pairs], grid])
+    true = np.array([parameter.coordinate(value) for parameter, value in pairs])
+    # What holds nothing at all has no coordinate.
+    return np.vstack([true, grid]) if np.isfinite(true).all() else grid
 
 
 def _fits(

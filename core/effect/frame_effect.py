@@ -66,6 +66,8 @@ class EffectParameter:
     def coordinate(self, value: float) -> float:
         """Return x of a value."""
         if self.scaling == "compliance":
+            if value <= 0.0:
+                return np.inf
             return float(np.log1p(self.scale / value)) if np.isfinite(value) else 0.0
         share = (value - self.neutral) / self.scale
         if self.scaling == "linear":
