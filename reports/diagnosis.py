@@ -11,7 +11,16 @@ from typing import Any
 
 from femubench.reports.blocks import Block, Column, Items, Section, Table, to_markdown, to_terminal
 from femubench.reports.cells import NOTHING, fixed, plain
-from femubench.reports.diagnosis_words import CAUSES, GAINS, pairs_of, sentence, sits, weight
+from femubench.reports.diagnosis_words import (
+    CAUSES,
+    FAULTS,
+    GAINS,
+    numbered,
+    pairs_of,
+    sentence,
+    sits,
+    weight,
+)
 from femubench.reports.figures import chance, estimate, figure, rms, signed
 from femubench.reports.markdown import escape
 
@@ -54,9 +63,13 @@ def diagnosis_sections(data: Data) -> list[Section]:
         ),
         ("Residuals in standard deviations, measured minus predicted", _residuals(data)),
         (
+            FAULTS,
+            _items((_at(c), _cause(c)) for _, c in numbered(data["causes"], faults=True)),
+        ),
+        (
             CAUSES.get(data["verdict"], "Causes"),
             [
-                *_items((_at(cause), _cause(cause)) for cause in data["causes"]),
+                *_items((_at(c), _cause(c)) for _, c in numbered(data["causes"])),
                 *_items(("", sentence(weight(row))) for row in data["evidence"]),
                 *([data["reason"]] if data["reason"] else []),
             ],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from femubench.reports.cells import NOTHING, plain
@@ -29,6 +29,7 @@ CAUSES = {
     "unknown": "Best guess, which does not explain the data",
     "not-confirmed": "Best guess, which data held back do not confirm",
 }
+FAULTS = "What is wrong with the data, or was typed in wrongly"
 GAINS = {
     "used_percent": "used modes",
     "held_out_percent": "held-out modes",
@@ -44,6 +45,12 @@ INDICATORS = {
 _MOST_CHANGES, _MOST_PLACES = 6, 5
 _NOISE, _LIMIT = 0.05, 1e-3
 _LARGEST_ODDS = 1e6
+
+
+def numbered(causes: Sequence[Data], *, faults: bool = False) -> list[tuple[int, Data]]:
+    """Return causes, or faults of the data and of what was typed in, with their numbers."""
+    sides = ((i, cause, cause.get("side", "model")) for i, cause in enumerate(causes, 1))
+    return [(i, cause) for i, cause, side in sides if (side != "model") is faults]
 
 
 def percent(value: float | None) -> str:

@@ -61,8 +61,10 @@ def overlay(
         document = tomlkit.parse(read_text(file, MIB))
     except TOMLKitError as error:
         raise InputError(str(error), file=file, expected="valid TOML") from None
+    if "measurement" not in document:
+        raise InputError("no measurement", file=file, key="measurement", expected="a table")
     changes = document.pop("modification", [])
-    left_out = {CASE_FILE, TRUTH_FILE, *(str(change["modes"]) for change in changes)}
+    left_out = {CASE_FILE, TRUTH_FILE, *(str(change.get("modes")) for change in changes)}
     left_out |= set() if reference else {HEALTHY}
     target.mkdir(parents=True, exist_ok=True)
     for folder in (structure, truth_folder):

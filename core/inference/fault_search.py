@@ -102,24 +102,21 @@ def inquire(
     known = tuple(f for f in faults if reference is None or f.side == "data")
     mended: list[Mended] = []
     model, measurement = _possible(model, measurement, known, mended)
+    if not known:
+        return Inquiry(examine(model, measurement, "several"))
     now = _Drawn(model, measurement, reference, width)
-    ranked: Weighed = []
-    while known and len(mended) < _MOST:
-        ranked = _weighed(now, charges_of(now.model, now.measurement, known))
-        found = _definite(now, ranked, examine)
-        if found is None:
-            break
+    ranked = _weighed(now, known)
+    while len(mended) < _MOST and (found := _definite(now, ranked, examine)) is not None:
         mended.append(found)
         now = now.mended(found.charge)
+        ranked = _weighed(now, known)
     seen = examine(now.model, now.measurement, "several")
     # Other deviations would excuse whatever is wrong: they are the last resort.
     other = _reweighed(now, [charge for charge, _ in ranked if charge.reweighs], seen, examine)
     if other is None:
         return Inquiry(seen, tuple(mended))
     if other.charge.loosens < 1.0:
-        again = examine(*other.charge.mended, "several")
-        charge = now.beside(again.best).estimated(other.charge)
-        return Inquiry(again, (*mended, replace(other, charge=charge)))
+        return Inquiry(examine(*other.charge.mended, "several"), (*mended, other))
     clearly = replace(other.charge, x=other.charge.x - 2.0 * other.charge.std).loosens > _TWICE
     return Inquiry(seen, tuple(mended), (other,) if clearly else ())
 
@@ -227,7 +224,7 @@ class _Drawn:
     def log_density(self) -> float:
         """Return ln of the density of the data, in the units that they were measured in."""
         data = self.state.problem.data
-        return log_evidence(self.state) - float(np.log(std_of(data)).sum())
+        return log_evidence(self.state) - float(np.log(data.std).sum())
 
     def beside(self, explanation: Explanation) -> _Drawn:
         """Return the same with causes in the model, whose sizes are free to first order."""
@@ -310,7 +307,7 @@ class _Drawn:
         data = replace(own, measurement=measurement)
         if len(data) != len(own):
             return -np.inf
-        ratio = std_of(own) / std_of(data)
+        ratio = own.std / data.std
         rest = self.state.against(data) - ratio * self.state.problem.noise.mean
         if np.array_equal(ratio, np.ones(len(own))):
             white = self.state.problem.noise.whiten(rest)
@@ -329,6 +326,12 @@ class _Drawn:
 
     def screened(self, charge: Charge) -> tuple[Charge, float]:
         """Return a fault with its parameter estimated, and what it gains at the present scales."""
+        try:
+            return self._screened(charge)
+        except (FemubenchError, la.LinAlgError):
+            return charge, -np.inf
+
+    def _screened(self, charge: Charge) -> tuple[Charge, float]:
         if charge.suspect.parameter is None or charge.single:
             return charge, self.first(charge.mended[1]) + charge.log_prior
         found = self.estimated(charge)
@@ -385,8 +388,9 @@ def _inside(charge: Charge) -> bool:
     return low + _EDGE < charge.x < high - _EDGE
 
 
-def _weighed(now: _Drawn, charges: Sequence[Charge]) -> Weighed:
+def _weighed(now: _Drawn, faults: Sequence[Fault]) -> Weighed:
     """Return the suspects that promise something, likeliest first, with nats above no fault."""
+    charges = charges_of(now.model, now.measurement, faults)
     with threadpool_limits(1):
         data = [charge for charge in charges if charge.fault.side == "data"]
         promises = [now.screened(charge) for charge in data]
@@ -408,9 +412,9 @@ def _possible(
         blatant = [c for c in charges_of(model, measurement, faults) if c.suspect.blatant]
         if not blatant:
             break
-        costs = [_half_chi2(*charge.mended) for charge in blatant]
+        costs = [_half_chi2(charge, model, measurement) for charge in blatant]
         best = int(np.argmin(costs))
-        gain = _half_chi2(model, measurement) - costs[best]
+        gain = _half_chi2(None, model, measurement) - costs[best]
         if not gain > _CLEARLY:
             break
         others = float(logsumexp(np.array(costs)[best] - np.array(costs)))
@@ -419,9 +423,11 @@ def _possible(
     return model, measurement
 
 
-def _half_chi2(model: Model, measurement: Measurement) -> float:
-    """Return half of chi-square of a model as drawn; infinite where it has no modes."""
+def _half_chi2(charge: Charge | None, model: Model, measurement: Measurement) -> float:
+    """Return half of chi-square of a model as drawn, without a fault; infinite without modes."""
     try:
+        if charge is not None:
+            model, measurement = charge.mended
         data = Data(measurement, np.zeros(0))
         noise = Noise.of(np.zeros((len(data), 0)), 0.0)
         problem = placed(Basis.of(model, measurement), data, noise, ())
@@ -440,14 +446,7 @@ def log_density(examination: Examination, measured: Measurement) -> float:
     data = examination.problem.data
     before = replace(data, measurement=measured)
     weights = [e.log_joint for e in examination.posterior.explanations]
-    return float(logsumexp(weights)) + jacobian(before, data) - float(np.log(std_of(data)).sum())
-
-
-def std_of(data: Data) -> FloatArray:
-    """Return the standard deviation of every datum, (n_data,)."""
-    mode, sensor = data.shape_rows
-    mass = [] if data.mass is None else [data.mass[1]]
-    return np.concatenate([data.measurement.frequency_std, 1.0 / data.weight[sensor, mode], mass])
+    return float(logsumexp(weights)) + jacobian(before, data) - float(np.log(data.std).sum())
 
 
 def jacobian(before: Data, after: Data) -> float:

@@ -96,7 +96,8 @@ class State:
     def against(self, data: Data) -> FloatArray:
         """Return the residuals of other data on the same modes and sensors, (n_data,)."""
         raw, _ = _compared(data, *self.predicted, self.mass)
-        return raw + self.problem.offset
+        ratio = self.problem.data.std / data.std if len(data) == len(self.raw) else 1.0
+        return np.asarray(raw + ratio * self.problem.offset)
 
     @property
     def frequencies(self) -> FloatArray:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import log
 
 import numpy as np
 from scipy.special import logsumexp
 
-from femubench.core.inference.fit import Fit
+from femubench.core.inference.fit import Fit, State, state_at
 from femubench.core.inference.prior import PRIOR_BEYOND_TEXTBOOK, PRIOR_OF_COUNT, Base, log_prior
 from femubench.core.inference.projection import Projection
 from femubench.core.ties import by_probability, in_order
@@ -21,6 +21,12 @@ LIKELY_NOTHING = 0.5
 _EARNED, _FACTOR = 0.6, 20.0
 _OVERLOOKED = 0.05  # probability that a test does not find a mode among those that it finds
 Key = tuple[str, ...]
+
+
+def _unpaired(state: State) -> int:
+    """Return how many elastic modes lie below the last partner of a measured one, and are none."""
+    below = state.eigenvalues[: int(state.partner.max()) + 1]
+    return int((~state.problem.space.still(below)).sum()) - len(set(state.partner.tolist()))
 
 
 @dataclass(frozen=True)
@@ -64,9 +70,8 @@ class Explanation:
         if not added:
             return 0
         state = self.fit.state
-        below = state.eigenvalues[: int(state.partner.max()) + 1]
-        elastic = int((~state.problem.space.still(below)).sum())
-        return max(min(added, elastic - len(set(state.partner.tolist()))), 0)
+        drawn = state_at(replace(state.problem, offset=0.0), (), np.zeros(0))
+        return max(min(added, _unpaired(state) - _unpaired(drawn)), 0)
 
     @cached_property
     def log_prior(self) -> float:

@@ -66,6 +66,15 @@ class Data:
         mode, sensor = np.nonzero(self.weight.T > 0.0)
         return mode, sensor
 
+    @cached_property
+    def std(self) -> FloatArray:
+        """Return the standard deviation of every datum, (n_data,)."""
+        mode, sensor = self.shape_rows
+        mass = [] if self.mass is None else [self.mass[1]]
+        return np.concatenate(
+            [self.measurement.frequency_std, 1.0 / self.weight[sensor, mode], mass]
+        )
+
     @property
     def scale_count(self) -> int:
         """Return the number of shape scales that the data themselves must fix."""

@@ -127,7 +127,7 @@ def challenge(
 def _given(case: Path, path: Path, seed: int, truths: Path, reference: bool) -> Challenge:
     """Pose one of the truths in a folder, at any depth.
 
-    Their structures are folders in ``structures`` there, or built-in cases.
+    Their structures are folders in ``structures`` there or beside the truth, or built-in cases.
 
     Raises:
         InputError: when there is no truth, one is faulty, or something cannot be written.
@@ -139,9 +139,9 @@ def _given(case: Path, path: Path, seed: int, truths: Path, reference: bool) -> 
         raise InputError(what, file=truths, expected="a folder of truths")
     room = rooms[int(np.random.default_rng(seed).integers(len(rooms)))]
     told = read_truth(room)
-    structure = truths / "structures" / told.structure
-    if not structure.is_dir():
-        structure = _structure(told.structure, room)
+    near = (folder / "structures" / told.structure for folder in (room.parent, truths))
+    structure = next((folder for folder in near if folder.is_dir()), None)
+    structure = structure or _structure(told.structure, room)
     hidden = GivenTruth(told, seed, reference, digest="")
     return _sealed(case, path, lambda: pose(room, structure, case, reference), hidden)
 
@@ -183,9 +183,11 @@ def _sealed(
         write()
         text, commitment = seal(replace(hidden, digest=read_case(case).digest))
         path.write_text(text, encoding="utf-8")
-    except OSError as error:
+    except (OSError, InputError) as error:
         if new:
             shutil.rmtree(case, ignore_errors=True)
+        if isinstance(error, InputError):
+            raise
         raise InputError(f"cannot be written: {error.strerror}", file=path) from None
     return Challenge(case, path, commitment)
 

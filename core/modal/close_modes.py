@@ -77,7 +77,8 @@ def turn_towards(space: FloatArray, measured: FloatArray) -> FloatArray | None:
     # In the order in which they were measured: of shapes held equally well rounding would choose.
     best = np.sort(np.argsort(-likeness, kind="stable")[:count])
     target = across.T @ (held[:, best] / size[:, None])
-    target *= likeness[best] / np.linalg.norm(target, axis=0)
+    length = np.linalg.norm(target, axis=0)
+    target *= likeness[best] / np.where(length > 0.0, length, 1.0)
     left, _, right = np.linalg.svd(target)
     turn = np.asarray(left[:, : len(best)] @ right)
     return turn if len(best) == count else np.column_stack([turn, la.null_space(turn.T)])

@@ -7,6 +7,8 @@ from dataclasses import replace
 from functools import partial
 from typing import ClassVar, Literal
 
+import numpy as np
+
 from femubench import Measurement, Model
 from femubench.effect import Corrected, EffectParameter, Suspect
 
@@ -23,7 +25,10 @@ class SigmaMisstated:
     def suspects(self, model: Model, measurement: Measurement) -> Sequence[Suspect]:
         """Return frequencies and shapes, where there are some."""
         factor = EffectParameter("stated over true", "", 1.5, neutral=1.0, lower=0.2, upper=8.0)
-        counts = {"frequencies": len(measurement), "shapes": measurement.shapes.size}
+        counts = {
+            "frequencies": len(measurement),
+            "shapes": int(np.isfinite(measurement.shapes).sum()),
+        }
         return [
             Suspect(
                 "data",
