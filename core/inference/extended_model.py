@@ -12,9 +12,11 @@ from femubench.core.fem.model import Model
 from femubench.core.inference.fit import Fit, Problem, fit, signed_hz
 from femubench.core.inference.projection import Projection
 from femubench.core.modal.eigen import enough_modes, solve_modes
+from femubench.core.roles import EffectParameter
 from femubench.core.typing import FloatArray
 
 _ROUNDS = 3
+_RIGID = 1e4  # of what a spring is measured by, above which it is taken for rigid
 _AGREES = 0.3  # deviations in all, below which a fit and its model are the same to the data
 
 
@@ -29,12 +31,19 @@ def extended(model: Model, parts: Sequence[Projection], x: FloatArray) -> Model:
         h = part.hypothesis
         values = h.values(x[None, start : start + len(h.parameters)])[0]
         start += len(h.parameters)
-        found = h.effect.extend(model, h.place, [float(v) for v in values])
+        pairs = zip(h.parameters, values, strict=True)
+        found = h.effect.extend(model, h.place, [_as_it_acts(p, float(v)) for p, v in pairs])
         if not isinstance(found, Model):
             what = f"effect {h.effect.name!r} gave {type(found).__name__}"
             raise ModelError(f"{what}, expected femubench.Model")
         model = found
     return model
+
+
+def _as_it_acts(parameter: EffectParameter, value: float) -> float:
+    """Return a stiffness that hardly gives as one that does not: it would cost digits alone."""
+    rigid = parameter.scaling == "compliance" and value > _RIGID * parameter.scale
+    return float("inf") if rigid else value
 
 
 def raw_residual(problem: Problem, model: Model) -> FloatArray:
