@@ -70,7 +70,8 @@ MARK = "truth-sweep"
 SURE = 0.99
 # Truths, their structures, and what is added to headings.
 SETS = {
-    "solids": ((DEFECTS, FAULTS), SUITE, ""),
+    "solids": ((DEFECTS,), SUITE, ""),
+    "faults": ((FAULTS,), SUITE, ", faults of data and input"),
     "opensees": ((OPENSEES,), STRUCTURES, ", second generator"),
 }
 # Upper ends of the ranges of chi-square.

@@ -127,7 +127,8 @@ def _on_chords(
     chord, width = np.diff(rows, axis=1), np.diff(x, axis=1)
     a = np.square(chord).sum(axis=2) + np.square(width)
     b = np.einsum("hgi,hgi->hg", chord, rows[:, :-1]) + width * x[:, :-1]
-    t = np.clip(-b / a, 0.0, 1.0)
+    # On a long way modes change places: its ends are known, and nothing between.
+    t = np.where(width > _LONG, -2.0 * b > a, np.clip(-b / a, 0.0, 1.0))
     cost = np.square(rows[:, :-1]).sum(axis=2) + np.square(x[:, :-1]) + 2 * b * t + a * t**2
     best = np.arange(len(x)), least(cost)
     place = x[best] + t[best] * width[best]
@@ -149,6 +150,7 @@ _MINOR = 1e-4  # of the largest squared response: what is left out moves the mod
 _KEPT, _TRACKED = 5, 3  # modes beyond the last partner: in the basis, and with their response
 _LIKELY = 40  # that are looked at beside causes
 _FAR = 1e18
+_LONG = 1.5  # prior deviations between neighbours on a grid, above which nothing is interpolated
 
 
 def screen(
