@@ -313,6 +313,16 @@ def gravity_stiffness(structure: MeshedFrame) -> SparseArray:
 
     Raises:
         ModelError: when the frame moves out of plane, or nothing holds it against its weight.
+
+    Examples:
+        >>> joints = fem.Joint("A", (0.0, 0.0, 0.0)), fem.Joint("B", (0.0, 0.0, 2.0))
+        >>> bar, steel = fem.solid_rectangle(0.05, 0.05), fem.Material(2.1e11, 0.3, 7850.0)
+        >>> mast = fem.Member("mast", ("A", "B"), 4, bar, steel)
+        >>> foot = fem.Support(fem.Place(joint="A"), ("x", "z", "ry"))
+        >>> standing = fem.Frame("in-plane", "euler-bernoulli", joints, (mast,), supports=(foot,))
+        >>> weight = fem.gravity_stiffness(fem.Structure.build(standing))
+        >>> bool(weight.trace() < 0.0)
+        True
     """
     if structure.frame.plane == "out-of-plane":
         raise ModelError("out of plane the weight leaves no stress in the plane", "gravity")
