@@ -254,6 +254,8 @@ def strongest_places(diagnosis: Diagnosis | Data, indicator: str = "evidence") -
         return []
     causes: dict[str, list[str]] = {}
     for number, cause in enumerate(data["causes"], 1):
+        if cause.get("side", "model") != "model":
+            continue  # a fault of the data sits nowhere on the structure
         causes.setdefault(cause["place"], []).append(str(number))
         values.setdefault(cause["place"], 0.0)
     kept = [place for place in ranked[:_MOST_SPOTS] if values[place] >= _LEAST]
