@@ -209,6 +209,7 @@ class _Drawn:
         self.model, self.measurement = model, measurement
         self.reference, self.width = reference, width
         self.basis = Basis.of(model, measurement) if basis is None else basis
+        self._without: dict[Charge, _Drawn] = {}
 
     @cached_property
     def state(self) -> State:
@@ -239,9 +240,12 @@ class _Drawn:
 
     def mended(self, charge: Charge) -> _Drawn:
         """Return the same without a fault."""
-        model, measurement = charge.mended
-        basis = self.basis if model is self.model else None
-        return _Drawn(model, measurement, self.reference, self.width, basis)
+        if charge not in self._without:
+            model, measurement = charge.mended
+            basis = self.basis if model is self.model else None
+            other = _Drawn(model, measurement, self.reference, self.width, basis)
+            self._without[charge] = other
+        return self._without[charge]
 
     def exactly(self, charge: Charge, gain: float) -> tuple[Charge, float]:
         """Return a fault with its gain at scales of its own; none where it promises nothing.
