@@ -45,6 +45,7 @@ from femubench.core.fem.sections import (
     rectangular_tube,
     round_tube,
     solid_rectangle,
+    wall_of,
 )
 from femubench.core.fem.structure import Structure
 from femubench.core.typing import FloatArray, IntArray, SparseArray
@@ -92,4 +93,5 @@ __all__ = [
     "round_tube",
     "solid_rectangle",
     "stiffness_matrices",
+    "wall_of",
 ]

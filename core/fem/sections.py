@@ -147,6 +147,25 @@ def solid_rectangle(width: float, height: float) -> Section:
     )
 
 
+def wall_of(section: Section) -> float:
+    """Return the wall in m that follows from the shape and the area of a tube, 0 for no tube.
+
+    Arguments:
+        section: with its outer sizes, if it has any.
+
+    Examples:
+        >>> round(fem.wall_of(fem.round_tube(0.05, 0.002)), 6)
+        0.002
+    """
+    width, height = section.width or 0.0, section.height or 0.0
+    if section.shape == "rectangular-tube":
+        root = max((width + height) ** 2 - 4.0 * section.A, 0.0)
+        return float(width + height - np.sqrt(root)) / 4.0
+    if section.shape == "round-tube":
+        return float(width - np.sqrt(max(width**2 - 4.0 * section.A / np.pi, 0.0))) / 2.0
+    return 0.0
+
+
 def round_tube(diameter: float, wall: float) -> Section:
     """Return a circular tube; `wall` of half the diameter makes it solid; sizes in m.
 

@@ -34,6 +34,7 @@ from femubench.fem import (
     rectangular_tube,
     round_tube,
     stiffness_matrices,
+    wall_of,
 )
 
 _SCALE, _MOST, _NODES = 0.1, 0.9, 9
@@ -116,17 +117,12 @@ class WallThickness(FrameEffect):
 
 def _wall(section: Section) -> float | None:
     """Return the thickness of a tube's wall in m by its shape and area, None for what is none."""
-    width, height, area = section.width, section.height, section.A
-    if width is None or height is None or area <= 0.0:
+    width, height = section.width, section.height
+    tube = section.shape in ("rectangular-tube", "round-tube") and section.A > 0.0
+    if width is None or height is None or not tube:
         return None
-    if section.shape == "rectangular-tube":
-        inside = (width + height) ** 2 - 4.0 * area
-        wall = (width + height - np.sqrt(max(inside, 0.0))) / 4.0
-    elif section.shape == "round-tube":
-        wall = (width - np.sqrt(max(width**2 - 4.0 * area / np.pi, 0.0))) / 2.0
-    else:
-        return None
-    return float(wall) if wall < (1.0 - 1e-9) * min(width, height) / 2.0 else None
+    wall = wall_of(section)
+    return wall if wall < (1.0 - 1e-9) * min(width, height) / 2.0 else None
 
 
 def _tube(section: Section, wall: float) -> Section:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from femubench import Model
-from femubench.fem import Frame, Section, rectangular_tube, round_tube, solid_rectangle
+from femubench.fem import Frame, Section, rectangular_tube, round_tube, solid_rectangle, wall_of
 
 _SAME = 1e-6
 _SHAPES = ("rectangular-tube", "round-tube", "solid-rectangle")
@@ -44,30 +44,20 @@ def resized(section: Section, sizes: Mapping[str, float]) -> Section | None:
     old = sizes_of(section)
     if not old:
         return None
-    new = {"wall": wall_of(section), **old, **sizes}
+    wall = wall_of(section)
+    new = {"wall": wall, **old, **sizes}
     width, height = new["width"], new.get("height", new["width"])
     if section.shape == "round-tube" and new["wall"] > 0.499 * old["width"]:
         new["wall"] = 0.5 * width  # solid
     if new["wall"] > 0.5 * min(width, height):
         return None
-    own = _made(section.shape, old["width"], old.get("height", old["width"]), wall_of(section))
+    own = _made(section.shape, old["width"], old.get("height", old["width"]), wall)
     typed = {
         key: getattr(section, key)
         for key in _CONSTANTS
         if not np.isclose(getattr(section, key), getattr(own, key), rtol=_SAME, atol=0.0)
     }
     return replace(_made(section.shape, width, height, new["wall"]), **typed, name=section.name)
-
-
-def wall_of(section: Section) -> float:
-    """Return the wall that follows from the area of a tube, 0 for what is solid."""
-    width, height = section.width or 0.0, section.height or 0.0
-    if section.shape == "rectangular-tube":
-        root = max((width + height) ** 2 - 4.0 * section.A, 0.0)
-        return float(width + height - np.sqrt(root)) / 4.0
-    if section.shape == "round-tube":
-        return float(width - np.sqrt(max(width**2 - 4.0 * section.A / np.pi, 0.0))) / 2.0
-    return 0.0
 
 
 def _made(shape: str, width: float, height: float, wall: float) -> Section:

@@ -12,12 +12,11 @@ import numpy as np
 
 from femubench import Measurement, Model
 from femubench.effect import Corrected, Suspect
-from femubench.fem import Frame, Material, Section
+from femubench.fem import Frame, Material, Section, wall_of
 from femubench.plugins.faults.sections import (
     resized,
     sections_of,
     sizes_of,
-    wall_of,
     with_section,
 )
 
