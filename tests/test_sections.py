@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from femubench.core.fem.sections import (
     round_tube,
     saint_venant_rectangle,
     solid_rectangle,
+    wall_of,
 )
 
 
@@ -65,6 +68,14 @@ def test_round_sections() -> None:
     np.testing.assert_allclose([solid.A, solid.Iy], [np.pi * 1e-4, np.pi * 1e-8 / 4], rtol=1e-12)
     assert tube.Iy == pytest.approx(np.pi / 64 * (0.05**4 - 0.046**4), rel=1e-12)
     assert tube.J == tube.Jp == pytest.approx(2 * tube.Iy)
+
+
+@pytest.mark.parametrize("wall", [0.0001, 0.004, 0.0199])
+def test_the_wall_follows_from_the_area(wall: float) -> None:
+    assert wall_of(rectangular_tube(0.04, 0.08, wall)) == pytest.approx(wall, rel=1e-9)
+    assert wall_of(round_tube(0.04, wall)) == pytest.approx(wall, rel=1e-9)
+    assert wall_of(solid_rectangle(0.04, 0.08)) == 0.0
+    assert wall_of(replace(rectangular_tube(0.04, 0.08, wall), shape="")) == 0.0
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.25, 0.33, 0.5])
