@@ -234,12 +234,12 @@ def test_an_effect_that_states_no_change_is_tabulated_and_found(
 
 def test_every_effect_at_every_place_is_a_hypothesis() -> None:
     found = hypotheses_of(MODEL, catalogue().values())
-    labels = [(h.name, h.place) for h in found]
+    labels = [(h.effect.name, h.place) for h in found]
     assert len(set(labels)) == len(labels)
     for effect in catalogue().values():
-        places = [h.place for h in found if h.name == effect.name]
+        places = [h.place for h in found if h.effect.name == effect.name]
         assert places == list(dict.fromkeys(effect.places(MODEL)))
-        assert {h.places for h in found if h.name == effect.name} <= {len(places)}
+        assert {h.places for h in found if h.effect.name == effect.name} <= {len(places)}
     state = state_at(problem_of(MODEL, measured(MODEL, FRAME), ()), (), NOTHING)
     assert state.chi2 < 1e-8
 

@@ -13,8 +13,16 @@ import pytest
 import scipy.linalg as la
 
 from femubench import Model, NotApplicable, Sensors, diagnose, solve_modes
+from femubench.core.challenge.structures import structure_named
+from femubench.core.challenge.truth import finer
+from femubench.core.diagnosis.tables import placed_causes
 from femubench.core.effect.places import match
-from femubench.core.inference.hypothesis import hypothesis_at
+from femubench.core.inference.examine import examine
+from femubench.core.inference.hypothesis import (
+    by_themselves,
+    finer as finer_hypotheses,
+    hypothesis_at,
+)
 from femubench.core.inference.projection import Projector
 from femubench.core.modal.eigen import counted_evaluations, solve_dense
 from femubench.effect import (
@@ -36,10 +44,11 @@ from femubench.plugins.effects.brace_spring import BraceSpring
 from femubench.plugins.effects.grounding_spring import GroundingSpring
 from femubench.plugins.effects.joint_mass import JointMass
 from femubench.plugins.effects.mass_eccentricity import MassEccentricity
+from femubench.plugins.effects.mass_offset import MassOffset
 from femubench.plugins.effects.temperature import Temperature, slope_of
 
 sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import case_of, effects_named, measured
+from diagnosis_problems import case_of, catalogue, effects_named, measured
 from effect_checks import as_matrices, changed_matrices
 
 FrameBuilder = Callable[..., Frame]
@@ -105,6 +114,9 @@ CASES = [
     (AddedMass, "ladder", "BE@0.25"),
     (AddedMass, "hframe", "U1"),
     (AddedMass, "portal", "m4@0.5"),
+    (MassOffset, "ladder", "BE@0.25"),
+    (MassOffset, "hframe", "upper1@0.5"),
+    (MassOffset, "portal", "m4@0.5"),
     (GroundingSpring, "ladder", "AB@0.5"),
     (GroundingSpring, "hframe", "L2:x"),
     (GroundingSpring, "portal", "J3:y"),
@@ -365,6 +377,45 @@ def test_known_eccentricity_is_gone_on_from(models: dict[str, Model]) -> None:
     for name, place in (("ladder", "BE"), ("portal", "m2")):
         known = effect.extend(models[name], place, [0.002])
         assert_agree(effect, known, place, [0.003])
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "widths", "told"),
+    [
+        ("ladder", "rung-right@0.25", 1.5, "mass-offset"),
+        ("ladder", "rung-left@0.5", -0.5, "mass-offset"),
+        ("ladder", "rung-left@0.5", 0.0, "added-mass"),
+        ("portal", "right-lower@0.8", 1.5, "mass-offset"),
+        ("portal", "left-upper@0.5", 0.0, "added-mass"),
+    ],
+)
+def test_a_mass_beside_the_axis_is_told_where_it_shows(
+    name: str, place: str, widths: float, told: str
+) -> None:
+    specimen, effect = structure_named(name), MassOffset()
+    mass = 0.03 * specimen.model.total_mass
+    offset = widths * effect.parameters(specimen.model, place)[1].scale
+    truth = Model.of(effect.frame(finer(specimen.frame), place, [mass, offset]))
+    rng = np.random.default_rng(3)
+    test = measured(truth, specimen.frame, count=8, shapes=6, rng=rng)
+    seen = examine(specimen.model, test, tuple(catalogue().values()), tolerance=0.002)
+    (cause,) = placed_causes(seen, seen.best)
+    assert (cause.effect, cause.place) == (told, place)
+    assert cause.probability == pytest.approx(seen.posterior.inclusion("added-mass"))
+    values = [p.value for p in cause.parameters]
+    np.testing.assert_allclose(values, [mass, offset][: len(values)], rtol=0.15)
+
+
+def test_an_offset_alone_is_tried_by_itself(models: dict[str, Model]) -> None:
+    known = catalogue()
+    offset, mass = known["mass-offset"], known["added-mass"]
+    assert by_themselves([offset, mass]) == (mass,)
+    assert by_themselves([offset]) == (offset,)
+    here = hypothesis_at(models["ladder"], mass, "BE@0.25", 21)
+    (more,) = finer_hypotheses(here, models["ladder"], [offset, mass])
+    assert (more.effect, more.name, more.places) == (offset, "added-mass", 42)
+    at_a_joint = hypothesis_at(models["ladder"], mass, "B", 21)
+    assert finer_hypotheses(at_a_joint, models["ladder"], [offset, mass]) == []
 
 
 def test_coupling_turns_its_sign_in_the_mirror(ladder: FrameBuilder) -> None:

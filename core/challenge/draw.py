@@ -115,7 +115,9 @@ class Candidates:
     def places(self) -> dict[str, tuple[str, ...]]:
         """Return the places of every effect that applies to the structure."""
         name = self.specimen.name
-        found = {key: _places(name, effect) for key, effect in self.effects.items()}
+        # What tells more of another effect is not always to be told from it.
+        alone = {k: e for k, e in self.effects.items() if getattr(e, "refines", None) is None}
+        found = {key: _places(name, effect) for key, effect in alone.items()}
         return {name: places for name, places in found.items() if places}
 
     @property

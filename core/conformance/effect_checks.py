@@ -244,6 +244,9 @@ def _hints(effect: Effect) -> str:
     for hint in ("softens", "innate"):
         if not isinstance(given := getattr(effect, hint, False), bool):
             return f"{hint} is {given!r}, expected True or False"
+    refined = getattr(effect, "refines", None)
+    if refined is not None and (not isinstance(refined, str) or refined == effect.name):
+        return f"refines is {refined!r}, expected the slug of another effect"
     reading = getattr(effect, "reading", None)
     if reading is not None and not (isinstance(reading, Reading) and reading.std > 0.0):
         return f"reading is {reading!r}, expected a Reading with std > 0"

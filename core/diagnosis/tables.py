@@ -109,7 +109,7 @@ def causes_in(
                 value, std = textbook * (1.0 + value) - 1.0, textbook * std
             fitted.append(_parameter(parameter, value, std))
         start += len(h.parameters)
-        causes.append(Cause(h.name, h.place, tuple(fitted), share, _summary(h.effect)))
+        causes.append(Cause(h.effect.name, h.place, tuple(fitted), share, _summary(h.effect)))
     return causes
 
 
@@ -145,8 +145,8 @@ def _coordinates(
     start = 0
     for part in explanation.parts:
         h, width = part.hypothesis, len(part.hypothesis.parameters)
-        if (h.name, h.place, width) == (
-            hypothesis.name,
+        if (h.effect.name, h.place, width) == (
+            hypothesis.effect.name,
             hypothesis.place,
             len(hypothesis.parameters),
         ):
@@ -175,17 +175,18 @@ def placed_causes(
     found = []
     for k, cause in enumerate(causes):
         shares = places_of(posterior, explanation, k - first) if k >= first else {cause.place: 1.0}
+        name = explanation.parts[k - first].hypothesis.name if k >= first else cause.effect
         alike_at = {
             part.hypothesis.place
             for other in tied
             for part in other.parts
-            if part.hypothesis.name == cause.effect
+            if part.hypothesis.name == name
         }
         others = [place for place in shares if place in alike_at and place != cause.place]
         found.append(
             replace(
                 cause,
-                probability=held * posterior.inclusion(cause.effect),
+                probability=held * posterior.inclusion(name),
                 place_probability=shares[cause.place],
                 places=credible(shares),
                 mirrors=mirror_places(examination.model, cause.place, others) if others else (),

@@ -97,6 +97,8 @@ class FrameEffect(Effect):
             level is worth measuring.
         innate: whether it is there from the day that the structure was built, so that it cannot
             be what differs from a reference.
+        refines: the slug of an effect of which it tells more at the same place: it is tried where
+            that one is likely, and weighed with it.
         reading: the instrument that reads it directly; a proposal of the advice.
         sizes: how large it is in hidden cases, one range a parameter; of more parameters the last
             range goes on. Without one it is drawn from half a deviation of its prior to two.
@@ -107,6 +109,7 @@ class FrameEffect(Effect):
     caution: ClassVar[str] = ""
     softens: ClassVar[bool] = False
     innate: ClassVar[bool] = False
+    refines: ClassVar[str | None] = None
     reading: ClassVar[Reading | None] = None
     sizes: ClassVar[Sequence[Size]] = ()
 

@@ -15,7 +15,7 @@ from femubench.core.errors import NotApplicable
 from femubench.core.fem.model import Model
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.fit import Fit, Problem, State, fit, log_evidence, state_at
-from femubench.core.inference.hypothesis import Hypothesis, hypotheses_of
+from femubench.core.inference.hypothesis import Hypothesis, by_themselves, hypotheses_of
 from femubench.core.inference.mesh_error import mesh_bias
 from femubench.core.inference.model_error import (
     CHANGE,
@@ -211,11 +211,7 @@ def examine(
     effort = effort or Effort()
     # Thousands of small matrices: threads would wait for each other most of the time.
     with threadpool_limits(1), ExitStack() as stages:
-        known = tuple(effects)
-        hypotheses = hypotheses_of(model, known)
-        if reference is not None:
-            hypotheses = tuple(h for h in hypotheses if not is_innate(h))
-            known = tuple({id(h.effect): h.effect for h in hypotheses}.values())
+        hypotheses, known = _candidates(model, tuple(effects), reference)
         basis = Basis.of(model, measurement)
         problem, slopes = posed(model, measurement, hypotheses, tolerance, basis)
         before = None if reference is None else before_of(problem, reference)
@@ -233,6 +229,18 @@ def examine(
         *(model, own, slopes, tolerance, posterior, tuple(atlas), basis.modes),
         *(error, reference, width, beam),
     )
+
+
+def _candidates(
+    model: Model, effects: tuple[Effect, ...], reference: Measurement | None
+) -> tuple[tuple[Hypothesis, ...], tuple[Effect, ...]]:
+    """Return the hypotheses that are screened, and the effects that may come in."""
+    offered = hypotheses_of(model, by_themselves(effects))
+    if reference is None:
+        return offered, effects
+    innate = {id(h.effect) for h in offered if is_innate(h)}
+    kept = tuple(e for e in effects if id(e) not in innate)
+    return tuple(h for h in offered if id(h.effect) not in innate), kept
 
 
 def is_innate(hypothesis: Hypothesis) -> bool:
@@ -292,7 +300,7 @@ def searched(
 def _causes(explanation: Explanation) -> tuple[object, ...]:
     """Return what is the same of explanations that differ in their scales alone."""
     places = (
-        (p.hypothesis.name, p.hypothesis.place, len(p.hypothesis.parameters))
+        (p.hypothesis.effect.name, p.hypothesis.place, len(p.hypothesis.parameters))
         for p in explanation.parts
     )
     return (explanation.base.names, *sorted(places))

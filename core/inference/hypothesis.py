@@ -45,8 +45,13 @@ class Hypothesis:
 
     @property
     def name(self) -> str:
-        """Return the slug of the effect."""
-        return self.effect.name
+        """Return the slug that it is weighed under: its own, or that of what it tells more of."""
+        return self.effect.name if self.told is None else self.told
+
+    @property
+    def told(self) -> str | None:
+        """Return the slug of the effect that it tells more of, None for an effect by itself."""
+        return getattr(self.effect, "refines", None)
 
     @property
     def textbook(self) -> FloatArray | None:
@@ -141,6 +146,27 @@ def hypotheses_of(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, 
     # Kept with the effects, so that no other one has their addresses meanwhile.
     key = "hypotheses", *map(id, known)
     return once_for(model, key, lambda: (known, _hypotheses(model, known)))[1]
+
+
+def by_themselves(effects: Iterable[Effect]) -> tuple[Effect, ...]:
+    """Return the effects that tell no more of another one of them: those are tried after it."""
+    known = tuple(effects)
+    names = {effect.name for effect in known}
+    return tuple(e for e in known if getattr(e, "refines", None) not in names)
+
+
+def finer(hypothesis: Hypothesis, model: Model, effects: Iterable[Effect]) -> list[Hypothesis]:
+    """Return what tells more of an effect where it sits.
+
+    It is the effect itself with further words for the place, by its ``finer(model, place)``, or
+    another one that ``refines`` it and may sit there. As likely as not there is no more to tell.
+    """
+    own, place, places = hypothesis.effect, hypothesis.place, 2 * hypothesis.places
+    words = getattr(own, "finer", None)
+    found = [(own, word) for word in (words(model, place) if callable(words) else ())]
+    others = (e for e in effects if getattr(e, "refines", None) == own.name)
+    found += [(e, place) for e in others if place in e.places(model)]
+    return [hypothesis_at(model, effect, word, places) for effect, word in found]
 
 
 def _hypotheses(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ...]:

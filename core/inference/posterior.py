@@ -19,6 +19,7 @@ from femubench.core.ties import by_probability, in_order
 LIKELY_NOTHING = 0.5
 # A textbook effect is part of a name only where it is likely, and the data made it so.
 _EARNED, _FACTOR = 0.6, 20.0
+_SURELY_MORE = 0.95
 _OVERLOOKED = 0.05  # probability that a test does not find a mode among those that it finds
 Key = tuple[str, ...]
 
@@ -100,6 +101,11 @@ class Explanation:
     def effects(self) -> frozenset[str]:
         """Return the slugs of all that is in the model, textbook or fitted."""
         return frozenset({*self.base.names, *self.searched})
+
+    @property
+    def tells_more(self) -> bool:
+        """Tell whether an effect that tells more of another one is among the causes."""
+        return any(part.hypothesis.told is not None for part in self.parts)
 
     @property
     def place(self) -> str:
@@ -199,8 +205,17 @@ class Posterior:
         return sum(p for key, p in self.names.items() if name in key)
 
     def best(self, key: Key) -> Explanation:
-        """Return the most probable explanation of that name."""
-        return next(e for e in self.explanations if self.key(e) == key)
+        """Return the most probable explanation of that name.
+
+        One that tells more, by another slug, stands first where hardly anything else is left.
+        """
+        members = self.members(key)
+        first, _ = members[0]
+        if not first.tells_more:
+            return first
+        share = sum(p for e, p in members if e.tells_more) / sum(p for _, p in members)
+        plain = (e for e, _ in members if not e.tells_more)
+        return first if share >= _SURELY_MORE else next(plain, first)
 
     @property
     def nothing(self) -> Explanation:

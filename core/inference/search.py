@@ -14,7 +14,12 @@ from femubench.core.inference.effort import Effort
 from femubench.core.inference.extended_model import agreed, extended
 from femubench.core.inference.fit import Fit, Problem, State, fit, log_evidence, state_at
 from femubench.core.inference.grid_search import Screened, likely, screen
-from femubench.core.inference.hypothesis import Hypothesis, hypotheses_of, hypothesis_at
+from femubench.core.inference.hypothesis import (
+    Hypothesis,
+    by_themselves,
+    finer,
+    hypotheses_of,
+)
 from femubench.core.inference.posterior import Explanation, by_weight
 from femubench.core.inference.prior import Base, selection_cost, textbook_bases
 from femubench.core.inference.projection import Projection, Projector
@@ -149,17 +154,11 @@ class Search:
         return Explanation(base, Fit(alone, log_evidence(alone)), self.names)
 
     def split(self, explanation: Explanation) -> list[Explanation]:
-        """Return an explanation with more values at one of its places, where the effect has more.
-
-        An effect that has them offers ``finer(model, place)``, further words for a place.
-        """
+        """Return an explanation with more values at one of its places, where there are more."""
         result, problem = [], replace(explanation.fit.state.problem, offset=0.0)
         for i, part in enumerate(explanation.parts):
-            effect, model = part.hypothesis.effect, problem.model
-            finer = getattr(effect, "finer", None)
-            for place in finer(model, part.hypothesis.place) if callable(finer) else ():
-                # As likely as not there is one value.
-                own = hypothesis_at(model, effect, place, 2 * part.hypothesis.places)
+            model = problem.model
+            for own in finer(part.hypothesis, model, self.effects):
                 basis = Basis.of(model, problem.data.measurement)
                 parts = list(explanation.parts)
                 parts[i] = Projector(model, basis.modes.shapes)(own)
@@ -198,8 +197,13 @@ class Search:
         atlas = screened(problem, start.state, problem.space.projections)
         fits = self.refined(problem, start, atlas)
         explanations = [Explanation(base, item, self.names) for item in (start, *fits)]
-        singles = by_weight(explanations[1:])[:_SPLIT]
-        explanations += [e for single in singles for e in self.split(single)]
+        ranked = by_weight(explanations[1:])
+        # What tells more may carry most of it: the best of what it refines count wherever they are.
+        refined = {getattr(effect, "refines", None) for effect in self.effects}
+        own = [e for e in ranked[_SPLIT:] if refined.intersection(e.searched)]
+        explanations += [
+            e for single in (*ranked[:_SPLIT], *own[:_SPLIT]) for e in self.split(single)
+        ]
         return Found(base, problem, tuple(explanations), tuple(atlas))
 
     def grounded(self, base: Base) -> Problem:
@@ -209,7 +213,7 @@ class Search:
         value may be off.
         """
         model = extended(self.problem.model, base.parts, base.x)
-        known = hypotheses_of(model, self.effects)
+        known = hypotheses_of(model, by_themselves(self.effects))
         basis = Basis.of(model, self.problem.data.measurement)
         return with_shortlist(placed(basis, self.problem.data, self.problem.noise, known))
 

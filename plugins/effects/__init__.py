@@ -15,6 +15,7 @@ CLASSES = {
     "joint-offset": "joint_offset:JointOffset",
     "joint-mass": "joint_mass:JointMass",
     "added-mass": "added_mass:AddedMass",
+    "mass-offset": "mass_offset:MassOffset",
     "support-flexibility": "support_flexibility:SupportFlexibility",
     "grounding-spring": "grounding_spring:GroundingSpring",
     "member-stiffness": "material:MemberStiffness",
