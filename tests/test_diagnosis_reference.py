@@ -188,6 +188,33 @@ class TestCaseFolder:
         assert back.reference_used == case.reference_used
         assert (back.model_error, back.beam_share) == (2.0, 0.3)
 
+    def test_it_may_have_sensors_of_its_own(self, folder: Callable[[str], Path]) -> None:
+        """Other names, another order, one turned round, one elsewhere and one not there."""
+        path = folder('\n[reference]\nmodes = "then.csv"\nsensors = "before.csv"\n')
+        points = "label,x,y,z,direction\nspin,1.5,0,1.2,ry\nup,0.75,0,1.1,-z\n"
+        (path / "before.csv").write_text(points + "mid,0,0,0.5,x\nelsewhere,0,0,0.25,x\n")
+        head = "mode,frequency,frequency_std,up,spin,mid,elsewhere\n"
+        (path / "then.csv").write_text(head + "1,21.6,0.05,-0.02,0.8,0.35,0.5\n2,81,0.1,2,,0.2,0\n")
+        case = read_case(path)
+        before = case.reference
+        assert before is not None
+        assert before.sensors == case.measurement.sensors  # left_top, left_mid, girder, turn
+        expected = [[np.nan, np.nan], [-0.35, -0.2], [0.02, -2.0], [0.8, np.nan]]
+        np.testing.assert_array_equal(before.shapes, expected)
+        assert np.isfinite(before.shape_std[1:3]).all()
+
+    def test_sensors_of_a_reference_elsewhere_leave_the_frequencies(
+        self, folder: Callable[[str], Path]
+    ) -> None:
+        path = folder('\n[reference]\nmodes = "then.csv"\nsensors = "before.csv"\n')
+        (path / "before.csv").write_text("label,x,y,z,direction\nelsewhere,0,0,0.25,x\n")
+        (path / "then.csv").write_text(
+            "mode,frequency,frequency_std,elsewhere\n1,21.6,.05,1\n2,8,.1,1\n"
+        )
+        before = read_case(path).reference
+        assert before is not None
+        assert np.isnan(before.shapes).all()
+
     def test_model_error_is_considered_beside_a_reference(
         self, folder: Callable[[str], Path]
     ) -> None:
@@ -204,6 +231,7 @@ class TestCaseFolder:
             ('[reference]\nmodes = "modes.csv"\nused = [77]', "mode 77 has no data in modes.csv"),
             ('[reference]\nmodes = "modes.csv"\nused = [1, 1]', "listed twice"),
             ('[reference]\nmodes = "modes.csv"\nsensor = "a"', "sensor"),
+            ('[reference]\nmodes = "modes.csv"\nsensors = "none.csv"', "none.csv"),
             ("[diagnosis]\nmodel_error = -1.0", "model_error"),
             ("[diagnosis]\nbeam_share = 1.0", "beam_share"),
         ],

@@ -24,6 +24,7 @@ from femubench.core.diagnosis.verdict import (
     mostly_common,
     overstatement,
 )
+from femubench.core.inference.hypothesis import by_themselves
 from femubench.core.inference.posterior import Posterior
 from femubench.core.inference.residuals import Data
 from femubench.core.inference.search import adequacy
@@ -135,6 +136,7 @@ def explained(
     columns = np.array(direction, dtype=float)[:, None] if names else np.zeros((3, 0))
     return SimpleNamespace(
         base=SimpleNamespace(names=book, parts=book),
+        tells_more=False,
         parts=names,
         searched=names,
         effects=frozenset({*book, *names}),
@@ -427,7 +429,8 @@ def test_a_clean_model_lacks_nothing_and_says_what_it_would_have_seen(clean: Dia
     assert clean.causes == ()
     assert clean.extended is not None
     assert clean.gain.used_percent[0] == clean.gain.used_percent[1]
-    applicable = {name for name, effect in catalogue().items() if effect.places(MODEL)}
+    known = by_themselves(catalogue().values())
+    applicable = {effect.name for effect in known if effect.places(MODEL)}
     assert {row.effect for row in clean.smallest_visible} == applicable
     assert all(row.size > 0.0 for row in clean.smallest_visible)
 

@@ -12,12 +12,14 @@ from femubench.core.case.frames import Site
 from femubench.core.case.schema import SMALLEST
 from femubench.core.case.tables import RESERVED, Complex, Table, read_table
 from femubench.core.errors import InputError
+from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.sensors import DIRECTIONS, Sensors
 from femubench.core.modal.complex_modes import real_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray
 
 FREQUENCY_STD = 0.005  # of the frequency, where the table gives none
+_SAME_AXIS = 0.999999  # cosine
 _MOST_NUMBERS = 20_000_000  # modes times sensors
 NO_SENSORS = Sensors((), np.zeros((0, 3)), ())
 
@@ -163,6 +165,30 @@ def fitted_modes(read: Measurement, file: Path, sensors: Sensors, share: float) 
         shapes[s] = read.shapes[row]
     std = with_default_std(shapes, np.full(shapes.shape, np.nan), share)
     return replace(read, sensors=sensors, shapes=shapes, shape_std=std)
+
+
+def seen_at(measurement: Measurement, sensors: Sensors) -> Measurement:
+    """Return a measurement as other sensors would have seen it.
+
+    What was measured at the same point along the same axis is taken over, turned where the axis
+    looks the other way; the shapes at other sensors are missing.
+
+    Arguments:
+        measurement: on sensors of its own.
+        sensors: that are wanted.
+    """
+    own = measurement.sensors
+    if own is sensors or not len(own):
+        return replace(measurement, sensors=sensors)
+    shapes, std = np.full((2, len(sensors), len(measurement)), np.nan)
+    for s, (xyz, axis) in enumerate(zip(sensors.xyz, sensors.axes, strict=True)):
+        signs = own.axes @ axis
+        near = np.linalg.norm(own.xyz - xyz, axis=1) < ON_MEMBER
+        rows = np.flatnonzero(near & (np.abs(signs) > _SAME_AXIS))
+        if len(rows):
+            shapes[s] = signs[rows[0]] * measurement.shapes[rows[0]]
+            std[s] = measurement.shape_std[rows[0]]
+    return replace(measurement, sensors=sensors, shapes=shapes, shape_std=std)
 
 
 def measured_only(sensors: Sensors, shapes: FloatArray) -> Sensors:

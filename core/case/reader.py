@@ -32,6 +32,7 @@ from femubench.core.case.modes import (
     fitted_sensors,
     measured_only,
     read_modes,
+    seen_at,
 )
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.schema import CaseSpec, FrameSpec, ModificationSpec, parse_spec
@@ -155,7 +156,7 @@ class _Building:
             band=self.spec.measurement.band,
             digest=self.files.digest(),
             tolerance=self.spec.diagnosis.tolerance,
-            reference=self.reference(measurement.sensors),
+            reference=self.reference(site, measurement.sensors),
             reference_used=self.reference_used,
             model_error=self.spec.diagnosis.model_error,
             beam_share=self.spec.diagnosis.beam_share,
@@ -228,12 +229,16 @@ class _Building:
             return ()
         return self.spec.measurement.used if spec.used is None else spec.used
 
-    def reference(self, sensors: Sensors) -> Measurement | None:
-        """Return the modes of the structure as it was."""
+    def reference(self, site: Site, sensors: Sensors) -> Measurement | None:
+        """Return the modes of the structure as it was, on the sensors of the measurement."""
         spec = self.spec.reference
         if spec is None:
             return None
-        found = self.modes(("reference", "modes"), spec.modes, sensors)
+        own = sensors
+        if spec.sensors is not None:
+            path, read = self.reading(("reference", "sensors"), spec.sensors)
+            own = read_sensors(path, site) if read is None else fitted_sensors(read, path, site)
+        found = seen_at(self.modes(("reference", "modes"), spec.modes, own), sensors)
         key = "modes" if spec.used is None else "used"
         listed = [(("reference", key), number) for number in self.reference_used]
         check_labels(listed, found, spec.modes)

@@ -344,6 +344,7 @@ class ReferenceSpec(Table):
     """`[reference]`."""
 
     modes: FileName = Field(description="a file in the case folder")
+    sensors: FileName | None = Field(None, description="a file in the case folder")
     used: Annotated[Many[Count], Field(min_length=1)] | None = Field(
         None, description="a list of mode numbers, one at least"
     )

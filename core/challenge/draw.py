@@ -115,10 +115,13 @@ class Candidates:
     def places(self) -> dict[str, tuple[str, ...]]:
         """Return the places of every effect that applies to the structure."""
         name = self.specimen.name
-        # What tells more of another effect is not always to be told from it.
-        alone = {k: e for k, e in self.effects.items() if getattr(e, "refines", None) is None}
-        found = {key: _places(name, effect) for key, effect in alone.items()}
+        found = {key: _places(name, effect) for key, effect in self.effects.items()}
         return {name: places for name, places in found.items() if places}
+
+    @property
+    def drawn(self) -> list[str]:
+        """Return the effects to choose from: what tells more of one is not always told from it."""
+        return [n for n in self.places if getattr(self.effects[n], "refines", None) is None]
 
     @property
     def strangers(self) -> tuple[str, ...]:
@@ -156,7 +159,7 @@ class Candidates:
 
     def one(self, effect: str | None) -> Candidate:
         """Return a truth with one effect."""
-        return self.causes(self.cause(effect or str(self.rng.choice(list(self.places)))))
+        return self.causes(self.cause(effect or str(self.rng.choice(self.drawn))))
 
     def pair(self, effect: str | None) -> Candidate:
         """Return a truth with two effects, either of which shows beside the other.
@@ -164,7 +167,7 @@ class Candidates:
         Raises:
             ModelError: when it does not, or both sit at one place.
         """
-        first, second = (str(name) for name in self.rng.choice(list(self.places), 2, replace=False))
+        first, second = (str(name) for name in self.rng.choice(self.drawn, 2, replace=False))
         if effect is not None:
             first, second = effect, first if first != effect else second
         causes = self.cause(first), self.cause(second)

@@ -213,9 +213,10 @@ class Posterior:
         first, _ = members[0]
         if not first.tells_more:
             return first
-        share = sum(p for e, p in members if e.tells_more) / sum(p for _, p in members)
-        plain = (e for e, _ in members if not e.tells_more)
-        return first if share >= _SURELY_MORE else next(plain, first)
+        more = sum(p for e, p in members if e.tells_more)
+        if more >= _SURELY_MORE * sum(p for _, p in members):
+            return first
+        return next((e for e, _ in members if not e.tells_more), first)
 
     @property
     def nothing(self) -> Explanation:
