@@ -38,7 +38,7 @@ def delta_chi2(case: Case, truth: Truth, effects: Mapping[str, FrameEffect]) -> 
     present = [effects[cause.effect] for cause in truth.causes]
     known = hypotheses_of(case.model, dict.fromkeys(present))
     wanted = {(cause.effect, cause.place) for cause in truth.causes}
-    true = [h for h in known if (h.name, h.place) in wanted]
+    true = [h for h in known if (h.effect.name, h.place) in wanted]
     problem, _ = posed(case.model, case.used_measurement(), true, case.tolerance)
     whole = _chi2(problem, truth.causes)
     return tuple(
@@ -68,7 +68,9 @@ def _chi2(problem: Problem, causes: Sequence[TrueCause]) -> float:
     for cause in causes:
         label = (cause.effect, cause.place)
         part = next(
-            p for p in problem.space.projections if (p.hypothesis.name, p.hypothesis.place) == label
+            p
+            for p in problem.space.projections
+            if (p.hypothesis.effect.name, p.hypothesis.place) == label
         )
         parts.append(part)
         known = zip(part.hypothesis.parameters, cause.values, strict=True)
