@@ -19,29 +19,11 @@ from threadpoolctl import threadpool_limits
 from femubench import Case, FemubenchError, Model, NotApplicable, Run, Strategy
 from femubench.core.library.cases import read_cases
 from femubench.core.plugin.loader import load_plugins
-from femubench.effect import Effect
+from femubench.effect import textbook_model, textbook_values
 from femubench.plugins.strategies import diagnosed
 from femubench.results import JobResult, leaderboard, score_model
 
 FIGURES = Path(__file__).parents[1] / "docs" / "figures" / "textbook-start.json"
-
-
-def textbook_values(effect: Effect, model: Model) -> dict[str, list[float]]:
-    """Return by place the values that an effect gives without a fit."""
-    found = {}
-    for place in effect.places(model):
-        values = [item.textbook for item in effect.parameters(model, place)]
-        if all(value is not None for value in values):
-            found[place] = [float(value) for value in values if value is not None]
-    return found
-
-
-def textbook(model: Model, effects: Iterable[Effect]) -> Model:
-    """Return the model with all textbook values in it."""
-    for effect in effects:
-        for place, values in textbook_values(effect, model).items():
-            model = effect.extend(model, place, values)
-    return model
 
 
 def board(
@@ -81,7 +63,7 @@ def figures() -> dict[str, dict[str, dict[str, float]]]:
     effects, strategies = tuple(plugins.effects.values()), tuple(plugins.strategies.values())
     cases = read_cases((), plugins)
     drawn = {case.name: case.model for case in cases}
-    better = {name: textbook(model, effects) for name, model in drawn.items()}
+    better = {name: textbook_model(model, effects) for name, model in drawn.items()}
     known = {e.name for e in effects for case in cases if textbook_values(e, case.model)}
     rest = tuple(effect for effect in effects if effect.name not in known)
     with patch.object(diagnosed, "registered_effects", lambda: rest):

@@ -66,6 +66,7 @@ from femubench.core.effect.places import (
 from femubench.core.effect.reading import Reading
 from femubench.core.effect.sizes import Site, Size
 from femubench.core.effect.suspect import Corrected, Suspect
+from femubench.core.effect.textbook import textbook_model, textbook_values
 from femubench.core.look.modes import Seen
 from femubench.core.roles import Effect, Fault
 from femubench.core.schema.diagnosis import LookWarning
@@ -132,6 +133,8 @@ __all__ = [
     "split_direction",
     "support_places",
     "supports_of",
+    "textbook_model",
+    "textbook_values",
     "total_mass",
     "translation_rows",
     "type_place",

@@ -143,6 +143,9 @@ def notes_of(run: Run) -> list[str]:
     """Return what a reader has to know before anything else: what was left out, what is missing."""
     told = run.meta.get("notes")
     notes = [plain(note) for note in told] if isinstance(told, (list, tuple)) else []
+    asked = run.meta.get("request")
+    if isinstance(asked, Mapping) and asked.get("nominal") == "textbook":
+        notes.append("all start from the textbook model, which stands for the unchanged one")
     jobs = len(cases_of(run)) * len(strategies_of(run)) * len(seeds_of(run))
     if "finished" in run.meta and run.meta["finished"] is None:
         notes.append(f"the run has not ended: {len(run.results)} of {jobs} jobs are there")

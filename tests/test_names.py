@@ -19,6 +19,8 @@ ALLOWED = {
     "spring": r"quantity|properties|lookup|weights|name|property|rigid|: \(\)|counted|marker|stiff",
     "offset": r"`offset` \(global",  # where a point mass sits
     "hframe": r"\"hframe\": _hframe",  # a structure of the challenge; in its seeds
+    # the model with handbook values, and where a value of a cause comes from
+    "textbook": r"nominal|Nominal|handbook|record|: \[|_CAUSE_COLUMNS|source =",
     "physical": r"\"unphysical\"",  # a label beside its contrary
 }
 

@@ -20,7 +20,7 @@ from femubench.core.plugin.validation import chosen
 from femubench.core.version import __version__
 
 if TYPE_CHECKING:
-    from femubench.core.library.rank import Plan
+    from femubench.core.library.rank import Nominal, Plan
     from femubench.core.plugin.loader import Plugins
     from femubench.core.roles import Reporter
     from femubench.core.run.recording import Overwrite
@@ -45,6 +45,11 @@ if TYPE_CHECKING:
 @click.option(
     "--seed", type=click.IntRange(0, 2**62), default=0, metavar="S", show_default=True,
     help="The first seed.",
+)  # fmt: skip
+@click.option(
+    "--nominal", type=click.Choice(["drawn", "textbook"]), default="drawn", show_default=True,
+    help="The model that all strategies start from and are measured against: as drawn, or with "
+    "what handbooks give for torsion, shear and rotary inertia.",
 )  # fmt: skip
 @click.option(
     "--timeout", "timeouts", multiple=True, callback=timeouts_of, metavar="DURATION",
@@ -89,6 +94,7 @@ def run(
     jobs: int | None,
     seeds: int | None,
     seed: int,
+    nominal: Nominal,
     timeouts: dict[str, float],
     memory: int | None,
     resume: bool,
@@ -160,6 +166,7 @@ def _plan(ctx: click.Context, plugins: Plugins, store: Store) -> Plan:
         plugins,
         seeds=words["seeds"],
         seed=_given(ctx, "seed"),
+        nominal=_given(ctx, "nominal"),
         timeout=limits.pop("", None),
         timeouts=limits,
         memory=words["memory"],
@@ -174,7 +181,10 @@ def _check_locked(ctx: click.Context) -> None:
         InputError: naming the first of them.
     """
     default = click.core.ParameterSource.DEFAULT
-    words = ("cases", "strategies", "seeds", "seed", "timeouts", "memory", "resume", "overwrite")
+    words = (
+        *("cases", "strategies", "seeds", "seed", "nominal"),
+        *("timeouts", "memory", "resume", "overwrite"),
+    )
     for name in words:
         if ctx.get_parameter_source(name) is not default:
             raise InputError(f"--locked repeats a run as it was; {name} cannot be given beside it")
@@ -215,9 +225,10 @@ def _header(plan: Plan, workers: int) -> str:
     seeds = request.all_seeds
     named = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]}-{seeds[-1]}"
     meaning = "data as recorded" if seeds == range(1) else "noise added"
+    start = " from the textbook model" if request.nominal == "textbook" else ""
     own = "".join(f", {name} {spoken(limit)}" for name, limit in request.timeouts.items())
     return (
-        f"femubench {__version__}: {counted(cases, 'case')}, "
+        f"femubench {__version__}: {counted(cases, 'case')}{start}, "
         f"{counted(strategies, 'strategy')}, {named} ({meaning}), "
         f"{counted(cases * strategies * len(seeds), 'job')}, {counted(workers, 'worker')}, "
         f"timeout {spoken(request.timeout)}{own}"

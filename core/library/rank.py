@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter, ValidationError
 
 from femubench.core.case.case import Case
-from femubench.core.errors import InputError
+from femubench.core.errors import InputError, NotApplicable
 from femubench.core.files import make_folder
 from femubench.core.library.cases import CaseLike, case_words, listed, read_cases, usable_plugins
 from femubench.core.plugin.loader import Plugins
@@ -29,6 +31,7 @@ from femubench.core.score.leaderboard import leaderboard
 if TYPE_CHECKING:
     import pandas as pd
 
+Nominal = Literal["drawn", "textbook"]
 StrategyLike = str | Strategy | type[Strategy]
 DEFAULT_STORE = "femubench-results"
 DEFAULT_TIMEOUT = 600.0  # s
@@ -44,6 +47,7 @@ class Request:
         strategies: names, with options.
         seeds: number of draws of noise; None for the data as recorded.
         seed: the first one.
+        nominal: the model that all start from, as drawn or with its textbook values.
         timeout: seconds that a job may take.
         timeouts: the same for single strategies.
         memory: bytes that a job may take; None for an even share.
@@ -53,6 +57,7 @@ class Request:
     strategies: tuple[str, ...]
     seeds: Annotated[int, Field(ge=1)] | None = None
     seed: Annotated[int, Field(ge=0)] = 0
+    nominal: Nominal = "drawn"
     timeout: _Seconds = DEFAULT_TIMEOUT
     timeouts: Mapping[str, _Seconds] = field(default_factory=dict)
     memory: Annotated[int, Field(ge=1)] | None = None
@@ -163,7 +168,7 @@ class Plan:
                 resume=resume,
                 progress=progress,
                 run_seed=asked.seed,
-                request=asked.to_json() if self.repeatable else None,
+                request=asked.to_json() if self.repeatable else {"nominal": asked.nominal},
             )
         )
 
@@ -174,6 +179,7 @@ def rank(
     *,
     seeds: int | None = None,
     seed: int | None = None,
+    nominal: Nominal | None = None,
     jobs: int | None = None,
     timeout: float | None = None,
     timeouts: Mapping[str, float] | None = None,
@@ -191,6 +197,8 @@ def rank(
             classes or instances, also of a notebook; all that are installed where there is none.
         seeds: number of draws of measurement noise; None for the data as recorded.
         seed: the first seed; 0 by default.
+        nominal: the model that all strategies start from and are measured against, as it was drawn
+            or, by the word ``textbook``, with what handbooks give. As drawn by default.
         jobs: number of worker processes; None for one a processor.
         timeout: seconds that a job may take; 600 by default.
         timeouts: the same for single strategies, by name.
@@ -216,6 +224,7 @@ def rank(
         usable_plugins(),
         seeds=seeds,
         seed=seed,
+        nominal=nominal,
         timeout=timeout,
         timeouts=timeouts,
         memory=memory,
@@ -231,6 +240,7 @@ def plan_of(
     *,
     seeds: int | None = None,
     seed: int | None = None,
+    nominal: Nominal | None = None,
     timeout: float | None = None,
     timeouts: Mapping[str, float] | None = None,
     memory: int | None = None,
@@ -244,7 +254,7 @@ def plan_of(
     """
     words, wanted = listed(cases), listed(strategies)
     if resumed is not None and not words and not wanted and resumed.runs():
-        for name, value in (("seeds", seeds), ("seed", seed)):
+        for name, value in (("seeds", seeds), ("seed", seed), ("nominal", nominal)):
             if value is not None:
                 what = f"--resume alone goes on as before; {name} needs CASE or -s beside it"
                 raise InputError(what)
@@ -262,11 +272,12 @@ def plan_of(
             strategies=tuple(strategy.name for strategy in found),
             seeds=seeds,
             seed=seed or 0,
+            nominal=nominal or "drawn",
             timeout=DEFAULT_TIMEOUT if timeout is None else timeout,
             timeouts=_known(timeouts or {}, found),
             memory=memory,
         ),
-        read,
+        _started_from(nominal, read),
         found,
         repeatable=plain and all(isinstance(item, str) for item in wanted),
     )
@@ -276,7 +287,25 @@ def repeated(request: Request, plugins: Plugins) -> Plan:
     """Return the plan of what was asked for before."""
     found = _strategies(request.strategies, plugins)
     _known(request.timeouts, found)
-    return Plan(request, read_cases(request.cases, plugins), found)
+    read = read_cases(request.cases, plugins)
+    return Plan(request, _started_from(request.nominal, read), found)
+
+
+def _started_from(nominal: Nominal | None, cases: Sequence[Case]) -> list[Case]:
+    """Return cases with the nominal model that is meant; matrices stay as they are."""
+    if nominal != "textbook":
+        return list(cases)
+    from femubench.core.effect.textbook import textbook_model
+    from femubench.core.plugin.loader import registered_effects
+
+    known = registered_effects()
+    found = []
+    for case in cases:
+        with suppress(NotApplicable):
+            digest = hashlib.sha256(f"textbook of {case.digest}".encode()).hexdigest()
+            case = replace(case, model=textbook_model(case.model, known), digest=digest)
+        found.append(case)
+    return found
 
 
 def _strategies(given: Sequence[object], plugins: Plugins) -> list[Strategy]:

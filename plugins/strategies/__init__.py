@@ -6,6 +6,7 @@ from femubench import hookimpl
 
 CLASSES = {
     "unchanged": "unchanged:Unchanged",
+    "textbook": "textbook:Textbook",
     "baruch": "baruch:Baruch",
     "berman": "berman:Berman",
     "kabe": "kabe:Kabe",
@@ -26,5 +27,5 @@ CLASSES = {
 
 @hookimpl
 def femubench_strategies() -> dict[str, str]:
-    """Return where the strategies are: of both papers in their order, then `diagnosed`."""
+    """Return where the strategies are: without data, of both papers in their order, `diagnosed`."""
     return {name: f"{__name__}.{place}" for name, place in CLASSES.items()}

@@ -1,0 +1,94 @@
+"""The textbook model: what handbooks give without a measurement, as a start and as a row."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import femubench
+from femubench import NotApplicable
+from femubench.core.cli.main import bench
+from femubench.core.library.rank import request_of
+from femubench.core.plugin.loader import registered_effects
+from femubench.effect import textbook_model, textbook_values
+from femubench.fem import bredt
+from femubench.results import score_model
+
+sys.path.insert(0, str(Path(__file__).parent))
+from effect_checks import as_matrices
+
+EFFECTS = registered_effects()
+
+
+def test_it_has_bredts_torsion_constant_shear_and_rotary_inertia() -> None:
+    case = femubench.cases["frame"]
+    frame = textbook_model(case.model, EFFECTS).frame_structure.frame
+    tube = frame.members[0].section
+    wall = (0.0254 - np.sqrt(0.0254**2 - tube.A)) / 2.0
+    assert pytest.approx(bredt(0.0254 - wall, 0.0254 - wall, wall), rel=2e-3) == tube.J
+    assert frame.beam == "timoshenko"
+    assert frame.rotary_share == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("name", ["frame", "hframe", "suite/gantry"])
+def test_what_is_repaired_stays_as_it_is(name: str) -> None:
+    once = textbook_model(femubench.cases[name].model, EFFECTS)
+    twice = textbook_model(once, EFFECTS)
+    for one, two in ((once.mass, twice.mass), (once.stiffness, twice.stiffness)):
+        assert abs(one - two).max() <= 1e-12 * abs(one).max()
+
+
+def test_effects_that_need_a_fit_give_nothing() -> None:
+    model = femubench.cases["frame"].model
+    named = {effect.name: effect for effect in EFFECTS}
+    assert textbook_values(named["added-mass"], model) == {}
+    assert textbook_values(named["shear-deformation"], model) == {"all": (1.0,)}
+
+
+def test_matrices_have_no_textbook() -> None:
+    model = as_matrices(femubench.cases["frame"].model)
+    with pytest.raises(NotApplicable, match="matrices"):
+        textbook_model(model, EFFECTS)
+
+
+def test_as_a_strategy_it_looks_at_no_data() -> None:
+    case = femubench.cases["frame"]
+    update = femubench.strategies["textbook"]().update
+    rng = np.random.default_rng(0)
+    one = update(case.model, case.used_measurement(), rng).model
+    other = update(case.model, case.used_measurement().select(case.used[:1]), rng).model
+    assert abs(one.stiffness - other.stiffness).max() == 0.0
+    errors = {name: block.rms_percent for name, block in score_model(case, one).items()}
+    assert errors["used"] < 0.5 * score_model(case, case.model)["used"].rms_percent
+
+
+def test_a_run_from_the_textbook_model_measures_against_it(tmp_path: Path) -> None:
+    wanted = ("frame", ["unchanged", "textbook"])
+    drawn = femubench.rank(*wanted, jobs=1, store=tmp_path)
+    repaired = femubench.rank(*wanted, jobs=1, store=tmp_path, nominal="textbook")
+    scores = {
+        run.meta["request"]["nominal"]: run.table.set_index("strategy") for run in (drawn, repaired)
+    }
+    assert scores["drawn"].loc["textbook", "score"] < 0.6
+    assert scores["textbook"].loc["textbook", "score"] == pytest.approx(1.0, abs=1e-9)
+    unchanged = scores["textbook"].loc["unchanged"]
+    assert unchanged["used_percent"] == scores["drawn"].loc["textbook", "used_percent"]
+    assert request_of(repaired).nominal == "textbook"
+    assert len({result.key for run in (drawn, repaired) for result in run.results}) == 4
+    again = femubench.rank(jobs=1, store=tmp_path, resume=True, overwrite="missing")
+    assert again.meta["request"]["nominal"] == "textbook"
+
+
+def test_the_screen_says_where_all_start_from(tmp_path: Path) -> None:
+    words = ["run", "frame", "-s", "textbook", "-j", "1", "--nominal", "textbook"]
+    shown = CliRunner().invoke(bench, [*words, "--store", str(tmp_path)])
+    assert shown.exit_code == 0, shown.output
+    assert "1 case from the textbook model" in shown.output
+    assert "all start from the textbook model" in " ".join(shown.output.split())
+    locked = CliRunner().invoke(bench, ["run", "--locked", "x", "--nominal", "textbook"])
+    assert locked.exit_code == 2
+    assert "nominal cannot be given beside it" in locked.output
