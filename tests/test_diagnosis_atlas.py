@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from femubench import Model
 from femubench.core.challenge.structures import structure_named
 from femubench.core.inference.fit import Fit, Problem, fit, state_at
-from femubench.core.inference.grid_search import Screened, screen
+from femubench.core.inference.grid_search import Screened, _in_cells, screen
 
 sys.path.insert(0, str(Path(__file__).parent))
 from diagnosis_problems import (
@@ -175,3 +176,20 @@ def test_causes_that_are_there_make_room(clean: Problem) -> None:
     )
     assert before.max() > 20.0
     assert after.max() < 0.1 * before.max()
+
+
+def test_two_parameters_that_act_alike_far_beyond_their_prior_are_screened() -> None:
+    """Their normal equations have one direction to sixteen digits."""
+    grid = np.array(list(product((0.5, 1.5, 2.5), (0.5, 1.5, 2.5))))
+    shape = np.array([1.0, -2.0, 0.5])
+    residuals = 1e9 * (grid.sum(axis=1, keepdims=True) - 2.2) * shape
+    x, cost = _in_cells(grid, residuals)
+    assert x.sum() == pytest.approx(2.2, rel=1e-5)
+    assert cost < 1e9
+
+
+def test_three_parameters_are_screened_where_they_were_tried() -> None:
+    grid = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    x, cost = _in_cells(grid, np.array([[3.0], [1.0], [2.0]]))
+    np.testing.assert_array_equal(x, grid[1])
+    assert cost == 2.0

@@ -89,9 +89,11 @@ def _best_of_grid(projection: Projection, residuals: FloatArray) -> Screened:
 
 
 def _in_cells(grid: FloatArray, residuals: FloatArray) -> tuple[FloatArray, float]:
-    """Return the best point of a grid in two coordinates, residuals linear within its cells."""
+    """Return the best point of a grid, residuals linear within its cells in two coordinates."""
     cost = np.square(residuals).sum(axis=1) + np.square(grid).sum(axis=1)
     best = int(least(cost))
+    if grid.shape[1] != 2:
+        return grid[best], float(cost[best])
     axes = [np.unique(column) for column in grid.T]
     rows = residuals.reshape(*map(len, axes), -1)
     corner = np.stack(np.meshgrid(*(axis[:-1] for axis in axes), indexing="ij"), axis=2)
@@ -101,7 +103,11 @@ def _in_cells(grid: FloatArray, residuals: FloatArray) -> tuple[FloatArray, floa
     turned = np.swapaxes(sides, 2, 3)
     normal = turned @ sides + np.square(size)[..., None] * np.eye(2)
     right = (turned @ here[..., None])[..., 0] + size * corner
-    share = np.clip(-np.linalg.solve(normal, right[..., None])[..., 0], 0.0, 1.0)
+    # In units of its own columns: two that act alike, and far beyond the prior, are none to digits.
+    unit = np.sqrt(np.diagonal(normal, axis1=2, axis2=3))
+    normal = normal / unit[..., :, None] / unit[..., None, :] + _ALIKE * np.eye(2)
+    solution = np.linalg.solve(normal, (right / unit)[..., None])[..., 0]
+    share = np.clip(-solution / unit, 0.0, 1.0)
     x = corner + share * size
     left = here + (sides @ share[..., None])[..., 0]
     value = np.square(left).sum(axis=2) + np.square(x).sum(axis=2)
@@ -150,6 +156,7 @@ _MINOR = 1e-4  # of the largest squared response: what is left out moves the mod
 _KEPT, _TRACKED = 5, 3  # modes beyond the last partner: in the basis, and with their response
 _LIKELY = 40  # that are looked at beside causes
 _FAR = 1e18
+_ALIKE = 1e-12
 _LONG = 1.5  # prior deviations between neighbours on a grid, above which nothing is interpolated
 
 
