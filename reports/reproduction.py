@@ -42,7 +42,7 @@ _SHORT: dict[Verdict, str] = {
     "fitted": "~ fitted",
     "input": "= input",
     "cannot-be-checked": "· unseen",
-    "misprint": "! print",
+    "misprint": "! misprint",
     "does-not-follow": "✗ no",
 }
 _WORDS: dict[Verdict, str] = {

@@ -107,6 +107,13 @@ def test_what_was_fitted_or_taken_over_is_never_independent(cells: Cells) -> Non
     assert {cells["4d", mode, "initial"].verdict for mode in MODES} == {"input"}
 
 
+def test_no_option_of_an_independent_update_was_set(cells: Cells) -> None:
+    words = [c.note for (_, _, name), c in cells.items() if name == "updated"]
+    assert any("options." in note for note in words)
+    for cell in cells.values():
+        assert cell.verdict != "independent" or "options." not in cell.note
+
+
 def test_what_was_chosen_for_a_fitted_cell_matters(bench: Workbench, cells: Cells) -> None:
     """Without its damping and number of steps 4b misses the printed parameters."""
     row = row_of("b")

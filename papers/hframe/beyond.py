@@ -155,7 +155,7 @@ def _history(bench: Workbench, row: Row) -> Extra:
     heads = [f"{name}, {units.get(name, '(rad/s)^4')}" for name in names]
     note = f"bench run hframe -s '{words}'"
     if row.converged:
-        note += "; to convergence, where the cells stop short or are damped"
+        note += "; to convergence, where the cells stop short"
     return Extra(f"Iterations of table {row.table}", ("iteration", *heads), rows, note)
 
 
