@@ -20,25 +20,70 @@ from femubench.reports.digits import Digits, off
 from femubench.reports.html import to_html
 from femubench.reports.markdown import escape
 from femubench.reports.terminal import WIDTH
-from femubench.reproduction import Cell, Extra, Figure, Study, verdict_counts
+from femubench.reproduction import (
+    VERDICTS,
+    Cell,
+    Extra,
+    Figure,
+    Study,
+    Verdict,
+    verdict_counts,
+)
 
 Drawings = Mapping[str, str]  # name of a figure -> SVG
+Words = Mapping[Verdict, str]
 
 FIGURES = "figures"
 # Short words for the screen, whole ones for documents; a mark tells them apart without colour.
-_SHORT = {"agrees": "✓ yes", "agrees-under": "≈ if", "does-not-follow": "✗ no"}
-_WORDS = {
-    "agrees": "✓ agrees",
-    "agrees-under": "≈ agrees under",
+_SHORT: dict[Verdict, str] = {
+    "independent": "✓ yes",
+    "under-convention": "≈ if",
+    "searched": "? tried",
+    "fitted": "~ fitted",
+    "input": "= input",
+    "cannot-be-checked": "· unseen",
+    "misprint": "! misprint",
+    "does-not-follow": "✗ no",
+}
+_WORDS: dict[Verdict, str] = {
+    "independent": "✓ independent",
+    "under-convention": "≈ under a convention",
+    "searched": "? searched",
+    "fitted": "~ fitted",
+    "input": "= input",
+    "cannot-be-checked": "· cannot be checked",
+    "misprint": "! misprint",
     "does-not-follow": "✗ does not follow",
 }
-_MEANING = {
-    "agrees": "ours rounds to the printed figure, or lies within the tolerance of the row's kind",
-    "agrees-under": "agrees under a convention that the text does not state, or states otherwise: "
-    "the note below the table says which",
-    "does-not-follow": "does not follow from the text: a misprint, data that are not in print, or "
-    "a step that is missing; the note says which",
+_MEANING: dict[Verdict, str] = {
+    "independent": "the figures agree, and nothing was chosen for it",
+    "under-convention": "they agree under a convention that the text does not state, or states "
+    "otherwise",
+    "searched": "they agree under a reading that was found by trying; the note says how many were "
+    "tried",
+    "fitted": "they agree after something was fitted to this figure or to its like",
+    "input": "a count, a definition or a figure that the paper was given: its agreement shows "
+    "nothing but care in copying",
+    "cannot-be-checked": "needs mode shapes that are not in print: ours stands beside it for "
+    "comparison alone",
+    "misprint": "other printed figures of the same paper contradict it",
+    "does-not-follow": "it does not follow from the text under any reading that was tried",
 }
+# What a sentence says of a number of cells, and a caption of those of one table.
+_COUNTED: dict[Verdict, str] = {
+    "independent": "independent",
+    "under-convention": "under a convention",
+    "searched": "searched",
+    "fitted": "fitted",
+    "input": "input",
+    "cannot-be-checked": "cannot be checked",
+    "misprint": "misprinted",
+    "does-not-follow": "do not follow",
+}
+_AGREE = (
+    "Two figures agree when ours rounds to the printed one or lies within the tolerance of the "
+    "row's kind. Of several grounds the weakest makes the verdict; the note names them all."
+)
 _DEVIATION = (
     "Deviation: (ours - printed) / |printed| in percent; of figures that are percentages "
     "themselves, ours - printed in points (pt). A frequency with an i is imaginary and counts as "
@@ -52,7 +97,7 @@ _NUMERIC = frozenset("0123456789+-–<>.")
 
 
 def counts_line(studies: Iterable[Study]) -> str:
-    """Return how many cells there are, and how many of every verdict."""
+    """Return how many cells agree with nothing chosen for it, then all other verdicts."""
     return _counts([cell for study in studies for cell in study.cells])
 
 
@@ -77,31 +122,34 @@ def reproduction_html(studies: Sequence[Study], drawings: Drawings) -> str:
 
 
 def _counts(cells: Sequence[Cell]) -> str:
-    counts = verdict_counts(cells)
-    noun = "cell" if len(cells) == 1 else "cells"
+    count = verdict_counts(cells)
     return (
-        f"{len(cells)} printed {noun}: {counts['agrees']} agree, "
-        f"{counts['agrees-under']} agree under a stated convention, "
-        f"{counts['does-not-follow']} do not follow from the text"
+        f"{count['independent']} of {len(cells)} printed {_noun(cells)} agree independently, "
+        f"{count['under-convention']} under a stated convention, {count['searched']} after a "
+        f"search and {count['fitted']} after a fit; {count['input']} are input, "
+        f"{count['cannot-be-checked']} cannot be checked, {count['misprint']} are misprints and "
+        f"{count['does-not-follow']} do not follow"
     )
 
 
 def _summary(cells: Sequence[Cell]) -> str:
     """Return the counts of a table without those that are zero."""
-    told = ("agree", "agree under a convention", "do not follow")
-    noun = "cell" if len(cells) == 1 else "cells"
-    counts = zip(told, verdict_counts(cells).values(), strict=True)
-    parts = ", ".join(f"{number} {what}" for what, number in counts if number)
-    return f"{len(cells)} {noun}: {parts}"
+    counts = verdict_counts(cells)
+    parts = ", ".join(f"{counts[v]} {_COUNTED[v]}" for v in VERDICTS if counts[v])
+    return f"{len(cells)} {_noun(cells)}: {parts}"
 
 
-def _legend(words: Mapping[str, str]) -> Iterator[Section]:
+def _noun(cells: Sequence[Cell]) -> str:
+    return "cell" if len(cells) == 1 else "cells"
+
+
+def _legend(words: Words) -> Iterator[Section]:
     entries = [(words[verdict], meaning) for verdict, meaning in _MEANING.items()]
-    yield Section("How to read it", [Items(entries), _DEVIATION])
+    yield Section("How to read it", [_AGREE, Items(entries), _DEVIATION])
 
 
 def _chapters(
-    studies: Iterable[Study], words: Mapping[str, str], drawings: Drawings | None, folder: str
+    studies: Iterable[Study], words: Words, drawings: Drawings | None, folder: str
 ) -> Iterator[Section]:
     for study in studies:
         yield Section(study.title, [study.citation, f"{_counts(study.cells)}."])
@@ -130,7 +178,7 @@ def _remarks(title: str, sentences: Sequence[str]) -> Iterator[Section]:
         yield Section(title, [Items([("", sentence) for sentence in sentences])], level=3)
 
 
-def _page(cells: Sequence[Cell], words: Mapping[str, str]) -> Iterator[Block]:
+def _page(cells: Sequence[Cell], words: Words) -> Iterator[Block]:
     """Return the cells of one table, then every note once."""
     notes = list(dict.fromkeys(cell.note for cell in cells if cell.note))
     marks = {note: f"[{number}]" for number, note in enumerate(notes, 1)}

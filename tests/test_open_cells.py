@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 
 from femubench import InputError, Strategy, read_case, solve_modes
 from femubench.core.plugin.variants import strategy_of
+from femubench.papers.frame import readings
 from femubench.plugins.strategies.generic import GenericAdjusted, GenericLS
 from femubench.plugins.strategies.nobari import Nobari
 from femubench.plugins.strategies.physical import Physical
@@ -20,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 from equation_readings import Reading, expanded, nominal_of, predicted, solution, system
 from ladder_settings import FRAME, patterns
 from nearest_model import nearest_with
-from open_cells import column, deviation
+from open_cells import COLUMNS, PAGE, column, deviation, grid
 from open_cells_numbering import EACH, MEMBERS
 
 STRATEGIES: dict[str, Strategy] = {
@@ -163,3 +165,13 @@ def test_unknown_choices_are_refused() -> None:
         strategy_of("physical:expansion=serep", STRATEGIES)
     with pytest.raises(InputError, match="measured or nominal"):
         strategy_of("physical:frequencies=mine", STRATEGIES)
+
+
+def test_the_number_of_readings_tried_is_that_of_the_search() -> None:
+    """What `bench reproduce` says of a cell that was found by trying, and of all before it."""
+    assert {len(set(grid(family))) for family in COLUMNS} == {readings.TRIED}
+    text = PAGE.read_text(encoding="utf-8")
+    tried = re.search(r"^\| generic LS +\| [\d.]+ +\| \d+ of (\d+),.*\| \d+ of (\d+),", text, re.M)
+    assert tried is not None
+    assert sum(map(int, tried.groups())) == readings.TRIED
+    assert f"about {readings.EXPLORED // 1000} 000 exploratory readings" in " ".join(text.split())

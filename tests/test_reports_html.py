@@ -20,7 +20,7 @@ from femubench.reports.reproduction import (
     reproduction_text,
 )
 from femubench.reports.svg import embedded
-from femubench.reproduction import Page, Study
+from femubench.reproduction import Ground, Page, Study
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import reproduction_toys as toys
@@ -130,28 +130,29 @@ class TestDigits:
 class TestScreen:
     def test_cells(self) -> None:
         text = reproduction_text(STUDIES)
-        assert re.search(r"mode 1 +FE +255\.8 +255\.83 +\+0\.01 +✓ yes\n", text)
-        assert re.search(r"mode 4 +FE +911\.3 +867\.60 +-4\.80 +✗ no \[2\]\n", text)
-        assert re.search(r"mode 5 +FE +1049\.4 +– +– +✗ no \[2\]\n", text)
-        assert re.search(r"rigid 1 +Kabe +1197\.6 i +1197\.90 i +\+0\.03 +≈ if \[1\]\n", text)
+        assert re.search(r"mode 1 +FE +255\.8 +255\.83 +\+0\.01 +✓ yes \[1\]\n", text)
+        assert re.search(r"mode 4 +FE +911\.3 +867\.60 +-4\.80 +✗ no \[3\]\n", text)
+        assert re.search(r"mode 5 +FE +1049\.4 +– +– +✗ no \[3\]\n", text)
+        assert re.search(r"rigid 1 +Kabe +1197\.6 i +1197\.90 i +\+0\.03 +≈ if \[2\]\n", text)
 
     def test_a_note_stands_once_a_table(self) -> None:
         text = " ".join(reproduction_text(STUDIES[:1]).split())
         assert text.count(toys.CONVENTION) == text.count(toys.REASON) == 1
 
     def test_long_names_go_on_below(self) -> None:
-        page = Page("frame", "1", unit="Hz")
+        page = Page("frame", "1", (toys.FREE,), unit="Hz")
         cell = page.cell("a long row " * 9, "a long column " * 9, 1049.4, 1049.5)
         study = Study("frame", "Title", "", (), (cell,))
         _, *lines = reproduction_text([study]).splitlines()
         assert max(map(len, lines)) <= 80
-        assert any(re.search(r"  1049\.4  1049\.50 +\+0\.01  ✓ yes$", line) for line in lines)
+        assert any(re.search(r"  1049\.4  1049\.50 +\+0\.01  ✓ yes \[1\]$", line) for line in lines)
         text = "\n".join(lines)
         assert (text.count("long"), text.count("row")) == (18, 11)
 
     def test_commands_stay_whole(self) -> None:
         words = "spring:" + ",".join(f"option_{k}={k}" for k in range(20))
-        page = Page("frame", "1", tolerance=1.0, convention=f"bench run hframe -s '{words}'")
+        ground = Ground("under-convention", f"bench run hframe -s '{words}'")
+        page = Page("frame", "1", (ground,), tolerance=1.0)
         study = Study("frame", "Title", "", (), (page.cell("a", "b", 1.0, 1.001),))
         assert words in reproduction_text([study])
 
@@ -202,7 +203,7 @@ class TestHtml:
         names = [tag for tag, _ in document.elements if tag in ("h1", "h2", "h3")]
         assert names[0] == "h1"
         assert names.count("h1") == 1
-        assert document.texts("h1")[0].startswith("18 printed cells: 8 agree, ")
+        assert document.texts("h1")[0].startswith("4 of 22 printed cells agree independently, ")
         assert document.all("html") == [{"lang": "en"}]
         assert [tag for tag, _ in document.elements].count("main") == 1
 
@@ -219,7 +220,7 @@ class TestHtml:
 
     def test_verdicts_are_words_with_a_symbol(self, document: Document) -> None:
         cells = document.texts("td")
-        for words in ("✓ agrees", "≈ agrees under [1]", "✗ does not follow [2]"):
+        for words in ("✓ independent [1]", "≈ under a convention [2]", "✗ does not follow [3]"):
             assert words in cells
 
     def test_nothing_runs_and_nothing_is_fetched(self, source: str, document: Document) -> None:

@@ -34,8 +34,9 @@ def reproduce(
 ) -> None:
     """Recompute the tables of the papers, cell by cell.
 
-    Each printed figure stands beside ours, with a verdict: it agrees, it agrees under a convention
-    that the text does not state, or it does not follow from the text. Without a paper, both.
+    Each printed figure stands beside ours, with a verdict and its reason: it agrees independently,
+    under a convention, after a search or after a fit; it is input, a misprint or cannot be checked;
+    or it does not follow from the text. Without a paper, both.
     """
     from femubench.papers import PAPERS
 

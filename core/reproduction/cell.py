@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass
 
-Verdict = Literal["agrees", "agrees-under", "does-not-follow"]
-VERDICTS: tuple[Verdict, ...] = ("agrees", "agrees-under", "does-not-follow")
-_UNEXPLAINED = "no reading of the text was found that gives it"
+from femubench.core.errors import InputError
+from femubench.core.reproduction.ground import FAULTS, Ground, Verdict, weakest
+
+_UNEXPLAINED = Ground("does-not-follow", "no reading of the text was found that gives it")
 
 
 @dataclass(frozen=True)
@@ -21,10 +21,10 @@ class Cell:
         row, column: what the paper calls them.
         printed: its figure; an imaginary frequency is a negative one.
         ours: the same from a re-run; None where there is none.
-        verdict: whether it agrees, agrees under a convention that the text does not state, or does
-            not follow from the text.
-        note: the convention, or why it does not follow; may be empty for ``agrees``.
+        verdict: what the comparison is worth.
+        note: what an agreement rests on, or why there is none.
         unit: of both; ``%`` for a figure that is a percentage itself.
+        tried: number of readings that were tried, of a cell that was found by searching.
     """
 
     paper: str
@@ -34,61 +34,86 @@ class Cell:
     printed: float
     ours: float | None
     verdict: Verdict
-    note: str = ""
+    note: str
     unit: str = ""
+    tried: int | None = None
 
     @property
     def deviation_percent(self) -> float | None:
-        """Return (ours - printed) / |printed| in percent; of percentages, ours - printed.
+        """Return how far ours is from the printed figure; see `deviation_percent`."""
+        return deviation_percent(self.printed, self.ours, self.unit)
 
-        None where there is no value of ours, the printed one is zero and ours is not, or one of
-        two frequencies is imaginary; two imaginary ones are compared by size.
-        """
-        printed, ours = self.printed, self.ours
-        if ours is None or not math.isfinite(ours):
-            return None
-        if self.unit == "%":
-            return ours - printed
-        if printed == 0.0:
-            return 0.0 if ours == 0.0 else None
-        if self.unit == "Hz" and (printed < 0.0 or ours < 0.0):
-            # Imaginary frequencies are compared by size, and with nothing else.
-            return 100.0 * (ours / printed - 1.0) if max(printed, ours) < 0.0 else None
-        return 100.0 * (ours - printed) / abs(printed)
+
+def deviation_percent(printed: float, ours: float | None, unit: str) -> float | None:
+    """Return (ours - printed) / |printed| in percent; of percentages, ours - printed.
+
+    None where there is no value of ours, the printed one is zero and ours is not, or one of
+    two frequencies is imaginary; two imaginary ones are compared by size.
+
+    Arguments:
+        printed, ours, unit: as in `Cell`.
+    """
+    if ours is None or not math.isfinite(ours):
+        return None
+    if unit == "%":
+        return ours - printed
+    if printed == 0.0:
+        return 0.0 if ours == 0.0 else None
+    if unit == "Hz" and (printed < 0.0 or ours < 0.0):
+        # Imaginary frequencies are compared by size, and with nothing else.
+        return 100.0 * (ours / printed - 1.0) if max(printed, ours) < 0.0 else None
+    return 100.0 * (ours - printed) / abs(printed)
 
 
 @dataclass(frozen=True)
 class Page:
-    """Where cells of one kind stand, and when they agree.
+    """Where cells of one kind stand, when they agree, and what that is worth.
 
     Arguments:
         paper, table: as in `Cell`.
+        grounds: all that an agreement rests on; the weakest makes the verdict.
         unit: of the cells.
         tolerance: largest deviation that agrees, in percent (of percentages: in points).
         decimals: digits behind the point in print: what rounds to the printed figure agrees too;
             None for the tolerance alone.
-        convention: what the text does not state and the value rests on; empty for nothing.
-        reason: why cells that do not agree do not follow from the text.
+        fault: what a cell is that does not agree, unless it cannot be checked.
+
+    Raises:
+        InputError: for no grounds, or where a fault stands among them or something else as fault.
     """
 
     paper: str
     table: str
+    grounds: tuple[Ground, ...]
     unit: str = ""
     tolerance: float = 0.1
     decimals: int | None = None
-    convention: str = ""
-    reason: str = _UNEXPLAINED
+    fault: Ground = _UNEXPLAINED
+
+    def __post_init__(self) -> None:
+        """Check that grounds are grounds, and the fault is one."""
+        wrong = [ground.verdict for ground in self.grounds if ground.verdict in FAULTS]
+        if not self.grounds or wrong or self.fault.verdict not in FAULTS:
+            raise InputError(
+                f"page {self.paper} {self.table}: grounds {[g.verdict for g in self.grounds]}, "
+                f"fault {self.fault.verdict!r} (expected at least one ground, none of them "
+                f"{' or '.join(FAULTS)}, and one of these as fault)"
+            )
 
     def cell(self, row: str, column: str, printed: float, ours: float | None) -> Cell:
-        """Return the cell with its verdict, which follows from the figures alone."""
-        cell = Cell(self.paper, self.table, row, column, printed, ours, "agrees", "", self.unit)
-        off = cell.deviation_percent
+        """Return the cell with its verdict: figures decide whether, grounds for what."""
+        deciding = weakest(self.grounds)
+        note = "; ".join(dict.fromkeys(ground.words for ground in self.grounds))
+        if deciding.verdict != "cannot-be-checked" and not self._meets(printed, ours):
+            deciding, note = self.fault, self.fault.words
+        return Cell(
+            self.paper, self.table, row, column, printed, ours,
+            deciding.verdict, note, self.unit, deciding.tried,
+        )  # fmt: skip
+
+    def _meets(self, printed: float, ours: float | None) -> bool:
+        off = deviation_percent(printed, ours, self.unit)
         same = ours is not None and round(ours - printed, 12) == 0.0
         digits = math.inf if self.decimals is None else self.decimals
         rounds = ours is not None and abs(ours - printed) <= 0.5000001 * 10.0**-digits
-        meets = same or rounds or (off is not None and abs(off) <= self.tolerance)
-        if not meets:
-            return replace(cell, verdict="does-not-follow", note=self.reason)
-        if self.convention:
-            return replace(cell, verdict="agrees-under", note=self.convention)
-        return cell
+        return same or rounds or (off is not None and abs(off) <= self.tolerance)

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from femubench.core.plot.figure import Figure
-from femubench.core.reproduction.cell import VERDICTS, Cell, Verdict
+from femubench.core.reproduction.cell import Cell
+from femubench.core.reproduction.ground import VERDICTS, Verdict
 
 _TOLD = (
     *("paper", "table", "row", "column"),
-    *("printed", "ours", "deviation_percent", "verdict", "note"),
+    *("printed", "ours", "deviation_percent", "verdict", "note", "tried"),
 )
 
 
@@ -61,9 +62,10 @@ def verdict_counts(cells: Sequence[Cell]) -> dict[Verdict, int]:
     """Return the number of cells of every verdict, none left out.
 
     Examples:
-        >>> page = reproduction.Page("paper", "1", unit="Hz", tolerance=0.1)
-        >>> reproduction.verdict_counts([page.cell("mode 1", "FE", 255.8, 255.83)])
-        {'agrees': 1, 'agrees-under': 0, 'does-not-follow': 0}
+        >>> fit = reproduction.Ground("fitted", "the length is fitted to this frequency")
+        >>> page = reproduction.Page("paper", "1", (fit,), unit="Hz", tolerance=0.1)
+        >>> reproduction.verdict_counts([page.cell("mode 1", "FE", 255.8, 255.83)])["fitted"]
+        1
     """
     return {verdict: sum(cell.verdict == verdict for cell in cells) for verdict in VERDICTS}
 

@@ -6,18 +6,24 @@ import numpy as np
 
 from femubench import Modes, solve_modes
 from femubench.fem import FloatArray
-from femubench.reproduction import Workbench
+from femubench.reproduction import Ground, Workbench
 
 PAPER = "frame"
 CASE = "frame"
 TRUTH = "frame-beam"
-RECOVERED = (
-    "centre lines, E/rho and an accelerometer of 26.6 g at coordinate 1, fitted to the printed FE "
-    "frequencies, so that this is no independent check"
+RECOVERED = Ground(
+    "fitted",
+    "centre lines, E/rho and an accelerometer of 26.6 g at coordinate 1 are fitted to the printed "
+    "FE frequencies, so that this is no independent check",
 )
 TWIN_SHAPES = (
     "on the recovered model, with shapes of the solid twin that carries the accelerometer; the "
     "paper prints none of the test's"
+)
+GIVEN = Ground(
+    "input",
+    "a measured frequency that the update is given, and that a method which meets its equations "
+    "gives back",
 )
 
 

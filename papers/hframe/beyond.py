@@ -16,7 +16,7 @@ from femubench.papers.hframe.physical import (
     shape_paired_errors,
 )
 from femubench.papers.hframe.rows import FREE_EI, ROWS, Row, at_printed, parameter_values, run
-from femubench.papers.hframe.updates import USED, misprinted, unit_of
+from femubench.papers.hframe.updates import USED, follows, misprinted, unit_of
 from femubench.papers.printed import printed
 from femubench.reproduction import Bars, Extra, Workbench
 
@@ -117,12 +117,14 @@ def _converged(bench: Workbench) -> Extra:
     rows, ratios = [], ("printed ratio", "our ratio")
     for row in ROWS:
         theirs = printed("hframe")["table4"][row.key]["parameters"]
-        runs = [("as in the cells", row.updated.words)]
-        runs += [("without its damping", row.converged)] if row.converged else []
-        runs += [("EI free, as the text has it", FREE_EI)] if row.letter == "d" else []
+        cells = {name: row.apart.get(name, row.updated).words for name in row.names}
+        runs = [("as in the cells", cells)]
+        undamped = dict.fromkeys(row.names, row.converged or row.updated.words)
+        runs += [("without damping of its own", undamped)] if undamped != cells else []
+        free = dict.fromkeys(row.names, FREE_EI)
+        runs += [("EI free, as the text has it", free)] if row.letter == "d" else []
         for what, words in runs:
-            for symbol in row.names:
-                chosen = row.apart[symbol].words if symbol in row.apart else words
+            for symbol, chosen in words.items():
                 before, after = parameter_values(bench, row, chosen)[symbol]
                 first, last = theirs[symbol]
                 off = _signed(100.0 * (after / last - 1.0), 3)
@@ -153,7 +155,7 @@ def _history(bench: Workbench, row: Row) -> Extra:
     heads = [f"{name}, {units.get(name, '(rad/s)^4')}" for name in names]
     note = f"bench run hframe -s '{words}'"
     if row.converged:
-        note += "; to convergence, where the cells stop short or are damped"
+        note += "; to convergence, where the cells stop short"
     return Extra(f"Iterations of table {row.table}", ("iteration", *heads), rows, note)
 
 
@@ -167,7 +169,7 @@ def _misprints(bench: Workbench) -> Extra:
             for mode, (f, f_m, error) in enumerate(pairs, 1):
                 if misprinted(f, f_m, error):
                     place = f"table {row.table}, mode {mode}, {column} error"
-                    rows.append((place, f"{error:+.2f} %", f"{100.0 * (f / f_m - 1.0):+.2f} %"))
+                    rows.append((place, f"{error:+.2f} %", f"{follows(f, f_m):+.2f} %"))
     text, table = printed("hframe")["section8"], printed("hframe")["table4"]["e_offset"]
     units = f"{text['a_V']:g} mm", f"{table['parameters']['a_V'][0]:g} m"
     rows.append(("section 8 against table 4e, a_V", *units))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from femubench import Case, Model, UpdateResult
 from femubench.fem import Parameter
+from femubench.papers.hframe.meshes import RECOVERED
 from femubench.papers.printed import printed
-from femubench.reproduction import Workbench
+from femubench.reproduction import Ground, Workbench
 
 # The printed springs, arms and rigidities; the case knows the half depth of 20 mm.
 SPRINGS = "stiffness.x=3.30e9,stiffness.z=4.48e9,stiffness.ry=3.02e6"
@@ -17,22 +18,30 @@ FREE_EI = f"spring:{SPRINGS}"
 _TO_THE_LAST = "options.tolerance=1e-9,options.cost_tolerance=1e-12"
 
 
+_AS_TOLD = Ground(
+    "independent",
+    "with the strategy as the text has it on the recovered dimensions, which no update was fitted "
+    "to; nothing is chosen for it",
+)
+
+
 @dataclass(frozen=True)
 class Reading:
     """What a column rests on.
 
     Arguments:
         words: ``strategy:option=value,...``, as after ``bench run hframe -s``.
-        convention: what the text does not state; empty where the words are what it says.
+        ground: what an agreement under these words is worth.
     """
 
     words: str
-    convention: str = ""
+    ground: Ground = _AS_TOLD
 
     @property
-    def note(self) -> str:
-        """Return the convention with the words that repeat it."""
-        return self.convention and f"{self.convention}: bench run hframe -s '{self.words}'"
+    def told(self) -> Ground:
+        """Return the ground with the words that repeat it."""
+        words = f"{self.ground.words}: bench run hframe -s '{self.words}'"
+        return replace(self.ground, words=words)
 
     @property
     def start(self) -> str:
@@ -50,9 +59,10 @@ class Row:
         title: what is updated.
         updated: how the updated column follows.
         names: from the paper's symbol to our parameter.
-        before: how the initial column follows where that is another model.
+        initial_ground: what an agreement of the initial frequencies is worth.
+        before: the words of the initial column where that is another model.
         apart: symbols that follow from another reading.
-        converged: words without the convention on damping, where there is one.
+        converged: words without a damping that was chosen, where all of ``updated`` rests on one.
     """
 
     letter: str
@@ -60,7 +70,8 @@ class Row:
     title: str
     updated: Reading
     names: Mapping[str, str]
-    before: Reading | None = None
+    initial_ground: Ground
+    before: str = ""
     apart: Mapping[str, Reading] = field(default_factory=dict)
     converged: str = ""
 
@@ -72,9 +83,27 @@ class Row:
     @property
     def initial(self) -> Reading:
         """Return what the initial column rests on."""
-        return self.before or Reading(self.updated.words)
+        return Reading(self.before or self.updated.words, self.initial_ground)
 
 
+_DAMPED = Reading(
+    f"spring:free_stiffness=false,{SPRINGS},options.damping=0.3,"
+    f"options.max_iterations=200,{_TO_THE_LAST}",
+    Ground(
+        "fitted",
+        "EI frozen; damped so strongly that k_x and k_z, on which the frequencies hardly depend, "
+        "have not drifted further when k_theta settles; the damping was chosen to meet these two",
+    ),
+)
+_HELD = Ground(
+    "input",
+    "the initial value, printed again: that EI was frozen is read from this very figure",
+)
+_JOINTS = Ground(
+    "independent",
+    "a joint of the text with the printed values on the recovered dimensions, which are fitted to "
+    "the frame without joints; nothing is chosen for it",
+)
 ROWS = (
     Row(
         "a",
@@ -82,6 +111,7 @@ ROWS = (
         "EI of all members",
         Reading("global"),
         {"EI": "EI all members"},
+        RECOVERED,
     ),
     Row(
         "b",
@@ -89,10 +119,14 @@ ROWS = (
         "EI of the elements at the joints",
         Reading(
             "local:options.damping=0.01,options.max_iterations=6",
-            "stopped a little short of convergence; damping and number of steps were chosen to "
-            "meet the two printed parameters",
+            Ground(
+                "fitted",
+                "stopped a little short of convergence; damping and number of steps were chosen to "
+                "meet the two printed parameters",
+            ),
         ),
         {"EI_x": "EI at T branch", "EI_z": "EI at T through"},
+        RECOVERED,
         converged="local",
     ),
     Row(
@@ -102,27 +136,33 @@ ROWS = (
         Reading(
             f"spring:variant=global,{RIGID_SPRINGS},options.damping=1.0,"
             f"options.max_iterations=30,{_TO_THE_LAST}",
-            "springs made rigid, unlike those of the initial column; only EI / rho A is "
-            "determined, and where the two stand along it is where the iteration stops, which was "
-            "chosen to meet them",
+            Ground(
+                "fitted",
+                "springs made rigid, unlike those of the initial column, because this column asks "
+                "for it; only EI / rho A is determined, and where the two stand along it is where "
+                "the iteration stops, which was chosen to meet them",
+            ),
         ),
         {"EI": "EI all members", "rhoA": "rhoA all members"},
-        before=Reading(f"spring:variant=global,{SPRINGS}"),
+        _JOINTS,
+        before=f"spring:variant=global,{SPRINGS}",
     ),
     Row(
         "d",
         "d_spring",
         "springs at the joints",
         Reading(
-            f"spring:free_stiffness=false,{SPRINGS},options.damping=0.3,"
-            f"options.max_iterations=200,{_TO_THE_LAST}",
-            "EI frozen, which the text sets free; damped so strongly that k_x and k_z, on which "
-            "the frequencies hardly depend, have not drifted further when k_theta settles; the "
-            "damping was chosen to meet these two",
+            f"spring:free_stiffness=false,{SPRINGS}",
+            Ground(
+                "under-convention",
+                "EI frozen, which the text sets free and the table prints unchanged",
+            ),
         ),
         {"k_x": "k_x T branch", "k_z": "k_z T branch", "k_theta": "k_ry T branch"}
         | {"EI": "EI all members"},
-        converged=f"spring:free_stiffness=false,{SPRINGS}",
+        Ground("input", "the initial column of table 4(c), printed again"),
+        apart=dict.fromkeys(("k_x", "k_z"), _DAMPED)
+        | {"EI": Reading(f"spring:free_stiffness=false,{SPRINGS}", _HELD)},
     ),
     Row(
         "e",
@@ -130,8 +170,12 @@ ROWS = (
         "partly rigid elements at the joints and EI",
         Reading("offset"),
         {"a_H": "a T branch", "a_V": "a T through", "EI": "EI all members"},
+        _JOINTS,
         apart={
-            "a_V": Reading("offset:options.damping=3e-3", "damping strong enough to hold it still")
+            "a_V": Reading(
+                "offset:options.damping=3e-3",
+                Ground("fitted", "the damping was chosen strong enough to hold it still"),
+            )
         },
     ),
 )

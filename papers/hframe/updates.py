@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from femubench import Model
-from femubench.papers.hframe.meshes import RECOVERED, frequencies
+from femubench.papers.hframe.meshes import frequencies
 from femubench.papers.hframe.rows import (
     ROWS,
     Reading,
@@ -19,13 +18,26 @@ from femubench.papers.hframe.rows import (
     run,
 )
 from femubench.papers.printed import printed
-from femubench.reproduction import Cell, Page, Workbench
+from femubench.reproduction import Cell, Ground, Page, Workbench
 from femubench.update import spring_estimates
 
 INITIAL, UPDATED, LIMIT = 0.01, 0.05, 0.1  # of frequencies and of parameters, in percent
 DIGITS = {"k_x": -7, "k_z": -7}  # printed with three digits
 UNITS = {"EI": "N m2", "rhoA": "kg/m", "k_theta": "N m/rad", "k": "N/m", "a": "m"}
-USED = 5
+USED, ERROR_DECIMALS = 5, 2
+RULED = ("k_x", "k_z", "k_theta")
+_TAKEN = Ground("input", "an initial value that the update is given")
+_BY_RULE = Ground(
+    "independent", "by the rule of section 7 on the elements of mesh C, with nothing chosen"
+)
+_ERROR = Ground(
+    "input",
+    "by definition: the error of the printed frequency beside it; ours is computed from that and "
+    "the measured one",
+)
+_RATIO = Ground(
+    "input", "by definition: the ratio of the two printed values; ours is computed from them"
+)
 
 
 def unit_of(symbol: str) -> str:
@@ -44,12 +56,14 @@ def update_cells(bench: Workbench) -> tuple[Cell, ...]:
     return (*cells, *_text_cells(bench))
 
 
-def misprinted(frequency: float, measured: float, error: float) -> str:
-    """Return how a printed error contradicts the printed frequency beside it; empty if not."""
-    follows = 100.0 * (frequency / measured - 1.0)
-    if abs(follows - error) <= 0.02:
-        return ""
-    return f"misprint: the printed frequencies give {follows:+.2f} %"
+def follows(frequency: float, measured: float) -> float:
+    """Return the error in percent that two printed frequencies give."""
+    return 100.0 * (frequency / measured - 1.0)
+
+
+def misprinted(frequency: float, measured: float, error: float) -> bool:
+    """Return whether a printed error contradicts the printed frequency beside it."""
+    return abs(follows(frequency, measured) - error) > 0.5000001 * 10.0**-ERROR_DECIMALS
 
 
 def _mode_cells(
@@ -58,43 +72,43 @@ def _mode_cells(
     words = reading.start if column == "initial" else reading.words
     ours = frequencies(run(bench, words).model, USED)
     measured = bench.cases["hframe"].used_measurement(0).frequencies
-    # The model as built is that of table 3, to which its dimensions are fitted.
-    fitted = RECOVERED if row.letter in "ab" else ""
-    note = reading.note if column == "updated" else fitted
-    hertz = Page("hframe", row.table, "Hz", limit, decimals=2, convention=note)
+    ground = reading.ground if column == "initial" else reading.told
+    hertz = Page("hframe", row.table, (ground,), "Hz", limit, decimals=2)
     for i, (f, f_m) in enumerate(zip(theirs[column], measured, strict=True)):
         yield hertz.cell(f"mode {i + 1}", column, f, float(ours[i]))
-        printed_error = theirs[f"{column}_error"][i]
-        wrong = misprinted(f, f_m, printed_error)
-        # What the tolerance of the frequency makes of the error, and half a printed digit.
-        points = limit * f / f_m + 0.005
-        page = Page("hframe", row.table, "%", points, convention=note)
-        page = replace(page, reason=wrong) if wrong else page
-        error = 100.0 * (float(ours[i]) / f_m - 1.0)
-        yield page.cell(f"mode {i + 1}", f"{column} error", printed_error, error)
+        own = follows(f, float(f_m))
+        wrong = Ground("misprint", f"the printed frequencies, {f} and {f_m} Hz, give {own:+.2f} %")
+        page = Page("hframe", row.table, (_ERROR,), "%", 0.0, ERROR_DECIMALS, wrong)
+        yield page.cell(f"mode {i + 1}", f"{column} error", theirs[f"{column}_error"][i], own)
 
 
 def _parameter_cells(bench: Workbench, row: Row, theirs: dict[str, Any]) -> Iterator[Cell]:
-    reason = _reason(bench, row)
+    missed = Ground("does-not-follow", _reason(bench, row))
     for symbol, (first, last) in theirs["parameters"].items():
         reading = row.apart.get(symbol, row.updated)
         before, after = parameter_values(bench, row, reading.words)[symbol]
         digits, unit = DIGITS.get(symbol), unit_of(symbol)
-        page = Page("hframe", row.table, unit, LIMIT, digits, reason=_rule(bench, symbol))
+        rule = Ground("does-not-follow", _rule(bench, symbol))
+        page = Page("hframe", row.table, (_initial_ground(symbol),), unit, LIMIT, digits, rule)
         yield page.cell(symbol, "initial", first, _initial(bench, symbol, before))
-        page = Page("hframe", row.table, unit, LIMIT, digits, reading.note, reason)
+        page = Page("hframe", row.table, (reading.told,), unit, LIMIT, digits, missed)
         yield page.cell(symbol, "updated", last, after)
-        ratio = theirs["ratios"][symbol]
-        # The tolerance of the value, and half a digit of a ratio printed with three decimals.
+        ratio, own = theirs["ratios"][symbol], last / first
+        # The three digits of the values, and half a digit of a ratio printed with three decimals.
         tolerance = LIMIT + 100.0 * 0.0005 / abs(ratio)
-        page = Page("hframe", row.table, "", tolerance, None, reading.note, reason)
-        yield page.cell(symbol, "ratio", ratio, after / before)
+        wrong = Ground("misprint", f"the printed values, {first:g} and {last:g}, give {own:.4f}")
+        page = Page("hframe", row.table, (_RATIO,), "", tolerance, None, wrong)
+        yield page.cell(symbol, "ratio", ratio, own)
+
+
+def _initial_ground(symbol: str) -> Ground:
+    return _BY_RULE if symbol in RULED else _TAKEN
 
 
 def _springs_by_rule(bench: Workbench) -> dict[str, float]:
     frame = bench.cases["hframe"].model.frame_structure.frame
     found = spring_estimates(frame, ("horizontal@T1", "horizontal@T2"))
-    return {"k_x": found["x"], "k_z": found["z"], "k_theta": found["ry"]}
+    return dict(zip(RULED, (found["x"], found["z"], found["ry"]), strict=True))
 
 
 def _initial(bench: Workbench, symbol: str, before: float) -> float:
@@ -149,10 +163,11 @@ def _text_cells(bench: Workbench) -> Iterator[Cell]:
     passing = next(p for p, _ in structure.changes if p.name == row.names["a_V"])
     thousandth = Model.of(structure.with_values([passing], [1e-3 * found["a_V"][0]]))
     moved = largest_miss(thousandth, list(frequencies(Model.of(structure), USED)))
-    reason = (
-        "misprint: the unit, mm in the text and m in table 4(e); the frequencies cannot tell, "
-        f"they differ by {moved:.4f} %"
+    unit = Ground(
+        "misprint",
+        "the unit, mm in the text and m in table 4(e); the frequencies cannot tell, they differ by "
+        f"{moved:.4f} %",
     )
-    page = Page("hframe", "4e", "mm", LIMIT, reason=reason)
+    page = Page("hframe", "4e", (_TAKEN,), "mm", LIMIT, fault=unit)
     for symbol in ("a_H", "a_V"):
         yield page.cell(symbol, "initial in section 8", text[symbol], 1e3 * found[symbol][0])

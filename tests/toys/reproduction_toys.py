@@ -4,29 +4,37 @@ from __future__ import annotations
 
 import numpy as np
 
-from femubench.reproduction import Bars, Curve, Curves, Extra, Figure, Page, Study
+from femubench.reproduction import Bars, Curve, Curves, Extra, Figure, Ground, Page, Study
 
+GIVEN = Ground("input", "a count")
+FREE = Ground("independent", "nothing is chosen for it")
 EVIL = "<script>alert(1)</script> | *x* & `y` [z](w)"
 CONVENTION = "with the words frame:weight=30, which the text does not give"
 REASON = "the described least squares gives another column"
 
 
 def study(paper: str = "frame") -> Study:
-    """Return a study with two tables, three verdicts, five kinds of figures, and two drawings."""
-    plain = Page(paper, "1", unit="Hz", tolerance=0.1, decimals=1)
-    under = Page(paper, "1", unit="Hz", tolerance=0.1, convention=CONVENTION, reason=REASON)
-    share = Page(paper, "4d", unit="%", tolerance=0.05, reason=EVIL)
-    stiff = Page(paper, "4d", unit="N/m")
-    count = Page(paper, "4d", tolerance=0.0)
+    """Return a study with every verdict once or twice, two drawings, and a table of its own."""
+    under = Ground("under-convention", CONVENTION)
+    missed = Ground("does-not-follow", REASON)
+    plain = Page(paper, "1", (FREE,), "Hz", tolerance=0.1, decimals=1)
+    stated = Page(paper, "1", (FREE, under), "Hz", tolerance=0.1, fault=missed)
+    share = Page(paper, "4d", (GIVEN,), "%", tolerance=0.05, fault=Ground("misprint", EVIL))
+    stiff = Page(paper, "4d", (FREE, Ground("fitted", "damped until it met")), "N/m")
+    found = Page(paper, "4d", (Ground("searched", "found by trying", 2208),))
+    unseen = Page(paper, "4d", (Ground("cannot-be-checked", "its shapes are not printed"),))
+    count = Page(paper, "4d", (GIVEN,), tolerance=0.0)
     cells = (
         plain.cell("mode 1", "FE", 255.8, 255.83),
         plain.cell("mode 2", "FE", 500.0, 500.02),
-        under.cell("mode 3", "FE", 581.3, 581.41),
-        under.cell("mode 4", "FE", 911.3, 867.6),
-        under.cell("mode 5", "FE", 1049.4, None),
-        under.cell("rigid 1", "Kabe", -1197.6, -1197.9),
+        stated.cell("mode 3", "FE", 581.3, 581.41),
+        stated.cell("mode 4", "FE", 911.3, 867.6),
+        stated.cell("mode 5", "FE", 1049.4, None),
+        stated.cell("rigid 1", "Kabe", -1197.6, -1197.9),
         share.cell("error <b>1</b>", "C|a", 12.8, 15.0),
         stiff.cell("k_x", "updated", 3.24e9, 3.2412e9),
+        found.cell("k_z", "updated", 100.0, 100.01),
+        unseen.cell("MAC", "1", 75.0, 99.0),
         count.cell("unknowns", "K", 231, 231),
     )
     extra = Extra(
