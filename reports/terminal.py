@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from femubench.reports.cells import fixed, interval, plain, shortened, whole
 from femubench.reports.summary import Trouble, notes_of, spared, troubles, unconverged
-from femubench.results import Run, leaderboard, ranked
+from femubench.results import Run, leaderboard, ranked, tell_apart
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,6 +39,8 @@ class TerminalReporter:
         parts.append("\n".join(_legend(board)))
         if board["skill_unseen"].notna().any():
             parts.append(_unseen(board))
+        if len(board) > 1:
+            parts.append(_first_tier(run, board))
         failed = troubles(run.results)
         if failed:
             parts.append(failures(failed))
@@ -128,6 +130,17 @@ def _unseen(board: pd.DataFrame) -> str:
         f"{_marks(row)}{plain(row['strategy'])} {fixed(row['skill_unseen'], 2)}" for _, row in rows
     )
     return textwrap.fill(f"skill on unseen data (higher, modified): {', '.join(named)}", WIDTH)
+
+
+def _first_tier(run: Run, board: pd.DataFrame) -> str:
+    """Return of which strategies no difference from the best is shown, or why nothing is tested."""
+    tested = tell_apart(run, list(board["strategy"]))
+    if not tested.tiers:
+        return textwrap.fill(tested.note, WIDTH)
+    named = ", ".join(map(plain, tested.tiers[0]))
+    others = sum(map(len, tested.tiers[1:]))
+    below = f"; the other {others} differ" if others else ""
+    return textwrap.fill(f"tier 1, no difference from the best shown: {named}{below}", WIDTH)
 
 
 def _notes(run: Run) -> Iterator[str]:

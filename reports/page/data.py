@@ -171,6 +171,7 @@ def _statistics(run: Run, order: list[str]) -> dict[str, Any]:
     return {
         "pairs": [[names.index(a), names.index(b), rounded(p, 4)] for a, b, p in found.pairs],
         "groups": [[names.index(name) for name in group] for group in found.groups],
+        "tiers": [[names.index(name) for name in tier] for tier in found.tiers],
         "note": found.note,
     }
 
