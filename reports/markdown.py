@@ -22,7 +22,7 @@ from femubench.reports.summary import (
     troubles,
     unconverged,
 )
-from femubench.results import JobResult, PairedMode, Run, leaderboard, tell_apart
+from femubench.results import JobResult, PairedMode, Run, interval_kind, leaderboard, tell_apart
 
 _SPECIAL = re.compile(r"([\\`*_\[\]|~])")
 _ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
@@ -90,9 +90,9 @@ def _leaderboard(run: Run) -> Iterator[str]:
         *("rank", "strategy", "skill", "unseen", "used %", "higher %", "modified %"),
         *("rigid lost", "negative", "parameters", "evaluations", "seconds", "ok", "tier", "group"),
     ]
-    several = bool(board["skill_low"].notna().any())
-    if several:
-        headers.insert(3, "95 % interval")
+    kind = interval_kind(run)
+    if kind:
+        headers.insert(3, f"95 % interval over {kind}")
     rows = []
     for row in board.to_dict("records"):
         cells = [
@@ -108,7 +108,7 @@ def _leaderboard(run: Run) -> Iterator[str]:
             str(tiers.get(row["strategy"], NOTHING)),
             letters.get(row["strategy"], NOTHING),
         ]
-        if several:
+        if kind:
             cells.insert(3, interval(row["skill_low"], row["skill_high"]))
         rows.append(cells)
     yield table(headers, rows, "rl" + "r" * (len(headers) - 3) + "l")

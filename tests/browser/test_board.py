@@ -107,10 +107,9 @@ def test_opens_from_disk_and_is_the_leaderboard(page: Page, real: Any) -> None:
     assert page.title().startswith("Leaderboard")
     assert page.locator("#facts").inner_text().find(real.run.meta["run"]) >= 0
     for row in leaderboard(real.run).to_dict("records"):
-        data = page.locator(f"tr[data-strategy='{row['strategy']}'] .range")
-        low, high = (float(data.get_attribute(f"data-{end}") or "nan") for end in ("low", "high"))
-        assert low <= row["skill"] * (1 + 1e-9)
-        assert high >= row["skill"] * (1 - 1e-9)
+        # One seed on two structures has no interval.
+        shown_range = page.locator(f"tr[data-strategy='{row['strategy']}'] .range")
+        assert shown_range.inner_text() == "–"
     assert page.locator("tr[data-strategy=nobari] .flags").inner_text().startswith("▲")
     assert "1 failed" in page.locator("tr[data-strategy=kabe] .coverage").inner_text()
 

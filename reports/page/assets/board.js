@@ -17,7 +17,7 @@
     ...(data && data.blocks ? data.blocks : []).map((block, k) => ({ key: `${block}_percent`, title: `${block} rms,\u00a0%`, block: k, hint: `median rms frequency error of the ${block} modes`, cell: (row) => value(row[`${block}_percent`], small) })),
     { key: "flags", title: "Flags", text: true, cell: flagCell },
     { key: "coverage", title: "Coverage", text: true, cell: coverageCell },
-    { key: "tier", title: "Tier", hint: "1: no difference from the best shown; 2: none from the best of the others", cell: (row) => value(tiers[row.index], bench.count) },
+    { key: "tier", title: "Tier", hint: "1: no difference from the best shown; 2: none from the best of the others", cell: (row) => el("td", { class: "right" }, bench.count(tiers[row.index])) },
     { key: "letters", title: "Group", text: true, hint: "strategies that share a letter: no difference shown", cell: (row) => el("td", { class: "letters" }, letters[row.index] || (bench.overview.groups().length ? "alone" : "–")) },
     { key: "parameters", title: "Unknowns", hint: "free parameters, median over the cases", cell: (row) => value(row.parameters, bench.count) },
     { key: "seconds", title: "Time,\u00a0s", hint: "wall time, median over the cases", cell: (row) => value(row.seconds, small) },
