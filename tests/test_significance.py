@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 from femubench.core.errors import InputError
 from femubench.core.run.runner import run_jobs
@@ -17,7 +18,13 @@ from femubench.core.schema.results import Block, JobResult, Run
 from femubench.core.score.comparison import Against, compare_runs
 from femubench.core.score.statistics import Evidence, ScoreTable, evidence_of, structures_of
 from femubench.core.typing import FloatArray
-from femubench.results import run_from_json, run_to_json, tell_apart
+from femubench.results import (
+    interval_kind,
+    leaderboard,
+    run_from_json,
+    run_to_json,
+    tell_apart,
+)
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
@@ -215,6 +222,35 @@ class TestTiers:
             apart += any(p < 0.05 for *_, p in found.pairs)
         assert kept >= 95
         assert apart <= 7
+
+
+class TestSkill:
+    """The interval of a skill in the leaderboard."""
+
+    def test_is_that_of_student_over_structures(self) -> None:
+        """Log scores that are normal, so that the interval of Student is the right one."""
+        logs = np.random.default_rng(1).normal(-1.0, 0.4, 20)
+        scores = np.exp(np.repeat(logs, 3).reshape(20, 3, 1) + np.zeros((1, 1, 2)))
+        run = run_of({"a": scores}, TWENTY)
+        assert interval_kind(run) == "structures"
+        (row,) = leaderboard(run).to_dict("records")
+        assert row["skill"] == pytest.approx(np.exp(logs.mean()))
+        half = student.ppf(0.975, 19) * logs.std(ddof=1) / np.sqrt(20)
+        assert np.log(row["skill_low"]) == pytest.approx(logs.mean() - half, abs=0.1 * half)
+        assert np.log(row["skill_high"]) == pytest.approx(logs.mean() + half, abs=0.1 * half)
+
+    def test_grows_where_cases_share_structures_and_is_none_of_few(self) -> None:
+        logs = np.repeat(np.random.default_rng(2).normal(-1.0, 0.4, 10), 2)
+        scores = {"a": np.exp(np.repeat(logs, 3).reshape(20, 3, 1))}
+
+        def width(sharing: int) -> float:
+            labels = {case: f"s{c // sharing}" for c, case in enumerate(TWENTY)}
+            (row,) = leaderboard(run_of(scores, labels)).to_dict("records")
+            return float(np.log(row["skill_high"] / row["skill_low"]))
+
+        # Half as many independent ones: wider by the root of two, and a little for Student.
+        assert 1.4 < width(2) / width(1) < 1.7
+        assert np.isnan(width(4))
 
 
 class TestLabels:
