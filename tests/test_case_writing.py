@@ -698,6 +698,7 @@ def test_odd_names(tmp_path: Path, ladder: Case, odd: str) -> None:
         name=f"a {odd} case",
         title=f"{odd} title {odd}",
         source=odd,
+        structure=f"a {odd} thing",
         measurement=replace(m, sensors=replace(m.sensors, labels=labels)),
         modifications=(
             replace(
