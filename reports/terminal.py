@@ -145,7 +145,7 @@ def _first_tier(run: Run, board: pd.DataFrame) -> str:
         for row in first
     )
     others = len(rows) - len(tested.tiers[0])
-    below = f"; the other {others} differ" if others else ""
+    below = f"; {others} of {len(rows)} are below" if others else ""
     said = "tier 1, no difference from the best shown (95 % interval over structures)"
     return textwrap.fill(f"{said}: {named}{below}", WIDTH)
 

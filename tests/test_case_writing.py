@@ -95,7 +95,7 @@ def assert_same_measurement(one: Measurement, other: Measurement) -> None:
 
 
 def assert_same_case(one: Case, other: Case) -> None:
-    for name in ("name", "title", "source", "used", "held_out", "band", "tolerance"):
+    for name in ("name", "title", "source", "structure", "used", "held_out", "band", "tolerance"):
         assert getattr(one, name) == getattr(other, name)
     assert_same_matrix(one.model.mass, other.model.mass)
     assert_same_matrix(one.model.stiffness, other.model.stiffness)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -18,6 +19,7 @@ from femubench.core.schema.results import Block, JobResult, Run
 from femubench.core.score.comparison import Against, compare_runs
 from femubench.core.score.statistics import Evidence, ScoreTable, evidence_of, structures_of
 from femubench.core.typing import FloatArray
+from femubench.reports.terminal import TerminalReporter
 from femubench.results import (
     interval_kind,
     leaderboard,
@@ -222,6 +224,32 @@ class TestTiers:
             apart += any(p < 0.05 for *_, p in found.pairs)
         assert kept >= 95
         assert apart <= 7
+
+
+class TestScreen:
+    def test_names_the_first_tier_with_its_intervals(self) -> None:
+        random = np.random.default_rng(4)
+        scores = {
+            name: mean * np.exp(0.1 * random.standard_normal((20, 3, 1)))
+            for name, mean in {"first": 0.3, "second": 0.3, "third": 0.9}.items()
+        }
+        text = TerminalReporter().render(run_of(scores, TWENTY))
+        assert max(map(len, text.splitlines())) <= 80
+        said = " ".join(text.split())
+        assert "tier 1, no difference from the best shown (95 % interval over structures)" in said
+        tier = said.partition("structures): ")[2]
+        number = r"0\.\d{3}"
+        found = re.findall(rf"(\w+) ({number}) \(({number}) - ({number})\)", tier)
+        assert {name for name, *_ in found} == {"first", "second"}
+        assert all(float(low) < float(skill) < float(high) for _, skill, low, high in found)
+        assert "1 of 3 are below" in tier
+
+    def test_says_why_nothing_is_tested(self) -> None:
+        scores = {"first": np.full((20, 3, 9), 0.1), "second": np.full((20, 3, 9), 5.0)}
+        text = TerminalReporter().render(run_of(scores, dict.fromkeys(TWENTY, "one")))
+        told = "Ranks are not tested: no two strategies differ on 6 structures"
+        assert told in " ".join(text.split())
+        assert "tier 1" not in text
 
 
 class TestSkill:

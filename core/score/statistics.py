@@ -172,8 +172,8 @@ def structures_of(run: Run) -> dict[str, str]:
     """Return the structure of every case as the run tells; a case that is not there is its own.
 
     Examples:
-        >>> results.structures_of(run)
-        {'frame': 'ladder'}
+        >>> list(results.structures_of(run).values())
+        ['ladder']
     """
     return dict(run.meta.get("structures") or {})
 
