@@ -6,13 +6,20 @@ from femubench.core.run.frames import modes_frame, results_frame, run_from_json,
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.results import Block, JobResult, PairedMode, Run
-from femubench.core.score.leaderboard import leaderboard
+from femubench.core.score.leaderboard import interval_kind, leaderboard
 from femubench.core.score.ranking import OFFSET_PERCENT, SCORE_OF_FAILURE, TIE, rank_results, ranked
 from femubench.core.score.scoring import frequency_error, predict_block, score_model
-from femubench.core.score.statistics import METHOD, tell_apart
+from femubench.core.score.statistics import (
+    FEWEST,
+    METHOD,
+    interval_tail,
+    structures_of,
+    tell_apart,
+)
 
 __all__ = [
     "Block",
+    "FEWEST",
     "JobResult",
     "METHOD",
     "OFFSET_PERCENT",
@@ -24,6 +31,8 @@ __all__ = [
     "TIE",
     "element_norms",
     "frequency_error",
+    "interval_kind",
+    "interval_tail",
     "leaderboard",
     "modes_frame",
     "predict_block",
@@ -35,5 +44,6 @@ __all__ = [
     "run_to_json",
     "score_model",
     "stiffness_difference",
+    "structures_of",
     "tell_apart",
 ]

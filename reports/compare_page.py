@@ -22,7 +22,7 @@ _LEGEND = (
     "Ratios B / A, less than 1 is better in B: skill; used, higher, modified (rms frequency error "
     "+ 0.05 %); seconds (sums). Means are geometric, over cases and seeds."
 )
-_EVIDENCE = f"{METHOD} The interval of the mean ratio is by bootstrap."
+_EVIDENCE = f"{METHOD} The interval of the mean ratio is by bootstrap over structures."
 _SAYS = {"lost": "lost", "gained": "gained", "other": "changed"}
 _HEADS = ("strategy", "scenario", "jobs", *_RATIOS, "lost")
 
@@ -45,7 +45,7 @@ def comparison_text(data: Mapping[str, Any]) -> str:
     board = aligned_table(rows, heads, ("left", *("right",) * 7))
     parts.append(board.replace(_BLANK, " "))
     parts.append(_wrapped(_LEGEND + " Scenarios where nothing differs are left out."))
-    titles = ("strategy", "pairs", "differ", "ratio", "95 % interval", "p", "B is")
+    titles = ("strategy", "struc-\ntures", "differ", "ratio", "95 % interval", "p", "B is")
     lines = [[shortened(row[0], 18), *row[1:]] for row in map(_proof, data["evidence"])]
     align = ("left", "right", "right", "right", "left", "right", "left")
     parts.append(aligned_table(lines, titles, align))
@@ -67,7 +67,7 @@ def comparison_markdown(data: Mapping[str, Any]) -> str:
     rows = [[escape(cell) for cell in _cells(row)] for row in data["rows"]]
     parts += ["## Ratios", table(_HEADS, rows, "llrrrrrrr"), _LEGEND]
     rows = [[escape(cell) for cell in _proof(item)] for item in data["evidence"]]
-    heads = ("strategy", "pairs", "differing", "ratio", "95 % interval", "p (Holm)", "B is")
+    heads = ("strategy", "structures", "differing", "ratio", "95 % interval", "p (Holm)", "B is")
     parts += ["## Is it more than chance?", table(heads, rows, "lrrrlrl"), _EVIDENCE]
     for title, lines in _lists(data):
         parts += _bullets(title, lines)
@@ -184,7 +184,7 @@ def _proof(item: Mapping[str, Any]) -> list[str]:
     known = item["low"] is not None and item["high"] is not None
     return [
         plain(item["strategy"]),
-        str(item["pairs"]),
+        str(item["structures"]),
         str(item["differing"]),
         fixed(item["ratio"], 3, 6),
         f"{fixed(item['low'], 3, 6)} - {fixed(item['high'], 3, 6)}" if known else NOTHING,

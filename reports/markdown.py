@@ -22,7 +22,7 @@ from femubench.reports.summary import (
     troubles,
     unconverged,
 )
-from femubench.results import JobResult, PairedMode, Run, leaderboard, tell_apart
+from femubench.results import JobResult, PairedMode, Run, interval_kind, leaderboard, tell_apart
 
 _SPECIAL = re.compile(r"([\\`*_\[\]|~])")
 _ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
@@ -82,17 +82,17 @@ def table(headers: Sequence[str], rows: Iterable[Iterable[str]], align: str) -> 
 
 
 def _leaderboard(run: Run) -> Iterator[str]:
-    """Return the ranking with the groups without a difference, and what they rest on."""
+    """Return the ranking with tiers and groups without a difference, and what they rest on."""
     board = leaderboard(run)
     tested = tell_apart(run, list(board["strategy"]))
-    letters = tested.letters()
+    tiers, letters = tested.tier_of(), tested.letters()
     headers = [
         *("rank", "strategy", "skill", "unseen", "used %", "higher %", "modified %"),
-        *("rigid lost", "negative", "parameters", "evaluations", "seconds", "ok", "group"),
+        *("rigid lost", "negative", "parameters", "evaluations", "seconds", "ok", "tier", "group"),
     ]
-    several = bool(board["skill_low"].notna().any())
-    if several:
-        headers.insert(3, "95 % interval")
+    kind = interval_kind(run)
+    if kind:
+        headers.insert(3, f"95 % interval over {kind}")
     rows = []
     for row in board.to_dict("records"):
         cells = [
@@ -105,13 +105,14 @@ def _leaderboard(run: Run) -> Iterator[str]:
             *(whole(row[key]) for key in ("parameters", "evaluations")),
             fixed(row["seconds"], 3, 7),
             f"{whole(row['ok'])} of {whole(row['total'] - row['not_applicable'])}",
+            str(tiers.get(row["strategy"], NOTHING)),
             letters.get(row["strategy"], NOTHING),
         ]
-        if several:
+        if kind:
             cells.insert(3, interval(row["skill_low"], row["skill_high"]))
         rows.append(cells)
     yield table(headers, rows, "rl" + "r" * (len(headers) - 3) + "l")
-    yield f"**group**: {escape(tested.note)}"
+    yield f"**tier, group**: {escape(tested.note)}"
 
 
 def _coverage(run: Run) -> Iterator[str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from femubench.reports.cells import fixed, interval, plain, shortened, whole
 from femubench.reports.summary import Trouble, notes_of, spared, troubles, unconverged
-from femubench.results import Run, leaderboard, ranked
+from femubench.results import Run, interval_kind, leaderboard, ranked, tell_apart
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,11 +34,13 @@ class TerminalReporter:
         """Return the ranking, the failures and what the columns mean."""
         board = leaderboard(run)
         parts = [ranking(board)]
-        if board["skill_low"].notna().any():
+        if interval_kind(run) == "seeds":
             parts.append(intervals(board))
         parts.append("\n".join(_legend(board)))
         if board["skill_unseen"].notna().any():
             parts.append(_unseen(board))
+        if len(board) > 1:
+            parts.append(_first_tier(run, board))
         failed = troubles(run.results)
         if failed:
             parts.append(failures(failed))
@@ -128,6 +130,24 @@ def _unseen(board: pd.DataFrame) -> str:
         f"{_marks(row)}{plain(row['strategy'])} {fixed(row['skill_unseen'], 2)}" for _, row in rows
     )
     return textwrap.fill(f"skill on unseen data (higher, modified): {', '.join(named)}", WIDTH)
+
+
+def _first_tier(run: Run, board: pd.DataFrame) -> str:
+    """Return of which strategies no difference from the best is shown, or why nothing is tested."""
+    tested = tell_apart(run, list(board["strategy"]))
+    if not tested.tiers:
+        return textwrap.fill(tested.note, WIDTH)
+    rows = {row["strategy"]: row for row in board.to_dict("records")}
+    first = (rows[name] for name in tested.tiers[0])
+    named = ", ".join(
+        f"{_marks(row)}{plain(row['strategy'])} {fixed(row['skill'], 3)} "
+        f"({interval(row['skill_low'], row['skill_high'])})"
+        for row in first
+    )
+    others = len(rows) - len(tested.tiers[0])
+    below = f"; {others} of {len(rows)} are below" if others else ""
+    said = "tier 1, no difference from the best shown (95 % interval over structures)"
+    return textwrap.fill(f"{said}: {named}{below}", WIDTH)
 
 
 def _notes(run: Run) -> Iterator[str]:

@@ -95,7 +95,7 @@ def assert_same_measurement(one: Measurement, other: Measurement) -> None:
 
 
 def assert_same_case(one: Case, other: Case) -> None:
-    for name in ("name", "title", "source", "used", "held_out", "band", "tolerance"):
+    for name in ("name", "title", "source", "structure", "used", "held_out", "band", "tolerance"):
         assert getattr(one, name) == getattr(other, name)
     assert_same_matrix(one.model.mass, other.model.mass)
     assert_same_matrix(one.model.stiffness, other.model.stiffness)
@@ -698,6 +698,7 @@ def test_odd_names(tmp_path: Path, ladder: Case, odd: str) -> None:
         name=f"a {odd} case",
         title=f"{odd} title {odd}",
         source=odd,
+        structure=f"a {odd} thing",
         measurement=replace(m, sensors=replace(m.sensors, labels=labels)),
         modifications=(
             replace(

@@ -91,10 +91,14 @@ def test_ratios_by_block_and_scenario_are_those_of_the_errors(data: Data) -> Non
     assert {item["scenario"] for item in found["excesses"]} == {None, "corner", "other"}
 
 
-def test_evidence_needs_six_pairs_that_differ() -> None:
+def test_evidence_needs_six_structures_that_differ() -> None:
     few, many, mixed = [1.1] * 5, [1.1, 1.2, 1.3, 1.05, 1.15, 1.4, 1.01, 1.2], [0.5, 2.0] * 5
     found = {item.strategy: item for item in evidence_of({"few": few, "many": many})}
-    assert (found["few"].verdict, found["few"].p, found["few"].low) == ("too few pairs", None, None)
+    assert (found["few"].verdict, found["few"].p, found["few"].low) == (
+        "too few structures",
+        None,
+        None,
+    )
     assert found["many"].verdict == "worse"
     assert found["many"].p == pytest.approx(2 / 2**8)
     low, high, ratio = found["many"].low, found["many"].high, found["many"].ratio
@@ -103,7 +107,11 @@ def test_evidence_needs_six_pairs_that_differ() -> None:
     assert ratio is not None
     assert 1.0 < low < ratio < high
     better = evidence_of({"many": [1.0 / value for value in many], "mixed": mixed, "none": []})
-    assert [item.verdict for item in better] == ["better", "no difference shown", "too few pairs"]
+    assert [item.verdict for item in better] == [
+        "better",
+        "no difference shown",
+        "too few structures",
+    ]
     # Holm: the smallest of two p is doubled.
     assert better[0].p == pytest.approx(4 / 2**8)
     # What two machines round differently is no difference.
@@ -121,7 +129,7 @@ def test_signed_ranks_with_ties_against_hand_figures() -> None:
     """Ranks 1.5, 1.5, 3, 4, 5.5, 5.5, the second one falling: 3 of 64 sums are 1.5 or less."""
     ratios = [2.0, 1 / 2.0, 4.0, 8.0, 16.0, 16.0]
     (found,) = evidence_of({"s": [*ratios, 1.0]})
-    assert (found.pairs, found.differing) == (7, 6)
+    assert (found.structures, found.differing) == (7, 6)
     assert found.p == pytest.approx(2 * 3 / 64)
 
 
@@ -133,21 +141,25 @@ def test_signed_ranks_are_those_of_scipy(count: int) -> None:
     assert found.p == pytest.approx(expected.pvalue, rel=1e-9)
 
 
-def test_seeds_are_averaged_but_in_a_run_of_one_case(data: Data) -> None:
+def test_neither_seeds_nor_cases_of_one_structure_count_as_structures(data: Data) -> None:
     """Draws of the noise on one structure say nothing about other structures."""
     before, after = data, scaled(data, "softer", 1.5)
     several = [json.loads(json.dumps(run)) for run in (before, after)]
     for run in several:
         run["results"] = [{**r, "seed": seed} for r in run["results"] for seed in (1, 2, 3)]
 
-    def pairs(*runs: Data) -> int:
+    def evidence(*runs: Data) -> Data:
         (found,) = compared(*runs, strategies=["softer"])["evidence"]
-        return int(found["pairs"])
+        return dict(found)
 
-    assert pairs(before, after) == pairs(*several) == 6
+    assert before["meta"]["structures"] == {"corner": "corner", "other/corner": "other/corner"}
+    assert evidence(before, after)["structures"] == evidence(*several)["structures"] == 2
     for run in several:
-        run["results"] = [r for r in run["results"] if r["case"] == "corner"]
-    assert pairs(*several) == 9
+        run["meta"]["structures"]["other/corner"] = "corner"
+    found = evidence(*several)
+    assert (found["structures"], found["verdict"]) == (1, "too few structures")
+    # Both cases have three blocks, so that the whole is the mean of the scores.
+    assert found["ratio"] == pytest.approx(row(compared(*several), "softer")["skill"], rel=1e-12)
 
 
 VARIANT = "softer:factor=0.5"
@@ -332,7 +344,7 @@ def test_runs_of_a_store_by_their_first_letters(tmp_path: Path) -> None:
     answer = CliRunner().invoke(bench, ["compare", a, b, *options])
     assert answer.exit_code == 0
     found = json.loads(answer.output)
-    assert (found["schema"], found["before"], found["after"]) == (1, a, b)
+    assert (found["schema"], found["before"], found["after"]) == (2, a, b)
     assert found["evidence"][0]["verdict"] == "same"
 
 

@@ -179,11 +179,11 @@ class TestStatistics:
         found = outcome_of(scored({name: list(random.uniform(0.9, 1.1, 12)) for name in "abcd"}))
         assert [sorted(group) for group in found.groups] == [list("abcd")]
 
-    def test_few_pairs_are_not_tested(self) -> None:
+    def test_few_structures_are_not_tested(self) -> None:
         for step, cases in ((1.0, 5), (0.0, 12), (1e-9, 12)):
             table = {name: [1.0 + step * k] * cases for k, name in enumerate("abc")}
             found = outcome_of(scored(table))
-            assert found.pairs == found.groups == ()
+            assert found.tiers == found.pairs == found.groups == ()
             assert "not tested" in found.note
 
     def test_too_few_pairs_for_so_many_comparisons_are_told(self) -> None:
@@ -220,7 +220,7 @@ class TestStatistics:
 
     def test_markdown_has_groups_coverage_and_the_test(self) -> None:
         text = MarkdownReporter().render(SMALL)
-        assert "| ok | group |" in text
+        assert "| ok | tier | group |" in text
         assert "Wilcoxon's signed rank test" in text
 
 

@@ -93,6 +93,8 @@ def test_one_run_gives_its_leaderboard(data: Data, site: Site) -> None:
             ) or (version[f"{block}_percent"] is None)
     assert [case["name"] for case in found["cases"]] == ["corner", "other/corner"]
     assert all(case["ranked"] for case in found["cases"])
+    (kept,) = (site.folder / "data").glob("*.json")
+    assert json.loads(kept.read_text())["meta"]["structures"] == data["meta"]["structures"]
     text = (site.folder / "index.html").read_text()
     assert f"{found['strategies'][0]['versions'][0]['skill']:.3f}" in text
 

@@ -105,3 +105,20 @@ def test_the_twin_interpolation_agrees_with_a_left_out_station() -> None:
     interpolated = twin_data._reading(left_out, xyz, "z")
     peak = first["uz"].abs().max()
     assert interpolated == pytest.approx(first.loc[station, "uz"], abs=5e-4 * peak)
+
+
+def test_cases_of_one_structure_say_so() -> None:
+    """All of them, so that no built-in case counts twice as evidence."""
+    shared: dict[str, set[str]] = {}
+    for file in HERE.glob("**/case.toml"):
+        told = tomllib.loads(file.read_text(encoding="utf-8"))["case"]
+        shared.setdefault(told.get("structure", told["name"]), set()).add(told["name"])
+    assert {label: names for label, names in shared.items() if len(names) > 1} == {
+        "ladder": {
+            *("frame", "frame-solid", "frame-beam", "frame-beam-asymmetric"),
+            *("design-change/ladder-beam", "design-change/ladder-solid"),
+        },
+        "h-frame": {"hframe", "hframe-solid", "design-change/hframe-solid"},
+        "suite/garteur": {"garteur", "suite/garteur"},
+    }
+    assert read_case(CASES["frame"], "frame").structure == "ladder"

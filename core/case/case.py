@@ -55,6 +55,8 @@ class Case(Shown):
             1 beside a reference, which says much of it, and 0 without.
         beam_share: how probable it is, before any datum, that the structure behaves like a beam
             model with ordinary scatter.
+        structure: the physical structure, which several cases may share; empty for one that no
+            other case is known to share.
     """
 
     name: str
@@ -73,6 +75,7 @@ class Case(Shown):
     reference_used: tuple[int, ...] = ()
     model_error: float | None = None
     beam_share: float = BEAM_SHARE
+    structure: str = ""
 
     def rows(self) -> list[tuple[str, str]]:
         """Return where the case is from, its model, and what was measured on it."""
@@ -81,6 +84,7 @@ class Case(Shown):
             (self.name, self.title),
             ("source", self.source),
             ("folder", str(self.folder)),
+            *([("structure", self.structure)] if self.structure else []),
             ("model", self.model.rows()[0][1]),
             ("sensors", str(len(measured.sensors))),
             ("used", modes_line(self.used, measured.select(self.used).frequencies)),

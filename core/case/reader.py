@@ -160,6 +160,7 @@ class _Building:
             reference_used=self.reference_used,
             model_error=self.spec.diagnosis.model_error,
             beam_share=self.spec.diagnosis.beam_share,
+            structure=info.structure,
         )
 
     def model(self) -> Model:

@@ -170,6 +170,7 @@ class CaseInfo(Table):
     name: CaseName = Field(description="a name without blanks at its ends, in quotes")
     title: Text = Field("", description="one line of text")
     source: Text = Field("", description="one line: where the numbers come from")
+    structure: CaseName = Field("", description="a name without blanks at its ends, in quotes")
 
 
 class MaterialSpec(Table):

@@ -78,7 +78,7 @@ _SAME_MATRIX = 1e-9  # of the diagonal: far above rounding, far below any change
 
 
 _SETTINGS = (
-    *("name", "title", "source", "used", "held_out", "band", "reference_used"),
+    *("name", "title", "source", "structure", "used", "held_out", "band", "reference_used"),
     *("tolerance", "model_error", "beam_share"),
 )
 
@@ -215,8 +215,8 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
         files["sensors.csv"] = sensors_csv(case.measurement.sensors)
     files["modes.csv"] = modes_csv(case.measurement, share)
     measurement |= _settings(case)
-    info = {"name": case.name, "title": case.title, "source": case.source}
-    info = {key: value for key, value in info.items() if value}
+    told = {key: getattr(case, key) for key in ("name", "title", "source", "structure")}
+    info = {key: value for key, value in told.items() if value}
     content: Keys = {"case": info, "model": keys, "measurement": measurement}
     tables = []
     for item in modifications:

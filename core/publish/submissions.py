@@ -61,6 +61,7 @@ class _Meta(_Record):
     seed: int = 0
     strategies: list[Name] = []
     baseline: Name | None = None
+    structures: dict[Name, Name] = {}
     cases: dict[Name, _Case]
     citations: dict[Name, Annotated[str, Field(max_length=5_000)]] = {}
     reference: dict[Name, dict[Literal["used", "higher", "modified"], float]]
@@ -139,8 +140,9 @@ def _meta(run: Run, file: Path) -> dict[str, Any]:
         key = ".".join(["meta", *map(str, first["loc"])])
         raise InputError(first["msg"], file=file, key=key) from error
     data: dict[str, Any] = record.model_dump()
-    if data["baseline"] is None:  # as in what was published before there was one
-        del data["baseline"]
+    for name in ("baseline", "structures"):
+        if not data[name]:  # as in what was published before there was one
+            del data[name]
     for name, blocks in data["reference"].items():
         for block, value in blocks.items():
             if not 0.0 <= value <= 1e150:

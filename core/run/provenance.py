@@ -185,6 +185,7 @@ def run_meta(
             "blas": blas_name(),
         },
         "git_commit": git_commit(),
+        "structures": {case.name: case.structure or case.name for case in cases},
         "cases": {case.name: {"title": case.title, "digest": case.digest} for case in cases},
         "strategies": [strategy.name for strategy in strategies],
         "citations": {strategy.name: strategy.citation for strategy in strategies},

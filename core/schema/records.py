@@ -108,6 +108,7 @@ class MetaRecord(BaseModel):
     strategies: Annotated[list[Name], Field(max_length=_MOST_NAMES)] = []
     baseline: Name | None = None
     cases: dict[Name, _CaseMeta] = {}
+    structures: dict[Name, Name] | None = None
     citations: dict[Name, _Text] | None = None
     reference: dict[Name, dict[Name, _Percent]] | None = None
 
@@ -226,7 +227,12 @@ def run_to_json(run: Run) -> dict[str, Any]:
         ['meta', 'results']
     """
     meta: dict[str, Any] = finite(dict(run.meta))
-    return {"meta": meta, "results": [result_to_json(result) for result in run.results]}
+    structures = meta.get("structures") or {}
+    results = [
+        {**result_to_json(result), "structure": structures.get(result.case, result.case)}
+        for result in run.results
+    ]
+    return {"meta": meta, "results": results}
 
 
 def run_from_json(data: object, *, file: Path | str | None = None) -> Run:

@@ -11,13 +11,13 @@ from femubench.core.errors import InputError
 from femubench.core.schema.results import BLOCKS, DONE, JobResult, Run
 from femubench.core.score.ranking import OFFSET_PERCENT, geometric_mean, score_of
 from femubench.core.score.repeatability import environment_differences
-from femubench.core.score.statistics import Evidence, block_ratios, evidence_of, log_scores
+from femubench.core.score.statistics import Evidence, ScoreTable, evidence_of, structures_of
 from femubench.core.typing import FloatArray
 
 Metric = Literal["skill", "used", "higher", "modified", "seconds", "failures"]
 METRICS: tuple[Metric, ...] = get_args(Metric)
 Kind = Literal["lost", "gained", "other"]
-SCHEMA = 1
+SCHEMA = 2
 
 
 @dataclass(frozen=True)
@@ -212,6 +212,7 @@ def compare_runs(
         expected = "one (case, strategy, seed) with the same case files"
         raise InputError("the two runs have no job in common", expected=expected)
     references = {**(after.meta.get("reference") or {}), **(before.meta.get("reference") or {})}
+    structures = {**structures_of(after), **structures_of(before)}
     pairs = [_Pair(j.strategy, old[j], new[j], references.get(j.case) or {}) for j in shared]
     rows = tuple(_rows(pairs))
     return Comparison(
@@ -221,7 +222,7 @@ def compare_runs(
         jobs=len(pairs),
         changes=_changes(pairs),
         rows=rows,
-        evidence=evidence_of(_ratios(pairs, references)),
+        evidence=evidence_of(_ratios(pairs, references, structures)),
         only_before=tuple(job for job in old if job not in new),
         only_after=tuple(job for job in new if job not in old),
         other_cases=tuple(other),
@@ -311,14 +312,16 @@ def _damage(result: JobResult) -> str:
 
 
 def _ratios(
-    pairs: Sequence[_Pair], references: Mapping[str, Mapping[str, float]]
+    pairs: Sequence[_Pair],
+    references: Mapping[str, Mapping[str, float]],
+    structures: Mapping[str, str],
 ) -> dict[str, FloatArray]:
-    """Return the ratios of the scores of all blocks by strategy."""
+    """Return the ratios of the scores on all structures by strategy."""
     names = list(dict.fromkeys(pair.strategy for pair in pairs))
     columns = [[pair.before for pair in pairs if pair.strategy == name] for name in names]
     columns += [[pair.after for pair in pairs if pair.strategy == name] for name in names]
-    logs = log_scores(columns, references)
-    return {name: block_ratios(logs[k], logs[k + len(names)]) for k, name in enumerate(names)}
+    table = ScoreTable.of(columns, references, structures)
+    return {name: table.ratios(k, k + len(names)) for k, name in enumerate(names)}
 
 
 def _rows(pairs: Iterable[_Pair]) -> Iterable[Row]:

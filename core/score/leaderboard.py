@@ -16,6 +16,7 @@ from femubench.core.score.ranking import (
     ranked,
     score_of,
 )
+from femubench.core.score.statistics import FEWEST, interval_over_structures, structures_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,10 +37,12 @@ class _Grid:
     Arguments:
         blocks: number of blocks by case.
         seeds: of the run.
+        structures: by case; one that is not named is a structure of its own.
     """
 
     blocks: dict[str, int]
     seeds: tuple[int, ...]
+    structures: dict[str, str]
 
     @classmethod
     def of(cls, run: Run) -> _Grid:
@@ -48,7 +51,23 @@ class _Grid:
         for result in run.results:
             blocks[result.case] = max(blocks.get(result.case, 1), len(result.blocks))
         seeds = {*run.meta.get("seeds", ()), *(result.seed for result in run.results)}
-        return cls(blocks, tuple(sorted(seeds)))
+        return cls(blocks, tuple(sorted(seeds)), structures_of(run))
+
+    @property
+    def interval(self) -> str:
+        """Return what the intervals of the skills are over; nothing where there are none."""
+        count = len({self.structures.get(case, case) for case in self.blocks})
+        return "structures" if count >= FEWEST else "seeds" if len(self.seeds) > 1 else ""
+
+
+def interval_kind(run: Run) -> str:
+    """Return what the intervals of the skills are over: ``structures``, ``seeds`` or nothing.
+
+    Examples:
+        >>> results.interval_kind(run)
+        ''
+    """
+    return _Grid.of(run).interval
 
 
 def leaderboard(run: Run) -> pd.DataFrame:
@@ -57,7 +76,8 @@ def leaderboard(run: Run) -> pd.DataFrame:
     Strategies of one skill share a rank.
 
     `skill` is the geometric mean over all blocks of all cases, and with several seeds the median
-    over seeds, with a 95 % bootstrap interval in `skill_low` and `skill_high`; `skill_unseen` is
+    over seeds, with a 95 % bootstrap interval in `skill_low` and `skill_high`: over structures
+    where there are enough of them, else over the seeds of those there are; `skill_unseen` is
     that over all seeds without the block that the strategy was given. The three errors are the
     median over cases of the median over seeds of the rms error in percent, over the jobs that
     are ok; so are `parameters`, `evaluations` and `seconds`. Rigid-body modes lost and negative
@@ -97,7 +117,11 @@ def _row(
     reference: Mapping[str, Mapping[str, float]],
 ) -> dict[str, Any]:
     skills = _skills(results, grid)
-    low, high = _interval(skills, strategy, seed)
+    low, high = (
+        _over_structures(results, grid)
+        if grid.interval == "structures"
+        else _over_seeds(skills, strategy, seed)
+    )
     fine = [result for result in results if result.status == "ok"]
     return {
         "strategy": strategy,
@@ -144,7 +168,21 @@ def _unseen(
     return geometric_mean(scores, weights) if scores else float("nan")
 
 
-def _interval(skills: Sequence[float], strategy: str, seed: int) -> tuple[float, float]:
+def _over_structures(results: Sequence[JobResult], grid: _Grid) -> tuple[float, float]:
+    """Return the bootstrap interval of the skill over structures, each with all its seeds."""
+    scores = {(result.case, result.seed): result.score for result in results}
+    sums: dict[str, list[float]] = {}
+    for case, weight in grid.blocks.items():
+        found = [scores.get((case, seed)) for seed in grid.seeds]
+        logs = np.log([SCORE_OF_FAILURE if score is None else score for score in found])
+        entry = sums.setdefault(grid.structures.get(case, case), [0.0, 0.0])
+        entry[0] += weight * float(logs.mean())
+        entry[1] += weight
+    totals, weights = np.array(list(sums.values())).T
+    return interval_over_structures(totals / weights, weights)
+
+
+def _over_seeds(skills: Sequence[float], strategy: str, seed: int) -> tuple[float, float]:
     """Return the bootstrap interval of the median over seeds; nan with a single seed."""
     if len(skills) < 2:
         return float("nan"), float("nan")

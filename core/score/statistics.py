@@ -1,15 +1,15 @@
-"""Do two strategies differ by more than chance? Signed ranks over blocks, Holm's correction.
+"""Do two strategies differ by more than chance? Signed ranks over structures, Holm's correction.
 
-The one answer of `bench compare` and of the groups in the reports of a run.
+The one answer of `bench compare` and of the tiers and groups in the reports of a run.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -17,35 +17,44 @@ from femubench.core.schema.results import JobResult, Run
 from femubench.core.score.ranking import OFFSET_PERCENT, score_of
 from femubench.core.typing import FloatArray
 
-Verdict = Literal["better", "worse", "no difference shown", "same", "too few pairs"]
-FEWEST = 6  # pairs that differ; five can at best give p = 0.06
+_Item = TypeVar("_Item", bound=Hashable)
+Verdict = Literal["better", "worse", "no difference shown", "same", "too few structures"]
+FEWEST = 6  # structures that differ; five can at best give p = 0.06
 LEVEL = 0.05
 METHOD = (
-    "Wilcoxon's signed rank test on the scores of both, paired by block of each case (seeds "
-    "averaged; in a run of one case every seed is a pair), Holm's correction over the comparisons. "
-    f"Fewer than {FEWEST} pairs that differ say nothing."
+    "Wilcoxon's signed rank test on the scores of both, paired by structure: seeds, blocks and "
+    "cases of one structure are averaged first (geometric mean), since they say nothing about "
+    "other structures. Holm's correction over the comparisons. With fewer than "
+    f"{FEWEST} structures that differ no difference is claimed, however large it is."
+)
+_NOTE = (
+    "Tier 1: no difference from the first strategy is shown at the 5 % level (Holm's correction "
+    "over the comparisons with it), so that the best one is among them; of many that are equally "
+    "good one or another may still be below. Tier 2: the same among the others, and so on. "
+    "Strategies that share a letter: no difference between them is shown when all pairs are "
+    f"compared, which takes more to show one. {METHOD}"
 )
 _DIGITS = 6  # of the logarithm of a ratio; what two machines round differently is a tie
-_MOST_EXACT = 50  # pairs up to which all signs are counted out
-_RESAMPLES = 999
+_MOST_EXACT = 50  # structures up to which all signs are counted out
+_RESAMPLES = 4999
 _MOST_GROUPS = 26  # more overlapping groups than letters say nothing to a reader
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the pairs of one comparison say.
+    """What the structures of one comparison say.
 
     Arguments:
         strategy: the one that is judged.
-        pairs, differing: blocks that both have, and those whose scores differ.
-        ratio: geometric mean of the ratios B / A; None without a pair.
-        low, high: its 95 % bootstrap interval; None with few pairs.
-        p: of the signed rank test, after Holm's correction; None with few pairs.
+        structures, differing: those that both have results of, and those whose scores differ.
+        ratio: geometric mean over the structures of the ratios B / A; None without any.
+        low, high: its 95 % bootstrap interval over structures; None with few structures.
+        p: of the signed rank test, after Holm's correction; None with few structures.
         verdict: in words.
     """
 
     strategy: str
-    pairs: int
+    structures: int
     differing: int
     ratio: float | None
     low: float | None
@@ -59,15 +68,24 @@ class Groups:
     """Which strategies of a run no difference is shown of.
 
     Arguments:
-        pairs: two strategies and p after Holm's correction; 1 where too few pairs differ.
+        tiers: the strategies of which no difference from the best one is shown, then those of which
+            none from the best one of the others is shown, and so on; each in the order of the
+            leaderboard; none without a test.
+        pairs: two strategies and p after Holm's correction over all pairs; 1 where too few
+            structures differ.
         groups: strategies without a difference among them, each group and the groups in the order
             of the leaderboard; none without a test.
         note: in words for a reader.
     """
 
+    tiers: tuple[tuple[str, ...], ...]
     pairs: tuple[tuple[str, str, float], ...]
     groups: tuple[tuple[str, ...], ...]
     note: str
+
+    def tier_of(self) -> dict[str, int]:
+        """Return the number of every strategy's tier; the first one is 1."""
+        return {name: place for place, tier in enumerate(self.tiers, start=1) for name in tier}
 
     def letters(self) -> dict[str, str]:
         """Return the letters of a strategy's groups."""
@@ -78,72 +96,148 @@ class Groups:
         return {name: " ".join(letters) for name, letters in found.items()}
 
 
-def log_scores(
-    columns: Sequence[Iterable[JobResult]], references: Mapping[str, Mapping[str, float]]
-) -> FloatArray:
-    """Return the logarithm of the score of every block; (columns, blocks of the cases, seeds).
-
-    A job without a model scores as in the ranking; nan where there is no result, and for such a job
-    where the nominal error is not known. The seeds of one case alone are blocks of their own.
+@dataclass(frozen=True)
+class ScoreTable:
+    """The scores of strategies on structures.
 
     Arguments:
-        columns: the results of a strategy each.
-        references: rms error of the nominal model in percent by case and block.
+        logs: logarithms of the scores of all blocks, nan where there is no result; (columns,
+            blocks, seeds).
+        structures: 1 where a block belongs to a structure, else 0; (structures, blocks).
     """
-    found: list[dict[tuple[str, str, int], float]] = []
-    for results in columns:
-        found.append({})
-        for result in results:
-            known = references.get(result.case) or {}
-            scores = {name: score_of(result, {name: rms}) for name, rms in known.items()}
-            if not known and result.status == "ok":
-                # The unknown nominal error is a factor of both sides of every pair.
-                scores = {name: b.rms_percent + OFFSET_PERCENT for name, b in result.blocks.items()}
-            for name, score in scores.items():
-                found[-1][result.case, name, result.seed] = math.log(score)
-    units = list(dict.fromkeys(unit for scores in found for unit in scores))
-    blocks = {block: place for place, block in enumerate(dict.fromkeys(unit[:2] for unit in units))}
-    seeds = {seed: place for place, seed in enumerate(dict.fromkeys(unit[2] for unit in units))}
-    table = np.full((len(columns), len(blocks), len(seeds)), np.nan)
-    for column, values in enumerate(found):
-        for (case, name, seed), value in values.items():
-            table[column, blocks[case, name], seeds[seed]] = value
-    alone = len({case for case, _ in blocks}) == 1
-    return table.reshape(len(columns), -1, 1) if alone else table
+
+    logs: FloatArray
+    structures: FloatArray
+
+    @classmethod
+    def of(
+        cls,
+        columns: Sequence[Iterable[JobResult]],
+        references: Mapping[str, Mapping[str, float]],
+        structures: Mapping[str, str],
+    ) -> ScoreTable:
+        """Return the scores of results.
+
+        A job without a model scores as in the ranking; it is left out where the nominal error is
+        not known.
+
+        Arguments:
+            columns: the results of a strategy each.
+            references: rms error of the nominal model in percent by case and block.
+            structures: by case; one that is not named is a structure of its own.
+        """
+        found: list[dict[tuple[str, str, int], float]] = []
+        for results in columns:
+            found.append({})
+            for result in results:
+                known = references.get(result.case) or {}
+                scores = {name: score_of(result, {name: rms}) for name, rms in known.items()}
+                if not known and result.status == "ok":
+                    # The unknown nominal error is a factor of both sides of every pair.
+                    errors = {name: block.rms_percent for name, block in result.blocks.items()}
+                    scores = {name: error + OFFSET_PERCENT for name, error in errors.items()}
+                for name, score in scores.items():
+                    found[-1][result.case, name, result.seed] = math.log(score)
+        units = list(dict.fromkeys(unit for scores in found for unit in scores))
+        blocks = _places(unit[:2] for unit in units)
+        seeds = _places(unit[2] for unit in units)
+        logs = np.full((len(columns), len(blocks), len(seeds)), np.nan)
+        for column, values in enumerate(found):
+            for (case, name, seed), value in values.items():
+                logs[column, blocks[case, name], seeds[seed]] = value
+        names = _places(structures.get(case, case) for case, _ in blocks)
+        member = np.zeros((len(names), len(blocks)))
+        for (case, _), place in blocks.items():
+            member[names[structures.get(case, case)], place] = 1.0
+        return cls(logs, member)
+
+    def ratios(self, before: int, after: int) -> FloatArray:
+        """Return the ratios of the scores, after / before, of the structures that both have.
+
+        Seeds are averaged first, then the blocks of all cases of a structure, as geometric means.
+
+        Arguments:
+            before, after: columns.
+        """
+        change = self.logs[after] - self.logs[before]
+        there = np.isfinite(change)
+        seeds = there.sum(axis=1)
+        means = np.where(there, change, 0.0).sum(axis=1) / np.maximum(seeds, 1)
+        blocks = self.structures @ (seeds > 0)
+        shared = blocks > 0.0
+        return np.asarray(np.exp((self.structures @ means)[shared] / blocks[shared]))
 
 
-def block_ratios(before: FloatArray, after: FloatArray) -> FloatArray:
-    """Return the ratios of the scores, after / before, of the blocks that both have.
+def structures_of(run: Run) -> dict[str, str]:
+    """Return the structure of every case as the run tells; a case that is not there is its own.
+
+    Examples:
+        >>> list(results.structures_of(run).values())
+        ['ladder']
+    """
+    return dict(run.meta.get("structures") or {})
+
+
+def interval_over_structures(
+    logs: FloatArray, weights: FloatArray | None = None
+) -> tuple[float, float]:
+    """Return the 95 % interval of a geometric mean by resampling structures.
 
     Arguments:
-        before, after: logarithms; (blocks, seeds).
+        logs: logarithm of the mean of every structure.
+        weights: of the structures; equal by default.
+
+    Source: percentile bootstrap; Hesterberg (2015), American Statistician 69, 371-386.
     """
-    change = after - before
-    there = np.isfinite(change)
-    shared = there.any(axis=1)
-    sums = np.where(there, change, 0.0).sum(axis=1)
-    return np.asarray(np.exp(sums[shared] / there.sum(axis=1)[shared]))
+    count = len(logs)
+    shares = np.ones(count) if weights is None else weights
+    drawn = np.random.default_rng(0).integers(0, count, (_RESAMPLES, count))
+    means = (shares * logs)[drawn].sum(axis=1) / shares[drawn].sum(axis=1)
+    tail = interval_tail(count)
+    low, high = np.exp(np.quantile(means, (tail, 1.0 - tail)))
+    return float(low), float(high)
+
+
+def interval_tail(count: int) -> float:
+    """Return the share of resamples beyond either end of the 95 % interval.
+
+    The fewer structures, the less it is, as with Student's t: a share of 0.025 would make the
+    interval of ten structures too narrow by a fifth.
+
+    Arguments:
+        count: number of structures, at least 2.
+
+    Examples:
+        >>> [round(results.interval_tail(count), 3) for count in (6, 10, 1000)]
+        [0.002, 0.009, 0.025]
+
+    Source: Hesterberg (2015), section on expanded percentile intervals.
+    """
+    from scipy.special import ndtr, stdtrit
+
+    return float(ndtr(math.sqrt(count / (count - 1)) * stdtrit(count - 1, 0.025)))
 
 
 def evidence_of(ratios: Mapping[str, Sequence[float] | FloatArray]) -> tuple[Evidence, ...]:
     """Return what every comparison says, with Holm's correction over those that can be tested.
 
     Arguments:
-        ratios: of the scores, B / A, one for every block, by the strategy that is judged.
+        ratios: of the scores, B / A, one for every structure, by the strategy that is judged.
     """
     logs = {name: np.log(np.array(values, dtype=float)) for name, values in ratios.items()}
     found = []
-    for (name, values), p in zip(logs.items(), _corrected(logs.values()), strict=True):
+    corrected = _corrected([_test(values) for values in logs.values()])
+    for (name, values), p in zip(logs.items(), corrected, strict=True):
         differing = _differing(values)
         ratio = float(np.exp(values.mean())) if len(values) else None
         low = high = None
-        verdict: Verdict = "same" if len(values) and not len(differing) else "too few pairs"
+        verdict: Verdict = "same" if len(values) and not len(differing) else "too few structures"
         if p is not None:
             verdict = "no difference shown"
             if p < LEVEL:
                 verdict = "worse" if _signed_rank(differing)[1] else "better"
         if p is not None or (verdict == "same" and len(values) >= FEWEST):
-            low, high = _interval(values)
+            low, high = interval_over_structures(values)
         found.append(Evidence(name, len(values), len(differing), ratio, low, high, p, verdict))
     return tuple(found)
 
@@ -161,31 +255,50 @@ def tell_apart(run: Run, order: Sequence[str]) -> Groups:
     columns: dict[str, list[JobResult]] = {name: [] for name in order}
     for result in run.results:
         columns[result.strategy].append(result)
-    logs = log_scores(list(columns.values()), run.meta.get("reference") or {})
+    table = ScoreTable.of(
+        list(columns.values()), run.meta.get("reference") or {}, structures_of(run)
+    )
     places = list(combinations(range(len(order)), 2))
-    ratios = [block_ratios(logs[i], logs[j]) for i, j in places]
-    differing = [len(_differing(np.log(values))) for values in ratios]
-    tested = sum(count >= FEWEST for count in differing)
-    if not tested:
-        note = f"Ranks are not tested: no two strategies differ in {FEWEST} blocks or more."
-        return Groups((), (), note)
-    found = [1.0 if p is None else p for p in _corrected(np.log(values) for values in ratios)]
+    logs = {(i, j): np.log(table.ratios(i, j)) for i, j in places}
+    most = max((len(_differing(values)) for values in logs.values()), default=0)
+    if most < FEWEST:
+        note = (
+            f"Ranks are not tested: no two strategies differ on {FEWEST} structures or more; with "
+            "fewer no difference is claimed, however large it is, and seeds do not count for them."
+        )
+        return Groups((), (), (), note)
+    raw = {pair: _test(values) for pair, values in logs.items()}
+    found = [1.0 if p is None else p for p in _corrected(list(raw.values()))]
     sets, whole = _groups(
         len(order), [pair for pair, p in zip(places, found, strict=True) if p < LEVEL]
     )
-    note = f"Strategies that share a letter: no difference shown at the 5 % level. {METHOD}"
-    least = 2.0 ** (1 - max(differing))
-    if least * tested >= LEVEL:
-        note += (
-            f" With {max(differing)} pairs the test gives no p below {least:.2g}, too much for "
-            f"{tested} comparisons: none can be shown, however large the difference."
-        )
+    note = _NOTE + _out_of_reach(most, [p is not None for p in raw.values()], len(order) - 1)
     if not whole:
         note += " Of many overlapping groups those of neighbours in the ranking are shown."
     return Groups(
+        tuple(tuple(order[place] for place in tier) for tier in _tiers(len(order), raw)),
         tuple((order[i], order[j], p) for (i, j), p in zip(places, found, strict=True)),
         tuple(tuple(order[place] for place in members) for members in sets),
         note,
+    )
+
+
+def _out_of_reach(most: int, tested: Sequence[bool], others: int) -> str:
+    """Return which comparisons can show nothing because so few structures are there.
+
+    Arguments:
+        most: structures that differ in one comparison, at most.
+        tested: whether a pair is tested; those with the first strategy come first.
+        others: number of strategies but the first.
+    """
+    least = 2.0 ** (1 - most)
+    kinds = {"pairs": sum(tested), "comparisons with the first strategy": sum(tested[:others])}
+    named = [f"{count} {kind}" for kind, count in kinds.items() if least * count >= LEVEL]
+    if not named:
+        return ""
+    return (
+        f" With {most} structures the test gives no p below {least:.2g}, too much for "
+        f"{' and for '.join(named)}: none can be shown there, however large the difference."
     )
 
 
@@ -202,15 +315,39 @@ def holm(p: Sequence[float]) -> FloatArray:
     return corrected
 
 
-def _corrected(logs: Iterable[FloatArray]) -> list[float | None]:
-    """Return p of every comparison; None, and no part in the correction, where few pairs differ.
+def _tiers(count: int, raw: Mapping[tuple[int, int], float | None]) -> Iterator[tuple[int, ...]]:
+    """Yield those that do not differ from the first, then the same of those that are left.
+
+    Arguments:
+        count: number of strategies, best first.
+        raw: p of every pair (i, j) with i < j, not corrected; None where few structures differ.
+
+    Source: Hsu (1981), Annals of Statistics 9, 1026-1034, on comparisons with the best one alone.
+    """
+    left = list(range(count))
+    while left:
+        best, *others = left
+        p = _corrected([raw[best, one] for one in others])
+        below = [
+            one for one, value in zip(others, p, strict=True) if value is not None and value < LEVEL
+        ]
+        yield tuple(one for one in left if one not in below)
+        left = below
+
+
+def _test(logs: FloatArray) -> float | None:
+    """Return p of one comparison before any correction; None where few structures differ."""
+    differing = _differing(logs)
+    return _signed_rank(differing)[0] if len(differing) >= FEWEST else None
+
+
+def _corrected(raw: Sequence[float | None]) -> list[float | None]:
+    """Return p of every comparison by Holm's method; None counts as no comparison.
 
     Source: Tarone (1990), Biometrics 46, 515-522: what can never be significant costs nothing.
     """
-    listed = [_differing(values) for values in logs]
-    tested = [_signed_rank(values)[0] for values in listed if len(values) >= FEWEST]
-    corrected = iter(holm(tested))
-    return [float(next(corrected)) if len(values) >= FEWEST else None for values in listed]
+    corrected = iter(holm([p for p in raw if p is not None]))
+    return [None if p is None else float(next(corrected)) for p in raw]
 
 
 def _differing(logs: FloatArray) -> FloatArray:
@@ -237,13 +374,6 @@ def _signed_rank(logs: FloatArray) -> tuple[float, bool]:
         chances *= 0.5
     tail = float(chances[: min(up, total - up) + 1].sum())
     return min(1.0, 2.0 * tail), up > total - up
-
-
-def _interval(logs: FloatArray) -> tuple[float, float]:
-    """Return the 95 % interval of the mean ratio by the percentiles of resamples."""
-    drawn = np.random.default_rng(0).integers(0, len(logs), (_RESAMPLES, len(logs)))
-    low, high = np.exp(np.quantile(logs[drawn].mean(axis=1), (0.025, 0.975)))
-    return float(low), float(high)
 
 
 def _groups(count: int, different: Iterable[tuple[int, int]]) -> tuple[list[list[int]], bool]:
@@ -299,6 +429,11 @@ def _stretches(apart: Sequence[int]) -> list[int]:
         if stop > before:
             found.append(((1 << stop) - 1) & ~((1 << start) - 1))
     return found
+
+
+def _places(items: Iterable[_Item]) -> dict[_Item, int]:
+    """Return the place of every item in the order of their first appearance."""
+    return {item: place for place, item in enumerate(dict.fromkeys(items))}
 
 
 def _letter(place: int) -> str:

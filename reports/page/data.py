@@ -19,13 +19,16 @@ from femubench.reports.summary import (
     strategies_of,
 )
 from femubench.results import (
+    FEWEST,
     OFFSET_PERCENT,
     SCORE_OF_FAILURE,
     TIE,
     JobResult,
     Run,
+    interval_tail,
     leaderboard,
     rank_results,
+    structures_of,
     tell_apart,
 )
 
@@ -128,6 +131,7 @@ def _case(run: Run, case: str, exhibits: Exhibits | None) -> dict[str, Any]:
     return {
         "name": case,
         "scenario": _scenario(case),
+        "structure": structures_of(run).get(case, case),
         "title": about.get("title") or "",
         "reference": {name: reference[name] for name in BLOCKS if name in reference},
         "stage": plain_data(None if stage is None else _with_short_points(stage)),
@@ -167,11 +171,16 @@ def _result(result: JobResult, case: int, strategy: int) -> dict[str, Any]:
 
 
 def _statistics(run: Run, order: list[str]) -> dict[str, Any]:
+    """Return tiers and groups, and what the page needs for intervals of a part of the run."""
+    count = len(cases_of(run))
     found, names = tell_apart(run, order), strategies_of(run)
     return {
         "pairs": [[names.index(a), names.index(b), rounded(p, 4)] for a, b, p in found.pairs],
         "groups": [[names.index(name) for name in group] for group in found.groups],
+        "tiers": [[names.index(name) for name in tier] for tier in found.tiers],
         "note": found.note,
+        "fewest": FEWEST,
+        "tails": [interval_tail(n) if n >= FEWEST else None for n in range(count + 1)],
     }
 
 

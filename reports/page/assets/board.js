@@ -6,6 +6,7 @@
   const parts = {};
   const lines = new Map();
   let letters = [];
+  let tiers = [];
 
   const COLUMNS = [
     { key: "rank", title: "Rank", cell: (row) => value(row.rank, bench.count) },
@@ -16,6 +17,7 @@
     ...(data && data.blocks ? data.blocks : []).map((block, k) => ({ key: `${block}_percent`, title: `${block} rms,\u00a0%`, block: k, hint: `median rms frequency error of the ${block} modes`, cell: (row) => value(row[`${block}_percent`], small) })),
     { key: "flags", title: "Flags", text: true, cell: flagCell },
     { key: "coverage", title: "Coverage", text: true, cell: coverageCell },
+    { key: "tier", title: "Tier", hint: "1: no difference from the best shown; 2: none from the best of the others", cell: (row) => el("td", { class: "right" }, bench.count(tiers[row.index])) },
     { key: "letters", title: "Group", text: true, hint: "strategies that share a letter: no difference shown", cell: (row) => el("td", { class: "letters" }, letters[row.index] || (bench.overview.groups().length ? "alone" : "–")) },
     { key: "parameters", title: "Unknowns", hint: "free parameters, median over the cases", cell: (row) => value(row.parameters, bench.count) },
     { key: "seconds", title: "Time,\u00a0s", hint: "wall time, median over the cases", cell: (row) => value(row.seconds, small) },
@@ -126,6 +128,7 @@
     if (key === "flags") return row.rigid_modes_lost + row.negative_eigenvalues + (row.ok ? 0 : 1e9);
     if (key === "coverage") return -row.ok - row.not_applicable / 1e6;
     if (key === "letters") return letters[row.index] || "~";
+    if (key === "tier") return tiers[row.index];
     return row[key];
   }
   // Put the rows in order without computing anything anew; nothing stays at the end.
@@ -200,7 +203,7 @@
     const changed = !bench.ranking.isWhole(state.filter);
     const fewer = state.rows.length < data.strategies.length;
     const first = `${state.rows.length} of ${bench.plural(data.strategies.length, "strategy", "strategies")}, ${state.rows.length ? state.rows[0].weights.length : 0} of ${bench.plural(data.cases.length, "case")}, ${state.filter.blocks.length} of ${bench.plural(data.blocks.length, "block")}.`;
-    const anew = changed ? " Skills, intervals, errors and ranks are computed anew for these; the groups are those of the whole run." : fewer ? " Ranks are among these; the groups are those of the whole run." : "";
+    const anew = changed ? " Skills, intervals, errors and ranks are computed anew for these; the tiers and groups are those of the whole run." : fewer ? " Ranks are among these; the tiers and groups are those of the whole run." : "";
     parts.status.textContent = first + anew;
     parts.status.classList.toggle("changed", changed || fewer);
   }
@@ -223,6 +226,7 @@
     page() {
       state.filter = bench.ranking.everything();
       letters = bench.overview.letters();
+      tiers = bench.overview.tiers();
       parts.body = el("tbody");
       parts.status = el("p", { class: "status", role: "status" });
       parts.figures = el("div", { class: "figures" });

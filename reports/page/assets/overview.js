@@ -164,6 +164,12 @@
   let whole = null;
   bench.overview = {
     groups,
+    // Return the tier of every strategy by its index, null where nothing was tested.
+    tiers() {
+      const found = data.strategies.map(() => null);
+      ((data.statistics && data.statistics.tiers) || []).forEach((tier, t) => tier.forEach((s) => (found[s] = t + 1)));
+      return found;
+    },
     // Return the letters of every strategy, by its index.
     letters() {
       const found = data.strategies.map(() => "");

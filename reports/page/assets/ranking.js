@@ -1,7 +1,7 @@
 // Scores, skills and ranks of any part of a run, by the rules of docs/scoring.md. Without a filter the
 // figures are those of the run's own leaderboard.
 {
-  const RESAMPLES = 999;
+  const RESAMPLES = 1999;
   const { data, median } = bench;
   const all = data && data.results ? prepare() : null;
 
@@ -155,24 +155,33 @@
     for (let t = 0; t < times; t += 1) for (let i = 0; i < n; i += 1) counts[t * n + Math.floor(random() * n)] += 1;
     return counts;
   }
-  function overCases(rows) {
-    const n = rows[0].weights.length;
+  function structuresOf(row) {
+    return [...new Set(row.cases.map((c) => data.cases[c].structure))];
+  }
+  // Resample structures, each with all its cases and seeds.
+  function overStructures(rows) {
+    const names = structuresOf(rows[0]);
+    const n = names.length;
     const counts = draws(n, RESAMPLES);
-    const { weights } = rows[0];
+    const tail = data.statistics.tails[n];
+    const place = rows[0].cases.map((c) => names.indexOf(data.cases[c].structure));
     const found = new Float64Array(RESAMPLES);
     for (const row of rows) {
-      const logs = row.logs[0];
+      const [sums, weights] = [new Float64Array(n), new Float64Array(n)];
+      row.weights.forEach((w, k) => {
+        for (const logs of row.logs) sums[place[k]] += (w * logs[k]) / row.logs.length;
+        weights[place[k]] += w;
+      });
       for (let t = 0; t < RESAMPLES; t += 1) {
         let [top, bottom] = [0, 0];
         for (let i = 0; i < n; i += 1) {
-          const w = counts[t * n + i] * weights[i];
-          top += w * logs[i];
-          bottom += w;
+          top += counts[t * n + i] * sums[i];
+          bottom += counts[t * n + i] * weights[i];
         }
         found[t] = top / bottom;
       }
       found.sort();
-      [row.skill_low, row.skill_high] = [Math.exp(quantile(found, 0.025)), Math.exp(quantile(found, 0.975))];
+      [row.skill_low, row.skill_high] = [Math.exp(quantile(found, tail)), Math.exp(quantile(found, 1 - tail))];
     }
   }
   function overSeeds(rows) {
@@ -185,20 +194,21 @@
     }
   }
 
-  // Fill the 95 % intervals in; returns what they are over: "seeds", "cases" or "" for none.
+  // Fill the 95 % intervals in; returns what they are over: "structures", "seeds" or "" for none.
   function fillIntervals(rows, filter) {
     if (!rows.length) return "";
     const kind = intervalKind(rows);
-    if (kind === "seeds" && isWhole(filter)) {
+    if (kind && isWhole(filter)) {
       const given = new Map(data.board.map((row) => [row.strategy, row]));
       for (const row of rows) ({ skill_low: row.skill_low, skill_high: row.skill_high } = given.get(row.strategy) || row);
     } else if (kind === "seeds") overSeeds(rows);
-    else if (kind === "cases") overCases(rows);
+    else if (kind === "structures") overStructures(rows);
     return kind;
   }
   function intervalKind(rows) {
     if (!rows.length) return "";
-    return rows[0].skills.length > 1 ? "seeds" : rows[0].weights.length > 1 ? "cases" : "";
+    if (structuresOf(rows[0]).length >= data.statistics.fewest) return "structures";
+    return rows[0].skills.length > 1 ? "seeds" : "";
   }
   // Tell whether cases and blocks are those of the whole run; the strategies change no figure.
   function isWhole(filter) {
