@@ -22,6 +22,7 @@ from femubench import (
     read_case,
     solve_modes,
 )
+from femubench.core.challenge.structures import structure_named
 from femubench.core.library.cases import read_cases
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.variants import strategy_of
@@ -43,6 +44,7 @@ from femubench.scenarios import HERE
 from femubench.update import check_used_modes, with_measured_frequencies
 
 sys.path.insert(0, str(Path(__file__).parent))
+from diagnosis_problems import measured as seen
 from printed_boards import TWO_STRUCTURES
 
 FrameBuilder = Callable[..., Frame]
@@ -131,6 +133,18 @@ def test_meeting_the_frequencies_moves_nothing_else(
     np.testing.assert_allclose(np.abs(same), np.eye(3), atol=1e-6)
     assert int(after.rigid.sum()) == 3
     assert after.eigenvalues[0] >= 0.0
+
+
+def test_a_mass_beside_the_axis_comes_with_its_arm() -> None:
+    """It is weighed as an added mass, and told by its own name."""
+    specimen, place = structure_named("ladder"), "rung-right@0.25"
+    effect = load_plugins().effects["mass-offset"]
+    values = [0.03 * specimen.model.total_mass, 1.5 * 0.0254]
+    test = seen(effect.extend(specimen.model, place, values), specimen.frame, count=8, shapes=6)
+    found = Diagnosed().update(specimen.model, test, np.random.default_rng(0))
+    names = {item.name: item for item in found.parameters}
+    assert names[f"mass-offset {place}: mass"].after == pytest.approx(values[0], rel=0.05)
+    assert names[f"mass-offset {place}: offset"].before == 0.0
 
 
 def test_a_model_that_lacks_nothing_stays(ladder: FrameBuilder) -> None:

@@ -225,7 +225,7 @@ def second_level(group: Group) -> Option | None:
                 continue
             none = Predicted(np.zeros_like(now), np.zeros((len(now), 0)))
             size = distance(Predicted(fall, spread), none, np.full(len(now), std))
-            text = f"{_LEVEL} looks like {hypothesis.name}"
+            text = f"{_LEVEL} looks like {hypothesis.effect.name}"
             found.append(Option("level", text, (size,)))
     return next(iter(in_order(found, lambda option: -option.distances[0])), None)
 
@@ -322,5 +322,6 @@ def _told(option: Option, labels: Sequence[str]) -> tuple[str, float]:
 
 
 def _label(view: Outlook) -> str:
-    names = [f"{h.name} at {h.place}" if h.place != "all" else h.name for h, _ in view.causes]
+    named = [(h.effect.name, h.place) for h, _ in view.causes]
+    names = [f"{name} at {place}" if place != "all" else name for name, place in named]
     return " + ".join(names) or "nothing more"

@@ -127,7 +127,7 @@ def _estimates(explanation: Explanation) -> tuple[ParameterEstimate, ...]:
     """Return every number that the explanation puts into the model."""
     parts = (*explanation.base.parts, *explanation.parts)
     neutral = {
-        (part.hypothesis.name, part.hypothesis.place, parameter.name): parameter.neutral
+        (part.hypothesis.effect.name, part.hypothesis.place, parameter.name): parameter.neutral
         for part in reversed(parts)
         for parameter in part.hypothesis.parameters
     }
