@@ -478,6 +478,33 @@ def test_kabe_leaves_alone_what_a_larger_least_squares_cutoff_hides(
         KabeRigid(least_squares_cutoff=-1.0)
 
 
+def test_kabe_turns_to_least_squares_where_singular_values_do_not_converge(
+    cases: dict[str, Case], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wanted = update(KabeRigid, cases["hframe"]).model.stiffness
+
+    def unsolved(*_: Any) -> Any:
+        raise np.linalg.LinAlgError("SVD did not converge")
+
+    monkeypatch.setattr(entry_update, "smallest_change", unsolved)
+    assert abs(update(KabeRigid, cases["hframe"]).model.stiffness - wanted).max() == 0.0
+
+
+def test_kabe_tells_on_which_step_least_squares_lose_a_mode(
+    cases: dict[str, Case], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, data = cases["hframe"]
+
+    def blind_after_the_first(current: Model, wanted: Measurement) -> QuasiModes:
+        if current is not model:
+            raise StrategyFailure("no mode of the model matches measured mode 3")
+        return quasi_measured_modes(current, wanted)
+
+    monkeypatch.setattr(entry_update, "quasi_measured_modes", blind_after_the_first)
+    with pytest.raises(StrategyFailure, match="after step 1 of least squares .* measured mode 3"):
+        update(KabeRigid, (model, data))
+
+
 def test_kabe_without_least_squares_fails_with_its_residual(
     cases: dict[str, Case], monkeypatch: pytest.MonkeyPatch
 ) -> None:

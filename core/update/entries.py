@@ -339,9 +339,10 @@ def update_entries(
 
     Raises:
         NotApplicable: when the matrix has too many entries, or a low-rank term.
-        StrategyFailure: when a measured mode has no partner in the nominal model.
-        SelfCheckFailed: when the last model has no partner for a used mode, or when the matrix is
-            too large for least squares and none with the used modes was found.
+        StrategyFailure: when a measured mode has no partner in the nominal model, or loses it
+            on the way of least squares.
+        SelfCheckFailed: when the matrix is too large for least squares and none with the used
+            modes was found.
 
     Source: Ahmadian, Gladwell & Ismail (1997), section 4.1.
 
@@ -401,14 +402,14 @@ def _fitted(
     changes, current, rank = np.zeros(len(pattern)), model, 0
     history: list[Mapping[str, float]] = []
     for _ in range(ITERATIONS):
-        quasi = _next_quasi(current, measurement, history)
+        quasi = _quasi_after(len(history), current, measurement)
         before = changes
         changes, rank = least_squares_change(equations_of(pattern, model, quasi, cutoff), free)
         current = replace(model, stiffness=pattern.matrix(changes))
         found = measure_residuals(current, quasi.shapes, quasi.eigenvalues)
         change = float(np.linalg.norm(changes - before))
         history.append({"residual": found.forces, "change": change})
-    last = _next_quasi(current, measurement, history)
+    last = _quasi_after(ITERATIONS, current, measurement)
     return EntryUpdate(
         model=current,
         pattern=pattern,
@@ -467,3 +468,11 @@ def _next_quasi(
             "inertia forces of the used modes"
         )
         raise SelfCheckFailed(promise, history[-1]["residual"], ALLOWED) from lost
+
+
+def _quasi_after(step: int, current: Model, measurement: Measurement) -> QuasiModes:
+    try:
+        return quasi_measured_modes(current, measurement)
+    except StrategyFailure as lost:
+        text = f"after step {step} of least squares over the entries {lost}"
+        raise StrategyFailure(text) from lost

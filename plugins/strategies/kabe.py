@@ -45,8 +45,9 @@ class _Entries(Strategy):
         """Return the model with other entries in the same places.
 
         Raises:
-            SelfCheckFailed: when a used mode has no partner in the model that was found.
-            StrategyFailure: when a measured mode has no partner in the nominal model.
+            StrategyFailure: when a measured mode has no partner in the model, before or after.
+            SelfCheckFailed: when no matrix of this pattern with the used modes was found, and it
+                is too large for least squares.
             NotApplicable: when the matrix has too many entries.
         """
         cutoffs = self.cutoff, self.least_squares_cutoff
