@@ -501,7 +501,7 @@ def test_kabe_tells_on_which_step_least_squares_lose_a_mode(
         return quasi_measured_modes(current, wanted)
 
     monkeypatch.setattr(entry_update, "quasi_measured_modes", blind_after_the_first)
-    with pytest.raises(StrategyFailure, match="after step 1 of least squares .* measured mode 3"):
+    with pytest.raises(StrategyFailure, match=r"after step 1 of least squares .* measured mode 3"):
         update(KabeRigid, (model, data))
 
 
