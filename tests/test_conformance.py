@@ -101,6 +101,13 @@ def test_a_good_strategy_passes_every_check() -> None:
 
 
 @pytest.mark.usefixtures("here")
+def test_to_say_by_how_much_a_used_mode_is_off_keeps_the_promise() -> None:
+    found = verdicts("strategy", toys.Candid())
+    assert bad(found) == {}
+    assert found["promises"].status == "pass"
+
+
+@pytest.mark.usefixtures("here")
 def test_to_decline_everything_with_a_reason_is_honest() -> None:
     found = verdicts("strategy", toys.Declining())
     assert bad(found) == {}

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
+import femubench.scenarios
 from femubench import (
+    InputError,
     Measurement,
     Model,
     NotApplicable,
     Sensors,
     StrategyFailure,
     UpdateResult,
+    read_case,
     solve_modes,
 )
 from femubench.core.modal.correlation import mac
@@ -26,7 +30,12 @@ from femubench.core.modal.pairing import pair_modes
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.update import entries as entry_update
 from femubench.core.update.dynamic import expand_measured_shapes, expand_one_by_dynamics
-from femubench.core.update.entries import EntryPattern, null_space, smallest_change
+from femubench.core.update.entries import (
+    EntryPattern,
+    least_squares_change,
+    null_space,
+    smallest_change,
+)
 from femubench.core.update.low_rank import total_change
 from femubench.core.update.promise import check_used_modes, measure_residuals
 from femubench.core.update.quasi import QuasiModes, quasi_measured_modes
@@ -38,6 +47,7 @@ from femubench.plugins.strategies.kabe import Kabe, KabeRigid
 from femubench.plugins.strategies.unchanged import Unchanged
 from femubench.update import SelfCheckFailed
 
+SCENARIOS = Path(femubench.scenarios.__file__).parent
 PAPER = np.array([226.8, 275.2, 537.4])  # Hz, measured modes 1-3 of the paper's ladder
 FrameBuilder = Callable[..., Frame]
 Case = tuple[Model, Measurement]
@@ -387,11 +397,120 @@ def test_kabe_needs_a_pattern(frame_case: Case) -> None:
 
 
 @pytest.mark.parametrize("strategy", [Kabe, KabeRigid])
-def test_kabe_fails_with_its_residual_where_the_pattern_cannot_hold_the_modes(
+def test_kabe_states_by_how_much_a_used_frequency_is_off_where_no_matrix_has_them(
     cases: dict[str, Case], strategy: Any
 ) -> None:
+    model, data = cases["hframe"]
+    result = update(strategy, (model, data))
+    partners = quasi_measured_modes(result.model, data)
+    own = partners.modes.natural_frequencies[partners.partners]
+    worst = np.abs(own / data.frequencies - 1.0).max()
+    assert result.diagnostics["used_frequency_error"] == pytest.approx(worst, rel=1e-9)
+    assert worst > 1e-3
+    assert result.diagnostics["residual"] > worst
+    same_pattern(model, result.model)
+    assert "used_frequency_error" not in update(strategy, cases["frame"]).diagnostics
+
+
+HFRAMES = ("hframe", "hframe-solid", "design-change/hframe-solid")
+
+
+@pytest.mark.parametrize("name", HFRAMES)
+def test_kabe_rigid_gives_a_physical_model_of_every_hframe(name: str) -> None:
+    case = read_case(SCENARIOS / name)
+    result = KabeRigid().update(case.model, case.used_measurement(0), np.random.default_rng(0))
+    rigid = rigid_modes_of(case.model)
+    force = np.abs(result.model.stiffness_times(rigid)).max()
+    gross = (np.abs(result.model.stiffness) @ np.abs(rigid)).max()
+    assert rigid.shape[1] == 3
+    assert force <= 1e-9 * gross
+    modes = solve_modes(result.model)
+    assert modes.rigid.sum() == 3
+    assert (modes.eigenvalues >= 0.0).all()
+    assert 1e-3 < result.diagnostics["used_frequency_error"] < 0.3
+
+
+def test_least_squares_is_the_least_among_what_keeps_the_rigid_modes(
+    cases: dict[str, Case],
+) -> None:
+    """No feasible direction lowers the residual; what a cutoff hides stays as it is."""
+    model, data = cases["hframe"]
+    pattern = EntryPattern.of(model)
+    rigid = rigid_modes_of(model)
+    rows = pattern.products(rigid, np.ones(model.size)).toarray()
+    free = null_space(pattern.products(rigid, entry_update.force_scale(model)).toarray())
+    quasi = quasi_measured_modes(model, data)
+    equations = replace(entry_update.equations_of(pattern, model, quasi), cutoff=1e-9)
+    change, rank = least_squares_change(equations, free)
+    assert rank == free.shape[1] < len(equations.exact_right) + len(equations.fitted_right)
+
+    def misfit(x: Any) -> float:
+        exact = equations.exact @ x - equations.exact_right
+        fitted = equations.fitted @ x - equations.fitted_right
+        return float(np.sqrt(exact @ exact + fitted @ fitted))
+
+    scale = np.abs(rows).max() * np.abs(change).max()
+    assert np.abs(rows @ change).max() <= 1e-9 * scale
+    least = misfit(change)
+    assert least > 0.1
+    rng = np.random.default_rng(4)
+    for size in np.geomspace(1e-4, 1.0, 40):
+        step = free @ rng.standard_normal(free.shape[1])
+        step *= size * np.linalg.norm(change) / np.linalg.norm(step)
+        assert misfit(change + step) >= least * (1.0 - 1e-12)
+    cut, shown = least_squares_change(replace(equations, cutoff=0.3), free)
+    stacked = np.vstack([equations.exact @ free, equations.fitted @ free])
+    hidden = free @ np.linalg.svd(stacked, full_matrices=False)[2][shown:].T
+    assert hidden.shape[1] == rank - shown > 0
+    assert np.abs(hidden.T @ cut).max() <= 1e-9 * np.linalg.norm(cut)
+    assert misfit(cut) > least
+
+
+def test_kabe_leaves_alone_what_a_larger_least_squares_cutoff_hides(
+    cases: dict[str, Case],
+) -> None:
+    case, rng = cases["hframe"], np.random.default_rng(0)
+    results = [KabeRigid(least_squares_cutoff=c).update(*case, rng) for c in (0.1, 0.3, 1.0)]
+    ranks = [result.diagnostics["rank"] for result in results]
+    assert ranks == sorted(ranks, reverse=True)
+    assert len(set(ranks)) == 3
+    with pytest.raises(InputError, match="cutoff -1 is not positive"):
+        KabeRigid(least_squares_cutoff=-1.0)
+
+
+def test_kabe_turns_to_least_squares_where_singular_values_do_not_converge(
+    cases: dict[str, Case], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wanted = update(KabeRigid, cases["hframe"]).model.stiffness
+
+    def unsolved(*_: Any) -> Any:
+        raise np.linalg.LinAlgError("SVD did not converge")
+
+    monkeypatch.setattr(entry_update, "smallest_change", unsolved)
+    assert abs(update(KabeRigid, cases["hframe"]).model.stiffness - wanted).max() == 0.0
+
+
+def test_kabe_tells_on_which_step_least_squares_lose_a_mode(
+    cases: dict[str, Case], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, data = cases["hframe"]
+
+    def blind_after_the_first(current: Model, wanted: Measurement) -> QuasiModes:
+        if current is not model:
+            raise StrategyFailure("no mode of the model matches measured mode 3")
+        return quasi_measured_modes(current, wanted)
+
+    monkeypatch.setattr(entry_update, "quasi_measured_modes", blind_after_the_first)
+    with pytest.raises(StrategyFailure, match=r"after step 1 of least squares .* measured mode 3"):
+        update(KabeRigid, (model, data))
+
+
+def test_kabe_without_least_squares_fails_with_its_residual(
+    cases: dict[str, Case], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(entry_update, "DENSE_UNKNOWNS", 0)
     with pytest.raises(SelfCheckFailed, match=r"off by .*promises 1e-08") as caught:
-        update(strategy, cases["hframe"])
+        update(Kabe, cases["hframe"])
     assert caught.value.measured > 1e-3
 
 

@@ -63,6 +63,7 @@ RNG = np.random.default_rng(0)
 HFRAME_HZ = np.array([77.13, 137.60, 300.90, 404.98, 482.23])
 LADDER_HZ = np.array([226.8, 275.2, 537.4])
 PAPER_SPRINGS = {"x": 3.30e9, "z": 4.48e9, "ry": 3.02e6}
+STRONGLY_DAMPED = UpdateOptions(damping=3e-3)
 EVERY = (Global(), Local(), Spring(), Offset(), Bayesian())
 
 
@@ -117,7 +118,8 @@ def ratios(result: UpdateResult) -> dict[str, float]:
 
 
 def test_row_a_global(hframe_case: Any) -> None:
-    result = Global().update(*hframe_case, RNG)
+    paper = UpdateOptions(residual="eigenvalue")
+    result = Global(options=paper).update(*hframe_case, RNG)
     assert ratios(result) == {"EI all members": pytest.approx(0.8942, abs=1e-4)}
     np.testing.assert_allclose(
         solve_modes(result.model).elastic.natural_frequencies[:5],
@@ -138,7 +140,9 @@ def test_row_b_local(hframe_case: Any) -> None:
 
 
 def test_row_d_spring_with_the_global_factor_frozen(hframe_case: Any) -> None:
-    strategy = Spring(arm=0.02, stiffness=PAPER_SPRINGS, free_stiffness=False)
+    strategy = Spring(
+        arm=0.02, stiffness=PAPER_SPRINGS, free_stiffness=False, options=STRONGLY_DAMPED
+    )
     result = strategy.update(*hframe_case, RNG)
     after = {p.name: p.after for p in result.parameters}
     assert after["k_ry T branch"] == pytest.approx(273725, rel=1e-3)
@@ -161,18 +165,54 @@ def test_row_d_spring_with_the_global_factor_frozen(hframe_case: Any) -> None:
 
 
 def test_row_d_spring_with_the_global_factor_free(hframe_case: Any) -> None:
-    result = Spring(arm=0.02, stiffness=PAPER_SPRINGS).update(*hframe_case, RNG)
+    strategy = Spring(arm=0.02, stiffness=PAPER_SPRINGS, options=STRONGLY_DAMPED)
+    result = strategy.update(*hframe_case, RNG)
     assert result.parameter_count == 4
     assert ratios(result)["EI all members"] == pytest.approx(1.0133, abs=1e-4)
     assert ratios(result)["k_ry T branch"] == pytest.approx(259210 / 3.02e6, rel=1e-3)
     # the rule of the paper on mesh C comes near the same
-    by_rule = Spring(arm=0.02).update(*hframe_case, RNG)
+    by_rule = Spring(arm=0.02, options=STRONGLY_DAMPED).update(*hframe_case, RNG)
     assert ratios(by_rule)["EI all members"] == pytest.approx(1.0133, abs=1e-3)
     assert by_rule.parameters[0].after == pytest.approx(259210, rel=0.01)
 
 
+def nearest_factor(residual: str, measured_hz: np.ndarray, nominal_hz: np.ndarray) -> float:
+    """Return the factor on the whole stiffness with the least sum of squares, in closed form."""
+    if residual == "frequency":
+        return float((measured_hz @ nominal_hz) / (nominal_hz @ nominal_hz)) ** 2
+    wanted, own = np.square(measured_hz), np.square(nominal_hz)
+    if residual == "relative-eigenvalue":
+        wanted, own = np.ones_like(wanted), own / wanted
+    return float((wanted @ own) / (own @ own))
+
+
+@pytest.mark.parametrize("residual", ["frequency", "eigenvalue", "relative-eigenvalue"])
+def test_global_gives_the_factor_that_its_residual_asks_for(ladder: Any, residual: Any) -> None:
+    """Out of plane the factor scales the whole stiffness, so that the optimum is known."""
+    model = Model.of(ladder())
+    data = measured(model, 3, LADDER_HZ)
+    options = UpdateOptions(residual=residual)
+    strategy = Global() if residual == "frequency" else Global(options=options)
+    (factor,) = ratios(strategy.update(model, data, RNG)).values()
+    nominal = solve_modes(model).elastic.natural_frequencies[:3]
+    assert factor == pytest.approx(nearest_factor(residual, LADDER_HZ, nominal), rel=1e-5)
+    others = {"frequency", "eigenvalue", "relative-eigenvalue"} - {residual}
+    for other in others:
+        assert abs(factor / nearest_factor(other, LADDER_HZ, nominal) - 1.0) > 1e-3
+
+
+def test_spring_comes_nearer_to_the_data_the_weaker_its_damping(hframe_case: Any) -> None:
+    costs = [
+        Spring(options=UpdateOptions(damping=damping)).update(*hframe_case, RNG).history[-1]["cost"]
+        for damping in (0.1, 3e-3, UpdateOptions().damping)
+    ]
+    assert costs == sorted(costs, reverse=True)
+    assert costs[2] < 0.9 * costs[1]
+    assert Spring().update(*hframe_case, RNG).history[-1]["cost"] == costs[2]
+
+
 def test_row_e_offset(hframe_case: Any) -> None:
-    result = Offset(length=0.02, options=UpdateOptions(damping=3e-3)).update(*hframe_case, RNG)
+    result = Offset(length=0.02, options=STRONGLY_DAMPED).update(*hframe_case, RNG)
     assert ratios(result)["a T branch"] == pytest.approx(-1.4248, abs=1e-3)
     assert ratios(result)["EI all members"] == pytest.approx(1.0053, abs=1e-4)
     assert ratios(result)["a T through"] == pytest.approx(1.0, abs=1e-3)

@@ -10,12 +10,13 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from scipy.sparse.linalg import SuperLU, splu
 
-from femubench.core.errors import NotApplicable, SelfCheckFailed, StrategyFailure
+from femubench.core.errors import ModelError, NotApplicable, SelfCheckFailed, StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 from femubench.core.update.promise import (
     ALLOWED,
+    USED_ERROR,
     Residuals,
     check_used_modes,
     force_scale,
@@ -160,6 +161,23 @@ def smallest_change(equations: Equations, free: FloatArray) -> tuple[FloatArray,
     return change + rest @ (right[:found].T @ (target / singular[:found])), rank + found
 
 
+def least_squares_change(equations: Equations, free: FloatArray) -> tuple[FloatArray, int]:
+    """Return the shortest x of least squares over all rows, and their rank.
+
+    The rows that are exact elsewhere count like the others; what must hold in spite of the data
+    is in ``free``.
+
+    Arguments:
+        equations: with at most some thousand unknowns; ``cutoff`` is that of all rows.
+        free: orthonormal basis of the space in which x must lie, (n_unknowns, n_free).
+    """
+    rows = np.vstack([equations.exact @ free, equations.fitted @ free])
+    left, singular, right = la.svd(rows, full_matrices=False)
+    found = int(np.sum(singular > equations.cutoff))
+    target = left[:, :found].T @ np.concatenate([equations.exact_right, equations.fitted_right])
+    return free @ (right[:found].T @ (target / singular[:found])), found
+
+
 def smallest_change_sparse(equations: Equations) -> FloatArray:
     """Return x of many unknowns by one sparse factorisation.
 
@@ -212,6 +230,9 @@ def _factorised(equations: Equations, exact: SparseArray, weak: float) -> SuperL
 # A direction in which entries change by 100 % and forces by less than 3 % of the inertia forces
 # is taken for one that the modes do not show.
 CUTOFF = 0.03
+# The same where the equations contradict each other. Of 0.03, 0.1, 0.3 and 1, the smallest with
+# which no built-in structure that keeps its rigid-body modes gets a negative eigenvalue.
+LEAST_SQUARES_CUTOFF = 0.3
 MOST_ITERATIONS = 40
 # Beyond these numbers of entries: a sparse solution, refusal with and without rigid-body modes.
 DENSE_UNKNOWNS = 1_500
@@ -231,6 +252,8 @@ class EntryUpdate:
         rank: of the equations in the last step; None where it was not counted.
         residuals: of the used modes.
         history: one mapping an iteration.
+        used_error: largest relative error of a used frequency where the equations are met by
+            least squares only; None where they are met.
     """
 
     model: Model
@@ -240,6 +263,7 @@ class EntryUpdate:
     rank: int | None
     residuals: Residuals
     history: tuple[Mapping[str, float], ...]
+    used_error: float | None = None
 
     @property
     def result(self) -> UpdateResult:
@@ -251,6 +275,8 @@ class EntryUpdate:
         }
         if self.rank is not None:
             diagnostics["rank"] = float(self.rank)
+        if self.used_error is not None:
+            diagnostics[USED_ERROR] = self.used_error
         count = len(self.pattern) if self.free is None else self.free
         return UpdateResult(
             self.model, parameter_count=count, history=self.history, diagnostics=diagnostics
@@ -291,22 +317,34 @@ def equations_of(
 
 
 def update_entries(
-    model: Model, measurement: Measurement, rigid: FloatArray, cutoff: float = CUTOFF
+    model: Model,
+    measurement: Measurement,
+    rigid: FloatArray,
+    cutoff: float = CUTOFF,
+    least_squares_cutoff: float = LEAST_SQUARES_CUTOFF,
 ) -> EntryUpdate:
     """Return the model whose changed entries give the used modes, pattern kept exactly.
 
-    Five iterations, and further ones until the used modes are there.
+    Five iterations, and further ones until the used modes are there. Where they do not get there,
+    the equations contradict each other: they are then met by least squares, orthogonality and
+    equations of motion alike, in five iterations that each start from the nominal model. The
+    rigid-body modes stay exact.
 
     Arguments:
         model: the nominal model.
         measurement: the used modes.
         rigid: rigid-body modes that must stay at zero frequency, (n, r).
         cutoff: as in `equations_of`.
+        least_squares_cutoff: the same where least squares decide.
 
     Raises:
         NotApplicable: when the matrix has too many entries, or a low-rank term.
-        StrategyFailure: when a measured mode has no partner in the nominal model.
-        SelfCheckFailed: when no matrix of this pattern was found that has the used modes.
+        StrategyFailure: when a measured mode has no partner in the nominal model, or loses it
+            on the way of least squares.
+        SelfCheckFailed: when the matrix is too large for least squares and none with the used
+            modes was found.
+
+    Source: Ahmadian, Gladwell & Ismail (1997), section 4.1.
 
     Examples:
         >>> entries = update.update_entries(model, measurement, np.zeros((model.size, 0)))
@@ -315,6 +353,24 @@ def update_entries(
     """
     pattern = EntryPattern.of(model)
     free = _free_directions(pattern, model, rigid)
+    try:
+        found = _met(model, measurement, pattern, free, cutoff)
+    except (SelfCheckFailed, ModelError, la.LinAlgError):
+        if free is None:
+            raise
+        found = _fitted(model, measurement, pattern, free, least_squares_cutoff)
+    _check_kept(model, found.model, rigid)
+    return found
+
+
+def _met(
+    model: Model,
+    measurement: Measurement,
+    pattern: EntryPattern,
+    free: FloatArray | None,
+    cutoff: float,
+) -> EntryUpdate:
+    """Return the model that has the used modes; raise SelfCheckFailed where none was found."""
     changes, current, rank = np.zeros(len(pattern)), model, None
     history: list[Mapping[str, float]] = []
     for step in range(MOST_ITERATIONS):
@@ -331,9 +387,39 @@ def update_entries(
         if step + 1 >= ITERATIONS and found.forces <= max(0.1 * ALLOWED, found.rounding):
             break
     found = check_used_modes(current, quasi.shapes, quasi.eigenvalues)
-    _check_kept(model, current, rigid)
     count = None if free is None else free.shape[1]
     return EntryUpdate(current, pattern, changes, count, rank, found, tuple(history))
+
+
+def _fitted(
+    model: Model,
+    measurement: Measurement,
+    pattern: EntryPattern,
+    free: FloatArray,
+    cutoff: float,
+) -> EntryUpdate:
+    """Return the model that comes nearest to the used modes in the least-squares sense."""
+    changes, current, rank = np.zeros(len(pattern)), model, 0
+    history: list[Mapping[str, float]] = []
+    for _ in range(ITERATIONS):
+        quasi = _quasi_after(len(history), current, measurement)
+        before = changes
+        changes, rank = least_squares_change(equations_of(pattern, model, quasi, cutoff), free)
+        current = replace(model, stiffness=pattern.matrix(changes))
+        found = measure_residuals(current, quasi.shapes, quasi.eigenvalues)
+        change = float(np.linalg.norm(changes - before))
+        history.append({"residual": found.forces, "change": change})
+    last = _quasi_after(ITERATIONS, current, measurement)
+    return EntryUpdate(
+        model=current,
+        pattern=pattern,
+        changes=changes,
+        free=free.shape[1],
+        rank=rank,
+        residuals=measure_residuals(current, last.shapes, last.eigenvalues),
+        history=tuple(history),
+        used_error=last.frequency_error,
+    )
 
 
 def _free_directions(pattern: EntryPattern, model: Model, rigid: FloatArray) -> FloatArray | None:
@@ -382,3 +468,11 @@ def _next_quasi(
             "inertia forces of the used modes"
         )
         raise SelfCheckFailed(promise, history[-1]["residual"], ALLOWED) from lost
+
+
+def _quasi_after(step: int, current: Model, measurement: Measurement) -> QuasiModes:
+    try:
+        return quasi_measured_modes(current, measurement)
+    except StrategyFailure as lost:
+        text = f"after step {step} of least squares over the entries {lost}"
+        raise StrategyFailure(text) from lost

@@ -12,6 +12,8 @@ from femubench.core.ties import least
 from femubench.core.typing import FloatArray
 
 ALLOWED = 1e-8
+# The diagnostic in which a result says how far the worst used frequency is off, relative.
+USED_ERROR = "used_frequency_error"
 # A sum of k rounded products is off by less than k eps times the sum of their sizes; rows of
 # assembled beams have up to about this many entries.
 ROUNDED_TERMS = 32.0

@@ -37,6 +37,13 @@ class QuasiModes:
     modes: Modes
     partners: IntArray
 
+    @property
+    def frequency_error(self) -> float:
+        """Return the largest relative error of the model's own frequencies; 1 for an imaginary."""
+        measured = np.sqrt(self.eigenvalues) / (2.0 * np.pi)
+        own = self.modes.natural_frequencies[self.partners]
+        return float(np.where(own > 0.0, np.abs(own / measured - 1.0), 1.0).max())
+
 
 def partners_of(model: Model, measurement: Measurement) -> tuple[Modes, IntArray]:
     """Return enough modes of a model and every measured mode's partner among them, -1 for none."""

@@ -80,8 +80,8 @@ class Strategy(ABC):
         needs: capabilities that model or measurement must have: ``shapes`` measured mode shapes,
             ``elements`` element matrices, ``geometry`` members that can be rebuilt with other
             parameters, ``joints`` places where members meet.
-        promises: what every result keeps (of ``used-modes``, ``rigid-body-modes``,
-            ``no-negative-eigenvalue``); `bench plugins check` measures it.
+        promises: what every result keeps (of ``used-modes``, ``used-modes-or-stated``,
+            ``rigid-body-modes``, ``no-negative-eigenvalue``); `bench plugins check` measures it.
         baseline: whether it is the one that leaves the model as it is, to compare with.
         yardstick: whether `bench plugins check` compares time and memory with its own.
     """

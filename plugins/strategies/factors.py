@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass, field
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -48,7 +49,9 @@ class Global(_Factors):
     the update would no longer be one of the whole structure.
 
     Arguments:
-        options: of the iteration.
+        options: of the iteration; the residual is that of frequencies, in which one factor has to
+            compromise between all modes, while the paper's absolute eigenvalues
+            (``residual=eigenvalue``) leave the choice to the highest.
 
     Source: Horton et al. (1999), table 4(a).
     """
@@ -59,6 +62,8 @@ class Global(_Factors):
         "joints in a tubular H-frame, equation (4), table 4(a)"
     )
     needs: ClassVar[frozenset[str]] = frozenset({"geometry"})
+
+    options: UpdateOptions = field(default_factory=partial(UpdateOptions, residual="frequency"))
 
     def unknowns(self, structure: Structure, count: int) -> list[Unknown]:
         """Return one factor on all members."""

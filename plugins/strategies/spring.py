@@ -25,8 +25,6 @@ from femubench.update import (
 )
 
 _BENDING, _TORSION, _TRANSLATION = ("ry", "rz"), ("rx",), ("x", "y", "z")
-# Springs that hardly matter run away as far as the damping lets them: it has to be strong.
-_OPTIONS = UpdateOptions(damping=3e-3)
 _SOFTEST, _STIFFEST = 1e-4, 1e3  # of the initial stiffness: a hinge, and rigid
 
 
@@ -49,7 +47,8 @@ class Spring(Strategy):
         arm_factor: rigidity of the arm in that of the member; None for a rigid arm.
         stiffness: initial values by local direction in N/m or N m/rad that replace those of
             `spring_estimates`.
-        options: of the iteration.
+        options: of the iteration. Springs that hardly matter drift as far as its damping lets
+            them; it is that of the other sensitivity strategies.
 
     Source: Horton et al. (1999), sections 3.1 and 7, table 4(c) and (d).
     """
@@ -66,7 +65,7 @@ class Spring(Strategy):
     arm: float | None = None
     arm_factor: float | None = 5.0
     stiffness: Mapping[str, float] = field(default_factory=dict)
-    options: UpdateOptions = _OPTIONS
+    options: UpdateOptions = field(default_factory=UpdateOptions)
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator

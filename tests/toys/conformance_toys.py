@@ -24,6 +24,7 @@ from femubench import (
     UpdateResult,
     solve_modes,
 )
+from femubench.core.score.scoring import frequency_error, predict_block
 from femubench.effect import EffectParameter, FrameEffect, LookWarning, Reading, Seen, Site, Size
 from femubench.fem import Frame, GroundSpring, LowRank, Place, SparseArray
 
@@ -161,6 +162,31 @@ class ByIndex(Good):
         change = np.diag(measurement.eigenvalues - modes.eigenvalues[:count])
         low_rank = LowRank(model.mass_times(modes.shapes[:, :count]), change)
         return self.finish(replace(model, stiffness_change=low_rank))
+
+
+class Candid(Good):
+    """Say by how much the worst used frequency is off."""
+
+    promises: ClassVar[frozenset[str]] = frozenset({"used-modes-or-stated"})
+    factor: ClassVar[float] = 1.0
+
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        result = super().update(model, measurement, rng)
+        pairs = predict_block(result.model, measurement, None)
+        error = self.factor * max(map(frequency_error, pairs))
+        return replace(result, diagnostics={"used_frequency_error": error})
+
+
+class Flattering(Candid):
+    """Say that it is half as much."""
+
+    factor: ClassVar[float] = 0.5
+
+
+class Concealing(ByIndex):
+    """Say nothing of it."""
+
+    promises: ClassVar[frozenset[str]] = frozenset({"used-modes-or-stated"})
 
 
 class Looping(Good):
@@ -429,6 +455,8 @@ FAULTS: Mapping[type[Strategy], str] = {
     LockedResult: "picklable",
     Undeclared: "capabilities",
     ByIndex: "promises",
+    Flattering: "promises",
+    Concealing: "promises",
     Looping: "returns",
     LoopingWhenFree: "free-structure",
     Exiting: "returns",
