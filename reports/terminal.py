@@ -138,16 +138,18 @@ def _first_tier(run: Run, board: pd.DataFrame) -> str:
     if not tested.tiers:
         return textwrap.fill(tested.note, WIDTH)
     rows = {row["strategy"]: row for row in board.to_dict("records")}
-    first = (rows[name] for name in tested.tiers[0])
-    named = ", ".join(
+    named = [
         f"{_marks(row)}{plain(row['strategy'])} {fixed(row['skill'], 3)} "
         f"({interval(row['skill_low'], row['skill_high'])})"
-        for row in first
-    )
-    others = len(rows) - len(tested.tiers[0])
-    below = f"; {others} of {len(rows)} are below" if others else ""
+        for row in (rows[name] for name in tested.tiers[0])
+    ]
+    others = len(rows) - len(named)
+    if not others:
+        best = f"{named[0]}, 95 % interval over structures"
+        return textwrap.fill(f"no strategy is shown to differ from the best, {best}", WIDTH)
     said = "tier 1, no difference from the best shown (95 % interval over structures)"
-    return textwrap.fill(f"{said}: {named}{below}", WIDTH)
+    below = f"{others} of {len(rows)} are below"
+    return textwrap.fill(f"{said}: {', '.join(named)}; {below}", WIDTH)
 
 
 def _notes(run: Run) -> Iterator[str]:

@@ -51,7 +51,7 @@ def assert_board_is_that_of(run: Run, name: str) -> None:
         for column, cell in zip(COLUMNS, cells.split(), strict=False):
             assert row[column] == as_printed(cell), (row["strategy"], column)
     line = text[text.index("skill on unseen data (higher") :].partition(": ")[2]
-    listed = _UNSEEN.findall(" ".join(line.partition("```")[0].split()))
+    listed = _UNSEEN.findall(" ".join(line.partition("```")[0].partition("\n\n")[0].split()))
     assert {name for _, name, _ in listed} == {row["strategy"] for row in board}
     unseen = {row["strategy"]: row["skill_unseen"] for row in board}
     for _, name, value in listed:
