@@ -215,7 +215,7 @@ def rank(
 
     Examples:
         >>> femubench.rank(case, [nominal, scaled]).leaderboard["skill"].round(2).tolist()
-        [0.34, 1.0]
+        [0.31, 1.0]
     """
     kept = None if store is None else store_in(store)
     plan = plan_of(
@@ -373,7 +373,7 @@ def read_run(
     Examples:
         >>> file = femubench.report(run, "results.json")
         >>> femubench.read_run(file).leaderboard["skill"].round(2).tolist()
-        [0.34, 1.0]
+        [0.31, 1.0]
     """
     if isinstance(run, results.Run):
         return Run.of(run)

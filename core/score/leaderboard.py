@@ -88,7 +88,7 @@ def leaderboard(run: Run) -> pd.DataFrame:
 
     Examples:
         >>> results.leaderboard(run)[["rank", "skill"]].round(2).values.tolist()
-        [[1.0, 0.34], [2.0, 1.0]]
+        [[1.0, 0.31], [2.0, 1.0]]
     """
     import pandas as pd
 

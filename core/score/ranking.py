@@ -95,7 +95,7 @@ def rank_results(
 
     Examples:
         >>> [(round(one.score, 2), one.rank) for one in results.rank_results(run.results)]
-        [(1.0, 2), (0.34, 1)]
+        [(1.0, 2), (0.31, 1)]
     """
     listed = tuple(results)
     given = {
