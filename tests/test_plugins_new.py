@@ -298,7 +298,7 @@ class TestShow:
             "  needs:    geometry, joints",
             "            free_stiffness = true",
             "            arm = (none)",
-            "            options.damping = 0.003",
+            "            options.damping = 1e-05",
             "            stiffness.KEY = (none)",
         ):
             assert line in result.stdout
@@ -324,7 +324,7 @@ class TestShow:
             ("density", ["density: effect", "means: the density is another"]),
             ("universal file", ["universal file: reader", "suffixes: .uff, .unv, .uf"]),
             ("markdown", ["markdown: reporter", "suffix: .md"]),
-            ("strategies", ["strategies: plugin", "unchanged, baruch"]),
+            ("strategies", ["strategies: plugin", "unchanged, textbook"]),
         ],
     )
     def test_other_kinds(self, name: str, expected: list[str]) -> None:
