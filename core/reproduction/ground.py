@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from femubench.core.errors import InputError
 
+# From what says most for a paper to what says least. Of several grounds the last one counts.
 Verdict = Literal[
     "independent",
     "under-convention",
@@ -18,17 +19,7 @@ Verdict = Literal[
     "misprint",
     "does-not-follow",
 ]
-# From what says most for a paper to what says least. Of several grounds the last one counts.
-VERDICTS: tuple[Verdict, ...] = (
-    "independent",
-    "under-convention",
-    "searched",
-    "fitted",
-    "input",
-    "cannot-be-checked",
-    "misprint",
-    "does-not-follow",
-)
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 FAULTS: tuple[Verdict, ...] = ("misprint", "does-not-follow")
 
 

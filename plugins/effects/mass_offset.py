@@ -18,6 +18,7 @@ from femubench.effect import (
     Site,
     Size,
     Term,
+    once_for,
     point_in,
     point_motion,
     point_of,
@@ -50,8 +51,8 @@ class MassOffset(FrameEffect):
         """Return the points along the members at which an arm can be felt."""
         if model.structure is None:
             return ()
-        along = [at for at in point_places(model) if "@" in at]
-        return [at for at in along if abs(_arm_rows(model, at)).max() > _FELT]
+        # Asked for with every likely added mass, and the same for all of them.
+        return once_for(model, "points with an arm", lambda: _felt_points(model))
 
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return the mass, and the arm, whose scale is the section's size that way."""
@@ -92,6 +93,11 @@ class MassOffset(FrameEffect):
             return np.column_stack([mass, mass * offset, mass * offset**2])
 
         return Change(terms, factors)
+
+
+def _felt_points(model: Model) -> tuple[str, ...]:
+    along = [at for at in point_places(model) if "@" in at]
+    return tuple(at for at in along if abs(_arm_rows(model, at)).max() > _FELT)
 
 
 def _directions(model: Model) -> list[str]:
