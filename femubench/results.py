@@ -6,7 +6,14 @@ from femubench.core.run.frames import modes_frame, results_frame, run_from_json,
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.results import Block, JobResult, PairedMode, Run
-from femubench.core.score.leaderboard import interval_kind, leaderboard
+from femubench.core.score.counting import block_weights, counted_blocks
+from femubench.core.score.leaderboard import (
+    FLOORS,
+    interval_kind,
+    leaderboard,
+    ranks_by_floor,
+    scored_on,
+)
 from femubench.core.score.ranking import OFFSET_PERCENT, SCORE_OF_FAILURE, TIE, rank_results, ranked
 from femubench.core.score.scoring import frequency_error, predict_block, score_model
 from femubench.core.score.statistics import (
@@ -20,6 +27,7 @@ from femubench.core.score.statistics import (
 __all__ = [
     "Block",
     "FEWEST",
+    "FLOORS",
     "JobResult",
     "METHOD",
     "OFFSET_PERCENT",
@@ -29,6 +37,8 @@ __all__ = [
     "SCORE_OF_FAILURE",
     "Store",
     "TIE",
+    "block_weights",
+    "counted_blocks",
     "element_norms",
     "frequency_error",
     "interval_kind",
@@ -38,11 +48,13 @@ __all__ = [
     "predict_block",
     "rank_results",
     "ranked",
+    "ranks_by_floor",
     "results_frame",
     "run_from_json",
     "run_jobs",
     "run_to_json",
     "score_model",
+    "scored_on",
     "stiffness_difference",
     "structures_of",
     "tell_apart",

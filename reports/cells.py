@@ -18,6 +18,8 @@ def fixed(value: float | None, digits: int = 2, width: int = 5) -> str:
         return NOTHING
     for decimals in range(digits, -1, -1):
         text = f"{value:.{decimals}f}"
+        if text.strip("-0.") == "":
+            text = text.removeprefix("-")
         if len(text) <= width:
             return text
     return f"{value:.0e}".replace("e+0", "e")

@@ -13,14 +13,15 @@ from femubench.reports.templating import site_page
 from femubench.reports.terminal import WIDTH, aligned_table
 from femubench.results import METHOD
 
-_RATIOS = ("skill", "used", "higher", "modified", "seconds")
+_RATIOS = ("unseen", "used", "higher", "modified", "seconds")
 _NAME = 26
 _BLANK = "\u2800"  # stands for an indent until the table is made, which strips all white space
 _MOST_LINES = 20
 _FOREST = (0.0, 560.0)  # where the axis of the drawing begins and ends
 _LEGEND = (
-    "Ratios B / A, less than 1 is better in B: skill; used, higher, modified (rms frequency error "
-    "+ 0.05 %); seconds (sums). Means are geometric, over cases and seeds."
+    "Ratios B / A, less than 1 is better in B: unseen (errors that make the skill); used, higher, "
+    "modified (rms frequency error + 0.05 %); seconds (sums). Means are geometric, over cases and "
+    "seeds."
 )
 _EVIDENCE = f"{METHOD} The interval of the mean ratio is by bootstrap over structures."
 _SAYS = {"lost": "lost", "gained": "gained", "other": "changed"}
@@ -41,7 +42,7 @@ def comparison_text(data: Mapping[str, Any]) -> str:
         [shortened(cells[0] if cells[1] == "all" else 2 * _BLANK + cells[1], _NAME), *cells[2:]]
         for cells in map(_cells, _telling(data["rows"]))
     ]
-    heads = ("strategy", "jobs", "skill", "used", "high.", "mod.", "s", "lost")
+    heads = ("strategy", "jobs", "unseen", "used", "high.", "mod.", "s", "lost")
     board = aligned_table(rows, heads, ("left", *("right",) * 7))
     parts.append(board.replace(_BLANK, " "))
     parts.append(_wrapped(_LEGEND + " Scenarios where nothing differs are left out."))

@@ -3,16 +3,41 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
-from femubench.results import Run, run_to_json
+from femubench.reports.page.rounding import clean
+from femubench.results import Run, leaderboard, run_to_json, tell_apart
+
+_FIGURES = {"given_percent": "used_percent", "higher_percent": "higher_percent"}
+_FIGURES |= {"modified_percent": "modified_percent", "skill_drawn": "skill_drawn"}
+_FIGURES |= {"skill_tests": "skill_tests", "ok": "ok", "of": "total"}
 
 
 class JsonReporter:
-    """Meta data and one entry a job."""
+    """Meta data, the leaderboard and one entry a job."""
 
     name = "json"
     suffix = ".json"
 
     def render(self, run: Run) -> str:
         """Return strict JSON: what is not a finite number is null."""
-        return json.dumps(run_to_json(run), indent=1, allow_nan=False)
+        plain = {**run_to_json(run), "leaderboard": board_of(run)}
+        return json.dumps(plain, indent=1, allow_nan=False)
+
+
+def board_of(run: Run) -> list[dict[str, Any]]:
+    """Return the rows of the leaderboard as plain data, best first."""
+    board = leaderboard(run)
+    tiers = tell_apart(run, list(board["strategy"])).tier_of()
+    return [
+        {
+            "strategy": row["strategy"],
+            "rank": clean(row["rank"]),
+            "tier": tiers.get(row["strategy"]),
+            "skill": clean(row["skill"]),
+            "interval": [clean(row["skill_low"]), clean(row["skill_high"])],
+            **{name: clean(row[column]) for name, column in _FIGURES.items()},
+            "physical": not row["unphysical"],
+        }
+        for row in board.to_dict("records")
+    ]

@@ -9,7 +9,7 @@ from dataclasses import replace
 from itertools import chain
 
 from femubench.reports.cells import NOTHING, fixed, hertz, interval, plain, whole
-from femubench.reports.page.papers import papers_of
+from femubench.reports.page.papers import papers_of, started_as_drawn
 from femubench.reports.summary import (
     Trouble,
     cases_of,
@@ -17,23 +17,34 @@ from femubench.reports.summary import (
     changes_of,
     first_seed,
     header,
+    lead,
     notes_of,
     strategies_of,
     troubles,
     unconverged,
 )
-from femubench.results import JobResult, PairedMode, Run, interval_kind, leaderboard, tell_apart
+from femubench.results import (
+    FLOORS,
+    JobResult,
+    PairedMode,
+    Run,
+    interval_kind,
+    leaderboard,
+    ranks_by_floor,
+    tell_apart,
+)
 
 _SPECIAL = re.compile(r"([\\`*_\[\]|~])")
 _ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
 _FOOTNOTES = (
-    "**skill**: geometric mean over blocks and cases of (rms + 0.05 %) / (rms of the unchanged "
-    "model + 0.05 %); 1 is no better than the unchanged model, less is better. A job that failed, "
-    "crashed or timed out counts 10, one that is not applicable 1. **unseen**: the same without "
-    "the block that the strategy was given.",
-    "**used, higher, modified**: rms relative frequency error in percent over the modes that the "
-    "strategy was given, those above that it was not given, and those of the structure with a "
-    "known design change; median over the cases. A measured mode without partner counts 100 %.",
+    "**skill**: 1 - r, where r is the geometric mean over structures, each the mean of its blocks "
+    "of unseen data, of (rms + 0.05 %) / (rms of the nominal model + 0.05 %). A job that failed, "
+    "crashed or timed out counts 10 in r, one that is not applicable 1. **from drawn**: the same "
+    "with the start from the models as drawn. **tests**: on tests alone, no computed truths.",
+    "**higher, modified, given**: rms relative frequency error in percent over the higher modes "
+    "and those of the structure with a known design change, which no strategy is given, and over "
+    "the modes that it was given; median over the cases. A measured mode without partner counts "
+    "100 %.",
     "**rigid lost, negative**: rigid-body modes that the updated models lost and negative "
     "eigenvalues that they have, in all jobs. Either makes a strategy *unphysical*: it ranks below "
     "all physical ones.",
@@ -51,18 +62,31 @@ class MarkdownReporter:
 
     def render(self, run: Run) -> str:
         """Return the report."""
-        printed = papers_of(run)
+        drawn, papers = started_as_drawn(run), papers_of(run)
         notes = [f"- **Note**: {escape(note)}" for note in notes_of(run)]
+        ranked = Run(run.meta, run.ranked)
         sections = [
             f"# Updating strategies compared: run {escape(run.meta.get('run', ''))}",
             table(["", ""], ([title, escape(text)] for title, text in header(run)), "ll"),
             *(["\n".join(notes)] if notes else []),
             "## Leaderboard",
             *_leaderboard(run),
+            lead(run),
             *_FOOTNOTES,
+            *_floors(run),
             *_coverage(run),
-            *chain.from_iterable(_case(run, case, printed.get(case, {})) for case in cases_of(run)),
-            *chain.from_iterable(_changes(run, *item) for item in changes_of(run).items()),
+            *chain.from_iterable(
+                _case(
+                    ranked,
+                    case,
+                    {
+                        "from the model as drawn": drawn.get(case, {}),
+                        "as the paper prints it": papers.get(case, {}),
+                    },
+                )
+                for case in cases_of(run)
+            ),
+            *chain.from_iterable(_changes(ranked, *item) for item in changes_of(ranked).items()),
             *_citations(run.meta.get("citations") or {}),
         ]
         return "\n\n".join(sections)
@@ -87,7 +111,7 @@ def _leaderboard(run: Run) -> Iterator[str]:
     tested = tell_apart(run, list(board["strategy"]))
     tiers, letters = tested.tier_of(), tested.letters()
     headers = [
-        *("rank", "strategy", "skill", "unseen", "used %", "higher %", "modified %"),
+        *("rank", "strategy", "skill", "from drawn", "tests", "higher %", "modified %", "given %"),
         *("rigid lost", "negative", "parameters", "evaluations", "seconds", "ok", "tier", "group"),
     ]
     kind = interval_kind(run)
@@ -99,8 +123,9 @@ def _leaderboard(run: Run) -> Iterator[str]:
             whole(row["rank"]),
             escape(row["strategy"]) + (" (unphysical)" if row["unphysical"] else ""),
             fixed(row["skill"], 3, 6),
-            fixed(row["skill_unseen"], 3, 6),
-            *(fixed(row[f"{block}_percent"], 2, 7) for block in ("used", "higher", "modified")),
+            fixed(row["skill_drawn"], 3, 6),
+            fixed(row["skill_tests"], 3, 6),
+            *(fixed(row[f"{block}_percent"], 2, 7) for block in ("higher", "modified", "used")),
             *(whole(row[key]) for key in ("rigid_modes_lost", "negative_eigenvalues")),
             *(whole(row[key]) for key in ("parameters", "evaluations")),
             fixed(row["seconds"], 3, 7),
@@ -113,6 +138,19 @@ def _leaderboard(run: Run) -> Iterator[str]:
         rows.append(cells)
     yield table(headers, rows, "rl" + "r" * (len(headers) - 3) + "l")
     yield f"**tier, group**: {escape(tested.note)}"
+
+
+def _floors(run: Run) -> Iterator[str]:
+    """Return which ranks rest on what is added to all errors."""
+    ranks = ranks_by_floor(run)
+    moved = {name: found for name, found in ranks.items() if len(set(found)) > 1}
+    floors = ", ".join(f"{floor:g}" for floor in FLOORS)
+    said = f"**Ranks with {floors} % added to all errors**: "
+    if not moved:
+        yield f"{said}the same."
+        return
+    named = (f"{escape(name)} {', '.join(map(str, found))}" for name, found in moved.items())
+    yield f"{said}the same but for {'; '.join(named)}."
 
 
 def _coverage(run: Run) -> Iterator[str]:
@@ -144,11 +182,14 @@ def _troubles(items: Iterable[Trouble]) -> str:
     return table(["case", "strategy", "seeds", "status", "reason"], rows, "lllll")
 
 
-def _case(run: Run, case: str, printed: Mapping[str, Mapping[int, float]]) -> Iterator[str]:
+def _case(
+    run: Run, case: str, printed: Mapping[str, Mapping[str, Mapping[int, float | None]]]
+) -> Iterator[str]:
     """Return the frequencies of one case, a strategy a row, as the papers tabulate them.
 
     Arguments:
-        printed: frequencies in Hz that a paper has for a strategy, by the mode's number.
+        printed: further frequencies in Hz, by where they come from, strategy and number of the
+            mode.
     """
     seed = first_seed(run)
     found = [r for r in run.results if r.case == case and r.seed == seed]
@@ -175,20 +216,26 @@ def _case(run: Run, case: str, printed: Mapping[str, Mapping[int, float]]) -> It
                 fixed(result.score, 3, 6),
             ]
         )
-        if result.strategy in printed:
-            rows.append(_printed(result.strategy, printed[result.strategy], columns))
-    yield table([*headers, "mean MAC", "score"], rows, "l" + "r" * (len(columns) + 2))
+        rows += [
+            _beside(result.strategy, said, named[result.strategy], columns)
+            for said, named in printed.items()
+            if result.strategy in named
+        ]
+    yield table([*headers, "mean MAC", "error left"], rows, "l" + "r" * (len(columns) + 2))
 
 
-def _printed(
-    strategy: str, hertz_of: Mapping[int, float], columns: Mapping[tuple[str, int], PairedMode]
+def _beside(
+    strategy: str,
+    said: str,
+    hertz_of: Mapping[int, float | None],
+    columns: Mapping[tuple[str, int], PairedMode],
 ) -> list[str]:
-    """Return the row of a paper, to stand under ours."""
+    """Return a row of other frequencies of a strategy, to stand under its own."""
     cells = (
         _predicted(replace(mode, predicted_hz=hertz_of[number])) if number in hertz_of else NOTHING
         for (_, number), mode in columns.items()
     )
-    return [f"*{escape(strategy)}, as the paper prints it*", *cells, NOTHING, NOTHING]
+    return [f"*{escape(strategy)}, {said}*", *cells, NOTHING, NOTHING]
 
 
 def _tested(result: JobResult) -> dict[tuple[str, int], PairedMode]:

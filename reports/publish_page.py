@@ -12,6 +12,7 @@ from femubench.results import ranked
 
 _WIDTH, _HEIGHT, _LEFT, _BOTTOM = 640.0, 220.0, 56.0, 34.0
 _MOST_DOTS = 60
+_LEAST_LEFT = 1e-6  # of the error, so that it has a logarithm
 
 Data = Mapping[str, Any]
 
@@ -83,12 +84,12 @@ def chart(versions: Sequence[Data]) -> dict[str, Any] | None:
     rows = [row for row in reversed(versions) if row["skill"] is not None][-_MOST_DOTS:]
     if len(rows) < 2:
         return None
-    logs = [math.log(row["skill"]) for row in rows]
+    logs = [math.log(max(1.0 - row["skill"], _LEAST_LEFT)) for row in rows]
     low, high = min([*logs, 0.0]) - 0.1, max([*logs, 0.0]) + 0.1
     step = (_WIDTH - _LEFT - 30.0) / (len(rows) - 1)
 
     def height(log: float) -> float:
-        return round(12.0 + (_HEIGHT - _BOTTOM - 12.0) * (high - log) / (high - low), 1)
+        return round(12.0 + (_HEIGHT - _BOTTOM - 12.0) * (log - low) / (high - low), 1)
 
     dots = [
         {
@@ -105,5 +106,5 @@ def chart(versions: Sequence[Data]) -> dict[str, Any] | None:
     nice = (digit * 10.0**power for power in range(-8, 9) for digit in (1.0, 2.0, 5.0))
     inside = [value for value in nice if low < math.log(value) < high and value != 1.0]
     shown = inside if len(inside) < 6 else [v for v in inside if f"{v:e}".startswith("1.")]
-    ticks = [(height(math.log(value)), f"{value:g}") for value in [1.0, *shown]]
+    ticks = [(height(math.log(value)), f"{1.0 - value:g}") for value in [1.0, *shown]]
     return {"dots": dots, "line": solid, "every": every, "ticks": ticks}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from femubench.reports.cells import plain
-from femubench.results import JobResult, PairedMode, Run, frequency_error
+from femubench.results import JobResult, PairedMode, Run, frequency_error, scored_on
 
 FINE = ("ok", "not-applicable")
 _HEADER = (
@@ -36,10 +36,13 @@ def troubles(results: Iterable[JobResult], *, fine: bool = False) -> list[Troubl
     Arguments:
         fine: return those that are not applicable instead of the failures.
     """
+    listed = list(results)
+    both = len({result.nominal for result in listed}) > 1
     groups: dict[tuple[str, str, str], list[JobResult]] = {}
-    for result in results:
+    for result in listed:
         if result.status != "ok" and (result.status in FINE) == fine:
-            groups.setdefault((result.case, result.strategy, result.status), []).append(result)
+            case = result.case + (", as drawn" if both and result.nominal == "drawn" else "")
+            groups.setdefault((case, result.strategy, result.status), []).append(result)
     return [
         Trouble(*key, tuple(job.seed for job in jobs), plain(jobs[0].reason))
         for key, jobs in groups.items()
@@ -139,14 +142,32 @@ def measured_modes(run: Run, case: str) -> list[tuple[str, PairedMode]]:
     return [(name, mode) for (name, _), mode in found.items()]
 
 
+def lead(run: Run) -> str:
+    """Return what the skill of a run says, and from where its strategies started."""
+    yardstick = "textbook" if run.meta.get("yardstick") == "textbook" else "nominal"
+    unseen = scored_on(run) == "unseen"
+    what = "unseen data" if unseen else "the modes that were given"
+    told = [
+        f"Skill is the part of the {yardstick} model's error on {what} that a strategy takes away: "
+        "1 is all of it, 0 none, less than 0 is worse."
+    ]
+    if len(run.nominals) > 1:
+        told.append("Ranks are from the textbook models; beside it the start from the drawn ones.")
+    elif yardstick == "textbook":
+        words = {"drawn": "the models as drawn", "textbook": "the textbook models"}
+        told.append(f"All start from {words[run.nominals[0]]}.")
+    if not unseen:
+        told.append("No case holds data back, so that nothing here shows what was learnt.")
+    return " ".join(told)
+
+
 def notes_of(run: Run) -> list[str]:
     """Return what a reader has to know before anything else: what was left out, what is missing."""
     told = run.meta.get("notes")
     notes = [plain(note) for note in told] if isinstance(told, (list, tuple)) else []
-    asked = run.meta.get("request")
-    if isinstance(asked, Mapping) and asked.get("nominal") == "textbook":
-        notes.append("all start from the textbook model, which stands for the unchanged one")
-    jobs = len(cases_of(run)) * len(strategies_of(run)) * len(seeds_of(run))
+    starts = run.meta.get("starts") or {}
+    models = sum(len(starts.get(case, ("drawn",))) for case in cases_of(run))
+    jobs = models * len(strategies_of(run)) * len(seeds_of(run))
     if "finished" in run.meta and run.meta["finished"] is None:
         notes.append(f"the run has not ended: {len(run.results)} of {jobs} jobs are there")
     elif run.meta.get("interrupted") is True:

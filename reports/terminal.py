@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from femubench.reports.cells import fixed, interval, plain, shortened, whole
-from femubench.reports.summary import Trouble, notes_of, spared, troubles, unconverged
+from femubench.reports.summary import Trouble, lead, notes_of, spared, troubles, unconverged
 from femubench.results import Run, interval_kind, leaderboard, ranked, tell_apart
 
 if TYPE_CHECKING:
@@ -18,8 +18,8 @@ _NAME_WIDTH = 16
 _MOST_FAILURES = 20
 _MOST_WIDTHS = (20, _NAME_WIDTH, 13)
 _HEADERS = (
-    *("#", "strategy", "skill", "used\n%", "high.\n%", "mod.\n%"),
-    *("rigid\nlost", "neg.\neig.", "par.", "eval.", "s"),
+    *("#", "strategy", "skill", "from\ndrawn", "high.\n%", "mod.\n%", "given\n%"),
+    *("rigid\nlost", "neg.\neig.", "par.", "s"),
 )
 _ALIGN = ("right", "left", *("right" for _ in _HEADERS[2:]))
 
@@ -36,9 +36,9 @@ class TerminalReporter:
         parts = [ranking(board)]
         if interval_kind(run) == "seeds":
             parts.append(intervals(board))
-        parts.append("\n".join(_legend(board)))
-        if board["skill_unseen"].notna().any():
-            parts.append(_unseen(board))
+        parts.append("\n".join(_legend(run, board)))
+        if board["skill_tests"].notna().any():
+            parts.append(_tests(board))
         if len(board) > 1:
             parts.append(_first_tier(run, board))
         failed = troubles(run.results)
@@ -93,11 +93,11 @@ def _row(row: dict[Any, Any]) -> list[str]:
         _marks(row) + whole(row["rank"]),
         shortened(plain(row["strategy"]), _NAME_WIDTH),
         fixed(row["skill"], 3),
-        *(fixed(row[f"{block}_percent"], 2, 4) for block in ("used", "higher", "modified")),
+        fixed(row["skill_drawn"], 3),
+        *(fixed(row[f"{block}_percent"], 2, 4) for block in ("higher", "modified", "used")),
         whole(row["rigid_modes_lost"], 5),
         whole(row["negative_eigenvalues"], 4),
         whole(row["parameters"], 5),
-        whole(row["evaluations"], 5),
         fixed(row["seconds"], 2, 4),
     ]
 
@@ -121,15 +121,15 @@ def aligned_table(rows: list[list[str]], headers: tuple[str, ...], align: tuple[
     return "\n".join(line.rstrip() for line in text.splitlines())
 
 
-def _unseen(board: pd.DataFrame) -> str:
-    """Return the order of the strategies on what they were not given."""
+def _tests(board: pd.DataFrame) -> str:
+    """Return the order of the strategies on tests alone."""
     rows = ranked(
-        board.to_dict("records"), lambda row: ((), row["skill_unseen"], str(row["strategy"]))
+        board.to_dict("records"), lambda row: ((), 1.0 - row["skill_tests"], str(row["strategy"]))
     )
     named = (
-        f"{_marks(row)}{plain(row['strategy'])} {fixed(row['skill_unseen'], 2)}" for _, row in rows
+        f"{_marks(row)}{plain(row['strategy'])} {fixed(row['skill_tests'], 2)}" for _, row in rows
     )
-    return textwrap.fill(f"skill on unseen data (higher, modified): {', '.join(named)}", WIDTH)
+    return textwrap.fill(f"skill on tests alone, no computed truths: {', '.join(named)}", WIDTH)
 
 
 def _first_tier(run: Run, board: pd.DataFrame) -> str:
@@ -160,13 +160,13 @@ def _notes(run: Run) -> Iterator[str]:
         yield f"Still moving at their last iteration (jobs): {named}."
     for reason, names in spared(run.results).items():
         listed = ", ".join(map(plain, names))
-        yield f"Not applicable, counted as unchanged (skill 1): {listed}: {reason}."
+        yield f"Not applicable, counted as unchanged (skill 0): {listed}: {reason}."
 
 
-def _legend(board: pd.DataFrame) -> Iterator[str]:
-    yield "skill: error against the unchanged model, 1 = no better, less is better"
-    yield "used, high., mod.: rms frequency error, median over the cases"
+def _legend(run: Run, board: pd.DataFrame) -> Iterator[str]:
+    yield textwrap.fill(lead(run), WIDTH)
+    yield "high., mod., given: rms frequency error of the modes, median over the cases"
     if board["unphysical"].any():
         yield "!: unphysical (rigid modes lost or negative eigenvalues), below all others"
     if (board["ok"] + board["not_applicable"] < board["total"]).any():
-        yield "*: some jobs gave no model: 10 each in the skill, left out of the errors"
+        yield "*: some jobs gave no model: ten times the error, left out of the errors shown"

@@ -48,8 +48,8 @@ def thresholds_of(
 )  # fmt: skip
 @click.option(
     "--fail", "thresholds", multiple=True, metavar="METRIC>X", callback=thresholds_of,
-    help="Exit with 1 if a ratio B/A exceeds X: skill, used, higher, modified, seconds; or the "
-    "number of lost results: failures. May be repeated. Default: skill>1.01 and failures>0.",
+    help="Exit with 1 if a ratio B/A exceeds X: unseen, used, higher, modified, seconds; or the "
+    "number of lost results: failures. May be repeated. Default: unseen>1.01 and failures>0.",
 )  # fmt: skip
 @options.style(
     "terminal", "markdown", "html", "json", dest="form", what="What is printed or written."

@@ -20,7 +20,7 @@ from femubench.core.plugin.validation import chosen
 from femubench.core.version import __version__
 
 if TYPE_CHECKING:
-    from femubench.core.library.rank import Nominal, Plan
+    from femubench.core.library.rank import Plan, Start
     from femubench.core.plugin.loader import Plugins
     from femubench.core.roles import Reporter
     from femubench.core.run.recording import Overwrite
@@ -47,9 +47,10 @@ if TYPE_CHECKING:
     help="The first seed.",
 )  # fmt: skip
 @click.option(
-    "--nominal", type=click.Choice(["drawn", "textbook"]), default="drawn", show_default=True,
-    help="The model that all strategies start from and are measured against: as drawn, or with "
-    "what handbooks give for torsion, shear and rotary inertia.",
+    "--nominal", type=click.Choice(["drawn", "textbook", "both"]), default="both",
+    show_default=True,
+    help="The model that all strategies start from: as drawn, or with what handbooks give for "
+    "torsion, shear and rotary inertia, from which the ranks are.",
 )  # fmt: skip
 @click.option(
     "--timeout", "timeouts", multiple=True, callback=timeouts_of, metavar="DURATION",
@@ -94,7 +95,7 @@ def run(
     jobs: int | None,
     seeds: int | None,
     seed: int,
-    nominal: Nominal,
+    nominal: Start,
     timeouts: dict[str, float],
     memory: int | None,
     resume: bool,
@@ -225,12 +226,13 @@ def _header(plan: Plan, workers: int) -> str:
     seeds = request.all_seeds
     named = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]}-{seeds[-1]}"
     meaning = "data as recorded" if seeds == range(1) else "noise added"
-    start = " from the textbook model" if request.nominal == "textbook" else ""
+    starts = {"drawn": "the models as drawn", "textbook": "the textbook models"}
+    start = f" from {starts.get(request.nominal, 'both nominal models')}"
     own = "".join(f", {name} {spoken(limit)}" for name, limit in request.timeouts.items())
     return (
         f"femubench {__version__}: {counted(cases, 'case')}{start}, "
         f"{counted(strategies, 'strategy')}, {named} ({meaning}), "
-        f"{counted(cases * strategies * len(seeds), 'job')}, {counted(workers, 'worker')}, "
+        f"{counted(plan.jobs, 'job')}, {counted(workers, 'worker')}, "
         f"timeout {spoken(request.timeout)}{own}"
     )
 

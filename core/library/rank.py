@@ -15,6 +15,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError, NotApplicable
+from femubench.core.fem.model import Model
 from femubench.core.files import make_folder
 from femubench.core.library.cases import CaseLike, case_words, listed, read_cases, usable_plugins
 from femubench.core.plugin.loader import Plugins
@@ -31,10 +32,11 @@ from femubench.core.score.leaderboard import leaderboard
 if TYPE_CHECKING:
     import pandas as pd
 
-Nominal = Literal["drawn", "textbook"]
+Start = Literal["drawn", "textbook", "both"]
 StrategyLike = str | Strategy | type[Strategy]
 DEFAULT_STORE = "femubench-results"
 DEFAULT_TIMEOUT = 600.0  # s
+_OWN = "femubench."
 _Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
@@ -47,7 +49,7 @@ class Request:
         strategies: names, with options.
         seeds: number of draws of noise; None for the data as recorded.
         seed: the first one.
-        nominal: the model that all start from, as drawn or with its textbook values.
+        nominal: the model that all start from, as drawn, with its textbook values, or both.
         timeout: seconds that a job may take.
         timeouts: the same for single strategies.
         memory: bytes that a job may take; None for an even share.
@@ -57,7 +59,7 @@ class Request:
     strategies: tuple[str, ...]
     seeds: Annotated[int, Field(ge=1)] | None = None
     seed: Annotated[int, Field(ge=0)] = 0
-    nominal: Nominal = "drawn"
+    nominal: Start = "both"
     timeout: _Seconds = DEFAULT_TIMEOUT
     timeouts: Mapping[str, _Seconds] = field(default_factory=dict)
     memory: Annotated[int, Field(ge=1)] | None = None
@@ -133,13 +135,25 @@ class Plan:
     Arguments:
         request: in words.
         cases, strategies: that they stand for.
+        textbook: the cases with their textbook models by name, where those differ.
+        classes: kinds of structure and truth by case.
         repeatable: whether the words say it all.
     """
 
     request: Request
     cases: Sequence[Case]
     strategies: Sequence[Strategy]
+    textbook: Mapping[str, Case]
+    classes: Mapping[str, Sequence[str]]
     repeatable: bool = True
+
+    @property
+    def jobs(self) -> int:
+        """Return the number of jobs."""
+        starts = len(self.cases)
+        if self.request.nominal == "both":
+            starts += len(self.textbook)
+        return starts * len(self.strategies) * len(self.request.all_seeds)
 
     def run(
         self,
@@ -169,6 +183,9 @@ class Plan:
                 progress=progress,
                 run_seed=asked.seed,
                 request=asked.to_json() if self.repeatable else {"nominal": asked.nominal},
+                textbook=self.textbook,
+                nominal=asked.nominal,
+                classes=self.classes,
             )
         )
 
@@ -179,7 +196,7 @@ def rank(
     *,
     seeds: int | None = None,
     seed: int | None = None,
-    nominal: Nominal | None = None,
+    nominal: Start | None = None,
     jobs: int | None = None,
     timeout: float | None = None,
     timeouts: Mapping[str, float] | None = None,
@@ -197,8 +214,9 @@ def rank(
             classes or instances, also of a notebook; all that are installed where there is none.
         seeds: number of draws of measurement noise; None for the data as recorded.
         seed: the first seed; 0 by default.
-        nominal: the model that all strategies start from and are measured against, as it was drawn
-            or, by the word ``textbook``, with what handbooks give. As drawn by default.
+        nominal: the model that all strategies start from: as it was ``drawn``, with what handbooks
+            give (``textbook``), or ``both``, which is the default. Ranks are from the textbook
+            model where that is among them. Errors are measured against the textbook model always.
         jobs: number of worker processes; None for one a processor.
         timeout: seconds that a job may take; 600 by default.
         timeouts: the same for single strategies, by name.
@@ -215,7 +233,7 @@ def rank(
 
     Examples:
         >>> femubench.rank(case, [nominal, scaled]).leaderboard["skill"].round(2).tolist()
-        [0.31, 1.0]
+        [0.69, 0.0]
     """
     kept = None if store is None else store_in(store)
     plan = plan_of(
@@ -240,7 +258,7 @@ def plan_of(
     *,
     seeds: int | None = None,
     seed: int | None = None,
-    nominal: Nominal | None = None,
+    nominal: Start | None = None,
     timeout: float | None = None,
     timeouts: Mapping[str, float] | None = None,
     memory: int | None = None,
@@ -272,13 +290,15 @@ def plan_of(
             strategies=tuple(strategy.name for strategy in found),
             seeds=seeds,
             seed=seed or 0,
-            nominal=nominal or "drawn",
+            nominal=nominal or "both",
             timeout=DEFAULT_TIMEOUT if timeout is None else timeout,
             timeouts=_known(timeouts or {}, found),
             memory=memory,
         ),
-        _started_from(nominal, read),
+        read,
         found,
+        _textbook(read),
+        _classes(plugins),
         repeatable=plain and all(isinstance(item, str) for item in wanted),
     )
 
@@ -288,24 +308,38 @@ def repeated(request: Request, plugins: Plugins) -> Plan:
     found = _strategies(request.strategies, plugins)
     _known(request.timeouts, found)
     read = read_cases(request.cases, plugins)
-    return Plan(request, _started_from(request.nominal, read), found)
+    return Plan(request, read, found, _textbook(read), _classes(plugins))
 
 
-def _started_from(nominal: Nominal | None, cases: Sequence[Case]) -> list[Case]:
-    """Return cases with the nominal model that is meant; matrices stay as they are."""
-    if nominal != "textbook":
-        return list(cases)
+def _textbook(cases: Sequence[Case]) -> dict[str, Case]:
+    """Return the cases with their textbook models by name, without those that have none.
+
+    They are made of this package's own effects: no plugin moves what all are measured against.
+    """
     from femubench.core.effect.textbook import textbook_model
     from femubench.core.plugin.loader import registered_effects
 
-    known = registered_effects()
-    found = []
+    known = [item for item in registered_effects() if type(item).__module__.startswith(_OWN)]
+    found = {}
     for case in cases:
         with suppress(NotApplicable):
-            digest = hashlib.sha256(f"textbook of {case.digest}".encode()).hexdigest()
-            case = replace(case, model=textbook_model(case.model, known), digest=digest)
-        found.append(case)
+            model = textbook_model(case.model, known)
+            if _differ(model, case.model):
+                digest = hashlib.sha256(f"textbook of {case.digest}".encode()).hexdigest()
+                found[case.name] = replace(case, model=model, digest=digest)
     return found
+
+
+def _differ(first: Model, second: Model) -> bool:
+    """Tell whether two models have other matrices."""
+    pairs = (first.mass, second.mass), (first.stiffness, second.stiffness)
+    return any(one.shape != other.shape or (one != other).nnz > 0 for one, other in pairs)
+
+
+def _classes(plugins: Plugins) -> dict[str, tuple[str, ...]]:
+    """Return kinds of structure and truth by case."""
+    listed = plugins.scenarios.values()
+    return {case: scenario.classes for scenario in listed for case in scenario.cases}
 
 
 def _strategies(given: Sequence[object], plugins: Plugins) -> list[Strategy]:

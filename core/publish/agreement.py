@@ -54,7 +54,7 @@ def findings_of(submissions: Iterable[Submission], references: References) -> li
     """
     groups: dict[tuple[str, str, int, str], list[Finding]] = {}
     for item in submissions:
-        for result in item.run.results:
+        for result in item.run.ranked:
             # The names go with the key: a forged key must not put two jobs together.
             job = result.case, result.strategy, result.seed, _whole_key(result)
             listed = groups.setdefault(job, [])

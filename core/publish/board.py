@@ -9,7 +9,9 @@ from typing import Any, NamedTuple
 from femubench.core.publish.agreement import Finding, References, findings_of, machine_of
 from femubench.core.publish.submissions import SCHEMA, Submission, slug
 from femubench.core.schema.results import BLOCKS, DONE, JobResult
+from femubench.core.score.counting import case_weights
 from femubench.core.score.ranking import geometric_mean, ranked as in_order, score_of
+from femubench.core.score.statistics import structures_of
 
 
 class _Version(NamedTuple):
@@ -32,8 +34,9 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
     versions = _versions(findings)
     latest = {version.strategy: version for version in versions}  # the last one stays
     ranked = _ranked(latest.values(), versions, current)
+    structures = {n: s for item in submissions for n, s in structures_of(item.run).items()}
     described = {
-        version: _described(version, listed, current, ranked, references)
+        version: _described(version, listed, current, ranked, references, structures)
         for version, listed in versions.items()
     }
     return {
@@ -106,6 +109,7 @@ def _described(
     current: Mapping[str, str],
     ranked: Sequence[str],
     references: References,
+    structures: Mapping[str, str],
 ) -> dict[str, Any]:
     """Return a version with its results on every case and what they come to."""
     groups: dict[tuple[str, str], list[Finding]] = {}
@@ -121,7 +125,9 @@ def _described(
         for case, listed in sorted(groups.items())
     ]
     counted = [case for case in cases if case["ranked"]]
-    weights = [max(len(references[case["case"], case["digest"]]), 1) for case in counted]
+    known = {case["case"]: references[case["case"], case["digest"]] for case in counted}
+    weights = case_weights(known, structures)
+    scores = [(case["score"], weights.get(case["case"], 1.0)) for case in counted]
     runs = sorted({run.order: run for item in findings for run in item.runs}.items())
     machines = {machine_of(run): run.run.meta["machine"] for _, run in runs}
     return {
@@ -131,7 +137,7 @@ def _described(
         "last": runs[-1][1].started,
         "machines": [machines[key] for key in sorted(machines)],
         "runs": [run.name for _, run in runs],
-        "skill": geometric_mean([c["score"] for c in counted], weights) if counted else None,
+        "skill": 1.0 - geometric_mean(*zip(*scores, strict=True)) if counted else None,
         **{f"{name}_percent": _median(counted, f"{name}_percent") for name in BLOCKS},
         "seconds": _median([c for c in counted if c["status"] == "ok"], "seconds"),
         "covered": len(counted),
@@ -198,7 +204,7 @@ def _strategy_entries(
     def order(name: str) -> tuple[tuple[float, ...], float, str]:
         row = described[latest[name]]
         tier = not row["complete"], row["unphysical"], -row["covered"]
-        return tier, 0.0 if row["skill"] is None else row["skill"], name
+        return tier, 0.0 if row["skill"] is None else 1.0 - row["skill"], name
 
     return [
         {

@@ -17,7 +17,7 @@ __all__ = ["modes_frame", "results_frame", "run_from_json", "run_to_json"]
 def results_frame(run: Run) -> pd.DataFrame:
     """Return one row a job: status, errors by block, counts, score and rank.
 
-    Columns: case strategy seed status reason seconds; ``used_percent``, ``used_mac`` and the same
+    Columns: case strategy seed nominal status reason seconds; ``used_percent``, ``used_mac`` and the same
     for ``higher`` and ``modified`` (nan where the case has no such block); rigid_body_modes
     rigid_body_modes_expected negative_eigenvalues unphysical parameter_count evaluations score
     rank.
@@ -42,7 +42,7 @@ def results_frame(run: Run) -> pd.DataFrame:
 def modes_frame(run: Run) -> pd.DataFrame:
     """Return one row a measured mode of every job that is ok.
 
-    Columns: case strategy seed block modification mode measured_hz predicted_hz error_percent
+    Columns: case strategy seed nominal block modification mode measured_hz predicted_hz error_percent
     mac. The error is signed, (f_p / f_m - 1), and nan for a mode without partner or with an
     imaginary one; `counted_percent` is what the score takes, 100 for such a mode.
 
@@ -57,6 +57,7 @@ def modes_frame(run: Run) -> pd.DataFrame:
             "case": result.case,
             "strategy": result.strategy,
             "seed": result.seed,
+            "nominal": result.nominal,
             "block": name,
             "modification": mode.modification,
             "mode": mode.number,
@@ -71,7 +72,7 @@ def modes_frame(run: Run) -> pd.DataFrame:
         for mode in block.modes
     ]
     floats = ("measured_hz", "predicted_hz", "error_percent", "counted_percent", "mac")
-    names = ("case", "strategy", "seed", "block", "modification", "mode", *floats)
+    names = ("case", "strategy", "seed", "nominal", "block", "modification", "mode", *floats)
     return pd.DataFrame(rows, columns=list(names)).astype(dict.fromkeys(floats, "float64"))
 
 
@@ -81,7 +82,7 @@ def _signed(measured: float, predicted: float | None) -> float | None:
     return 100.0 * (predicted / measured - 1.0)
 
 
-_JOB = ("case", "strategy", "seed", "status", "reason", "seconds")
+_JOB = ("case", "strategy", "seed", "nominal", "status", "reason", "seconds")
 _COUNTS = (
     *("rigid_body_modes", "rigid_body_modes_expected", "negative_eigenvalues", "unphysical"),
     *("parameter_count", "evaluations", "score", "rank"),

@@ -15,7 +15,7 @@ from femubench.core.run.answers import AnswerError, packed, unpacked
 from femubench.core.run.jobs import Job, JobOutcome, execute, one_line
 from femubench.core.run.model_checks import check_model
 from femubench.core.schema.records import result_to_json
-from femubench.core.schema.results import JobResult
+from femubench.core.schema.results import JobResult, Nominal
 from femubench.core.score.scoring import Reference, judge, score_of
 
 
@@ -26,7 +26,7 @@ class Verdict:
     Arguments:
         case: the case and its `Reference`, pickled by this program.
         answer: of the strategy's worker, from `packed`; nobody has looked into it yet.
-        strategy, seed: of the job.
+        strategy, seed, nominal: of the job.
         exhibited: whether its exhibit is wanted too.
     """
 
@@ -34,6 +34,7 @@ class Verdict:
     answer: bytes
     strategy: str
     seed: int
+    nominal: Nominal = "drawn"
     exhibited: bool = False
 
 
@@ -49,7 +50,8 @@ def run_judge(verdict: Verdict) -> bytes:
         outcome = unpacked(verdict.answer)
     except AnswerError as error:
         outcome = JobOutcome("failed", str(error), traceback.format_exc())
-    result = judged(case, reference, verdict.strategy, verdict.seed, outcome)
+    job = verdict.strategy, verdict.seed, verdict.nominal
+    result = judged(case, reference, job, outcome)
     exhibit = _exhibit(case, outcome, result) if verdict.exhibited else None
     return json.dumps({"result": result_to_json(result), "exhibit": exhibit}).encode()
 
@@ -71,12 +73,22 @@ def _exhibit(case: Case, outcome: JobOutcome, result: JobResult) -> dict[str, An
 
 
 def judged(
-    case: Case, reference: Reference, strategy: str, seed: int, outcome: JobOutcome
+    case: Case, reference: Reference, job: tuple[str, int, Nominal], outcome: JobOutcome
 ) -> JobResult:
-    """Return the result of a job: its model checked and scored; a model that fails has failed."""
+    """Return the result of a job: its model checked and scored; a model that fails has failed.
+
+    Arguments:
+        case: with the nominal model that the strategy started from.
+        reference: what the textbook model of the case gives.
+        job: strategy, seed, and which nominal model it is.
+        outcome: what the strategy left behind.
+    """
+    strategy, seed, nominal = job
     own = {f.name: getattr(outcome, f.name) for f in fields(outcome) if f.name != "model"}
     expected = reference.rigid.shape[1]
-    result = JobResult(case.name, strategy, seed, **own, rigid_body_modes_expected=expected)
+    result = JobResult(
+        case.name, strategy, seed, **own, rigid_body_modes_expected=expected, nominal=nominal
+    )
     if outcome.model is not None:
         result = _scored(result, case, outcome, reference)
     return replace(result, score=score_of(result, reference.rms_percent))

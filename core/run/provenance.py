@@ -104,12 +104,13 @@ def _python_files(folder: Path) -> Iterable[Path]:
         yield from (Path(where) / name for name in names if name.endswith(".py"))
 
 
-def provenance(meta: Mapping[str, Any], case: Case, version: str, seed: int) -> dict[str, Any]:
+def provenance(meta: Mapping[str, Any], digest: str, version: str, seed: int) -> dict[str, Any]:
     """Return where a result comes from, in plain data.
 
     Arguments:
         meta: of the run.
-        case, version, seed: of the job.
+        digest: of the files of the case.
+        version, seed: of the job.
     """
     machine = meta["machine"]
     return {
@@ -117,7 +118,7 @@ def provenance(meta: Mapping[str, Any], case: Case, version: str, seed: int) -> 
         "blas": machine["blas"],
         "cpu": machine["cpu"],
         "git": meta["git_commit"],
-        "case": case.digest,
+        "case": digest,
         "strategy": version,
         "seed": seed,
     }
@@ -164,6 +165,7 @@ def run_meta(
     references: Mapping[str, Reference],
     seeds: Sequence[int],
     settings: Mapping[str, Any],
+    about: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return the meta data of a run: id, seeds, versions, machine, commit, cases, references.
 
@@ -171,6 +173,7 @@ def run_meta(
         settings: ``seed`` of the run's statistics, ``jobs``, ``timeout`` in s, ``memory`` in bytes,
             ``plan`` (digest of the keys of all jobs), ``request`` (what was asked for, so that the
             run can be continued and repeated).
+        about: what else is said of the cases, by case: ``starts``, ``classes``.
     """
     return {
         "run": new_run_id(),
@@ -187,6 +190,7 @@ def run_meta(
         "git_commit": git_commit(),
         "structures": {case.name: case.structure or case.name for case in cases},
         "cases": {case.name: {"title": case.title, "digest": case.digest} for case in cases},
+        **about,
         "strategies": [strategy.name for strategy in strategies],
         "citations": {strategy.name: strategy.citation for strategy in strategies},
         "baseline": next((s.name for s in strategies if getattr(s, "baseline", False)), None),

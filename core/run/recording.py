@@ -27,7 +27,9 @@ class Results:
         self._slots, self._store, self._run, self._progress = slots, store, run, progress
         self._found: dict[int, JobResult] = {}
         if store is not None:
-            keep_drawings(store.exhibits, {slot.case.name: slot.case for slot in slots}.values())
+            # What is drawn of a case starts from the model that makes the ranks, which comes first.
+            drawn = {slot.case.name: slot.case for slot in reversed(slots)}
+            keep_drawings(store.exhibits, drawn.values())
 
     @property
     def shelf(self) -> Show | None:

@@ -7,7 +7,7 @@ import pickle
 import sys
 import traceback
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -23,7 +23,7 @@ from femubench.core.run.limits import Limits
 from femubench.core.run.provenance import job_key, provenance, strategy_version
 from femubench.core.run.workers import Ending, Workers
 from femubench.core.schema.records import result_from_json
-from femubench.core.schema.results import JobResult, Status
+from femubench.core.schema.results import JobResult, Nominal, Status
 from femubench.core.score.scoring import Reference
 
 
@@ -32,7 +32,8 @@ class Slot:
     """One job of the run: who and what, and the job or why there is none.
 
     Arguments:
-        case, strategy, seed: the job.
+        case, strategy, seed: the job; the case has the nominal model that is started from.
+        nominal: which one that is.
         key: of everything that decides on its result.
         provenance: of its result, in plain data.
         job: what a worker is given; None where it could not be made.
@@ -43,6 +44,7 @@ class Slot:
     case: Case
     strategy: str
     seed: int
+    nominal: Nominal
     key: str
     provenance: Mapping[str, Any]
     job: Job | None
@@ -57,16 +59,21 @@ class Slot:
     def made_by(self, meta: Mapping[str, Any]) -> Slot:
         """Return the job with the whole provenance of a run's results."""
         version = str(self.provenance["strategy"])
-        return replace(self, provenance=provenance(meta, self.case, version, self.seed))
+        digest = meta["cases"][self.case.name]["digest"]
+        return replace(self, provenance=provenance(meta, digest, version, self.seed))
 
 
 def slots_of(
-    cases: Sequence[Case], strategies: Sequence[Strategy], seeds: Sequence[int]
+    starts: Iterable[tuple[Nominal, Case]], strategies: Sequence[Strategy], seeds: Sequence[int]
 ) -> Iterator[Slot]:
-    """Yield the jobs of a run, case by case and seed by seed."""
+    """Yield the jobs of a run, case by case and seed by seed.
+
+    Arguments:
+        starts: cases, each with a nominal model to start from.
+    """
     pickled = [_pickled(strategy, sent) for strategy in strategies]
     versions = [strategy_version(strategy) for strategy in strategies]
-    for case in cases:
+    for nominal, case in starts:
         model = _pickled(case.model)
         for seed in seeds:
             measurement = _pickled(case.used_measurement(seed))
@@ -78,7 +85,7 @@ def slots_of(
                 known = _identity(strategy, code)
                 key = job_key(case, strategy.name, known, version, seed)
                 plain, now = {"strategy": version}, partial(strategy_version, strategy)
-                yield Slot(case, strategy.name, seed, key, plain, job, fault, now)
+                yield Slot(case, strategy.name, seed, nominal, key, plain, job, fault, now)
 
 
 def _identity(strategy: Strategy, code: bytes | JobOutcome) -> bytes:
@@ -153,7 +160,7 @@ class _Bench:
     ) -> None:
         self._slots, self._references, self._limits = slots, references, limits
         self._show, self._shown = show, min((slot.seed for slot in slots), default=0)
-        self._cases: dict[str, bytes] = {}
+        self._cases: dict[tuple[str, Nominal], bytes] = {}
         self._attempts = Counter[int]()
         self._alone: set[int] = set()
         self.waiting: deque[_Task] = deque()
@@ -172,7 +179,8 @@ class _Bench:
         slot = self._slots[index]
         if answer:
             shown = self._show is not None and slot.seed == self._shown
-            verdict = Verdict(self._case(slot.case), answer, slot.strategy, slot.seed, shown)
+            job = slot.strategy, slot.seed, slot.nominal
+            verdict = Verdict(self._case(slot), answer, *job, exhibited=shown)
             ending = workers.start(task, run_judge, verdict, self._judging(slot.strategy))
         else:
             ending = workers.start(task, run_strategy, slot.job, self._limits[slot.strategy])
@@ -210,7 +218,7 @@ class _Bench:
         """Return the result of a job that has no model to be judged."""
         slot = self._slots[index]
         reference = self._references[slot.case.name]
-        return judged(slot.case, reference, slot.strategy, slot.seed, outcome)
+        return judged(slot.case, reference, (slot.strategy, slot.seed, slot.nominal), outcome)
 
     def _judgement(self, slot: Slot, ending: Ending) -> JobResult | JobOutcome:
         if ending.how != "answer":
@@ -224,11 +232,12 @@ class _Bench:
             self._show(slot, data["exhibit"])
         return result
 
-    def _case(self, case: Case) -> bytes:
-        if case.name not in self._cases:
-            pair = (case, self._references[case.name])
-            self._cases[case.name] = pickle.dumps(pair, protocol=pickle.HIGHEST_PROTOCOL)
-        return self._cases[case.name]
+    def _case(self, slot: Slot) -> bytes:
+        start = slot.case.name, slot.nominal
+        if start not in self._cases:
+            pair = (slot.case, self._references[slot.case.name])
+            self._cases[start] = pickle.dumps(pair, protocol=pickle.HIGHEST_PROTOCOL)
+        return self._cases[start]
 
     def _judging(self, strategy: str) -> Limits:
         limits = self._limits[strategy]

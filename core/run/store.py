@@ -25,7 +25,7 @@ from femubench.core.schema.records import (
     result_from_json,
     result_to_json,
 )
-from femubench.core.schema.results import DONE, JobResult, Run
+from femubench.core.schema.results import DONE, NOMINALS, JobResult, Run
 from femubench.core.score.ranking import rank_results
 
 _MOST_NOTES = 3
@@ -341,11 +341,14 @@ def in_order_of_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> l
     Arguments:
         meta: ``cases``, ``seeds`` and ``strategies`` of the run; what they lack comes last.
     """
-    listed = meta.get("cases") or (), meta.get("seeds") or (), meta.get("strategies") or ()
+    listed = (
+        *(meta.get("cases") or (), tuple(reversed(NOMINALS))),
+        *(meta.get("seeds") or (), meta.get("strategies") or ()),
+    )
     places = [{name: place for place, name in enumerate(names)} for names in listed]
 
     def place(result: JobResult) -> list[int]:
-        words = result.case, result.seed, result.strategy
+        words = result.case, result.nominal, result.seed, result.strategy
         return [known.get(word, len(known)) for known, word in zip(places, words, strict=True)]
 
     return sorted(results, key=place)

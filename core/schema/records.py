@@ -13,7 +13,16 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from femubench.core.errors import InputError
 from femubench.core.files import MIB, read_text
-from femubench.core.schema.results import BLOCKS, Block, JobResult, PairedMode, Run, Status
+from femubench.core.schema.results import (
+    BLOCKS,
+    NOMINALS,
+    Block,
+    JobResult,
+    Nominal,
+    PairedMode,
+    Run,
+    Status,
+)
 from femubench.core.schema.validation import validated
 
 LARGEST_RUN = 256 * MIB  # bytes of a file of `bench run --json`
@@ -65,6 +74,7 @@ class ResultRecord(Record):
     case: Name
     strategy: Name
     seed: _Whole
+    nominal: Nominal = "drawn"
     status: Status
     reason: _Text = ""
     seconds: Annotated[float, Field(ge=0)] = 0.0
@@ -109,6 +119,11 @@ class MetaRecord(BaseModel):
     baseline: Name | None = None
     cases: dict[Name, _CaseMeta] = {}
     structures: dict[Name, Name] | None = None
+    yardstick: Nominal | None = None
+    starts: dict[Name, list[Nominal]] | None = None
+    alike: list[Name] | None = None
+    drawings: dict[Name, Name] | None = None
+    classes: dict[Name, list[Name]] | None = None
     citations: dict[Name, _Text] | None = None
     reference: dict[Name, dict[Name, _Percent]] | None = None
 
@@ -150,7 +165,7 @@ def check_extent(
     cases = {*(meta.get("cases") or ()), *(meta.get("reference") or ())}
     cases |= {result.case for result in results}
     seeds = {*meta.get("seeds", ()), *(result.seed for result in results)}
-    jobs = len(strategies) * len(cases) * len(seeds)
+    jobs = len(strategies) * len(cases) * len(seeds) * len(NOMINALS)
     if len(strategies) > _MOST_NAMES or jobs > _MOST_JOBS:
         what = f"{len(strategies)} strategies on {len(cases)} cases with {len(seeds)} seeds"
         expected = f"at most {_MOST_NAMES} strategies and {_MOST_JOBS} jobs"

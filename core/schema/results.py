@@ -14,6 +14,10 @@ STATUSES: tuple[Status, ...] = get_args(Status)
 # A result, though there may be no model; everything else is a failure and no result.
 DONE: frozenset[Status] = frozenset({"ok", "not-applicable"})
 BLOCKS = ("used", "higher", "modified")
+UNSEEN = ("higher", "modified")  # what no strategy is given
+# The model that a strategy starts from: as an engineer drew it, or with what handbooks give.
+Nominal = Literal["drawn", "textbook"]
+NOMINALS: tuple[Nominal, ...] = get_args(Nominal)
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,7 @@ class Block:
 
 @dataclass(frozen=True)
 class JobResult:
-    """The outcome of one (case, strategy, seed).
+    """The outcome of one (case, strategy, seed), started from one nominal model.
 
     Arguments:
         case, strategy, seed: the job.
@@ -67,12 +71,15 @@ class JobResult:
         negative_eigenvalues: of the updated model.
         parameter_count: unknowns that were free.
         evaluations: eigenvalue solutions that the strategy made.
-        score: geometric mean over the blocks of (rms + 0.05 %) / (nominal rms + 0.05 %).
-        rank: within case and seed; 1 is best.
+        score: how much of the textbook model's error on unseen data is left: geometric mean over
+            the unseen blocks of (rms + 0.05 %) / (its rms + 0.05 %). Less is better.
+        rank: within case, seed and nominal model; 1 is best.
         parameters, history, diagnostics: as the strategy gave them, in plain data.
         traceback: of an exception, for whoever asks for it.
         key: of the job, from everything that decides on its result; empty where it is not known.
         provenance: versions, libraries, processor, commit and digests, in plain data.
+        nominal: the model that the strategy started from; ``textbook`` too where the model as drawn
+            has all that handbooks give.
     """
 
     case: str
@@ -95,6 +102,7 @@ class JobResult:
     traceback: str = ""
     key: str = ""
     provenance: Mapping[str, Any] = field(default_factory=dict)
+    nominal: Nominal = "drawn"
 
     @property
     def rigid_modes_lost(self) -> int:
@@ -118,6 +126,26 @@ class Run(Shown):
 
     meta: Mapping[str, Any]
     results: tuple[JobResult, ...]
+
+    @property
+    def nominals(self) -> tuple[Nominal, ...]:
+        """Return the models that strategies started from, the one that ranks first."""
+        told = {name for names in (self.meta.get("starts") or {}).values() for name in names}
+        found = told | {result.nominal for result in self.results}
+        return tuple(name for name in reversed(NOMINALS) if name in found) or ("drawn",)
+
+    @property
+    def ranked(self) -> tuple[JobResult, ...]:
+        """Return the results that make the ranks: those started from the textbook models."""
+        return self.started_from(self.nominals[0])
+
+    def started_from(self, nominal: Nominal) -> tuple[JobResult, ...]:
+        """Return the results from one nominal model.
+
+        Where the model as drawn has all that handbooks give, its results stand for both.
+        """
+        alike = frozenset(self.meta.get("alike") or ())
+        return tuple(r for r in self.results if r.nominal == nominal or r.case in alike)
 
     def rows(self) -> Sequence[tuple[str, str]]:
         """Return what was run and how it ended."""

@@ -8,16 +8,17 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal, get_args
 
 from femubench.core.errors import InputError
-from femubench.core.schema.results import BLOCKS, DONE, JobResult, Run
+from femubench.core.schema.results import BLOCKS, DONE, NOMINALS, JobResult, Nominal, Run
+from femubench.core.score.counting import case_weights, counted_blocks
 from femubench.core.score.ranking import OFFSET_PERCENT, geometric_mean, score_of
 from femubench.core.score.repeatability import environment_differences
 from femubench.core.score.statistics import Evidence, ScoreTable, evidence_of, structures_of
 from femubench.core.typing import FloatArray
 
-Metric = Literal["skill", "used", "higher", "modified", "seconds", "failures"]
+Metric = Literal["unseen", "used", "higher", "modified", "seconds", "failures"]
 METRICS: tuple[Metric, ...] = get_args(Metric)
 Kind = Literal["lost", "gained", "other"]
-SCHEMA = 2
+SCHEMA = 3
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,8 @@ class Threshold:
     """The largest value of a metric that is still accepted.
 
     Arguments:
-        metric: a ratio B / A, or ``failures``, the number of results that B lost.
+        metric: a ratio B / A of errors (``unseen``: those that make the skill) or of seconds, or
+            ``failures``, the number of results that B lost.
         most: exceeded means worse.
     """
 
@@ -33,7 +35,7 @@ class Threshold:
     most: float
 
 
-DEFAULT_THRESHOLDS = (Threshold("skill", 1.01), Threshold("failures", 0.0))
+DEFAULT_THRESHOLDS = (Threshold("unseen", 1.01), Threshold("failures", 0.0))
 
 
 @dataclass(frozen=True)
@@ -145,12 +147,13 @@ _ROUNDING = 1e-9  # relative; two machines may differ by it
 
 @dataclass(frozen=True)
 class _Pair:
-    """One job in both runs; the errors of the nominal model stand for both."""
+    """One job in both runs; the errors of the nominal model and the weight stand for both."""
 
     strategy: str
     before: JobResult
     after: JobResult
     reference: Mapping[str, float]
+    weight: float
 
     @property
     def blocks(self) -> dict[str, float]:
@@ -164,20 +167,17 @@ class _Pair:
         }
 
     @property
-    def skill(self) -> float | None:
+    def unseen(self) -> float | None:
         """Return the ratio of the scores; None where a failure has nothing to be set against."""
         reference = self.reference
         if not reference and self.before.status == self.after.status == "ok":
-            return geometric_mean(self.blocks.values()) if self.blocks else None
+            ratios = self.blocks
+            counted = [ratios[name] for name in counted_blocks(ratios)]
+            return geometric_mean(counted) if counted else None
         if reference:
             return score_of(self.after, reference) / score_of(self.before, reference)
         scores = self.before.score, self.after.score
         return None if scores[0] is None or scores[1] is None else scores[1] / scores[0]
-
-    @property
-    def weight(self) -> int:
-        """Return the number of blocks, by which a score counts."""
-        return max(len(self.reference), len(self.before.blocks), len(self.after.blocks), 1)
 
 
 def compare_runs(
@@ -204,7 +204,9 @@ def compare_runs(
     names = _names(_strategies(before), _strategies(after), against)
     chosen = frozenset(strategies)
     names = {a: b for a, b in names.items() if not chosen or {a, b} & chosen}
-    old, new = _by_job(before, names), _by_job(after, {b: b for b in names.values()})
+    nominal = _common_start(before, after)
+    old = _by_job(before.started_from(nominal), names)
+    new = _by_job(after.started_from(nominal), {b: b for b in names.values()})
     shared = [job for job in old if job in new]
     other = [job for job in shared if _moved(before, old[job], after, new[job])]
     shared = [job for job in shared if job not in set(other)]
@@ -213,7 +215,11 @@ def compare_runs(
         raise InputError("the two runs have no job in common", expected=expected)
     references = {**(after.meta.get("reference") or {}), **(before.meta.get("reference") or {})}
     structures = {**structures_of(after), **structures_of(before)}
-    pairs = [_Pair(j.strategy, old[j], new[j], references.get(j.case) or {}) for j in shared]
+    weights = case_weights(references, structures)
+    pairs = [
+        _Pair(j.strategy, old[j], new[j], references.get(j.case) or {}, weights.get(j.case, 1.0))
+        for j in shared
+    ]
     rows = tuple(_rows(pairs))
     return Comparison(
         before=str(before.meta.get("run") or "A"),
@@ -235,9 +241,22 @@ def compare_runs(
     )
 
 
-def _by_job(run: Run, names: Mapping[str, str]) -> dict[Job, JobResult]:
+def _common_start(before: Run, after: Run) -> Nominal:
+    """Return the nominal model from which both runs start, the one that ranks before the other.
+
+    Raises:
+        InputError: when there is none.
+    """
+    for nominal in reversed(NOMINALS):
+        if before.started_from(nominal) and after.started_from(nominal):
+            return nominal
+    starts = " and ".join(f"the {run.nominals[0]} models" for run in (before, after))
+    raise InputError(f"the two runs start from {starts}", expected="one nominal model in both")
+
+
+def _by_job(results: Iterable[JobResult], names: Mapping[str, str]) -> dict[Job, JobResult]:
     """Return the results by job, under the strategy's name in B where A has another."""
-    chosen = (r for r in run.results if r.strategy in names)
+    chosen = (r for r in results if r.strategy in names)
     return {Job(names[r.strategy], r.case, r.seed): r for r in chosen}
 
 
@@ -336,14 +355,14 @@ def _rows(pairs: Iterable[_Pair]) -> Iterable[Row]:
 
 
 def _values(pairs: Sequence[_Pair]) -> dict[str, float | None]:
-    skills = [(pair.skill, pair.weight) for pair in pairs]
-    known = [(skill, weight) for skill, weight in skills if skill is not None]
-    values: dict[str, float | None] = {"skill": None}
+    ratios = [(pair.unseen, pair.weight) for pair in pairs if pair.weight > 0.0]
+    known = [(ratio, weight) for ratio, weight in ratios if ratio is not None]
+    values: dict[str, float | None] = {"unseen": None}
     if known:
-        values["skill"] = geometric_mean((s for s, _ in known), (w for _, w in known))
+        values["unseen"] = geometric_mean((r for r, _ in known), (w for _, w in known))
     for block in BLOCKS:
-        ratios = [pair.blocks[block] for pair in pairs if block in pair.blocks]
-        values[block] = geometric_mean(ratios) if ratios else None
+        errors = [pair.blocks[block] for pair in pairs if block in pair.blocks]
+        values[block] = geometric_mean(errors) if errors else None
     timed = [pair for pair in pairs if pair.before.status == pair.after.status == "ok"]
     total = sum(pair.before.seconds for pair in timed)
     ratio = sum(pair.after.seconds for pair in timed) / total if total > 0.0 else math.inf

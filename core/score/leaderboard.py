@@ -1,29 +1,41 @@
-"""The leaderboard: one row a strategy over all cases and seeds of a run."""
+"""The leaderboard: one row a strategy over all structures and seeds of a run."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femubench.core.schema.results import BLOCKS, JobResult, Run
+from femubench.core.schema.results import BLOCKS, UNSEEN, JobResult, Run
+from femubench.core.score.counting import (
+    WHOLE,
+    References,
+    Weights,
+    block_weights,
+)
 from femubench.core.score.ranking import (
+    OFFSET_PERCENT,
     SCORE_OF_FAILURE,
-    geometric_mean,
     rank_results,
     ranked,
-    score_of,
+    score_in,
 )
 from femubench.core.score.statistics import FEWEST, interval_over_structures, structures_of
+from femubench.core.typing import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
 
+COMPUTED = "computed truth"  # the class of a case whose truth is no test
+# What is added to all errors; ranks that move within are no ranks.
+FLOORS = (0.005, 0.02, OFFSET_PERCENT, 0.1, 0.2)  # percent
 _RESAMPLES = 999
 COLUMNS = (
-    *("rank", "strategy", "skill", "skill_low", "skill_high", "skill_unseen"),
+    *("rank", "strategy", "skill", "skill_low", "skill_high", "skill_drawn", "skill_tests"),
     *(f"{block}_percent" for block in BLOCKS),
     *("rigid_modes_lost", "negative_eigenvalues", "parameters", "evaluations", "seconds"),
     *("ok", "not_applicable", "total", "unphysical"),
@@ -32,31 +44,68 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class _Grid:
-    """All (case, seed) that a strategy is expected to have a result for.
+    """All (case, block, seed) that a strategy is expected to have a result for.
 
     Arguments:
-        blocks: number of blocks by case.
+        cases: of the run.
+        weights: how much a block counts; the blocks of a structure come to 1.
         seeds: of the run.
         structures: by case; one that is not named is a structure of its own.
+        reference: rms error of the nominal model in percent by case and block.
     """
 
-    blocks: dict[str, int]
+    cases: tuple[str, ...]
+    weights: Weights
     seeds: tuple[int, ...]
     structures: dict[str, str]
+    reference: References
 
     @classmethod
     def of(cls, run: Run) -> _Grid:
         reference = run.meta.get("reference") or {}
-        blocks = {case: len(errors) for case, errors in reference.items()}
-        for result in run.results:
-            blocks[result.case] = max(blocks.get(result.case, 1), len(result.blocks))
+        cases = dict.fromkeys((*reference, *(result.case for result in run.ranked)))
         seeds = {*run.meta.get("seeds", ()), *(result.seed for result in run.results)}
-        return cls(blocks, tuple(sorted(seeds)), structures_of(run))
+        structures = structures_of(run)
+        weights = block_weights(reference, structures)
+        weights |= {(case, WHOLE): 1.0 for case in cases if case not in reference}
+        return cls(tuple(cases), weights, tuple(sorted(seeds)), structures, reference)
+
+    def of_cases(self, cases: Iterable[str]) -> _Grid:
+        """Return what is expected on some of the cases."""
+        chosen = frozenset(cases)
+        weights = {unit: w for unit, w in self.weights.items() if unit[0] in chosen}
+        return _Grid(self.cases, weights, self.seeds, self.structures, self.reference)
+
+    @property
+    def members(self) -> FloatArray:
+        """Return how much every block is of its structure's mean; (structures, blocks)."""
+        owners = [self.structures.get(case, case) for case, _ in self.weights]
+        names = {name: place for place, name in enumerate(dict.fromkeys(owners))}
+        member = np.zeros((len(names), len(owners)))
+        member[[names[name] for name in owners], range(len(owners))] = list(self.weights.values())
+        return np.asarray(member / member.sum(axis=1, keepdims=True))
+
+    def logs(self, results: Iterable[JobResult], floor_percent: float) -> FloatArray:
+        """Return the logarithms of a strategy's scores; (structures, seeds).
+
+        What is missing counts as a failure.
+        """
+        found = {(result.case, result.seed): result for result in results}
+        scores = [
+            SCORE_OF_FAILURE
+            if (result := found.get((case, seed))) is None
+            else score_in(result, block, self.reference.get(case) or {}, floor_percent)
+            for case, block in self.weights
+            for seed in self.seeds
+        ]
+        shape = len(self.weights), len(self.seeds)
+        logs = np.log(np.array(scores, dtype=float)).reshape(shape)
+        return np.asarray(self.members @ logs)
 
     @property
     def interval(self) -> str:
         """Return what the intervals of the skills are over; nothing where there are none."""
-        count = len({self.structures.get(case, case) for case in self.blocks})
+        count = len({self.structures.get(case, case) for case, _ in self.weights})
         return "structures" if count >= FEWEST else "seeds" if len(self.seeds) > 1 else ""
 
 
@@ -70,65 +119,127 @@ def interval_kind(run: Run) -> str:
     return _Grid.of(run).interval
 
 
-def leaderboard(run: Run) -> pd.DataFrame:
+def leaderboard(run: Run, floor_percent: float = OFFSET_PERCENT) -> pd.DataFrame:
     """Return one row a strategy, best first: physical, then unphysical, then without any model.
 
     Strategies of one skill share a rank.
 
-    `skill` is the geometric mean over all blocks of all cases, and with several seeds the median
-    over seeds, with a 95 % bootstrap interval in `skill_low` and `skill_high`: over structures
-    where there are enough of them, else over the seeds of those there are; `skill_unseen` is
-    that over all seeds without the block that the strategy was given. The three errors are the
-    median over cases of the median over seeds of the rms error in percent, over the jobs that
-    are ok; so are `parameters`, `evaluations` and `seconds`. Rigid-body modes lost and negative
-    eigenvalues are sums. A job without result scores 10.
+    `skill` is the part of the textbook model's error on unseen data that the strategy takes away:
+    1 leaves nothing of it, 0 is no better, less than 0 is worse. It is 1 - r, with r the geometric
+    mean over structures, each the mean of its unseen blocks, of (rms + 0.05 %) / (rms of the
+    textbook model + 0.05 %), with several seeds the median over them. A job without result counts
+    as 10 in r. `skill_low` and `skill_high` are its 95 % bootstrap interval: over structures where
+    there are enough of them, else over the seeds of those there are. `skill_drawn` is the skill
+    with which the strategy starts from the models as drawn, `skill_tests` that on tests alone,
+    without computed truths; nan where there is no such difference. The three errors are the median
+    over cases of the median over seeds of the rms error in percent, over the jobs that are ok; so
+    are `parameters`, `evaluations` and `seconds`. Rigid-body modes lost and negative eigenvalues
+    are sums.
 
     Arguments:
         run: with `reference`, `seeds`, `seed` and `strategies` in its meta.
+        floor_percent: what is added to all errors.
 
     Examples:
         >>> results.leaderboard(run)[["rank", "skill"]].round(2).values.tolist()
-        [[1.0, 0.31], [2.0, 1.0]]
+        [[1.0, 0.69], [2.0, 0.0]]
     """
     import pandas as pd
 
-    grid = _Grid.of(run)
-    seed = int(run.meta.get("seed", 0))
-    reference = run.meta.get("reference") or {}
-    scored = rank_results(run.results, reference or None, run.meta.get("baseline"))
-    names = list(run.meta.get("strategies", ()))
-    names += sorted({result.strategy for result in scored} - set(names))
-    rows = [_row(n, [r for r in scored if r.strategy == n], grid, seed, reference) for n in names]
+    table = _Table.of(run, floor_percent)
+    scored = rank_results(run.ranked, run.meta.get("reference") or None, run.meta.get("baseline"))
+    rows = [_row(name, [r for r in scored if r.strategy == name], table) for name in table.names]
     listed = [{**row, "rank": rank} for rank, row in ranked(rows, _order)]
     return pd.DataFrame(listed, columns=list(COLUMNS))
+
+
+def ranks_by_floor(run: Run) -> dict[str, tuple[int, ...]]:
+    """Return the ranks of every strategy for each of `FLOORS`, in the order of the leaderboard.
+
+    Examples:
+        >>> results.ranks_by_floor(run)
+        {'scaled': (1, 1, 1, 1, 1), 'nominal': (2, 2, 2, 2, 2)}
+    """
+    order = leaderboard(run)["strategy"]
+    boards = [leaderboard(run, floor).set_index("strategy")["rank"] for floor in FLOORS]
+    return {name: tuple(int(board[name]) for board in boards) for name in order}
+
+
+def scored_on(run: Run) -> str:
+    """Return on what the skill of a run is measured: ``unseen`` data, or the ``given`` modes.
+
+    Examples:
+        >>> results.scored_on(run)
+        'unseen'
+    """
+    errors = list((run.meta.get("reference") or {}).values())
+    blocks = {name for found in (*errors, *(r.blocks for r in run.results)) for name in found}
+    return "unseen" if blocks & set(UNSEEN) else "given"
+
+
+@dataclass(frozen=True)
+class _Table:
+    """What the rows of a leaderboard are made from.
+
+    Arguments:
+        names: strategies.
+        grid: of the ranks; `tests` of the cases whose truth is a test, None where all are or none.
+        drawn: the results from the models as drawn, by strategy; None with one nominal model.
+        seed: of the bootstrap.
+        floor_percent: what is added to all errors.
+    """
+
+    names: tuple[str, ...]
+    grid: _Grid
+    tests: _Grid | None
+    drawn: dict[str, list[JobResult]] | None
+    seed: int
+    floor_percent: float
+
+    @classmethod
+    def of(cls, run: Run, floor_percent: float) -> _Table:
+        grid = _Grid.of(run)
+        classes = run.meta.get("classes") or {}
+        tests = [case for case in grid.cases if COMPUTED not in classes.get(case, ())]
+        drawn: dict[str, list[JobResult]] | None = None
+        if len(run.nominals) > 1:
+            drawn = defaultdict(list)
+            for result in run.started_from("drawn"):
+                drawn[result.strategy].append(result)
+        names = tuple(run.meta.get("strategies", ()))
+        names += tuple(sorted({result.strategy for result in run.results} - set(names)))
+        both = 0 < len(tests) < len(grid.cases)
+        seed = int(run.meta.get("seed", 0))
+        return cls(names, grid, grid.of_cases(tests) if both else None, drawn, seed, floor_percent)
 
 
 def _order(row: dict[str, Any]) -> tuple[tuple[bool, bool], float, str]:
     """Put physical models first, then unphysical ones, then who never gave a model."""
     nothing = row["ok"] + row["not_applicable"] == 0
-    return (nothing, row["unphysical"]), row["skill"], row["strategy"]
+    return (nothing, row["unphysical"]), 1.0 - row["skill"], row["strategy"]
 
 
-def _row(
-    strategy: str,
-    results: Sequence[JobResult],
-    grid: _Grid,
-    seed: int,
-    reference: Mapping[str, Mapping[str, float]],
-) -> dict[str, Any]:
-    skills = _skills(results, grid)
+def _row(strategy: str, results: Sequence[JobResult], table: _Table) -> dict[str, Any]:
+    grid = table.grid
+    logs = grid.logs(results, table.floor_percent)
+    left = np.exp(logs.mean(axis=0))
     low, high = (
-        _over_structures(results, grid)
+        interval_over_structures(logs.mean(axis=1))
         if grid.interval == "structures"
-        else _over_seeds(skills, strategy, seed)
+        else _over_seeds(left, strategy, table.seed)
     )
     fine = [result for result in results if result.status == "ok"]
     return {
         "strategy": strategy,
-        "skill": float(np.median(skills)),
-        "skill_low": low,
-        "skill_high": high,
-        "skill_unseen": _unseen(results, grid, reference),
+        "skill": 1.0 - float(np.median(left)),
+        "skill_low": 1.0 - high,
+        "skill_high": 1.0 - low,
+        "skill_drawn": _skill(
+            grid if table.drawn is not None else None,
+            (table.drawn or {}).get(strategy, ()),
+            table.floor_percent,
+        ),
+        "skill_tests": _skill(table.tests, results, table.floor_percent),
         **{f"{block}_percent": _median(fine, _error_in(block)) for block in BLOCKS},
         "rigid_modes_lost": sum(result.rigid_modes_lost for result in fine),
         "negative_eigenvalues": sum(result.negative_eigenvalues or 0 for result in fine),
@@ -137,60 +248,27 @@ def _row(
         "seconds": _median(fine, lambda result: result.seconds),
         "ok": len(fine),
         "not_applicable": sum(result.status == "not-applicable" for result in results),
-        "total": len(grid.blocks) * len(grid.seeds),
+        "total": len(grid.cases) * len(grid.seeds),
         "unphysical": any(result.unphysical for result in results),
     }
 
 
-def _skills(results: Sequence[JobResult], grid: _Grid) -> list[float]:
-    """Return the skill of every seed; a case weighs as much as it has blocks."""
-    scores = {(result.case, result.seed): result.score for result in results}
-    skills = []
-    for seed in grid.seeds:
-        found = [scores.get((case, seed)) for case in grid.blocks]
-        numbers = [SCORE_OF_FAILURE if score is None else score for score in found]
-        skills.append(geometric_mean(numbers, grid.blocks.values()))
-    return skills
+def _skill(grid: _Grid | None, results: Sequence[JobResult], floor_percent: float) -> float:
+    """Return a strategy's skill on a grid; nan where it is none or nothing on it counts."""
+    if grid is None or not grid.weights:
+        return math.nan
+    return 1.0 - float(np.median(np.exp(grid.logs(results, floor_percent).mean(axis=0))))
 
 
-def _unseen(
-    results: Sequence[JobResult], grid: _Grid, reference: Mapping[str, Mapping[str, float]]
-) -> float:
-    """Return the skill over the blocks that the strategy was not given; nan without any."""
-    found = {(result.case, result.seed): result for result in results}
-    scores, weights = [], []
-    for case, errors in reference.items():
-        hidden = {name: error for name, error in errors.items() if name != "used"}
-        for seed in grid.seeds if hidden else ():
-            result = found.get((case, seed))
-            scores.append(SCORE_OF_FAILURE if result is None else score_of(result, hidden))
-            weights.append(len(hidden))
-    return geometric_mean(scores, weights) if scores else float("nan")
-
-
-def _over_structures(results: Sequence[JobResult], grid: _Grid) -> tuple[float, float]:
-    """Return the bootstrap interval of the skill over structures, each with all its seeds."""
-    scores = {(result.case, result.seed): result.score for result in results}
-    sums: dict[str, list[float]] = {}
-    for case, weight in grid.blocks.items():
-        found = [scores.get((case, seed)) for seed in grid.seeds]
-        logs = np.log([SCORE_OF_FAILURE if score is None else score for score in found])
-        entry = sums.setdefault(grid.structures.get(case, case), [0.0, 0.0])
-        entry[0] += weight * float(logs.mean())
-        entry[1] += weight
-    totals, weights = np.array(list(sums.values())).T
-    return interval_over_structures(totals / weights, weights)
-
-
-def _over_seeds(skills: Sequence[float], strategy: str, seed: int) -> tuple[float, float]:
+def _over_seeds(left: FloatArray, strategy: str, seed: int) -> tuple[float, float]:
     """Return the bootstrap interval of the median over seeds; nan with a single seed."""
-    if len(skills) < 2:
-        return float("nan"), float("nan")
+    if len(left) < 2:
+        return math.nan, math.nan
     from scipy.stats import bootstrap
 
     random = np.random.default_rng(np.random.SeedSequence([seed, *strategy.encode()]))
     how: dict[str, Any] = {"method": "percentile", "n_resamples": _RESAMPLES}
-    found = bootstrap((np.array(skills),), np.median, **how, random_state=random)
+    found = bootstrap((left,), np.median, **how, random_state=random)
     return float(found.confidence_interval.low), float(found.confidence_interval.high)
 
 

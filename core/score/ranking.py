@@ -1,4 +1,4 @@
-"""Scores and ranks: every model against the nominal one of its case."""
+"""Scores and ranks: every model against the textbook one of its case, on what nobody was given."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from femubench.core.schema.results import JobResult
+from femubench.core.schema.results import JobResult, Nominal
+from femubench.core.score.counting import WHOLE, counted_blocks
 
 # A block that the nominal model already meets to the last digit must not decide a ranking.
 OFFSET_PERCENT = 0.05
@@ -20,25 +21,44 @@ _Item = TypeVar("_Item")
 
 
 def score_of(result: JobResult, reference: Mapping[str, float]) -> float:
-    """Return the geometric mean over blocks of (rms + 0.05 %) / (nominal rms + 0.05 %).
+    """Return how much of the nominal error on unseen data is left: 1 is all of it, less is better.
 
-    A job without a model scores 10. Where a strategy is not applicable the model stays as it
-    was, which scores 1.
+    It is the geometric mean over the unseen blocks of (rms + 0.05 %) / (nominal rms + 0.05 %); of
+    a case that holds nothing back, over the block of the given modes. A job without a model scores
+    10. Where a strategy is not applicable the model stays as it was, which scores 1.
 
     Arguments:
         reference: rms error of the nominal model in percent by block name.
     """
+    if not reference:
+        return SCORE_OF_NOTHING_DONE if result.status == "not-applicable" else SCORE_OF_FAILURE
+    return geometric_mean(score_in(result, name, reference) for name in counted_blocks(reference))
+
+
+def score_in(
+    result: JobResult,
+    block: str,
+    reference: Mapping[str, float],
+    floor_percent: float = OFFSET_PERCENT,
+) -> float:
+    """Return (rms + floor) / (nominal rms + floor) of one block.
+
+    Arguments:
+        block: its name; empty for the score that the result comes with, where no nominal error
+            is known.
+        reference: rms error of the nominal model in percent by block name.
+        floor_percent: what is added to both errors.
+    """
     if result.status == "not-applicable":
         return SCORE_OF_NOTHING_DONE
-    if result.status != "ok" or not reference:
+    if result.status != "ok":
         return SCORE_OF_FAILURE
-    ratios = [
-        (result.blocks[name].rms_percent + OFFSET_PERCENT) / (rms + OFFSET_PERCENT)
-        if name in result.blocks
-        else SCORE_OF_FAILURE
-        for name, rms in reference.items()
-    ]
-    return geometric_mean(ratios)
+    if block == WHOLE:
+        return SCORE_OF_FAILURE if result.score is None else result.score
+    if block not in result.blocks:
+        return SCORE_OF_FAILURE
+    error = result.blocks[block].rms_percent
+    return (error + floor_percent) / (reference[block] + floor_percent)
 
 
 def geometric_mean(values: Iterable[float], weights: Iterable[float] | None = None) -> float:
@@ -81,7 +101,7 @@ def rank_results(
     reference: Mapping[str, Mapping[str, float]] | None = None,
     baseline: str | None = None,
 ) -> tuple[JobResult, ...]:
-    """Return the results with their ranks within case and seed, and scores where missing.
+    """Return the results with their ranks within case, seed and nominal model, and their scores.
 
     Physical models come first, then unphysical ones, then jobs without a model; within each the
     score counts. Equal scores share a rank.
@@ -90,7 +110,7 @@ def rank_results(
         results: in any order, which is kept.
         reference: from case to the nominal rms errors by block; scores are computed anew from
             them. None keeps the scores that the results have; one that has none scores against
-            the result of the baseline in the same case and seed, or 10 where there is none.
+            the result of the baseline in the same group, or 10 where there is none.
         baseline: name of the strategy that leaves the model as it is, where one ran.
 
     Examples:
@@ -99,14 +119,14 @@ def rank_results(
     """
     listed = tuple(results)
     given = {
-        (item.case, item.seed): {name: block.rms_percent for name, block in item.blocks.items()}
+        _group(item): {name: block.rms_percent for name, block in item.blocks.items()}
         for item in listed
         if reference is None and item.strategy == baseline
     }
-    groups: dict[tuple[str, int], list[JobResult]] = {}
+    groups: dict[tuple[str, int, Nominal], list[JobResult]] = {}
     scored = []
     for result in listed:
-        job, score = (result.case, result.seed), result.score
+        job, score = _group(result), result.score
         if reference is not None:
             score = score_of(result, reference.get(result.case, {}))
         elif score is None:
@@ -118,7 +138,11 @@ def rank_results(
         for job, group in groups.items()
         for rank, result in ranked(group, _order)
     }
-    return tuple(replace(r, rank=ranks[r.case, r.seed, r.strategy]) for r in scored)
+    return tuple(replace(r, rank=ranks[*_group(r), r.strategy]) for r in scored)
+
+
+def _group(result: JobResult) -> tuple[str, int, Nominal]:
+    return result.case, result.seed, result.nominal
 
 
 def _order(result: JobResult) -> tuple[tuple[bool, bool], float, str]:

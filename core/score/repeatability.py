@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from femubench.core.schema.records import result_to_json
-from femubench.core.schema.results import JobResult, Run
+from femubench.core.schema.results import JobResult, Nominal, Run
 
 # What belongs to a run, or to the past, rather than to a result.
 _VOLATILE = frozenset({"seconds", "rank", "score", "key", "provenance", "traceback", "unphysical"})
@@ -35,9 +35,11 @@ def result_differences(old: Run, new: Run) -> list[str]:
     Times and ranks are left out: they do not belong to a result.
     """
     before, after = _by_job(old), _by_job(new)
+    both = len(old.nominals) > 1
     lines = []
     for job in sorted(before.keys() | after.keys(), key=str):
-        name = f"{job[0]}, {job[1]}, seed {job[2]}"
+        start = " as drawn" if both and job[3] == "drawn" else ""
+        name = f"{job[0]}{start}, {job[1]}, seed {job[2]}"
         if job not in after:
             lines.append(f"{name}: not run now")
         elif job not in before:
@@ -47,8 +49,8 @@ def result_differences(old: Run, new: Run) -> list[str]:
     return lines
 
 
-def _by_job(run: Run) -> dict[tuple[str, str, int], JobResult]:
-    return {(item.case, item.strategy, item.seed): item for item in run.results}
+def _by_job(run: Run) -> dict[tuple[str, str, int, Nominal], JobResult]:
+    return {(item.case, item.strategy, item.seed, item.nominal): item for item in run.results}
 
 
 def _environment(meta: Mapping[str, Any]) -> dict[str, Any]:

@@ -14,7 +14,13 @@ from typing import Literal, TypeVar
 import numpy as np
 
 from femubench.core.schema.results import JobResult, Run
-from femubench.core.score.ranking import OFFSET_PERCENT, score_of
+from femubench.core.score.counting import (
+    References,
+    Weights,
+    block_weights,
+    counted_blocks,
+)
+from femubench.core.score.ranking import OFFSET_PERCENT, score_in
 from femubench.core.typing import FloatArray
 
 _Item = TypeVar("_Item", bound=Hashable)
@@ -22,7 +28,8 @@ Verdict = Literal["better", "worse", "no difference shown", "same", "too few str
 FEWEST = 6  # structures that differ; five can at best give p = 0.06
 LEVEL = 0.05
 METHOD = (
-    "Wilcoxon's signed rank test on the scores of both, paired by structure: seeds, blocks and "
+    "Wilcoxon's signed rank test on the errors of both on unseen data, paired by structure: seeds, "
+    "blocks and "
     "cases of one structure are averaged first (geometric mean), since they say nothing about "
     "other structures. Holm's correction over the comparisons. With fewer than "
     f"{FEWEST} structures that differ no difference is claimed, however large it is."
@@ -98,12 +105,12 @@ class Groups:
 
 @dataclass(frozen=True)
 class ScoreTable:
-    """The scores of strategies on structures.
+    """The scores of strategies on what counts: the unseen blocks of structures.
 
     Arguments:
         logs: logarithms of the scores of all blocks, nan where there is no result; (columns,
             blocks, seeds).
-        structures: 1 where a block belongs to a structure, else 0; (structures, blocks).
+        structures: how much a block of a structure counts, else 0; (structures, blocks).
     """
 
     logs: FloatArray
@@ -113,8 +120,9 @@ class ScoreTable:
     def of(
         cls,
         columns: Sequence[Iterable[JobResult]],
-        references: Mapping[str, Mapping[str, float]],
+        references: References,
         structures: Mapping[str, str],
+        floor_percent: float = OFFSET_PERCENT,
     ) -> ScoreTable:
         """Return the scores of results.
 
@@ -125,18 +133,15 @@ class ScoreTable:
             columns: the results of a strategy each.
             references: rms error of the nominal model in percent by case and block.
             structures: by case; one that is not named is a structure of its own.
+            floor_percent: what is added to the errors and to the nominal ones.
         """
+        weights = block_weights(references, structures)
         found: list[dict[tuple[str, str, int], float]] = []
         for results in columns:
             found.append({})
             for result in results:
                 known = references.get(result.case) or {}
-                scores = {name: score_of(result, {name: rms}) for name, rms in known.items()}
-                if not known and result.status == "ok":
-                    # The unknown nominal error is a factor of both sides of every pair.
-                    errors = {name: block.rms_percent for name, block in result.blocks.items()}
-                    scores = {name: error + OFFSET_PERCENT for name, error in errors.items()}
-                for name, score in scores.items():
+                for name, score in _scores(result, known, weights, floor_percent).items():
                     found[-1][result.case, name, result.seed] = math.log(score)
         units = list(dict.fromkeys(unit for scores in found for unit in scores))
         blocks = _places(unit[:2] for unit in units)
@@ -147,8 +152,9 @@ class ScoreTable:
                 logs[column, blocks[case, name], seeds[seed]] = value
         names = _places(structures.get(case, case) for case, _ in blocks)
         member = np.zeros((len(names), len(blocks)))
-        for (case, _), place in blocks.items():
-            member[names[structures.get(case, case)], place] = 1.0
+        for (case, name), place in blocks.items():
+            own = names[structures.get(case, case)]
+            member[own, place] = weights.get((case, name), 1.0)
         return cls(logs, member)
 
     def ratios(self, before: int, after: int) -> FloatArray:
@@ -166,6 +172,22 @@ class ScoreTable:
         blocks = self.structures @ (seeds > 0)
         shared = blocks > 0.0
         return np.asarray(np.exp((self.structures @ means)[shared] / blocks[shared]))
+
+
+def _scores(
+    result: JobResult, known: Mapping[str, float], weights: Weights, floor_percent: float
+) -> dict[str, float]:
+    """Return the scores of a result in every block that counts."""
+    if known:
+        counted = (name for name in known if (result.case, name) in weights)
+        return {name: score_in(result, name, known, floor_percent) for name in counted}
+    if result.status != "ok":
+        return {}
+    # The unknown nominal error is a factor of both sides of every pair.
+    return {
+        name: result.blocks[name].rms_percent + floor_percent
+        for name in counted_blocks(result.blocks)
+    }
 
 
 def structures_of(run: Run) -> dict[str, str]:
@@ -253,7 +275,7 @@ def tell_apart(run: Run, order: Sequence[str]) -> Groups:
         ()
     """
     columns: dict[str, list[JobResult]] = {name: [] for name in order}
-    for result in run.results:
+    for result in run.ranked:
         columns[result.strategy].append(result)
     table = ScoreTable.of(
         list(columns.values()), run.meta.get("reference") or {}, structures_of(run)

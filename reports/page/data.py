@@ -7,12 +7,13 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Protocol
 
 from femubench.reports.cells import plain, shortened
-from femubench.reports.page.papers import papers_of
+from femubench.reports.page.papers import papers_of, started_as_drawn
 from femubench.reports.page.rounding import clean, plain_data, rounded
 from femubench.reports.summary import (
     cases_of,
     first_seed,
     header,
+    lead,
     measured_modes,
     notes_of,
     seeds_of,
@@ -60,9 +61,10 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
         exhibits: what the store has to draw.
     """
     reference, baseline = run.meta.get("reference") or None, run.meta.get("baseline")
-    run = Run(run.meta, rank_results(run.results, reference, baseline))
+    board, notes, about = leaderboard(run), notes_of(run), lead(run)
+    drawn_models = started_as_drawn(run)
+    run = Run(run.meta, rank_results(run.ranked, reference, baseline))
     cases, strategies = cases_of(run), strategies_of(run)
-    board = leaderboard(run)
     ranking = board.to_dict("records")
     listed = [_case(run, case, exhibits) for case in cases]
     stages = {case["name"]: case["stage"] for case in listed}
@@ -72,7 +74,8 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
         "version": VERSION,
         "run": plain(run.meta.get("run", "")),
         "header": [list(item) for item in header(run)],
-        "notes": [*notes_of(run), *(plain(note) for note in drawn), *left_out],
+        "lead": about,
+        "notes": [*notes, *(plain(note) for note in drawn), *left_out],
         "blocks": list(BLOCKS),
         "offset_percent": OFFSET_PERCENT,
         "score_of_failure": SCORE_OF_FAILURE,
@@ -90,6 +93,7 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
         "statistics": _statistics(run, list(board["strategy"])),
         "details": details,
         "papers": papers_of(run),
+        "as_drawn": drawn_models,
     }
 
 
@@ -119,7 +123,7 @@ def _strategies(run: Run, board: Iterable[Mapping[Any, Any]]) -> list[dict[str, 
 
 def _case(run: Run, case: str, exhibits: Exhibits | None) -> dict[str, Any]:
     about = (run.meta.get("cases") or {}).get(case) or {}
-    digest = about.get("digest")
+    digest = (run.meta.get("drawings") or {}).get(case, about.get("digest"))
     stage = exhibits.case(digest) if exhibits is not None and isinstance(digest, str) else None
     if stage is not None:
         stage = {**stage, "nominal": _fitting(stage.get("nominal"), stage)}

@@ -7,7 +7,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from femubench.reports.summary import cases_of, measured_modes
+from femubench.reports.summary import cases_of, first_seed, measured_modes
 from femubench.results import Run
 
 # Relative; the cases hold the printed frequencies, and what goes by the same name may be another.
@@ -35,6 +35,29 @@ def papers_of(run: Run) -> dict[str, dict[str, dict[int, float]]]:
                 for name, column in paper["strategies"].items()
             }
     return found
+
+
+def started_as_drawn(run: Run) -> dict[str, dict[str, dict[int, float | None]]]:
+    """Return our own frequencies in Hz from the models as drawn, as the papers have them.
+
+    By case, strategy and mode; of the first seed, where a run starts from both nominal models.
+    """
+    if len(run.nominals) < 2:
+        return {}
+    seed, found = first_seed(run), papers_of(run)
+    return {
+        case: {
+            result.strategy: {
+                mode.number: mode.predicted_hz
+                for name in ("used", "higher")
+                if name in result.blocks
+                for mode in result.blocks[name].modes
+            }
+            for result in run.started_from("drawn")
+            if result.case == case and result.seed == seed and result.strategy in strategies
+        }
+        for case, strategies in found.items()
+    }
 
 
 @cache

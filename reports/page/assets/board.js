@@ -11,10 +11,11 @@
   const COLUMNS = [
     { key: "rank", title: "Rank", cell: (row) => value(row.rank, bench.count) },
     { key: "strategy", title: "Strategy", text: true, cell: nameCell },
-    { key: "skill", title: "Skill", hint: "geometric mean of errors over the nominal model's: 1 is the nominal model, lower is better", cell: (row) => value(row.skill, number, "strong") },
+    { key: "skill", title: "Skill", down: true, hint: "part of the textbook model's error on unseen data that is taken away: 1 is all of it, 0 none, less than 0 is worse; more is better", cell: (row) => value(row.skill, number, "strong") },
     { key: "interval", title: "95 % interval", still: true, cell: intervalCell },
-    { key: "skill_unseen", title: "Unseen", hint: "skill without the modes that the strategy was given", cell: (row) => value(row.skill_unseen, number) },
-    ...(data && data.blocks ? data.blocks : []).map((block, k) => ({ key: `${block}_percent`, title: `${block} rms,\u00a0%`, block: k, hint: `median rms frequency error of the ${block} modes`, cell: (row) => value(row[`${block}_percent`], small) })),
+    ...(data && data.board && data.board.some((row) => row.skill_drawn !== null) ? [{ key: "skill_drawn", title: "From drawn", down: true, hint: "skill of the start from the models as drawn, against the textbook models too", cell: (row) => value(row.skill_drawn, number) }] : []),
+    ...(data && data.board && data.board.some((row) => row.skill_tests !== null) ? [{ key: "skill_tests", title: "On tests", down: true, hint: "skill on tests alone, without computed truths", cell: (row) => value(row.skill_tests, number) }] : []),
+    ...(data && data.blocks ? data.blocks : []).map((block, k) => ({ key: `${block}_percent`, title: `${block === "used" ? "given" : block} rms,\u00a0%`, block: k, hint: block === "used" ? "median rms frequency error of the modes that were given; no part of the skill" : `median rms frequency error of the ${block} modes`, cell: (row) => value(row[`${block}_percent`], small) })),
     { key: "flags", title: "Flags", text: true, cell: flagCell },
     { key: "coverage", title: "Coverage", text: true, cell: coverageCell },
     { key: "tier", title: "Tier", hint: "1: no difference from the best shown; 2: none from the best of the others", cell: (row) => el("td", { class: "right" }, bench.count(tiers[row.index])) },
@@ -43,24 +44,23 @@
     cell.replaceChildren(bar(row), el("span", { class: "range", "data-low": row.skill_low ?? "", "data-high": row.skill_high ?? "" }, text || "–"));
   }
 
-  // The bars share one logarithmic axis from the least to the largest figure of the board.
+  // The bars share one axis from the least figure of the board, or -1, to 1; what is less lies at its end.
   const WIDE = 120;
   function across(v) {
     const [low, high] = state.range;
-    return 5 + (Math.log(v / low) / Math.log(high / low)) * (WIDE - 10);
+    return 5 + ((Math.max(v, low) - low) / (high - low)) * (WIDE - 10);
   }
   // One element without children, which CSS draws: hundreds of rows stay quick to put in order.
   function bar(row) {
     const px = (v) => `${v.toFixed(1)}px`;
     const [low, high] = row.skill_low === null ? [row.skill, row.skill] : [row.skill_low, row.skill_high];
-    const style = { "--one": px(across(1)), "--at": px(across(row.skill)), "--low": px(across(low)), "--wide": px(across(high) - across(low)) };
+    const style = { "--one": px(across(0)), "--at": px(across(row.skill)), "--low": px(across(low)), "--wide": px(across(high) - across(low)) };
     return el("span", { class: "whisker", style });
   }
   function scaleBar() {
-    const ticks = [];
-    for (let e = Math.ceil(Math.log10(state.range[0])); 10 ** e <= state.range[1] * 1.001; e += 1) ticks.push(10 ** e);
+    const ticks = [-1, -0.5, 0, 0.5, 1].filter((t) => t >= state.range[0]);
     const node = svg("svg", { class: "scale", width: WIDE, height: 14, viewBox: `0 0 ${WIDE} 14`, "aria-hidden": "true" });
-    for (const t of ticks) node.append(svg("text", { class: "tick mid", x: Math.min(Math.max(across(t), 12), WIDE - 8), y: 11 }, String(Number(t.toPrecision(1)))));
+    for (const t of ticks) node.append(svg("text", { class: "tick mid", x: Math.min(Math.max(across(t), 12), WIDE - 8), y: 11 }, String(t).replace("-", "\u2212")));
     return node;
   }
 
@@ -86,7 +86,7 @@
   }
 
   function detail(row) {
-    const heads = ["Case", "Score", ...data.blocks.map((b) => `${b} rms,\u00a0%`), "MAC", "Unknowns", "Time,\u00a0s", "Outcome"];
+    const heads = ["Case", "Error left", ...data.blocks.map((b) => `${b} rms,\u00a0%`), "MAC", "Unknowns", "Time,\u00a0s", "Outcome"];
     const body = row.cases.map((c, place) => {
       const own = row.results.filter((r) => r.c === c);
       const fine = own.filter((r) => r.status === "ok");
@@ -99,7 +99,7 @@
       const ok = fine.length && seeds > 1 ? [`${fine.length} of ${seeds} seeds ok`] : fine.length ? ["✓ ok"] : [];
       return el("tr", {},
         el("th", { scope: "row" }, el("a", { href: bench.caseHref(data.cases[c].name) }, data.cases[c].name)),
-        value(bench.median(row.logs.map((logs) => Math.exp(logs[place]))), number),
+        value(row.logs[0][place] === null ? null : bench.median(row.logs.map((logs) => Math.exp(logs[place]))), number),
         data.blocks.map((_, k) => value(mid((r) => r.rms[k]), small)),
         value(mid(macs), number), value(mid((r) => r.parameters), bench.count), value(mid((r) => r.seconds), small),
         el("td", { class: "said" }, [...ok, ...flags, ...said].join("; ")));
@@ -148,7 +148,7 @@
       else th.removeAttribute("aria-sort");
     }
   }
-  function sortBy(key, down = state.key === key ? !state.down : false) {
+  function sortBy(key, down = state.key === key ? !state.down : Boolean((COLUMNS.find((column) => column.key === key) || {}).down)) {
     Object.assign(state, { key, down });
     order();
   }
@@ -171,7 +171,7 @@
     const kept = new Set([...state.filter.strategies].filter((s) => data.strategies[s].name.toLowerCase().includes(text)));
     const filter = { ...state.filter, strategies: kept };
     const rows = bench.ranking.rows(filter);
-    const later = rows.length * (rows.length ? rows[0].weights.length : 0) > LAZY;
+    const later = rows.length * (rows.length ? rows[0].cases.length : 0) > LAZY;
     state.rows = rows;
     if (!later) intervalsNow();
     draw();
@@ -184,8 +184,8 @@
   }
   function draw() {
     const { rows } = state;
-    const values = rows.flatMap((row) => [row.skill, row.skill_low, row.skill_high]).filter((v) => v !== null && v > 0);
-    state.range = [Math.min(0.5, ...values) / 1.15, Math.max(2, ...values) * 1.15];
+    const values = rows.flatMap((row) => [row.skill, row.skill_low]).filter((v) => v !== null);
+    state.range = [Math.max(-1, Math.min(-0.1, ...values)), 1];
     lines.clear();
     for (const row of rows) lines.set(row.index, { row, tr: el("tr", { class: row.unphysical ? "unphysical" : "", "data-strategy": row.strategy }, COLUMNS.map((column) => column.cell(row))), more: null });
     parts.body.replaceChildren();
@@ -202,7 +202,7 @@
   function say() {
     const changed = !bench.ranking.isWhole(state.filter);
     const fewer = state.rows.length < data.strategies.length;
-    const first = `${state.rows.length} of ${bench.plural(data.strategies.length, "strategy", "strategies")}, ${state.rows.length ? state.rows[0].weights.length : 0} of ${bench.plural(data.cases.length, "case")}, ${state.filter.blocks.length} of ${bench.plural(data.blocks.length, "block")}.`;
+    const first = `${state.rows.length} of ${bench.plural(data.strategies.length, "strategy", "strategies")}, ${state.rows.length ? state.rows[0].cases.length : 0} of ${bench.plural(data.cases.length, "case")}, ${state.filter.blocks.length} of ${bench.plural(data.blocks.length, "block")}.`;
     const anew = changed ? " Skills, intervals, errors and ranks are computed anew for these; the tiers and groups are those of the whole run." : fewer ? " Ranks are among these; the tiers and groups are those of the whole run." : "";
     parts.status.textContent = first + anew;
     parts.status.classList.toggle("changed", changed || fewer);
@@ -233,7 +233,7 @@
       const table = el("table", { id: "board-table", class: "board" }, el("caption", { class: "hidden" }, "Leaderboard; the buttons in the head sort it"), head(), parts.body);
       const page = el("section", { id: "board" },
         el("h1", { tabindex: "-1" }, "Leaderboard"),
-        el("p", { class: "lead" }, "Skill is the error that is left over that of the nominal model: 1 is no better than doing nothing, lower is better. Physical strategies rank before unphysical ones. Open a strategy for its scores case by case."),
+        el("p", { class: "lead" }, data.lead),
         bench.filters(), parts.status, bench.scroll("Leaderboard", table), el("h2", {}, "How the strategies compare"), parts.figures);
       update();
       return page;

@@ -95,12 +95,13 @@
   const frequencySection = (item, entries, state) => {
     const { el, data } = bench;
     const papers = (data.papers ?? {})[item.name] ?? {};
+    const drawn = (data.as_drawn ?? {})[item.name] ?? {};
     const box = el("div", {});
     const options = { errors: false, mac: false, all: true };
     const fill = () => {
       const wanted = options.all ? entries : twoOf(state);
       const columns = wanted.filter((entry) => entry.ok).map((entry) => ({ ...entry, mark: markOf(entry, state) }));
-      box.replaceChildren(columns.length ? bench.caseTables.frequencies(columns, papers, options) : note("No strategy gave a model."));
+      box.replaceChildren(columns.length ? bench.caseTables.frequencies(columns, [[drawn, "from drawn"], [papers, "as printed"]], options) : note("No strategy gave a model."));
     };
     const flip = (name, turn = (on) => on) => (on) => {
       options[name] = turn(on);

@@ -40,12 +40,15 @@
   // What an eigenvalue solution leaves of an exact fit says nothing.
   const rms = (value) => (value !== null && value < 0.001 ? "<0.001" : bench.number(value, 3));
 
+  // Return what stands beside a strategy's column: Hz by mode, and where they come from.
+  const beside = (papers, column) => papers.map(([named, mark]) => [named[column.name], mark]).filter(([hertz]) => hertz);
+
   const heads = (columns, papers) => {
     const { el } = bench;
     const pairs = columns.flatMap((column) => {
       const mark = column.mark ? el("span", { class: "case-mark" }, column.mark) : null;
       const own = el("th", { scope: "col", class: "num" }, column.name, mark);
-      return papers[column.name] ? [own, el("th", { scope: "col", class: "num case-printed" }, column.name, el("span", { class: "case-mark" }, "as printed"))] : [own];
+      return [own, ...beside(papers, column).map(([, mark]) => el("th", { scope: "col", class: "num case-printed" }, column.name, el("span", { class: "case-mark" }, mark)))];
     });
     return el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "Mode"), el("th", { scope: "col", class: "num" }, "Measured"), pairs));
   };
@@ -54,8 +57,7 @@
     const { el } = bench;
     const cells = columns.flatMap((column) => {
       const own = cell(column.detail.modes.find((item) => keyOf(item) === keyOf(mode)), options);
-      const paper = papers[column.name];
-      return paper ? [own, printed(mode.modification ? null : paper[String(mode.mode)], mode.measured_hz, options)] : [own];
+      return [own, ...beside(papers, column).map(([hertz]) => printed(mode.modification ? null : hertz[String(mode.mode)], mode.measured_hz, options))];
     });
     return el("tr", {}, el("th", { scope: "row" }, String(mode.mode)), el("td", { class: "num case-measured" }, bench.hertz(mode.measured_hz)), cells);
   };
@@ -65,7 +67,7 @@
     const at = data.blocks.indexOf(block);
     const cells = columns.flatMap((column) => {
       const own = el("td", { class: "num" }, rms(column.result.rms[at]));
-      return papers[column.name] ? [own, el("td", { class: "num case-printed" }, "")] : [own];
+      return [own, ...beside(papers, column).map(() => el("td", { class: "num case-printed" }, ""))];
     });
     return el("tr", { class: "case-sum" }, el("th", { scope: "row", title: "Root mean square of the frequency errors" }, "rms, %"), el("td", { class: "num" }, ""), cells);
   };
@@ -73,13 +75,13 @@
   /**
    * Return the table of natural frequencies in Hz.
    *
-   * columns: [{name, detail, result, mark}]. papers: printed Hz by strategy and mode.
+   * columns: [{name, detail, result, mark}]. papers: [Hz by strategy and mode, where they come from].
    * options: errors, mac: whether they stand under every frequency.
    */
   const frequencies = (columns, papers, options) => {
     const { el, data } = bench;
     const modes = measuredModes(columns);
-    const wide = 2 + columns.length + columns.filter((column) => papers[column.name]).length;
+    const wide = 2 + columns.length + columns.flatMap((column) => beside(papers, column)).length;
     const bodies = data.blocks.flatMap((block) => {
       const own = modes.filter((mode) => mode.block === block);
       const changes = [...new Set(own.map((mode) => mode.modification ?? ""))];

@@ -51,14 +51,14 @@
     if (!found.length) return null;
     const series = [["physical", false, 2], ["unphysical", true, 1]].map(([label, unphysical, style]) => {
       const own = found.filter((row) => row.unphysical === unphysical);
-      return { label, style, x: own.map((r) => r.seconds), y: own.map((r) => r.skill), names: own.map((r) => r.strategy) };
+      return { label, style, x: own.map((r) => r.seconds), y: own.map((r) => 1 - r.skill), names: own.map((r) => r.strategy) };
     });
     return bench.charts.scatter({
       title: "Accuracy against cost",
-      note: "Skill (1 = the nominal model) against wall time, median over the cases. Low and left is good.",
-      xLabel: "wall time in s", yLabel: "skill",
+      note: "What is left of the error (1 - skill; 1 = the textbook model) against wall time, median over the cases. Low and left is good.",
+      xLabel: "wall time in s", yLabel: "error left",
       logX: true, logY: true, height: 360,
-      lines: [{ y: 1, label: "nominal model" }],
+      lines: [{ y: 1, label: "textbook model" }],
       series: series.filter((s) => s.x.length),
     });
   }
@@ -68,14 +68,14 @@
     return (data.statistics && data.statistics.groups) || [];
   }
 
-  // Return the mean rank of every strategy over the cases by its score, equal scores share ranks.
+  // Return the mean rank of every strategy over the structures by its score, equal scores share ranks.
   function meanRanks() {
     const rows = bench.ranking.rows(bench.ranking.everything());
     if (!rows.length) return [];
-    const cases = rows[0].weights.length;
+    const cases = rows[0].structures.length;
     const totals = new Map(rows.map((row) => [row.index, 0]));
     for (let c = 0; c < cases; c += 1) {
-      const values = rows.map((row) => bench.median(row.logs.map((l) => l[c])));
+      const values = rows.map((row) => bench.median(row.perStructure.map((l) => l[c])));
       rows.forEach((row, k) => {
         const below = values.filter((v) => v < values[k] - data.tie).length;
         const same = values.filter((v) => Math.abs(v - values[k]) <= data.tie).length;

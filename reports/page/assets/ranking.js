@@ -33,68 +33,76 @@
     return base ? base.rms : data.blocks.map(() => null);
   }
 
-  // Return the logarithm of the score over the blocks whose index is listed.
-  function logScore(result, blocks, whole) {
+  // Return the logarithm of the score in a block; without one, of the score that the result came with.
+  function logScore(result, k) {
     const failure = Math.log(data.score_of_failure);
     if (!result) return failure;
-    if (whole && !all.scored && result.score !== null && result.score !== undefined) return Math.log(result.score);
     if (result.status === "not-applicable") return 0;
-    const reference = referenceOf(result);
-    const used = blocks.filter((b) => reference[b] !== null);
-    if (result.status !== "ok" || !used.length) return failure;
-    const offset = data.offset_percent;
-    let sum = 0;
-    for (const b of used) {
-      const rms = result.rms[b];
-      sum += rms === null ? failure : Math.log((rms + offset) / (reference[b] + offset));
-    }
-    return sum / used.length;
+    if (result.status !== "ok") return failure;
+    if (k === null) return result.score === null || result.score === undefined ? failure : Math.log(result.score);
+    const reference = referenceOf(result)[k];
+    const rms = result.rms[k];
+    return rms === null || reference === null ? failure : Math.log((rms + data.offset_percent) / (reference + data.offset_percent));
   }
 
-  // Return the cases that count, each with its weight: the number of its blocks.
+  // Return the cases that are shown and the units that count: blocks of cases with their weights. Unseen
+  // data count where there are any; what several cases of a structure share counts once.
   function gridOf(filter) {
-    const whole = filter.blocks.length === data.blocks.length;
-    const cases = [];
+    const whole = isWhole(filter);
+    const [cases, units, open] = [[], [], []];
     data.cases.forEach((item, c) => {
-      if (!filter.scenarios.has(item.scenario)) return;
       const own = all.perCase[c];
-      const given = data.blocks.map((b, k) => (item.reference && b in item.reference ? k : -1)).filter((k) => k >= 0);
-      const shown = data.blocks.map((_, k) => k).filter((k) => own.some((r) => r.rms[k] !== null));
-      const most = Math.max(0, ...own.map((r) => r.rms.filter((v) => v !== null).length));
-      if (!given.length && !own.length) return;
-      const there = given.length ? given : shown;
-      const weight = whole ? Math.max(given.length || 1, most) : there.filter((k) => filter.blocks.includes(k)).length;
-      if (weight) cases.push({ c, weight, hidden: given.filter((k) => data.blocks[k] !== "used" && filter.blocks.includes(k)) });
+      if (!filter.scenarios.has(item.scenario) || !(own.length || has(item.reference))) return;
+      const there = filter.blocks.filter((k) => (has(item.reference) ? data.blocks[k] in item.reference : own.some((r) => r.rms[k] !== null)));
+      if (!there.length && !whole) return;
+      cases.push(c);
+      if (has(item.reference)) for (const k of there) units.push({ c, k, data: `${item.structure}:${k}:${item.reference[data.blocks[k]].toPrecision(9)}` });
+      else if (whole) open.push({ c, k: null, weight: 1 });
+      else for (const k of there) open.push({ c, k, weight: 1 });
     });
-    return { cases, seeds: all.seeds, whole };
+    const unseen = (unit) => data.blocks[unit.k] !== "used";
+    const counted = units.some(unseen) ? units.filter(unseen) : units;
+    const often = new Map();
+    for (const unit of counted) often.set(unit.data, (often.get(unit.data) || 0) + 1);
+    for (const unit of counted) unit.weight = 1 / often.get(unit.data);
+    const kept = [...counted, ...open.filter((unit) => unit.k === null || !open.some(unseen) || unseen(unit))];
+    const structures = [...new Set(kept.map((unit) => data.cases[unit.c].structure))];
+    for (const unit of kept) unit.structure = structures.indexOf(data.cases[unit.c].structure);
+    return { cases, units: kept, structures, seeds: all.seeds, whole };
   }
 
-  function weighted(logs, weights) {
-    let [sum, total] = [0, 0];
-    for (let i = 0; i < logs.length; i += 1) {
-      sum += logs[i] * weights[i];
-      total += weights[i];
-    }
-    return total ? Math.exp(sum / total) : null;
+  // Return the weighted mean of values by group; null where a group has none.
+  function means(values, units, group, count) {
+    const [sums, weights] = [new Float64Array(count), new Float64Array(count)];
+    units.forEach((unit, i) => {
+      sums[group(unit)] += unit.weight * values[i];
+      weights[group(unit)] += unit.weight;
+    });
+    return [...sums].map((sum, i) => (weights[i] ? sum / weights[i] : null));
+  }
+  function skillOf(logs) {
+    return logs.length ? 1 - Math.exp(logs.reduce((total, v) => total + v, 0) / logs.length) : null;
   }
 
-  function rowOf(s, grid, filter, kept) {
-    const logs = grid.seeds.map((seed) => grid.cases.map(({ c }) => logScore(resultAt(s, c, seed), filter.blocks, grid.whole)));
-    const weights = grid.cases.map((item) => item.weight);
-    const skills = logs.map((l) => weighted(l, weights));
-    const unseen = grid.cases.filter((item) => item.hidden.length);
-    const unseenLogs = unseen.flatMap(({ c, hidden }) => grid.seeds.map((seed) => logScore(resultAt(s, c, seed), hidden, false)));
+  function rowOf(s, grid, kept) {
+    const found = grid.seeds.map((seed) => grid.units.map(({ c, k }) => logScore(resultAt(s, c, seed), k)));
+    const place = new Map(grid.cases.map((c, i) => [c, i]));
+    const logs = found.map((own) => means(own, grid.units, (unit) => place.get(unit.c), grid.cases.length));
+    const perStructure = found.map((own) => means(own, grid.units, (unit) => unit.structure, grid.structures.length));
+    const skills = perStructure.map(skillOf);
     const results = all.perStrategy[s].filter((r) => kept.has(r.c));
     const fine = results.filter((r) => r.status === "ok");
+    const name = data.strategies[s].name;
+    const given = grid.whole ? data.board.find((row) => row.strategy === name) : null;
     const row = {
-      index: s, strategy: data.strategies[s].name, rank: 0, skill: median(skills), skill_low: null, skill_high: null,
-      skill_unseen: weighted(unseenLogs, unseen.flatMap((item) => grid.seeds.map(() => item.hidden.length))),
+      index: s, strategy: name, rank: 0, skill: median(skills), skill_low: null, skill_high: null,
+      skill_drawn: given ? given.skill_drawn : null, skill_tests: given ? given.skill_tests : null,
       rigid_modes_lost: sum(fine, "lost"), negative_eigenvalues: sum(fine, "negative"),
       parameters: middle(fine, (r) => r.parameters), evaluations: middle(fine, (r) => r.evaluations),
       seconds: middle(fine, (r) => r.seconds), ok: fine.length,
       not_applicable: results.filter((r) => r.status === "not-applicable").length,
       total: grid.cases.length * grid.seeds.length, unphysical: results.some((r) => r.unphysical),
-      logs, skills, weights, results, cases: grid.cases.map((item) => item.c),
+      logs, perStructure, skills, results, cases: grid.cases, structures: grid.structures,
     };
     data.blocks.forEach((b, k) => (row[`${b}_percent`] = middle(fine, (r) => r.rms[k])));
     return row;
@@ -117,10 +125,10 @@
   // skills lie no further apart than a tie share a rank, in the order of their names.
   function ranked(rows) {
     const tier = (r) => (r.ok + r.not_applicable === 0 ? 2 : 0) + (r.unphysical ? 1 : 0);
-    rows.sort((a, b) => tier(a) - tier(b) || a.skill - b.skill);
+    rows.sort((a, b) => tier(a) - tier(b) || b.skill - a.skill);
     rows.forEach((row, k) => {
       const before = rows[k - 1];
-      const tied = before && tier(row) === tier(before) && row.skill - before.skill <= data.tie * row.skill;
+      const tied = before && tier(row) === tier(before) && before.skill - row.skill <= data.tie * (1 - row.skill);
       row.rank = tied ? before.rank : k + 1;
     });
     return rows.sort((a, b) => a.rank - b.rank || (a.strategy < b.strategy ? -1 : 1));
@@ -128,9 +136,9 @@
 
   function rowsOf(filter) {
     const grid = gridOf(filter);
-    const kept = new Set(grid.cases.map((item) => item.c));
-    const rows = data.strategies.map((_, s) => s).filter((s) => filter.strategies.has(s)).map((s) => rowOf(s, grid, filter, kept));
-    if (!grid.cases.length) return [];
+    const kept = new Set(grid.cases);
+    const rows = data.strategies.map((_, s) => s).filter((s) => filter.strategies.has(s)).map((s) => rowOf(s, grid, kept));
+    if (!grid.units.length) return [];
     return ranked(rows);
   }
 
@@ -155,33 +163,21 @@
     for (let t = 0; t < times; t += 1) for (let i = 0; i < n; i += 1) counts[t * n + Math.floor(random() * n)] += 1;
     return counts;
   }
-  function structuresOf(row) {
-    return [...new Set(row.cases.map((c) => data.cases[c].structure))];
-  }
   // Resample structures, each with all its cases and seeds.
   function overStructures(rows) {
-    const names = structuresOf(rows[0]);
-    const n = names.length;
+    const n = rows[0].structures.length;
     const counts = draws(n, RESAMPLES);
     const tail = data.statistics.tails[n];
-    const place = rows[0].cases.map((c) => names.indexOf(data.cases[c].structure));
     const found = new Float64Array(RESAMPLES);
     for (const row of rows) {
-      const [sums, weights] = [new Float64Array(n), new Float64Array(n)];
-      row.weights.forEach((w, k) => {
-        for (const logs of row.logs) sums[place[k]] += (w * logs[k]) / row.logs.length;
-        weights[place[k]] += w;
-      });
+      const means = row.structures.map((_, i) => row.perStructure.reduce((total, logs) => total + logs[i], 0) / row.perStructure.length);
       for (let t = 0; t < RESAMPLES; t += 1) {
-        let [top, bottom] = [0, 0];
-        for (let i = 0; i < n; i += 1) {
-          top += counts[t * n + i] * sums[i];
-          bottom += counts[t * n + i] * weights[i];
-        }
-        found[t] = top / bottom;
+        let top = 0;
+        for (let i = 0; i < n; i += 1) top += counts[t * n + i] * means[i];
+        found[t] = top / n;
       }
       found.sort();
-      [row.skill_low, row.skill_high] = [Math.exp(quantile(found, tail)), Math.exp(quantile(found, 1 - tail))];
+      [row.skill_low, row.skill_high] = [1 - Math.exp(quantile(found, 1 - tail)), 1 - Math.exp(quantile(found, tail))];
     }
   }
   function overSeeds(rows) {
@@ -207,7 +203,7 @@
   }
   function intervalKind(rows) {
     if (!rows.length) return "";
-    if (structuresOf(rows[0]).length >= data.statistics.fewest) return "structures";
+    if (rows[0].structures.length >= data.statistics.fewest) return "structures";
     return rows[0].skills.length > 1 ? "seeds" : "";
   }
   // Tell whether cases and blocks are those of the whole run; the strategies change no figure.
@@ -218,7 +214,7 @@
   // Return what differs from the run's own leaderboard by more than 1e-9 (rounded figures: 1e-3).
   function check() {
     const mine = new Map(rowsOf(bench.ranking.everything()).map((row) => [row.strategy, row]));
-    const exact = ["rank", "skill", "skill_unseen", "rigid_modes_lost", "negative_eigenvalues", "ok", "not_applicable", "total"];
+    const exact = ["rank", "skill", "rigid_modes_lost", "negative_eigenvalues", "ok", "not_applicable", "total"];
     const errors = data.blocks.map((b) => `${b}_percent`);
     return data.board.flatMap((row) =>
       [...exact, ...errors, "parameters", "evaluations", "seconds"].flatMap((key) => {
@@ -233,7 +229,7 @@
   // Return every (case, block) with the rms error of each strategy, median over seeds: what a strategy
   // without model leaves open is null, and "not applicable" leaves the nominal error.
   function problems(rows, filter) {
-    return gridOf(filter).cases.flatMap(({ c }) =>
+    return gridOf(filter).cases.flatMap((c) =>
       filter.blocks.map((b) => ({ c, b, errors: rows.map((row) => errorOf(row.index, c, b)) })).filter((p) => p.errors.some((e) => e !== null)),
     );
   }

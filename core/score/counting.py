@@ -1,0 +1,66 @@
+"""Which blocks of a run count in its ranks, and how much: unseen data, and nothing twice."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+
+from femubench.core.schema.results import UNSEEN
+
+References = Mapping[str, Mapping[str, float]]
+Weights = dict[tuple[str, str], float]
+# Stands for the score of a case that has one, where its nominal errors are not known.
+WHOLE = ""
+_DIGITS = 9  # of a nominal error; two cases of a structure that share them share the data
+
+
+def counted_blocks(blocks: Iterable[str]) -> tuple[str, ...]:
+    """Return the blocks of a case that count: the unseen ones, all where it holds nothing back.
+
+    Examples:
+        >>> results.counted_blocks(["used", "higher"])
+        ('higher',)
+    """
+    listed = tuple(blocks)
+    return tuple(name for name in listed if name in UNSEEN) or listed
+
+
+def block_weights(references: References, structures: Mapping[str, str]) -> Weights:
+    """Return by case and block how much it counts.
+
+    Where one case at least has unseen data, a case without any counts nothing. A block that
+    several cases of one structure share counts once, each time a share.
+
+    Arguments:
+        references: rms error of the nominal model in percent by case and block.
+        structures: by case; one that is not named is a structure of its own.
+
+    Examples:
+        >>> known = {"a": {"used": 2.0, "higher": 3.0}, "b": {"used": 4.0, "higher": 3.0}}
+        >>> results.block_weights(known, {"a": "frame", "b": "frame"})
+        {('a', 'higher'): 0.5, ('b', 'higher'): 0.5}
+    """
+    some = any(name in UNSEEN for errors in references.values() for name in errors)
+    named = {
+        (case, name): (structures.get(case, case), name, f"{errors[name]:.{_DIGITS}g}")
+        for case, errors in references.items()
+        for name in counted_blocks(errors)
+        if name in UNSEEN or not some
+    }
+    often = Counter(named.values())
+    return {block: 1.0 / often[data] for block, data in named.items()}
+
+
+def case_weights(references: References, structures: Mapping[str, str]) -> dict[str, float]:
+    """Return by case how much it counts; the cases of a structure come to 1.
+
+    Arguments:
+        references, structures: as for `block_weights`.
+    """
+    found = dict.fromkeys((case for case, errors in references.items() if errors), 0.0)
+    totals: dict[str, float] = {}
+    for (case, _), weight in block_weights(references, structures).items():
+        found[case] += weight
+        owner = structures.get(case, case)
+        totals[owner] = totals.get(owner, 0.0) + weight
+    return {case: w / totals.get(structures.get(case, case), 1.0) for case, w in found.items()}
