@@ -20,7 +20,7 @@ The example of every function starts from these lines:
 >>> joint = update.joint_stiffness(structure, joints[0])
 >>> nominal, scaled = femubench.strategies["unchanged"], femubench.strategies["global"]
 >>> result = scaled.update(model, measurement, None)
->>> run = femubench.rank(case, [nominal, scaled])
+>>> run = femubench.rank(case, [nominal, scaled], nominal="drawn")
 >>> torsion = femubench.effects["torsion-constant"]
 >>> found = femubench.diagnose(case, torsion, pairs=False)
 >>> examination = diagnosis.examine(model, measurement, [torsion], tolerance=0.005)

@@ -40,10 +40,10 @@ def hertz(value: float | None) -> str:
 
 
 def interval(low: float, high: float) -> str:
-    """Return ``low - high``, nothing where there is only one seed."""
+    """Return ``low to high``, nothing where there is none."""
     if not (math.isfinite(low) and math.isfinite(high)):
         return NOTHING
-    return f"{low:.3f} - {high:.3f}"
+    return f"{low:.3f} to {high:.3f}"
 
 
 def shortened(text: str, width: int) -> str:

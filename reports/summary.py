@@ -153,9 +153,9 @@ def lead(run: Run) -> str:
     ]
     if len(run.nominals) > 1:
         told.append("Ranks are from the textbook models; beside it the start from the drawn ones.")
-    elif yardstick == "textbook":
-        words = {"drawn": "the models as drawn", "textbook": "the textbook models"}
-        told.append(f"All start from {words[run.nominals[0]]}.")
+    elif run.meta.get("yardstick") == "textbook":
+        start = "as drawn" if run.nominals[0] == "drawn" else "of the textbooks"
+        told.append(f"All start from the models {start}.")
     if not unseen:
         told.append("No case holds data back, so that nothing here shows what was learnt.")
     return " ".join(told)

@@ -18,7 +18,7 @@ _NAME_WIDTH = 16
 _MOST_FAILURES = 20
 _MOST_WIDTHS = (20, _NAME_WIDTH, 13)
 _HEADERS = (
-    *("#", "strategy", "skill", "from\ndrawn", "high.\n%", "mod.\n%", "given\n%"),
+    *("#", "strategy", "skill", "from\ndrawn", "high\n%", "mod.\n%", "given\n%"),
     *("rigid\nlost", "neg.\neig.", "par.", "s"),
 )
 _ALIGN = ("right", "left", *("right" for _ in _HEADERS[2:]))
@@ -165,7 +165,7 @@ def _notes(run: Run) -> Iterator[str]:
 
 def _legend(run: Run, board: pd.DataFrame) -> Iterator[str]:
     yield textwrap.fill(lead(run), WIDTH)
-    yield "high., mod., given: rms frequency error of the modes, median over the cases"
+    yield "high, mod., given: rms frequency error of the modes, median over the cases"
     if board["unphysical"].any():
         yield "!: unphysical (rigid modes lost or negative eigenvalues), below all others"
     if (board["ok"] + board["not_applicable"] < board["total"]).any():

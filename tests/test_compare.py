@@ -84,8 +84,9 @@ def test_ratios_by_block_and_scenario_are_those_of_the_errors(data: Data) -> Non
             rms = old[block]["rms_percent"]
             ratios.append((1.5 * rms + 0.05) / (rms + 0.05))
             assert values[block] == pytest.approx(ratios[-1], rel=1e-12)
-        assert values["skill"] == pytest.approx(math.prod(ratios) ** (1 / 3), rel=1e-12)
-    assert row(found, "unchanged")["skill"] == 1.0
+        # The given modes are no part of what ranks.
+        assert values["unseen"] == pytest.approx(math.sqrt(math.prod(ratios[1:])), rel=1e-12)
+    assert row(found, "unchanged")["unseen"] == 1.0
     assert found["worse"]
     assert {item["strategy"] for item in found["excesses"]} == {"softer"}
     assert {item["scenario"] for item in found["excesses"]} == {None, "corner", "other"}
@@ -158,8 +159,8 @@ def test_neither_seeds_nor_cases_of_one_structure_count_as_structures(data: Data
         run["meta"]["structures"]["other/corner"] = "corner"
     found = evidence(*several)
     assert (found["structures"], found["verdict"]) == (1, "too few structures")
-    # Both cases have three blocks, so that the whole is the mean of the scores.
-    assert found["ratio"] == pytest.approx(row(compared(*several), "softer")["skill"], rel=1e-12)
+    # Both cases have two blocks that count, so that the whole is the mean of the scores.
+    assert found["ratio"] == pytest.approx(row(compared(*several), "softer")["unseen"], rel=1e-12)
 
 
 VARIANT = "softer:factor=0.5"
@@ -172,7 +173,7 @@ def test_two_variants_of_a_strategy_are_compared(data: Data, tmp_path: Path) -> 
     assert found["only_before"] == found["only_after"] == []
     same = compared(data, scaled(data, "softer", 1.5))
     assert row(found, VARIANT) == row(same, "softer")
-    assert row(found, "unchanged")["skill"] == 1.0
+    assert row(found, "unchanged")["unseen"] == 1.0
     ours, theirs = ({e["strategy"]: e for e in f["evidence"]} for f in (found, same))
     assert ours[VARIANT] == {**theirs["softer"], "strategy": VARIANT}
     for form in ("terminal", "markdown", "html"):
@@ -243,7 +244,7 @@ def test_what_ended_otherwise_comes_first(data: Data, tmp_path: Path) -> None:
     ] * 2
     assert row(found, "softer")["failures"] == 2.0
     assert row(found, "softer")["used"] is None
-    assert row(found, "softer")["skill"] > 10.0
+    assert row(found, "softer")["unseen"] > 10.0
     text = called_with(tmp_path, data, broken)
     assert text.exit_code == 1
     assert text.output.index("Ended otherwise") < text.output.index("strategy  ")
@@ -287,8 +288,8 @@ def test_only_jobs_of_both_are_compared(data: Data) -> None:
     ("options", "code"),
     [
         ([], 1),
-        (["--fail", "skill>1.6"], 0),
-        (["--fail", "skill>1.6", "--fail", " used > 1.2 "], 1),
+        (["--fail", "unseen>1.6"], 0),
+        (["--fail", "unseen>1.6", "--fail", " used > 1.2 "], 1),
         (["--fail", "higher>1.2"], 1),
         (["--fail", "modified>1.2"], 1),
         (["--fail", "failures>0"], 0),
@@ -344,7 +345,7 @@ def test_runs_of_a_store_by_their_first_letters(tmp_path: Path) -> None:
     answer = CliRunner().invoke(bench, ["compare", a, b, *options])
     assert answer.exit_code == 0
     found = json.loads(answer.output)
-    assert (found["schema"], found["before"], found["after"]) == (2, a, b)
+    assert (found["schema"], found["before"], found["after"]) == (3, a, b)
     assert found["evidence"][0]["verdict"] == "same"
 
 

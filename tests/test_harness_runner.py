@@ -240,7 +240,7 @@ def test_an_interrupt_stops_the_workers_and_keeps_what_is_done(
     assert [item.strategy for item in run.results] == ["unchanged"]
     assert run.meta["interrupted"] is True
     table = leaderboard(run).set_index("strategy")
-    assert table.loc["looping", "skill"] == pytest.approx(10.0)
+    assert table.loc["looping", "skill"] == pytest.approx(-9.0)
 
 
 def test_workers_that_cannot_start_end_the_run(
@@ -266,7 +266,7 @@ def test_wrong_input_is_told() -> None:
 def test_a_model_that_cannot_be_solved_has_failed() -> None:
     case = toys.tiny_case()
     massless = replace(case.model, mass=case.model.mass * 0.0)
-    result = judged(case, reference_of(case), "s", 0, JobOutcome("ok", model=massless))
+    result = judged(case, reference_of(case), ("s", 0, "drawn"), JobOutcome("ok", model=massless))
     assert result.status == "failed"
     assert result.reason
     assert np.isclose(result.score, 10.0)

@@ -80,7 +80,7 @@ def test_what_they_say_can_be_stored(runs: dict[str, Run]) -> None:
 
 def test_a_judgement_out_of_bounds_ends_its_job_alone() -> None:
     record = {"case": "c", "strategy": "s", "seed": 0, "status": "ok", "parameter_count": -1}
-    slot = Slot(toys.tiny_case(), "s", 0, "", {}, None)
+    slot = Slot(toys.tiny_case(), "s", 0, "drawn", "", {}, None)
     answer = json.dumps({"result": record, "exhibit": None}).encode()
     outcome = _Bench([slot], {}, {}, None)._judgement(slot, Ending("answer", answer))
     assert isinstance(outcome, JobOutcome)

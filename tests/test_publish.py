@@ -138,7 +138,7 @@ def test_history_has_every_version_and_the_board_the_latest(data: Data, site: Si
         "9.9",
         old["results"][1]["provenance"]["strategy"],
     ]
-    assert softer["versions"][0]["skill"] < softer["versions"][1]["skill"]
+    assert softer["versions"][0]["skill"] > softer["versions"][1]["skill"]
     assert softer["versions"][1]["machines"][0]["cpu"] == "Old <cpu>"
     page = (site.folder / softer["page"]).read_text()
     assert "<polyline" in page

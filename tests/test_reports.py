@@ -23,7 +23,7 @@ from femubench.reports.summary import change_errors, rms_percent
 from femubench.reports.terminal import TerminalReporter
 from femubench.results import Block, JobResult, PairedMode, Run
 
-NOMINAL = {"used": 10.0, "higher": 8.0, "modified": 5.0}
+NOMINAL = {"used": 10.0, "higher": 8.0, "modified": 60.0}
 
 
 def mode(
@@ -141,8 +141,8 @@ class TestTerminal:
         assert [row[0] for row in rows] == ["1", "2", "3", "!4", "*5"]
         # rms 1 % over used and higher; one of three modified modes has no partner
         modified = 100.0 * math.sqrt((0.01**2 + 1.0 + 0.01**2) / 3.0)
-        assert rows[0][3:] == ["1.00", "1.00", f"{modified:.1f}", "0", "0", "4", "17", "1.25"]
-        assert rows[3][6:8] == ["2", "2"]
+        assert rows[0][3:] == ["–", "1.00", f"{modified:.1f}", "1.00", "0", "0", "4", "1.25"]
+        assert rows[3][7:9] == ["2", "2"]
         assert "unphysical" in text
 
     def test_fits_80_columns_whatever_the_names_and_figures(self) -> None:
@@ -169,7 +169,7 @@ class TestTerminal:
         failed = [replace(FAILED, seed=seed) for seed in range(5)]
         text = TerminalReporter().render(run_of(*results, *failed))
         assert "95 % interval" in text
-        assert re.search(r"good +\d\.\d{3} +\d\.\d{3} - \d\.\d{3}", text)
+        assert re.search(r"good +0\.\d{3} +0\.\d{3} to 0\.\d{3}", text)
         assert "failed x5" in text
         assert text.count("measured 3e-2") == 1
 
@@ -179,7 +179,7 @@ class TestTerminal:
     def test_failures_are_told_and_counted(self) -> None:
         text = TerminalReporter().render(RUN)
         assert re.search(r"beam +broken +failed +stiffness: measured 3e-2,", text)
-        assert "counted as unchanged (skill 1): picky: the model has no joints." in text
+        assert "counted as unchanged (skill 0): picky: the model has no joints." in text
         many = [replace(FAILED, case=f"case{number}") for number in range(30)]
         assert "... and 10 more in the report" in TerminalReporter().render(run_of(*many))
 
@@ -209,7 +209,7 @@ class TestMarkdown:
             ["4", "imaginary (unphysical)"],
             ["5", "broken"],
         ]
-        assert rows[4][2] == "10.000"
+        assert rows[4][2] == "-9.000"
 
     def test_coverage_and_reasons(self) -> None:
         rows = {row[0]: row[1:] for row in with_header(self.TEXT, "strategy", "ok")}
@@ -336,5 +336,5 @@ def test_notes_name_what_still_moves_and_what_does_not_apply() -> None:
     for text in (TerminalReporter().render(run), MarkdownReporter().render(run)):
         assert "Still moving at their last iteration (jobs): slow (1)." in text
     lines = " ".join(TerminalReporter().render(run).split())
-    assert f"Not applicable, counted as unchanged (skill 1): picky: {SPARED.reason}." in lines
+    assert f"Not applicable, counted as unchanged (skill 0): picky: {SPARED.reason}." in lines
     assert "Still moving" not in TerminalReporter().render(run_of(done))

@@ -27,6 +27,7 @@ from femubench.core.score.scoring import (
     reference_of,
     score_model,
 )
+from femubench.results import ranks_by_floor, scored_on
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
@@ -178,13 +179,18 @@ def result(
     return JobResult(case, strategy, seed, status, blocks=blocks, **more)
 
 
-REFERENCE = {"a": {"used": 4.0, "higher": 2.0}, "b": {"used": 1.0}}
+REFERENCE = {"a": {"used": 4.0, "higher": 2.0}, "b": {"used": 1.0, "higher": 5.0}}
 META = {"reference": REFERENCE, "seeds": [0], "seed": 5, "strategies": []}
 
 
-def test_score_is_the_geometric_mean_of_the_ratios() -> None:
-    expected = math.sqrt((1.05 / 4.05) * (1.05 / 2.05))
-    assert score_of(result("s"), REFERENCE["a"]) == pytest.approx(expected, rel=1e-14)
+def test_score_is_what_is_left_of_the_error_on_unseen_data() -> None:
+    assert score_of(result("s"), REFERENCE["a"]) == pytest.approx(1.05 / 2.05, rel=1e-14)
+    both = {"used": 4.0, "higher": 2.0, "modified": 7.0}
+    blocks = {name: Block(rms, None, ()) for name, rms in (("higher", 1.0), ("modified", 3.0))}
+    expected = math.sqrt((1.05 / 2.05) * (3.05 / 7.05))
+    assert score_of(replace(result("s"), blocks=blocks), both) == pytest.approx(expected, rel=1e-14)
+    # A case that holds nothing back has nothing else to say.
+    assert score_of(result("s"), {"used": 4.0}) == pytest.approx(1.05 / 4.05, rel=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -255,43 +261,116 @@ def test_without_reference_the_result_of_the_baseline_serves() -> None:
     assert [item.score for item in found] == pytest.approx([1.0, 1.05 / 2.05, 10.0])
 
 
-def test_skill_weighs_every_block_of_every_case_alike() -> None:
-    results = [
-        result("s", rms=1.0),
-        replace(result("s", case="b"), blocks={"used": Block(3.0, None, ())}),
-    ]
-    row = leaderboard(Run(META, tuple(results))).iloc[0]
-    ratios = [1.05 / 4.05, 1.05 / 2.05, 3.05 / 1.05]
-    assert row["skill"] == pytest.approx(np.prod(ratios) ** (1 / 3), rel=1e-12)
+def board(reference: dict[str, dict[str, float]], *results: JobResult, **meta: Any) -> Any:
+    return leaderboard(Run({**META, "reference": reference, **meta}, results)).iloc[0]
+
+
+def with_blocks(case: str, **errors: float) -> JobResult:
+    return replace(
+        result("s", case=case), blocks={k: Block(rms, None, ()) for k, rms in errors.items()}
+    )
+
+
+def test_skill_is_what_is_taken_away_of_the_error_on_unseen_data() -> None:
+    results = (result("s", rms=1.0), with_blocks("b", used=3.0, higher=4.0))
+    row = board(REFERENCE, *results)
+    ratios = [1.05 / 2.05, 4.05 / 5.05]
+    assert row["skill"] == pytest.approx(1.0 - math.sqrt(np.prod(ratios)), rel=1e-12)
     assert row["used_percent"] == 2.0  # the median over the two cases
-    assert row["higher_percent"] == 1.0
+    assert row["higher_percent"] == 2.5
     assert np.isnan(row["modified_percent"])
+    better = board(
+        REFERENCE,
+        *(replace(item, blocks={**item.blocks, "used": Block(0.0, None, ())}) for item in results),
+    )
+    assert better["skill"] == row["skill"]  # meeting what was given is no skill
+
+
+def test_every_structure_counts_once_however_many_cases_it_has() -> None:
+    reference = {name: {"used": 1.0, "higher": 1.0} for name in "abc"}
+    errors = {"a": 3.0, "b": 3.0, "c": 0.5}
+    results = [with_blocks(name, higher=rms) for name, rms in errors.items()]
+    apart = board(reference, *results)
+    assert 1.0 - apart["skill"] == pytest.approx((3.05**2 * 0.55) ** (1 / 3) / 1.05)
+    one = board(reference, *results, structures={"a": "x", "b": "x"})
+    assert 1.0 - one["skill"] == pytest.approx((3.05 * 0.55) ** 0.5 / 1.05)
+
+
+def test_data_that_two_cases_of_a_structure_share_count_once() -> None:
+    reference = {"a": {"higher": 2.0, "modified": 1.0}, "b": {"modified": 1.0}}
+    results = [with_blocks("a", higher=1.0, modified=4.0), with_blocks("b", modified=4.0)]
+    row = board(reference, *results, structures={"a": "x", "b": "x"})
+    alone = board({"a": reference["a"]}, results[0])
+    assert row["skill"] == pytest.approx(alone["skill"], rel=1e-14)
+    other = board(reference | {"b": {"modified": 1.1}}, *results, structures={"a": "x", "b": "x"})
+    assert other["skill"] < row["skill"] - 0.05
+
+
+@pytest.mark.parametrize("floor", [0.005, 0.2])
+def test_what_is_added_to_all_errors_can_be_chosen(floor: float) -> None:
+    run = Run({**META, "reference": {"a": {"higher": 2.0}}}, (with_blocks("a", higher=1.0),))
+    left = 1.0 - leaderboard(run, floor)["skill"][0]
+    assert left == pytest.approx((1.0 + floor) / (2.0 + floor))
+
+
+def test_ranks_that_rest_on_the_floor_are_told() -> None:
+    reference = {"a": {"higher": 1.0}, "b": {"higher": 1.0}}
+    errors = {"met": (0.0, 4.0), "even": (0.45, 0.45)}
+    results = [
+        replace(with_blocks(case, higher=rms), strategy=name)
+        for name, pair in errors.items()
+        for case, rms in zip("ab", pair, strict=True)
+    ]
+    found = ranks_by_floor(Run({**META, "reference": reference}, tuple(results)))
+    assert found == {"met": (1, 1, 1, 2, 2), "even": (2, 2, 2, 1, 1)}
 
 
 def test_a_missing_result_scores_ten_and_a_strategy_without_any_is_there() -> None:
     run = Run({**META, "strategies": ["s", "never"]}, (result("s", rms=1.0),))
     table = leaderboard(run).set_index("strategy")
-    expected = math.exp((math.log(1.05 / 4.05) + math.log(1.05 / 2.05) + math.log(10.0)) / 3)
+    expected = 1.0 - math.sqrt(1.05 / 2.05 * 10.0)
     assert table.loc["s", "skill"] == pytest.approx(expected, rel=1e-12)
-    assert table.loc["never", "skill"] == pytest.approx(10.0)
+    assert table.loc["never", "skill"] == pytest.approx(-9.0)
     assert table.loc["s", ["ok", "total"]].tolist() == [1, 2]
 
 
-def test_skill_on_unseen_data_leaves_the_given_block_out() -> None:
+def test_a_case_that_holds_nothing_back_counts_only_among_its_like() -> None:
     reference = {"a": {"used": 4.0, "higher": 2.0, "modified": 1.0}, "b": {"used": 3.0}}
-    blocks = {
-        name: Block(rms, None, ())
-        for name, rms in (("used", 0.0), ("higher", 1.0), ("modified", 2.0))
-    }
-    seen = replace(result("s"), blocks=blocks)
-    run = Run({**META, "reference": reference}, (seen, result("s", rms=0.0, case="b")))
-    table = leaderboard(run)
-    expected = math.sqrt((1.05 / 2.05) * (2.05 / 1.05))
-    assert table["skill_unseen"][0] == pytest.approx(expected, rel=1e-12)
-    missing = leaderboard(Run({**META, "reference": reference}, (result("s", case="b"),)))
-    assert missing["skill_unseen"][0] == pytest.approx(10.0)
-    given = leaderboard(Run({**META, "reference": {"b": {"used": 3.0}}}, (result("s", case="b"),)))
-    assert np.isnan(given["skill_unseen"][0])
+    seen = with_blocks("a", used=0.0, higher=1.0, modified=2.0)
+    row = board(reference, seen, result("s", rms=0.0, case="b"))
+    expected = 1.0 - math.sqrt((1.05 / 2.05) * (2.05 / 1.05))
+    assert row["skill"] == pytest.approx(expected, rel=1e-12)
+    assert row[["ok", "total"]].tolist() == [2, 2]
+    assert board(reference, result("s", case="b"))["skill"] == pytest.approx(-9.0)
+    given = Run({**META, "reference": {"b": {"used": 3.0}}}, (result("s", case="b"),))
+    assert leaderboard(given)["skill"][0] == pytest.approx(1.0 - 1.05 / 3.05)
+    assert scored_on(given) == "given"
+    assert scored_on(Run({**META, "reference": reference}, (seen,))) == "unseen"
+
+
+def test_tests_stand_apart_from_computed_truths() -> None:
+    reference = {"a": {"higher": 1.0}, "b": {"higher": 1.0}}
+    results = (with_blocks("a", higher=0.5), with_blocks("b", higher=3.0))
+    row = board(reference, *results, classes={"b": ["free", "computed truth"]})
+    assert row["skill_tests"] == pytest.approx(1.0 - 0.55 / 1.05)
+    assert np.isnan(board(reference, *results)["skill_tests"])
+
+
+def test_ranks_are_from_the_textbook_model_and_the_start_as_drawn_is_beside() -> None:
+    reference = {"a": {"higher": 1.0}, "b": {"higher": 1.0}}
+    starts = {"starts": {"a": ["textbook", "drawn"], "b": ["textbook"]}, "alike": ["b"]}
+    results = [
+        replace(with_blocks("a", higher=0.5), nominal="textbook"),
+        replace(with_blocks("a", higher=2.0), negative_eigenvalues=1),
+        replace(with_blocks("b", higher=1.0), nominal="textbook"),
+    ]
+    run = Run({**META, "reference": reference, **starts}, rank_results(results, reference))
+    row = leaderboard(run).iloc[0]
+    assert row["skill"] == pytest.approx(1.0 - math.sqrt(0.55 / 1.05))
+    assert row["skill_drawn"] == pytest.approx(1.0 - math.sqrt(2.05 / 1.05))
+    assert not row["unphysical"]
+    assert row["total"] == 2
+    assert [item.rank for item in run.results] == [1, 1, 1]
 
 
 def test_the_unphysical_rank_below_the_physical_and_no_model_at_all_below_both() -> None:
@@ -311,8 +390,7 @@ def test_several_seeds_give_the_median_and_an_interval() -> None:
     results = [result("s", seed=k, rms=rms) for k, rms in enumerate(errors)]
     meta = {**META, "reference": {"a": REFERENCE["a"]}, "seeds": list(range(5))}
     row = leaderboard(Run(meta, tuple(results))).iloc[0]
-    expected = math.sqrt((3.05 / 4.05) * (3.05 / 2.05))
-    assert row["skill"] == pytest.approx(expected, rel=1e-12)
+    assert row["skill"] == pytest.approx(1.0 - 3.05 / 2.05, rel=1e-12)
     assert row["skill_low"] < row["skill"] < row["skill_high"]
     again = leaderboard(Run(meta, tuple(reversed(results)))).iloc[0]
     assert again.to_dict() == pytest.approx(row.to_dict(), nan_ok=True)

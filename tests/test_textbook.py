@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -68,12 +69,14 @@ def test_as_a_strategy_it_looks_at_no_data() -> None:
 
 def test_a_run_from_the_textbook_model_measures_against_it(tmp_path: Path) -> None:
     wanted = ("frame", ["unchanged", "textbook"])
-    drawn = femubench.rank(*wanted, jobs=1, store=tmp_path)
+    drawn = femubench.rank(*wanted, jobs=1, store=tmp_path, nominal="drawn")
     repaired = femubench.rank(*wanted, jobs=1, store=tmp_path, nominal="textbook")
     scores = {
         run.meta["request"]["nominal"]: run.table.set_index("strategy") for run in (drawn, repaired)
     }
-    assert scores["drawn"].loc["textbook", "score"] < 0.6
+    # Both runs measure against the textbook model, from wherever they start.
+    assert scores["drawn"].loc["unchanged", "score"] > 2.0
+    assert scores["drawn"].loc["textbook", "score"] == pytest.approx(1.0, abs=1e-9)
     assert scores["textbook"].loc["textbook", "score"] == pytest.approx(1.0, abs=1e-9)
     unchanged = scores["textbook"].loc["unchanged"]
     assert unchanged["used_percent"] == scores["drawn"].loc["textbook", "used_percent"]
@@ -83,12 +86,45 @@ def test_a_run_from_the_textbook_model_measures_against_it(tmp_path: Path) -> No
     assert again.meta["request"]["nominal"] == "textbook"
 
 
+def test_a_run_starts_from_both_models_and_ranks_from_the_textbook_one(tmp_path: Path) -> None:
+    case = femubench.cases["frame"]
+    plain = replace(case, name="plain", model=as_matrices(case.model))
+    both = femubench.rank([case, plain], "unchanged", jobs=1, store=tmp_path)
+    found = [(item.case, item.nominal, round(item.score or 0.0, 6)) for item in both.results]
+    # Matrices have no textbook: they are run once.
+    assert found[0] == ("frame", "textbook", 1.0)
+    assert found[1][:2] == ("frame", "drawn")
+    assert found[2:] == [("plain", "textbook", 1.0)]
+    row = both.leaderboard.iloc[0]
+    assert row["skill"] == pytest.approx(0.0, abs=1e-9)
+    assert row["skill_drawn"] == pytest.approx(1.0 - (found[1][2] or 0.0) ** 0.5, abs=1e-5)
+    assert [item.case for item in both.started_from("drawn")] == ["frame", "plain"]
+    again = femubench.rank([case, plain], "unchanged", jobs=1, store=tmp_path, resume=True)
+    assert again.results == both.results
+
+
+def test_no_plugin_moves_what_all_are_measured_against(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Stranger:
+        name = "lead-filling"
+
+        def places(self, model: object) -> list[str]:
+            return ["all"]
+
+        def parameters(self, model: object, place: str) -> list[object]:
+            raise AssertionError("asked for its textbook values")
+
+    plain = femubench.rank("frame", "unchanged", jobs=1).meta["reference"]
+    loader = "femubench.core.plugin.loader.registered_effects"
+    monkeypatch.setattr(loader, lambda: (*EFFECTS, Stranger()))
+    assert femubench.rank("frame", "unchanged", jobs=1).meta["reference"] == plain
+
+
 def test_the_screen_says_where_all_start_from(tmp_path: Path) -> None:
     words = ["run", "frame", "-s", "textbook", "-j", "1", "--nominal", "textbook"]
     shown = CliRunner().invoke(bench, [*words, "--store", str(tmp_path)])
     assert shown.exit_code == 0, shown.output
-    assert "1 case from the textbook model" in shown.output
-    assert "all start from the textbook model" in " ".join(shown.output.split())
+    assert "1 case from the textbook models" in shown.output
+    assert "All start from the models of the textbooks." in " ".join(shown.output.split())
     locked = CliRunner().invoke(bench, ["run", "--locked", "x", "--nominal", "textbook"])
     assert locked.exit_code == 2
     assert "nominal cannot be given beside it" in locked.output

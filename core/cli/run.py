@@ -20,10 +20,11 @@ from femubench.core.plugin.validation import chosen
 from femubench.core.version import __version__
 
 if TYPE_CHECKING:
-    from femubench.core.library.rank import Plan, Start
+    from femubench.core.library.rank import Plan
     from femubench.core.plugin.loader import Plugins
     from femubench.core.roles import Reporter
     from femubench.core.run.recording import Overwrite
+    from femubench.core.run.starts import Start
     from femubench.core.run.store import Store
     from femubench.core.schema.results import Run
 

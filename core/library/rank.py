@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field, TypeAdapter, ValidationError
 
@@ -25,6 +25,7 @@ from femubench.core.roles import Strategy
 from femubench.core.run.frames import modes_frame, results_frame
 from femubench.core.run.recording import Overwrite, Progress
 from femubench.core.run.runner import run_jobs
+from femubench.core.run.starts import Start, Starts
 from femubench.core.run.store import Store
 from femubench.core.schema import records as serial, results
 from femubench.core.score.leaderboard import leaderboard
@@ -32,7 +33,6 @@ from femubench.core.score.leaderboard import leaderboard
 if TYPE_CHECKING:
     import pandas as pd
 
-Start = Literal["drawn", "textbook", "both"]
 StrategyLike = str | Strategy | type[Strategy]
 DEFAULT_STORE = "femubench-results"
 DEFAULT_TIMEOUT = 600.0  # s
@@ -183,9 +183,7 @@ class Plan:
                 progress=progress,
                 run_seed=asked.seed,
                 request=asked.to_json() if self.repeatable else {"nominal": asked.nominal},
-                textbook=self.textbook,
-                nominal=asked.nominal,
-                classes=self.classes,
+                starts=Starts(self.textbook, asked.nominal, self.classes),
             )
         )
 
@@ -233,7 +231,7 @@ def rank(
 
     Examples:
         >>> femubench.rank(case, [nominal, scaled]).leaderboard["skill"].round(2).tolist()
-        [0.69, 0.0]
+        [0.0, -0.17]
     """
     kept = None if store is None else store_in(store)
     plan = plan_of(
@@ -407,7 +405,7 @@ def read_run(
     Examples:
         >>> file = femubench.report(run, "results.json")
         >>> femubench.read_run(file).leaderboard["skill"].round(2).tolist()
-        [0.31, 1.0]
+        [0.44, -2.16]
     """
     if isinstance(run, results.Run):
         return Run.of(run)

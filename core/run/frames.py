@@ -17,10 +17,10 @@ __all__ = ["modes_frame", "results_frame", "run_from_json", "run_to_json"]
 def results_frame(run: Run) -> pd.DataFrame:
     """Return one row a job: status, errors by block, counts, score and rank.
 
-    Columns: case strategy seed nominal status reason seconds; ``used_percent``, ``used_mac`` and the same
-    for ``higher`` and ``modified`` (nan where the case has no such block); rigid_body_modes
-    rigid_body_modes_expected negative_eigenvalues unphysical parameter_count evaluations score
-    rank.
+    Columns: case strategy seed nominal status reason seconds; ``used_percent``, ``used_mac`` and
+    the same for ``higher`` and ``modified`` (nan where the case has no such block);
+    rigid_body_modes rigid_body_modes_expected negative_eigenvalues unphysical parameter_count
+    evaluations score rank.
 
     Examples:
         >>> results.results_frame(run)["status"].tolist()
@@ -42,9 +42,9 @@ def results_frame(run: Run) -> pd.DataFrame:
 def modes_frame(run: Run) -> pd.DataFrame:
     """Return one row a measured mode of every job that is ok.
 
-    Columns: case strategy seed nominal block modification mode measured_hz predicted_hz error_percent
-    mac. The error is signed, (f_p / f_m - 1), and nan for a mode without partner or with an
-    imaginary one; `counted_percent` is what the score takes, 100 for such a mode.
+    Columns: case strategy seed nominal block modification mode measured_hz predicted_hz
+    error_percent mac. The error is signed, (f_p / f_m - 1), and nan for a mode without partner or
+    with an imaginary one; `counted_percent` is what the score takes, 100 for such a mode.
 
     Examples:
         >>> len(results.modes_frame(run))

@@ -37,7 +37,7 @@ def block_weights(references: References, structures: Mapping[str, str]) -> Weig
 
     Examples:
         >>> known = {"a": {"used": 2.0, "higher": 3.0}, "b": {"used": 4.0, "higher": 3.0}}
-        >>> results.block_weights(known, {"a": "frame", "b": "frame"})
+        >>> results.block_weights(known, {"a": "ladder", "b": "ladder"})
         {('a', 'higher'): 0.5, ('b', 'higher'): 0.5}
     """
     some = any(name in UNSEEN for errors in references.values() for name in errors)

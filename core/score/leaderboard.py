@@ -142,7 +142,7 @@ def leaderboard(run: Run, floor_percent: float = OFFSET_PERCENT) -> pd.DataFrame
 
     Examples:
         >>> results.leaderboard(run)[["rank", "skill"]].round(2).values.tolist()
-        [[1.0, 0.69], [2.0, 0.0]]
+        [[1.0, 0.44], [2.0, -2.16]]
     """
     import pandas as pd
 
@@ -157,8 +157,8 @@ def ranks_by_floor(run: Run) -> dict[str, tuple[int, ...]]:
     """Return the ranks of every strategy for each of `FLOORS`, in the order of the leaderboard.
 
     Examples:
-        >>> results.ranks_by_floor(run)
-        {'scaled': (1, 1, 1, 1, 1), 'nominal': (2, 2, 2, 2, 2)}
+        >>> list(results.ranks_by_floor(run).values())
+        [(1, 1, 1, 1, 1), (2, 2, 2, 2, 2)]
     """
     order = leaderboard(run)["strategy"]
     boards = [leaderboard(run, floor).set_index("strategy")["rank"] for floor in FLOORS]
@@ -172,8 +172,9 @@ def scored_on(run: Run) -> str:
         >>> results.scored_on(run)
         'unseen'
     """
-    errors = list((run.meta.get("reference") or {}).values())
-    blocks = {name for found in (*errors, *(r.blocks for r in run.results)) for name in found}
+    errors = run.meta.get("reference") or {}
+    found = errors.values() if errors else (result.blocks for result in run.results)
+    blocks = {name for listed in found for name in listed}
     return "unseen" if blocks & set(UNSEEN) else "given"
 
 

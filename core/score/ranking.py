@@ -30,8 +30,10 @@ def score_of(result: JobResult, reference: Mapping[str, float]) -> float:
     Arguments:
         reference: rms error of the nominal model in percent by block name.
     """
-    if not reference:
-        return SCORE_OF_NOTHING_DONE if result.status == "not-applicable" else SCORE_OF_FAILURE
+    if result.status == "not-applicable":
+        return SCORE_OF_NOTHING_DONE
+    if result.status != "ok" or not reference:
+        return SCORE_OF_FAILURE
     return geometric_mean(score_in(result, name, reference) for name in counted_blocks(reference))
 
 
@@ -115,7 +117,7 @@ def rank_results(
 
     Examples:
         >>> [(round(one.score, 2), one.rank) for one in results.rank_results(run.results)]
-        [(1.0, 2), (0.31, 1)]
+        [(3.16, 2), (0.56, 1)]
     """
     listed = tuple(results)
     given = {

@@ -1,0 +1,56 @@
+"""From which nominal models the strategies of a run start, and what they are measured against."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from femubench.core.case.case import Case
+from femubench.core.schema.results import NOMINALS, Nominal
+
+Start = Literal["drawn", "textbook", "both"]
+
+
+@dataclass(frozen=True)
+class Starts:
+    """The nominal models of a run's cases.
+
+    Arguments:
+        textbook: the cases with their textbook models by name, which all errors are measured
+            against; without those whose drawing has all that handbooks give. None starts from the
+            cases as given and measures against them.
+        nominal: which of the two models strategies start from.
+        classes: kinds of structure and truth by case.
+    """
+
+    textbook: Mapping[str, Case] | None = None
+    nominal: Start = "both"
+    classes: Mapping[str, Sequence[str]] = field(default_factory=dict)
+
+    def yardstick(self, case: Case) -> Case:
+        """Return a case with the model that all errors are measured against."""
+        return (self.textbook or {}).get(case.name, case)
+
+    def of(self, case: Case) -> Iterator[tuple[Nominal, Case]]:
+        """Yield a case with each nominal model to start from, the one that ranks first."""
+        textbook, drawn = reversed(NOMINALS)
+        if self.textbook is None:
+            yield drawn, case
+            return
+        if self.nominal != drawn:
+            yield textbook, self.yardstick(case)
+        if self.nominal == drawn or (self.nominal == "both" and case.name in self.textbook):
+            yield drawn, case
+
+    def about(self, cases: Sequence[Case]) -> dict[str, Any]:
+        """Return what a run tells of its cases: from where they start, and what they are."""
+        known = self.textbook
+        starts = {case.name: list(self.of(case)) for case in cases}
+        return {
+            "yardstick": NOMINALS[known is not None],
+            "starts": {name: [nominal for nominal, _ in own] for name, own in starts.items()},
+            "alike": [name for name in starts if known is not None and name not in known],
+            "drawings": {name: own[0][1].digest for name, own in starts.items()},
+            "classes": {name: list(self.classes[name]) for name in starts if name in self.classes},
+        }
