@@ -8,6 +8,7 @@ from femubench.core.run.store import Store
 from femubench.core.schema.results import Block, JobResult, PairedMode, Run
 from femubench.core.score.counting import block_weights, counted_blocks
 from femubench.core.score.leaderboard import (
+    COMPUTED,
     FLOORS,
     interval_kind,
     leaderboard,
@@ -26,6 +27,7 @@ from femubench.core.score.statistics import (
 
 __all__ = [
     "Block",
+    "COMPUTED",
     "FEWEST",
     "FLOORS",
     "JobResult",

@@ -20,6 +20,7 @@ from femubench.reports.summary import (
     strategies_of,
 )
 from femubench.results import (
+    COMPUTED,
     FEWEST,
     OFFSET_PERCENT,
     SCORE_OF_FAILURE,
@@ -136,6 +137,7 @@ def _case(run: Run, case: str, exhibits: Exhibits | None) -> dict[str, Any]:
         "name": case,
         "scenario": _scenario(case),
         "structure": structures_of(run).get(case, case),
+        "test": COMPUTED not in (run.meta.get("classes") or {}).get(case, ()),
         "title": about.get("title") or "",
         "reference": {name: reference[name] for name in BLOCKS if name in reference},
         "stage": plain_data(None if stage is None else _with_short_points(stage)),

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page
 
+from femubench.core.schema.records import read_run
 from femubench.results import Run, leaderboard, rank_results, run_to_json
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "toys"))
@@ -20,7 +21,7 @@ from synthetic_run import synthetic_run
 BLOCKS = ("used", "higher", "modified")
 ROUNDED = {"seconds": 1e-3}  # figures that the page holds with fewer digits
 KEYS = (
-    *("rank", "skill", "skill_unseen", "used_percent", "higher_percent", "modified_percent"),
+    *("rank", "skill", "skill_tests", "used_percent", "higher_percent", "modified_percent"),
     *("parameters", "seconds"),
 )
 
@@ -134,14 +135,14 @@ def test_every_number_of_the_json_is_in_the_page(page: Page, real: Any) -> None:
 
 def test_sorts_by_mouse_and_keyboard(page: Page) -> None:
     skill = {name: row["skill"] for name, row in shown(page).items()}
-    rising = sorted(skill, key=lambda name: skill[name] or 0.0)
-    assert order(page) != rising  # unphysical ones stand below
+    falling = sorted(skill, key=lambda name: -(skill[name] or 0.0))
+    assert order(page) != falling  # unphysical ones stand below
     head = page.locator("th[data-key=skill]")
     head.locator("button").click()
-    assert (order(page), head.get_attribute("aria-sort")) == (rising, "ascending")
+    assert (order(page), head.get_attribute("aria-sort")) == (falling, "descending")
     head.locator("button").focus()
     page.keyboard.press("Enter")
-    assert (order(page), head.get_attribute("aria-sort")) == (rising[::-1], "descending")
+    assert (order(page), head.get_attribute("aria-sort")) == (falling[::-1], "ascending")
     name = page.locator("th[data-key=strategy]")
     name.locator("button").focus()
     page.keyboard.press("Space")
@@ -240,4 +241,34 @@ def test_intervals_of_a_part_are_over_its_structures(
     tick(page, "scenarios", "scenario-03")
     kept = [case for case in run.meta["cases"] if case != "scenario-03"]
     for name, ends in expected(part(run, cases=kept)).items():
-        assert intervals()[name] == pytest.approx(ends, rel=0.05), name
+        left = [1.0 - end for end in intervals()[name]]
+        assert left == pytest.approx([1.0 - end for end in ends], rel=0.05), name
+
+
+def test_both_nominal_models_stand_side_by_side(
+    view: Callable[..., Any], command: Callable[..., str], tmp_path: Path
+) -> None:
+    data, file = tmp_path / "run.json", tmp_path / "run.html"
+    words = ("run", "frame", "-s", "unchanged", "-s", "baruch", "-q", "--store", tmp_path)
+    command(*words, "--json", data, "--report", file)
+    page = view(file).page
+    page.wait_for_selector("html[data-ready=yes]")
+    assert page.evaluate("bench.board.check()") == []
+    board = leaderboard(read_run(data)).set_index("strategy")
+    for name, row in shown(page).items():
+        assert row["skill_drawn"] == pytest.approx(board.loc[name, "skill_drawn"])
+        assert row["skill_drawn"] < -1.0 < row["skill"]
+    assert "Ranks are from the textbook models" in page.locator("p.lead").inner_text()
+    view_case = view(file, "#case/frame").page
+    heads = view_case.locator("table.case-frequencies thead").inner_text()
+    assert "from drawn" in heads
+    assert "as printed" in heads
+    ours = next(
+        r
+        for r in json.loads(data.read_text())["results"]
+        if (r["strategy"], r["nominal"]) == ("baruch", "drawn")
+    )
+    assert (
+        f"{ours['higher']['modes'][1]['predicted_hz']:.1f}"
+        in view_case.locator("table.case-frequencies").inner_text()
+    )

@@ -68,7 +68,9 @@
     const kept = [...counted, ...open.filter((unit) => unit.k === null || !open.some(unseen) || unseen(unit))];
     const structures = [...new Set(kept.map((unit) => data.cases[unit.c].structure))];
     for (const unit of kept) unit.structure = structures.indexOf(data.cases[unit.c].structure);
-    return { cases, units: kept, structures, seeds: all.seeds, whole };
+    const tested = cases.filter((c) => data.cases[c].test);
+    const tests = tested.length && tested.length < cases.length ? new Set(tested) : null;
+    return { cases, units: kept, structures, seeds: all.seeds, whole, tests };
   }
 
   // Return the weighted mean of values by group; null where a group has none.
@@ -80,6 +82,11 @@
     });
     return [...sums].map((sum, i) => (weights[i] ? sum / weights[i] : null));
   }
+  // Return the means of the structures over their tests alone.
+  function testsOf(values, grid) {
+    const kept = grid.units.map((unit) => (grid.tests.has(unit.c) ? unit : { ...unit, weight: 0 }));
+    return means(values, kept, (unit) => unit.structure, grid.structures.length).filter((mean) => mean !== null);
+  }
   function skillOf(logs) {
     return logs.length ? 1 - Math.exp(logs.reduce((total, v) => total + v, 0) / logs.length) : null;
   }
@@ -90,13 +97,14 @@
     const logs = found.map((own) => means(own, grid.units, (unit) => place.get(unit.c), grid.cases.length));
     const perStructure = found.map((own) => means(own, grid.units, (unit) => unit.structure, grid.structures.length));
     const skills = perStructure.map(skillOf);
+    const onTests = grid.tests && found.map((own) => testsOf(own, grid)).map(skillOf);
     const results = all.perStrategy[s].filter((r) => kept.has(r.c));
     const fine = results.filter((r) => r.status === "ok");
     const name = data.strategies[s].name;
     const given = grid.whole ? data.board.find((row) => row.strategy === name) : null;
     const row = {
       index: s, strategy: name, rank: 0, skill: median(skills), skill_low: null, skill_high: null,
-      skill_drawn: given ? given.skill_drawn : null, skill_tests: given ? given.skill_tests : null,
+      skill_drawn: given ? given.skill_drawn : null, skill_tests: onTests && onTests[0] !== null ? median(onTests) : null,
       rigid_modes_lost: sum(fine, "lost"), negative_eigenvalues: sum(fine, "negative"),
       parameters: middle(fine, (r) => r.parameters), evaluations: middle(fine, (r) => r.evaluations),
       seconds: middle(fine, (r) => r.seconds), ok: fine.length,
@@ -214,7 +222,7 @@
   // Return what differs from the run's own leaderboard by more than 1e-9 (rounded figures: 1e-3).
   function check() {
     const mine = new Map(rowsOf(bench.ranking.everything()).map((row) => [row.strategy, row]));
-    const exact = ["rank", "skill", "rigid_modes_lost", "negative_eigenvalues", "ok", "not_applicable", "total"];
+    const exact = ["rank", "skill", "skill_tests", "rigid_modes_lost", "negative_eigenvalues", "ok", "not_applicable", "total"];
     const errors = data.blocks.map((b) => `${b}_percent`);
     return data.board.flatMap((row) =>
       [...exact, ...errors, "parameters", "evaluations", "seconds"].flatMap((key) => {
