@@ -75,7 +75,8 @@ class TestEveryCommandOfTheReadme:
     def test_run_with_noise_and_run_resume(self) -> None:
         call("run", "rod", "-s", "unchanged", "--seeds", 3, "-q", "-j", 2, "--store", "a")
         run = femubench.rank("rod", "unchanged", seeds=3, jobs=2, store="b")
-        assert run.table["seed"].tolist() == [1, 2, 3]
+        assert run.table["seed"].tolist() == [1, 2, 3, 1, 2, 3]
+        assert run.table["nominal"].tolist() == 3 * ["textbook"] + 3 * ["drawn"]
         assert result_differences(femubench.read_run(store="a"), run) == []
         again = femubench.rank(resume=True, store="b")
         assert again.meta["run"] == run.meta["run"]
@@ -94,9 +95,9 @@ class TestEveryCommandOfTheReadme:
     def test_compare(self) -> None:
         a = femubench.rank("rod", TWO, jobs=2, store="s")
         b = femubench.rank("rod", TWO, jobs=2, store="s")
-        words = ("compare", a.meta["run"], b.meta["run"], "--store", "s", "--fail", "skill>1.2")
+        words = ("compare", a.meta["run"], b.meta["run"], "--store", "s", "--fail", "unseen>1.2")
         call(*words, "-f", "json", "-o", "theirs.json")
-        found = femubench.compare(a, b.meta["run"], fail="skill>1.2", store="s")
+        found = femubench.compare(a, b.meta["run"], fail="unseen>1.2", store="s")
         assert not found.worse
         femubench.report(found, "ours.json")
         assert data("ours.json") == data("theirs.json")
@@ -253,7 +254,7 @@ class TestCatalogues:
 class TestRank:
     def test_two_instances_of_one_class_have_names_of_their_own(self) -> None:
         given = [Scaled(), Scaled(0.9), Scaled(1.3), Duck, femubench.strategies["unchanged"]]
-        run = femubench.rank(femubench.read_case("rod"), given, jobs=2)
+        run = femubench.rank(femubench.read_case("rod"), given, jobs=2, nominal="textbook")
         names = ["scaled", "scaled:factor=0.9", "scaled:factor=1.3", "duck", "unchanged"]
         assert run.table["strategy"].tolist() == names
         assert set(run.table["status"]) == {"ok"}, run.table["reason"].tolist()
@@ -272,7 +273,7 @@ class TestRank:
             femubench.rank("rod", [Scaled(held=[1]), Scaled(held=[2])])
 
     def test_what_cannot_be_sent_to_a_worker_is_told(self) -> None:
-        run = femubench.rank("rod", [Scaled(held=threading.Lock())], jobs=1)
+        run = femubench.rank("rod", [Scaled(held=threading.Lock())], jobs=1, nominal="drawn")
         (reason,) = run.table["reason"]
         assert reason.startswith("Scaled cannot be sent to a worker process: TypeError")
 

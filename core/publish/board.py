@@ -7,11 +7,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from femubench.core.publish.agreement import Finding, References, findings_of, machine_of
-from femubench.core.publish.submissions import SCHEMA, Submission, slug
+from femubench.core.publish.submissions import Submission, slug
 from femubench.core.schema.results import BLOCKS, DONE, JobResult
 from femubench.core.score.counting import case_weights
 from femubench.core.score.ranking import geometric_mean, ranked as in_order, score_of
 from femubench.core.score.statistics import structures_of
+
+
+INDEX_SCHEMA = 2  # since more skill is better
 
 
 class _Version(NamedTuple):
@@ -40,7 +43,7 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
         for version, listed in versions.items()
     }
     return {
-        "schema": SCHEMA,
+        "schema": INDEX_SCHEMA,
         "cases": _case_entries(submissions, current, ranked, references),
         "strategies": _strategy_entries(submissions, latest, described, ranked),
         "conflicts": [_conflict(item) for item in findings if item.conflict],

@@ -25,7 +25,7 @@ from femubench.core.schema.records import (
     result_from_json,
     result_to_json,
 )
-from femubench.core.schema.results import DONE, NOMINALS, JobResult, Run
+from femubench.core.schema.results import DONE, NOMINALS, JobResult, Nominal, Run
 from femubench.core.score.ranking import rank_results
 
 _MOST_NOTES = 3
@@ -167,14 +167,14 @@ class Store:
         lines, notes = self._lines(damage)
         wanted = self._find(lines, run_id, damage)
         meta: dict[str, Any] = {"run": wanted, "finished": None}
-        results: dict[tuple[str, str, int], JobResult] = {}
+        results: dict[tuple[str, str, int, Nominal], JobResult] = {}
         for line in lines:
             if line.record["run"] != wanted:
                 continue
             with damage.told():
                 if line.record["record"] == "result":
                     found = self._result(line)
-                    results[found.case, found.strategy, found.seed] = found
+                    results[found.case, found.strategy, found.seed, found.nominal] = found
                 else:
                     meta.update(self._meta(line))
         reference = meta.get("reference") or None
