@@ -22,7 +22,7 @@ NUMERICAL := $(addprefix tests/test_,advice*.py assembly.py asymmetric_frame.py 
 	localisation.py look*.py matrix_strategies.py pairing.py papers_*.py preload.py rigid_modes.py \
 	scenarios.py scoring.py sections.py sensitiv*.py sparse_eigen.py suite.py truths_*.py)
 # What counts processes, memory or seconds has the machine to itself, and the browser its one run.
-ALONE := $(addprefix tests/,browser $(addprefix test_,harness_*.py untrusted.py))
+ALONE := $(addprefix tests/,browser $(addprefix test_,harness_*.py report_robust.py untrusted.py))
 # A file stays on one worker, and with it what its tests share; in the order of names, since those with
 # few tests take long and would come last.
 ON_ALL_CORES := -n 2 --dist loadfile --no-loadscope-reorder -p no:benchmark

@@ -98,12 +98,20 @@ def main() -> None:
     parser.add_argument("--structures", type=int, help="the smallest models of the suite alone")
     parser.add_argument("--seed", type=int, default=1, help="of the split, 1 by default")
     parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--store", help="folder of results; those that are there are taken")
     given = parser.parse_args()
     cases = sorted(read_cases(["suite"], load_plugins()), key=lambda case: case.model.size)
     cases = cases[: given.structures]
     wanted = settings_of(given.strategies)
     names = [name for listed in wanted.values() for name in listed]
-    run = femubench.rank(cases, [ZERO, *names], nominal="textbook", jobs=given.jobs)
+    run = femubench.rank(
+        cases,
+        [ZERO, *names],
+        nominal="textbook",
+        jobs=given.jobs,
+        store=given.store,
+        overwrite="missing",
+    )
     logs, first = unseen_logs(run), halves(cases, given.seed)
     found = [tuned(name, listed, logs, first) for name, listed in wanted.items()]
     print(
