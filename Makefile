@@ -21,12 +21,11 @@ NUMERICAL := $(addprefix tests/test_,advice*.py assembly.py asymmetric_frame.py 
 	element_strategies.py exhibits.py expansion.py frame_extensions.py frf.py kernels.py \
 	localisation.py look*.py matrix_strategies.py pairing.py papers_*.py preload.py rigid_modes.py \
 	scenarios.py scoring.py sections.py sensitiv*.py sparse_eigen.py suite.py truths_*.py)
-# What counts processes, memory or seconds, or writes where others read, has the machine to itself.
-ALONE := $(addprefix tests/,browser $(addprefix test_,docs_site.py harness_*.py install.py \
-	notebooks.py packaging.py plugins_new.py report_robust.py resume.py start_up.py tutorial.py \
-	untrusted.py))
-# A file stays on one worker, and with it what its tests share.
-ON_ALL_CORES := -n 2 --dist loadfile -p no:benchmark
+# What counts processes, memory or seconds has the machine to itself, and the browser its one run.
+ALONE := $(addprefix tests/,browser $(addprefix test_,harness_*.py report_robust.py untrusted.py))
+# A file stays on one worker, and with it what its tests share; in the order of names, since those with
+# few tests take long and would come last.
+ON_ALL_CORES := -n 2 --dist loadfile --no-loadscope-reorder -p no:benchmark
 
 .PHONY: run test docs kernels bench sweep fuzz truths format clean
 .DELETE_ON_ERROR:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from unittest.mock import patch
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -19,8 +18,8 @@ from threadpoolctl import threadpool_limits
 from femubench import Case, FemubenchError, Model, NotApplicable, Run, Strategy
 from femubench.core.library.cases import read_cases
 from femubench.core.plugin.loader import load_plugins
-from femubench.effect import textbook_model, textbook_values
-from femubench.plugins.strategies import diagnosed
+from femubench.effect import textbook_model
+from femubench.plugins.strategies.diagnosed import Diagnosed
 from femubench.results import JobResult, leaderboard, score_model
 
 FIGURES = Path(__file__).parents[1] / "docs" / "figures" / "textbook-start.json"
@@ -64,14 +63,10 @@ def figures() -> dict[str, dict[str, dict[str, float]]]:
     cases = read_cases((), plugins)
     drawn = {case.name: case.model for case in cases}
     better = {name: textbook_model(model, effects) for name, model in drawn.items()}
-    known = {e.name for e in effects for case in cases if textbook_values(e, case.model)}
-    rest = tuple(effect for effect in effects if effect.name not in known)
-    with patch.object(diagnosed, "registered_effects", lambda: rest):
-        without = board(cases, drawn, [diagnosed.Diagnosed()])
     return {
         "drawn": board(cases, drawn, strategies),
         "textbook": board(cases, better, strategies),
-        "without textbook effects": without,
+        "without textbook effects": board(cases, drawn, [Diagnosed(textbook=False)]),
     }
 
 

@@ -157,6 +157,7 @@ class Strategy(Protocol):
 
     - ``needs``: capabilities (of `CAPABILITIES`) that model or measurement must have.
     - ``promises``: what every result keeps; `bench plugins check` measures it.
+    - ``settings``: other values of its options, each in the words of ``bench run -s NAME:...``.
     """
 
     @property

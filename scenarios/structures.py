@@ -74,7 +74,6 @@ def ladder_truth(tube: Section, stretch: float = 1.0, soft_joint: float = 1.0) -
         joints=joints,
         members=members,
         joint_springs=tuple(springs),
-        bending_mass="shear-consistent",
     )
 
 

@@ -186,7 +186,8 @@ class IndependentCase:
             along = float((point - a) @ (b - a) / ((b - a) @ (b - a)))
             if -1e-9 <= along <= 1 + 1e-9 and np.linalg.norm(a + along * (b - a) - point) < 1e-6:
                 T, L = self.turn(rod)
-                local = interpolation(along * L, L, self.plane)
+                lag = rod.constants["EI"] * rod.constants["shear"]
+                local = interpolation(along * L, L, self.plane, lag)
                 back = T[:3, :3].T  # orthogonal
                 dofs = [3 * rod.start + i for i in range(3)] + [3 * rod.stop + i for i in range(3)]
                 return sign * (back @ local @ T @ self.shapes[dofs])[index]
@@ -246,12 +247,20 @@ def local_stiffness(c: dict[str, float], L: float, plane: str) -> Matrix:
     return both @ far @ both.T
 
 
-def interpolation(x: float, L: float, plane: str) -> Matrix:
-    """Return local displacements at x from the local dofs of both ends, (3, 6)."""
-    powers = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [1, L, L**2, L**3], [0, 1, 2 * L, 3 * L**2]])
-    cubic = np.linalg.inv(powers.astype(float))  # coefficients from (w, slope) at both ends
+def interpolation(x: float, L: float, plane: str, lag: float = 0.0) -> Matrix:
+    """Return local displacements at x from the local dofs of both ends, (3, 6).
+
+    Without load between its ends a beam has a cubic deflection w, and since its shear force is
+    -EI w''', its section turns by w' + lag w''' with lag = EI / (kappa G A).
+    """
+
+    def turned(at: float) -> list[float]:
+        return [0.0, 1.0, 2.0 * at, 3.0 * at**2 + 6.0 * lag]
+
+    powers = np.array([[1.0, 0.0, 0.0, 0.0], turned(0.0), [1.0, L, L**2, L**3], turned(L)])
+    cubic = np.linalg.inv(powers)  # coefficients from (w, rotation) at both ends
     across = np.array([1, x, x**2, x**3]) @ cubic
-    slope = np.array([0, 1, 2 * x, 3 * x**2]) @ cubic
+    slope = np.array(turned(x)) @ cubic
     linear = np.array([1 - x / L, x / L])
     rows = np.zeros((3, 6))
     w, s, other = (1, 2, 0) if plane == "in-plane" else (0, 2, 1)
@@ -269,6 +278,6 @@ def local_mass(c: dict[str, float], L: float, plane: str) -> Matrix:
         density = np.diag([c["rhoA"], c["rhoJp"], c["rhoI"]])
     mass = np.zeros((6, 6))
     for t, weight in zip(*np.polynomial.legendre.leggauss(5), strict=True):
-        rows = interpolation(L * (t + 1) / 2, L, plane)
+        rows = interpolation(L * (t + 1) / 2, L, plane, c["EI"] * c["shear"])
         mass += weight * L / 2 * rows.T @ density @ rows
     return mass

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 from typing import Any
 
 import pytest
@@ -18,12 +17,8 @@ from femubench.core.challenge.calibration import (
     statements,
     wilson,
 )
-from femubench.core.challenge.sweep import Record, run_task, stated, tasks
-from femubench.core.challenge.true_fit import Finding, fits_worse, is_search_fault, true_fit
-from femubench.core.diagnosis.diagnose import diagnose
-from femubench.core.diagnosis.result import Diagnosis
-from femubench.core.inference.effort import Effort
-from femubench.core.plugin.loader import load_plugins
+from femubench.core.challenge.sweep import Record
+from femubench.core.challenge.true_fit import fits_worse, is_search_fault
 
 
 def test_interval_of_a_proportion() -> None:
@@ -108,49 +103,3 @@ def test_faults_of_search_are_counted_by_kind() -> None:
         ("pair", "0", "0"),
         ("all", "2", "1"),
     ]
-
-
-@cache
-def of_a_pair(budget: float | None) -> Record:
-    """Return the record of a case with two causes; without a budget only single ones are found."""
-    task = next(task for task in tasks() if task.key == ("pairs", 1))
-
-    def search(case: Any) -> Diagnosis:
-        return diagnose(case, effort=Effort(budget))
-
-    return run_task(task, search)
-
-
-def test_a_search_that_finds_the_truth_has_no_fault() -> None:
-    record = of_a_pair(None)
-    assert record["right"]
-    leader, truth = record["leader_fit"], record["true_fit"]
-    assert truth["unknowns"] == 2
-    assert leader["chi2"] == pytest.approx(truth["chi2"], abs=0.1)
-    assert leader["log_weight"] == pytest.approx(truth["log_weight"], abs=0.1)
-    said = stated([record])
-    assert len(said) == 4
-    assert all(one.right and one.probability > 0.5 for one in said)
-
-
-def test_a_search_that_ends_early_leaves_the_truth_better() -> None:
-    """The truth needs one value more than what was found: nothing is said of the search then."""
-    record = of_a_pair(0.0)
-    assert record["true_fit"]["chi2"] < record["leader_fit"]["chi2"] - 10.0
-    assert record["true_fit"]["log_weight"] > record["leader_fit"]["log_weight"] + 5.0
-    assert record["leader_fit"]["unknowns"] == 1
-    assert fits_worse(record) is False
-
-
-def test_the_truth_is_found_from_the_grid_too() -> None:
-    task = next(task for task in tasks() if task.key == ("pairs", 1))
-    blind = task.draw()
-    seen = diagnose(blind.case).examination
-    assert seen is not None
-    effects = load_plugins().effects
-    causes = [[Finding(cause.effect, cause.place)] for cause in blind.truth.causes]
-    without = true_fit(seen, causes, effects, str.__eq__)
-    assert without is not None
-    assert without.chi2 == pytest.approx(of_a_pair(None)["true_fit"]["chi2"], abs=0.1)
-    nowhere = [[Finding(cause.effect, "nowhere")] for cause in blind.truth.causes]
-    assert true_fit(seen, nowhere, effects, str.__eq__) is None

@@ -183,7 +183,7 @@ def full_frames(ladder: Case, portal: Case, bracket: Case) -> Iterator[tuple[str
         replace(
             base,
             beam="timoshenko",
-            bending_mass="shear-consistent",
+            bending_mass="cubic",
             rotary_inertia=1.4,
             masses=(PointMass(point, 0.05, (0.0, 0.01, 0.0)),),
             springs=(GroundSpring(end, "-ry", 1.2345678901234567),),

@@ -14,11 +14,13 @@ import pytest
 
 from femubench import (
     Case,
+    InputError,
     Measurement,
     Model,
     NotApplicable,
     Sensors,
     UpdateResult,
+    diagnosis,
     read_case,
     solve_modes,
 )
@@ -267,6 +269,25 @@ def test_options_are_set_by_name(nominal: Model, truth: Frame) -> None:
     plain = strategy_of("diagnosed:meet_frequencies=false", known)
     m = replace(measured(truth), frequency_std=np.full(3, np.nan))
     assert plain.update(nominal, m, np.random.default_rng(0)).model is nominal
+
+
+def test_effects_are_left_out_by_name_and_those_of_handbooks_together(
+    nominal: Model, truth: Frame
+) -> None:
+    handbooks = {"torsion-constant", "shear-deformation", "rotary-inertia"}
+    kept = {*handbooks, "youngs-modulus"}
+    others = {effect.name for effect in diagnosis.registered_effects()} - kept
+
+    def named(*left_out: str, **options: Any) -> set[str]:
+        without = "+".join([*others, *left_out])
+        found = update(nominal, measured(truth), without=without, **options)
+        return {parameter.name.partition(" ")[0] for parameter in found.parameters}
+
+    assert handbooks <= named()
+    assert named("torsion-constant") == {"rotary-inertia", "youngs-modulus"}
+    assert named(textbook=False) <= {"youngs-modulus"}
+    with pytest.raises(InputError, match="no effect 'torsion'"):
+        Diagnosed(without="shear-deformation+torsion")
 
 
 def test_a_model_with_a_preload_can_leave_its_worker(nominal: Model) -> None:

@@ -1,24 +1,43 @@
-"""The budget of a search and its progress: what is left out, what is told, and when."""
+"""The budget of a search, its progress and its faults, on one case with two causes."""
 
 from __future__ import annotations
+
+from functools import cache
 
 import pytest
 
 import femubench
-from femubench.core.challenge.sweep import Task, tasks
+from femubench.core.challenge.draw import BlindCase
+from femubench.core.challenge.sweep import Record, run_task, stated, tasks
+from femubench.core.challenge.true_fit import Finding, fits_worse, true_fit
 from femubench.core.diagnosis.diagnose import diagnose
+from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import InputError
 from femubench.core.inference.effort import Effort
+from femubench.core.plugin.loader import load_plugins
+
+TASK = next(task for task in tasks() if task.key == ("pairs", 1))
 
 
-def pair() -> Task:
+@cache
+def pair() -> BlindCase:
     """Return a case with two causes that no single one explains."""
-    return next(task for task in tasks() if task.key == ("pairs", 1))
+    return TASK.draw()
+
+
+@cache
+def diagnosed(budget: float | None) -> Diagnosis:
+    """Return what is said of it; without a budget only single causes are found."""
+    return diagnose(pair().case, effort=Effort(budget))
+
+
+@cache
+def recorded(budget: float | None) -> Record:
+    return run_task(TASK, lambda case: diagnosed(budget))
 
 
 def test_a_spent_budget_leaves_single_causes_and_says_so() -> None:
-    case = pair().draw().case
-    whole, short = diagnose(case), diagnose(case, effort=Effort(budget=0.0))
+    whole, short = diagnosed(None), diagnosed(0.0)
     assert len(whole.causes) == 2
     assert not any("budget" in note for note in whole.notes)
     assert len(short.causes) == 1
@@ -26,20 +45,49 @@ def test_a_spent_budget_leaves_single_causes_and_says_so() -> None:
     assert "ended after its budget of 0 s" in short.notes[-1]
 
 
-def test_a_budget_that_is_not_spent_changes_nothing() -> None:
-    case = pair().draw().case
-    whole, limited = diagnose(case), diagnose(case, effort=Effort(budget=1e6))
-    assert (limited.sentence, limited.notes) == (whole.sentence, whole.notes)
-
-
-def test_fits_done_never_fall_and_end_at_all_that_are_known() -> None:
+def test_a_budget_that_is_not_spent_changes_nothing_and_fits_done_never_fall() -> None:
     told: list[tuple[int, int]] = []
-    diagnose(pair().draw().case, effort=Effort(told=lambda *counts: told.append(counts)))
+    effort = Effort(budget=1e6, told=lambda *counts: told.append(counts))
+    whole, limited = diagnosed(None), diagnose(pair().case, effort=effort)
+    assert (limited.sentence, limited.notes) == (whole.sentence, whole.notes)
     done, known = zip(*told, strict=True)
     assert list(done) == sorted(done)
     assert all(a <= b for a, b in told)
     assert done[-1] == known[-1] > 100
     assert len(set(done)) > 10
+
+
+def test_a_search_that_finds_the_truth_has_no_fault() -> None:
+    record = recorded(None)
+    assert record["right"]
+    leader, truth = record["leader_fit"], record["true_fit"]
+    assert truth["unknowns"] == 2
+    assert leader["chi2"] == pytest.approx(truth["chi2"], abs=0.1)
+    assert leader["log_weight"] == pytest.approx(truth["log_weight"], abs=0.1)
+    said = stated([record])
+    assert len(said) == 4
+    assert all(one.right and one.probability > 0.5 for one in said)
+
+
+def test_a_search_that_ends_early_leaves_the_truth_better() -> None:
+    """The truth needs one value more than what was found: nothing is said of the search then."""
+    record = recorded(0.0)
+    assert record["true_fit"]["chi2"] < record["leader_fit"]["chi2"] - 10.0
+    assert record["true_fit"]["log_weight"] > record["leader_fit"]["log_weight"] + 5.0
+    assert record["leader_fit"]["unknowns"] == 1
+    assert fits_worse(record) is False
+
+
+def test_the_truth_is_found_from_the_grid_too() -> None:
+    seen, truth = diagnosed(None).examination, pair().truth
+    assert seen is not None
+    effects = load_plugins().effects
+    causes = [[Finding(cause.effect, cause.place)] for cause in truth.causes]
+    without = true_fit(seen, causes, effects, str.__eq__)
+    assert without is not None
+    assert without.chi2 == pytest.approx(recorded(None)["true_fit"]["chi2"], abs=0.1)
+    nowhere = [[Finding(cause.effect, "nowhere")] for cause in truth.causes]
+    assert true_fit(seen, nowhere, effects, str.__eq__) is None
 
 
 def test_a_stage_counts_what_it_can_do_without() -> None:

@@ -49,8 +49,7 @@ def of_effect(warnings: tuple[LookWarning, ...], effect: str) -> LookWarning:
 @pytest.fixture
 def clean(ladder: FrameBuilder) -> Frame:
     """Return a slender ladder with nothing to complain of: shear, rotary inertia, Bredt's J."""
-    frame = ladder("timoshenko", polar=False, elements=8)
-    return replace(frame, bending_mass="shear-consistent")
+    return ladder("timoshenko", polar=False, elements=8)
 
 
 def test_nothing_is_found_in_a_good_model(clean: Frame) -> None:

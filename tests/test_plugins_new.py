@@ -62,7 +62,9 @@ def python(
 ) -> subprocess.CompletedProcess[str]:
     """Run Python with some packages and femubench, away from this process."""
     path = os.pathsep.join(map(str, [*(package / "src" for package in packages), SITE]))
-    env = os.environ | {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
+    # pytest-benchmark takes no times in a worker of pytest-xdist, which these processes are not.
+    ours = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
+    env = ours | {"PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1"}
     return subprocess.run(
         [sys.executable, *map(str, words)], capture_output=True, text=True, env=env, cwd=cwd
     )

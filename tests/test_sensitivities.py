@@ -55,7 +55,7 @@ def supported(ladder: Any) -> Frame:
 
 
 @pytest.fixture(
-    params=["spring", "rigid", "timoshenko", "supported", "asymmetric", "shear-mass", "3d"]
+    params=["spring", "rigid", "timoshenko", "supported", "asymmetric", "cubic-mass", "3d"]
 )
 def structure(
     request: pytest.FixtureRequest,
@@ -71,7 +71,7 @@ def structure(
         "timoshenko": lambda: timoshenko,
         "supported": lambda: supported(ladder),
         "asymmetric": lambda: asymmetric_ladder(elements=2),
-        "shear-mass": lambda: replace(timoshenko, bending_mass="shear-consistent"),
+        "cubic-mass": lambda: replace(timoshenko, bending_mass="cubic"),
         "3d": lambda: portal(3, elements=1),
     }
     return Structure.build(frames[request.param]())

@@ -276,7 +276,9 @@ class FrameSpec(Table):
     plane: Plane = Field(description="'in-plane', 'out-of-plane' or '3d'")
     beam: BeamTheory = Field("euler-bernoulli", description="'euler-bernoulli' or 'timoshenko'")
     rotary_inertia: Share | None = Field(None, description=_SHARE)
-    bending_mass: BendingMass = Field("cubic", description="'cubic' or 'shear-consistent'")
+    bending_mass: BendingMass = Field(
+        "shear-consistent", description="'cubic' or 'shear-consistent'"
+    )
     gravity: NotNegative = Field(0.0, description="a multiple of the own weight, a number >= 0")
     materials: dict[Name, MaterialSpec] = Field(description="tables [model.materials.NAME]")
     sections: dict[Name, SectionSpec] = Field(description="tables [model.sections.NAME]")

@@ -75,10 +75,7 @@ class Truth:
 
 
 def finer(frame: Frame) -> Frame:
-    """Return a frame on a mesh twice as fine, with another consistent mass matrix.
-
-    Shear-consistent functions differ from cubic ones as soon as shear is in the model.
-    """
+    """Return a frame on a mesh twice as fine, with the mass matrix that converges to its theory."""
     members = (replace(m, elements=_REFINEMENT * m.elements) for m in frame.members)
     return replace(frame, members=tuple(members), bending_mass="shear-consistent")
 

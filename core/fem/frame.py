@@ -237,8 +237,8 @@ class Frame:
     Arguments:
         rotary_inertia: whether rho I takes part, or a multiple of it; None follows the beam
             theory.
-        bending_mass: ``cubic`` takes Hermite's functions in every theory; ``shear-consistent``
-            takes those of the Timoshenko element (Friedman & Kosmatka 1993).
+        bending_mass: ``shear-consistent`` takes the functions of the Timoshenko element (Friedman
+            & Kosmatka 1993), Hermite's without shear; ``cubic`` takes these in every theory.
         gravity: multiple of the own weight, down along z, that acts on its stiffness.
         sets: named by the user.
         families: the members of every section and of every material, by the names that these have
@@ -255,7 +255,7 @@ class Frame:
     joint_springs: tuple[JointSpring, ...] = ()
     rigid_ends: tuple[RigidEnd, ...] = ()
     rotary_inertia: bool | float | None = None
-    bending_mass: BendingMass = "cubic"
+    bending_mass: BendingMass = "shear-consistent"
     gravity: float = 0.0
     factors: tuple[Factor, ...] = ()
     preloads: tuple[Preload, ...] = ()

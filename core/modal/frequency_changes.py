@@ -9,6 +9,7 @@ from scipy.optimize import linear_sum_assignment
 
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import Modes, modes_of, zero_tolerance
+from femubench.core.modal.pairing import FREQUENCY_WEIGHT
 from femubench.core.typing import FloatArray, IntArray
 
 _MARGIN = 4  # modes beyond those wanted, so that a pair may cross the end of the list
@@ -39,7 +40,10 @@ def frequency_changes(
     count: int,
     restrict: Callable[[FloatArray], FloatArray] = np.asarray,
 ) -> FloatArray:
-    """Return f_other / f - 1 of the first modes, paired by shape in the metric of the mass.
+    """Return f_other / f - 1 of the first modes, paired by shape and, less, by frequency.
+
+    Shapes alone would not do: at the nodes of a coarse mesh a far higher mode of a finer one may
+    look like a low mode.
 
     Arguments:
         model: whose modes they are.
@@ -50,7 +54,11 @@ def frequency_changes(
     """
     further = elastic_modes(other, min(count, len(modes)) + _MARGIN)
     count = min(count, len(modes), len(further))
-    likeness = np.square(model.mass_times(modes.shapes[:, :count]).T @ restrict(further.shapes))
-    partner = matched(likeness)
-    ratio = further.eigenvalues[partner] / modes.eigenvalues[:count]
+    shapes = restrict(further.shapes)
+    norms = np.einsum("ij,ij->j", shapes, model.mass_times(shapes))
+    likeness = np.square(model.mass_times(modes.shapes[:, :count]).T @ shapes)
+    likeness /= np.maximum(norms, np.finfo(float).tiny)
+    ratios = further.eigenvalues[None, :] / modes.eigenvalues[:count, None]
+    partner = matched(likeness - FREQUENCY_WEIGHT * np.abs(np.log(ratios)) / 2.0)
+    ratio = ratios[np.arange(count), partner]
     return np.asarray(np.sqrt(ratio) - 1.0)

@@ -34,6 +34,12 @@ class ElementStrategy(Strategy):
     needs: ClassVar[frozenset[str]] = frozenset({"shapes", "elements"})
     keep_rigid: ClassVar[bool] = False
 
+    settings: ClassVar[tuple[str, ...]] = (
+        "orthogonality=false",
+        "expansion=force",
+        "orthogonality=false,expansion=force",
+    )
+
     orthogonality: bool = True
     expansion: Expansion = "rotation"
     frequencies: Frequencies = "measured"

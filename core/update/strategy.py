@@ -82,6 +82,8 @@ class Strategy(ABC):
             parameters, ``joints`` places where members meet.
         promises: what every result keeps (of ``used-modes``, ``used-modes-or-stated``,
             ``rigid-body-modes``, ``no-negative-eigenvalue``); `bench plugins check` measures it.
+        settings: other values of its options that are as good a reading of its source, in the words
+            after the colon of ``bench run -s``; `benchmarks/tuning.py` compares them.
         baseline: whether it is the one that leaves the model as it is, to compare with.
         yardstick: whether `bench plugins check` compares time and memory with its own.
     """
@@ -90,6 +92,7 @@ class Strategy(ABC):
     citation: ClassVar[str]
     needs: ClassVar[frozenset[str]] = frozenset()
     promises: ClassVar[frozenset[str]] = frozenset()
+    settings: ClassVar[tuple[str, ...]] = ()
     baseline: ClassVar[bool] = False
     yardstick: ClassVar[bool] = False
 

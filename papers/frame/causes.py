@@ -84,6 +84,7 @@ class Ladder:
             masses=self.nominal.masses if accelerometer else (),
             joint_springs=self.truth.joint_springs if JOINTS in found else (),
             rotary_inertia=SHEAR in found,
+            bending_mass="cubic",  # of the paper's time
             factors=(Factor("shear", ("all",), flexibility),),
         )
 

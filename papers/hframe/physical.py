@@ -43,7 +43,7 @@ def physical_model(case: Case) -> Physical:
     The springs sit at the column's face, behind rigid arms; all frequencies count alike.
     """
     structure = case.model.frame_structure
-    frame = replace(structure.frame, beam="timoshenko")
+    frame = replace(structure.frame, beam="timoshenko", bending_mass="cubic")  # of the time
     sprung = with_joint_springs(
         structure.rebuilt(frame), {end: {"ry": _START} for end in _ENDS}, arm=ARM, arm_factor=None
     )

@@ -49,6 +49,12 @@ class Bayesian(Strategy):
         "chapter 8; Horton et al. (1999), equation (4) with the covariances of data and parameters"
     )
     needs: ClassVar[frozenset[str]] = frozenset({"geometry"})
+    settings: ClassVar[tuple[str, ...]] = (
+        "stiffness_std=0.05",
+        "joint_std=0.25",
+        "joint_std=1.0",
+        "shapes=true",
+    )
 
     stiffness_std: float = 0.1
     torsion_std: float = 0.3

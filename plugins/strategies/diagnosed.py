@@ -9,6 +9,7 @@ import numpy as np
 
 from femubench import (
     FemubenchError,
+    InputError,
     Measurement,
     Model,
     NotApplicable,
@@ -25,6 +26,7 @@ from femubench.diagnosis import (
     extended_by,
     registered_effects,
 )
+from femubench.effect import textbook_values
 from femubench.modal import rigid_modes_of
 from femubench.update import with_measured_frequencies
 
@@ -48,6 +50,8 @@ class Diagnosed(Strategy):
     Arguments:
         tolerance: standard deviation of the relative scatter of every element.
         meet_frequencies: whether the used frequencies are met at the end.
+        without: effects that are not examined, joined by ``+``.
+        textbook: whether effects are examined for which handbooks give a value without any fit.
 
     Source: docs/diagnosis.md for the causes; Baruch & Bar-Itzhack (1978) for the last step.
     """
@@ -61,6 +65,19 @@ class Diagnosed(Strategy):
 
     tolerance: float = 0.005
     meet_frequencies: bool = True
+    without: str = ""
+    textbook: bool = True
+
+    settings: ClassVar[tuple[str, ...]] = ("meet_frequencies=false", "tolerance=0.01")
+
+    def __post_init__(self) -> None:
+        known = {effect.name for effect in registered_effects()} if self.without else set()
+        for name in filter(None, self.without.split("+")):
+            if name not in known:
+                raise InputError(
+                    f"without: there is no effect {name!r}",
+                    expected="names that `bench plugins list` shows, joined by +",
+                )
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator
@@ -87,9 +104,13 @@ class Diagnosed(Strategy):
         known = [number for number, s in pairs if np.isfinite(s) and s > 0.0]
         if not known:
             return UpdateResult(model, diagnostics={"examined": 0.0})
-        examination = examine(
-            model, measurement.select(known), registered_effects(), tolerance=self.tolerance
-        )
+        effects = [
+            effect
+            for effect in registered_effects()
+            if effect.name not in self.without.split("+")
+            and (self.textbook or not textbook_values(effect, model))
+        ]
+        examination = examine(model, measurement.select(known), effects, tolerance=self.tolerance)
         found = _first_that_stands(model, examination)
         if found is None:
             return UpdateResult(model, diagnostics=_figures(examination, None))

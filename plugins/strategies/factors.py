@@ -62,6 +62,11 @@ class Global(_Factors):
         "joints in a tubular H-frame, equation (4), table 4(a)"
     )
     needs: ClassVar[frozenset[str]] = frozenset({"geometry"})
+    settings: ClassVar[tuple[str, ...]] = (
+        "residual=eigenvalue",
+        "residual=relative-eigenvalue",
+        "damping=1e-3",
+    )
 
     options: UpdateOptions = field(default_factory=partial(UpdateOptions, residual="frequency"))
 
@@ -91,6 +96,11 @@ class Local(_Factors):
         "joints in a tubular H-frame, equation (4), table 4(b)"
     )
     needs: ClassVar[frozenset[str]] = frozenset({"geometry", "joints"})
+    settings: ClassVar[tuple[str, ...]] = (
+        "residual=frequency",
+        "residual=relative-eigenvalue",
+        "damping=1e-3",
+    )
 
     def unknowns(self, structure: Structure, count: int) -> list[Unknown]:
         """Return the factors on the elements at joints."""

@@ -29,6 +29,12 @@ class GenericLS(ElementStrategy):
     )
     promises: ClassVar[frozenset[str]] = frozenset({"no-negative-eigenvalue"})
     tied: ClassVar[bool] = False
+    settings: ClassVar[tuple[str, ...]] = (
+        *ElementStrategy.settings,
+        "plain=full",
+        "plain=full,joint=full",
+        "plain=none",
+    )
 
     plain: Symmetry = "half-turn"
     joint: Symmetry = "none"

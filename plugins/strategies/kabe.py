@@ -27,6 +27,13 @@ class _Entries(Strategy):
 
     needs: ClassVar[frozenset[str]] = frozenset({"shapes"})
 
+    settings: ClassVar[tuple[str, ...]] = (
+        "cutoff=0.01",
+        "cutoff=0.1",
+        "least_squares_cutoff=0.1",
+        "least_squares_cutoff=1.0",
+    )
+
     cutoff: float = 0.03
     least_squares_cutoff: float = 0.3
 

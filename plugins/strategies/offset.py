@@ -52,6 +52,11 @@ class Offset(Strategy):
         "joints in a tubular H-frame, equation (5), section 8, table 4(e)"
     )
     needs: ClassVar[frozenset[str]] = frozenset({"geometry", "joints"})
+    settings: ClassVar[tuple[str, ...]] = (
+        "residual=frequency",
+        "residual=relative-eigenvalue",
+        "damping=1e-3",
+    )
 
     length: float | None = None
     options: UpdateOptions = field(default_factory=UpdateOptions)

@@ -59,6 +59,12 @@ class Spring(Strategy):
         "joints in a tubular H-frame, section 7, table 4(c) and (d)"
     )
     needs: ClassVar[frozenset[str]] = frozenset({"geometry", "joints"})
+    settings: ClassVar[tuple[str, ...]] = (
+        "residual=frequency",
+        "damping=1e-4",
+        "damping=3e-3",
+        "free_stiffness=false",
+    )
 
     variant: Literal["joints", "global"] = "joints"
     free_stiffness: bool = True

@@ -1,0 +1,72 @@
+"""Errors on what a strategy was not given, as multiples of those of the textbook model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from math import log
+
+import numpy as np
+
+from femubench import Run
+from femubench.core.score.statistics import interval_over_structures
+from femubench.results import (
+    FEWEST,
+    OFFSET_PERCENT,
+    SCORE_OF_FAILURE,
+    JobResult,
+    structures_of,
+)
+
+UNSEEN = ("higher", "modified")
+
+
+def unseen_logs(run: Run, zero: str = "textbook") -> dict[str, dict[str, float]]:
+    """Return ln of the error over that of a strategy that is there, by strategy and structure.
+
+    Geometric means over the unseen blocks of all cases and seeds of a structure. A failure counts
+    as in the ranking; what a strategy does not apply to stays as it was.
+
+    Arguments:
+        run: with the strategy `zero` in it.
+        zero: whose errors are the unit.
+    """
+    structures, reference = structures_of(run), run.meta["reference"]
+    unit = {r.case: _errors(r) for r in run.results if r.strategy == zero}
+    found: dict[str, dict[str, list[float]]] = {}
+    for result in run.results:
+        base = unit[result.case]
+        if result.status == "not-applicable":
+            own = {name: reference[result.case][name] for name in base}
+        elif result.status == "ok":
+            own = _errors(result)
+        else:
+            own = {name: SCORE_OF_FAILURE * error for name, error in base.items()}
+        rows = found.setdefault(result.strategy, {})
+        structure = structures.get(result.case, result.case)
+        rows.setdefault(structure, []).extend(
+            log((own[name] + OFFSET_PERCENT) / (error + OFFSET_PERCENT))
+            for name, error in base.items()
+        )
+    return {
+        strategy: {name: float(np.mean(values)) for name, values in rows.items() if values}
+        for strategy, rows in found.items()
+    }
+
+
+def _errors(result: JobResult) -> dict[str, float]:
+    return {name: b.rms_percent for name, b in result.blocks.items() if name in UNSEEN}
+
+
+def mean_ratio(logs: Mapping[str, float], structures: Iterable[str] | None = None) -> float:
+    """Return the geometric mean of the ratios of some structures, all where none is named."""
+    names = logs if structures is None else structures
+    return float(np.exp(np.mean([logs[name] for name in names])))
+
+
+def interval(logs: Iterable[float]) -> str:
+    """Return the 95 % interval of a geometric mean over structures, in words for a table."""
+    values = np.array(list(logs))
+    if len(values) < FEWEST:
+        return "-"
+    low, high = interval_over_structures(values)
+    return f"{low:.2f} to {high:.2f}"

@@ -1,0 +1,31 @@
+"""The pages on the strategies: whose choices each one makes, and settings that it can take."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from femubench.core.plugin.loader import load_plugins
+from femubench.core.plugin.variants import strategy_of
+from femubench.plugins.strategies import CLASSES
+
+PAGES = sorted((Path(__file__).parents[1] / "docs").glob("strategies-*.md"))
+ITEM = re.compile(r"^- `([a-z-]+)`\. (Authors':.+?)(?=^- |^$|\Z)", re.M | re.S)
+
+
+def test_every_strategy_says_whose_its_choices_are() -> None:
+    items = [item for page in PAGES for item in ITEM.findall(page.read_text("utf-8"))]
+    assert sorted(name for name, _ in items) == sorted(CLASSES)
+    for name, text in items:
+        assert re.fullmatch(r"Authors': .+; ours: .+\.", " ".join(text.split())), name
+
+
+@pytest.mark.parametrize("name", CLASSES)
+def test_other_settings_are_settings_and_not_the_usual_ones(name: str) -> None:
+    known = load_plugins().strategies
+    settings = getattr(known[name], "settings", ())
+    variants = [strategy_of(f"{name}:{setting}", known) for setting in settings]
+    different = [known[name], *(getattr(variant, "base", None) for variant in variants)]
+    assert len(set(map(repr, different))) == len(different)
