@@ -24,7 +24,22 @@ from femubench.core.update.element_families import (
 from femubench.core.update.element_strategy import ElementStrategy
 from femubench.core.update.entries import update_entries
 from femubench.core.update.equation_error import update_by_equation_error
+from femubench.core.update.l_curve import l_curve_corner, tikhonov
 from femubench.core.update.low_rank import total_change, with_measured_frequencies
+from femubench.core.update.modal_space import (
+    ModalFit,
+    ModalSpace,
+    bounded_log,
+    factor_result,
+    modal_space,
+)
+from femubench.core.update.parameter_sets import (
+    StiffnessParts,
+    checked_set,
+    element_sets,
+    stiffness_factors,
+    stiffness_parts,
+)
 from femubench.core.update.promise import check_used_modes, force_scale
 from femubench.core.update.quasi import ITERATIONS, QuasiModes, quasi_measured_modes
 from femubench.core.update.sensitivity_update import sensitivity_update
@@ -41,16 +56,23 @@ __all__ = [
     "ElementStrategy",
     "ITERATIONS",
     "JointGroup",
+    "ModalFit",
+    "ModalSpace",
     "QuasiModes",
     "SelfCheckFailed",
+    "StiffnessParts",
     "Symmetry",
     "Unknown",
     "UpdateOptions",
     "all_elements",
     "available_length",
+    "bounded_log",
     "carried_by",
     "check_used_modes",
+    "checked_set",
+    "element_sets",
     "expand_measured_shapes",
+    "factor_result",
     "flexible_ends",
     "force_scale",
     "generic_family",
@@ -59,11 +81,16 @@ __all__ = [
     "half_depth",
     "joint_groups",
     "joint_stiffness",
+    "l_curve_corner",
+    "modal_space",
     "nobari_family",
     "physical_family",
     "quasi_measured_modes",
     "sensitivity_update",
     "spring_estimates",
+    "stiffness_factors",
+    "stiffness_parts",
+    "tikhonov",
     "total_change",
     "update_by_equation_error",
     "update_entries",

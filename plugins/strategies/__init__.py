@@ -21,6 +21,9 @@ CLASSES = {
     "spring": "spring:Spring",
     "offset": "offset:Offset",
     "bayesian": "bayesian:Bayesian",
+    "eigensensitivity": "eigensensitivity:Eigensensitivity",
+    "multi-start": "multi_start:MultiStart",
+    "cma-es": "cma_es:CmaEs",
     "diagnosed": "diagnosed:Diagnosed",
 }
 

@@ -1,0 +1,104 @@
+"""Bounded least squares from many starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import qmc
+
+from femubench import Measurement, Model, Strategy, UpdateResult
+from femubench.fem import FloatArray
+from femubench.update import (
+    ModalFit,
+    ModalSpace,
+    checked_set,
+    factor_result,
+    modal_space,
+    stiffness_parts,
+)
+
+_EVALUATIONS = 30
+
+
+@dataclass(frozen=True)
+class MultiStart(Strategy):
+    """Fit frequencies and MAC by bounded least squares from the nominal and other starts.
+
+    Unknowns are the logarithms of the factors. Every start is followed to a local optimum with
+    exact derivatives; of all optima the one of least cost is taken. The search goes on in a
+    reduced basis; the last fit starts from its best point, in a basis made there.
+
+    Arguments:
+        parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
+            `materials`, `sets` of the case, or `groups` of matrices.
+        starts: number of starts from a Latin hypercube, beside the nominal model.
+        largest: bound of a factor; the least is its inverse.
+        shape_weight: of a MAC of 0 beside a frequency that is 100 % off; 0 for frequencies alone.
+        basis: shapes in the reduced basis of the search.
+
+    The authors' are the Latin hypercube (McKay, Beckman & Conover) and the trust-region
+    reflective method (Branch, Coleman & Li); number of starts, bounds and weights are ours.
+    """
+
+    name: ClassVar[str] = "multi-start"
+    citation: ClassVar[str] = (
+        "Branch, Coleman & Li (1999), A subspace, interior, and conjugate gradient method for "
+        "large-scale bound-constrained minimization problems, SIAM J. Sci. Comput. 21, 1-23; "
+        "McKay, Beckman & Conover (1979), Technometrics 21, 239-245 (Latin hypercube)"
+    )
+    promises: ClassVar[frozenset[str]] = frozenset({"rigid-body-modes", "no-negative-eigenvalue"})
+
+    parameters: str = "members"
+    starts: int = 8
+    largest: float = 3.0
+    shape_weight: float = 0.1
+    basis: int = 60
+
+    def __post_init__(self) -> None:
+        checked_set(self.parameters)
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        """Return the model with the factors of the best optimum.
+
+        Raises:
+            NotApplicable: when the model has no such parameters.
+            StrategyFailure: when no mode of the model looks like any measured mode.
+        """
+        parts = stiffness_parts(model, self.parameters)
+        weight, limit = self.shape_weight, float(np.log(self.largest))
+        space = modal_space(parts, measurement, shape_weight=weight, size=self.basis)
+        cube = qmc.LatinHypercube(len(parts), rng=rng).random(self.starts)
+        starts = [np.zeros(len(parts)), *(limit * (2.0 * cube - 1.0))]
+        found = [_optimum(space, start, limit) for start in starts]
+        best = min(found, key=lambda item: item[1])[0]
+        there = modal_space(parts, measurement, shape_weight=weight, at=best, size=self.basis)
+        log, cost = _optimum(there, best, limit)
+        costs = np.array([item[1] for item in found])
+        history = tuple({"cost": float(value)} for value in costs)
+        near = float(np.mean(costs <= 1.1 * costs.min()))
+        return factor_result(parts, log, history, cost=cost, share_of_starts_at_best=near)
+
+
+def _optimum(space: ModalSpace, start: FloatArray, limit: float) -> tuple[FloatArray, float]:
+    """Return the local optimum within the bounds and its cost."""
+    fits: dict[bytes, ModalFit] = {}
+
+    def fit(log: FloatArray) -> FloatArray:
+        fits.clear()
+        fits[log.tobytes()] = space.fit(log)
+        return fits[log.tobytes()].residual
+
+    def slope(log: FloatArray) -> FloatArray:
+        kept = fits.get(log.tobytes())
+        return (kept or space.fit(log)).slope
+
+    inside = np.clip(start, -0.999 * limit, 0.999 * limit)
+    found = least_squares(
+        fit, inside, slope, bounds=(-limit, limit), max_nfev=_EVALUATIONS, xtol=1e-6, ftol=1e-6
+    )
+    return np.asarray(found.x), 2.0 * float(found.cost)
