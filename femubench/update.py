@@ -25,11 +25,11 @@ from femubench.core.update.element_strategy import ElementStrategy
 from femubench.core.update.entries import update_entries
 from femubench.core.update.equation_error import update_by_equation_error
 from femubench.core.update.l_curve import l_curve_corner, tikhonov
+from femubench.core.update.lasso import lasso
 from femubench.core.update.low_rank import total_change, with_measured_frequencies
 from femubench.core.update.modal_space import (
     ModalFit,
     ModalSpace,
-    bounded_log,
     factor_result,
     modal_space,
 )
@@ -66,7 +66,6 @@ __all__ = [
     "UpdateOptions",
     "all_elements",
     "available_length",
-    "bounded_log",
     "carried_by",
     "check_used_modes",
     "checked_set",
@@ -82,6 +81,7 @@ __all__ = [
     "joint_groups",
     "joint_stiffness",
     "l_curve_corner",
+    "lasso",
     "modal_space",
     "nobari_family",
     "physical_family",

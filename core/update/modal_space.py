@@ -22,6 +22,8 @@ from femubench.core.update.strategy import ParameterEstimate, UpdateResult
 _SPARE = 10  # modes above the measured ones that may become their partners
 _LOST = 1.0 - 1.0 / WINDOW_WITHOUT_SHAPE  # what a mode without a partner counts as, relative
 _DEPENDENT = 1e-8
+_LONGEST = 0.5  # step of ln theta
+_HALVINGS = 6
 _LARGEST_LOG = np.log(5.0)  # a factor beyond 1/5 .. 5 is no error of a stiffness
 
 
@@ -120,6 +122,38 @@ class ModalSpace:
             int((partner >= 0).sum()),
         )
 
+    def advance(
+        self,
+        log: FloatArray,
+        fit: ModalFit,
+        wanted: FloatArray,
+        *,
+        squares: float = 0.0,
+        sizes: float = 0.0,
+    ) -> tuple[FloatArray, ModalFit]:
+        """Return the next point: shortened, and halved until cost and penalty do not grow.
+
+        Arguments:
+            log: ln theta, (p,).
+            fit: the fit there.
+            wanted: where a linear problem has its optimum, (p,).
+            squares, sizes: what the sums of squares and of absolute values of ln theta weigh in
+                the penalty, beside the sum of squares of the residual.
+        """
+
+        def penalty(x: FloatArray) -> float:
+            return squares * float(x @ x) + sizes * float(np.abs(x).sum())
+
+        step = wanted - log
+        step *= min(1.0, _LONGEST / max(float(np.abs(step).max()), _LONGEST))
+        before = fit.cost + penalty(log)
+        for halving in range(_HALVINGS):
+            trial = np.clip(log + step / 2**halving, -_LARGEST_LOG, _LARGEST_LOG)
+            found = self.fit(trial)
+            if found.cost + penalty(trial) <= before:
+                return trial, found
+        return log, fit
+
 
 def _unit(measured: FloatArray, own: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the measured shape at unit length, the model's and where both are known."""
@@ -215,11 +249,6 @@ def _few_shapes(
     values, turn = la.eigh(0.5 * (gram + gram.T))
     keep = values > _DEPENDENT * values[-1]
     return np.asarray(basis @ (turn[:, keep] / np.sqrt(values[keep])))
-
-
-def bounded_log(log: FloatArray) -> FloatArray:
-    """Return ln theta within 1/5 .. 5, beyond which a factor is no error of a stiffness."""
-    return np.clip(log, -_LARGEST_LOG, _LARGEST_LOG)
 
 
 def factor_result(

@@ -57,13 +57,13 @@ def element_sets(structure: Structure, word: str) -> Mapping[str, tuple[str, ...
         return {label: (label,) for label in labels}
     kind = {"sections": "section:", "materials": "material:"}.get(word)
     families = {f.name: f.members for f in frame.families if kind and f.name.startswith(kind)}
-    members = {
+    members: Mapping[str, Mapping[str, tuple[str, ...]]] = {
         "members": {member.name: (member.name,) for member in frame.members},
         "sets": {f"set:{found.name}": found.members for found in frame.sets},
-    }.get(word, families)
+    }
     parts = {
         name: tuple(label for label in labels if label.rpartition("/")[0] in chosen)
-        for name, chosen in members.items()
+        for name, chosen in members.get(word, families).items()
     }
     found = {name: elements for name, elements in parts.items() if elements}
     if not found:

@@ -22,6 +22,7 @@ CLASSES = {
     "offset": "offset:Offset",
     "bayesian": "bayesian:Bayesian",
     "eigensensitivity": "eigensensitivity:Eigensensitivity",
+    "sparse": "sparse:Sparse",
     "multi-start": "multi_start:MultiStart",
     "cma-es": "cma_es:CmaEs",
     "diagnosed": "diagnosed:Diagnosed",

@@ -8,11 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from femubench import Measurement, Model, Strategy, UpdateResult
-from femubench.fem import FloatArray
 from femubench.update import (
-    ModalFit,
-    ModalSpace,
-    bounded_log,
     checked_set,
     factor_result,
     l_curve_corner,
@@ -23,8 +19,6 @@ from femubench.update import (
 
 _ITERATIONS = 20
 _SMALL = 1e-3
-_LONGEST = 0.5
-_HALVINGS = 5
 
 
 @dataclass(frozen=True)
@@ -81,25 +75,11 @@ class Eigensensitivity(Strategy):
             if not right.any() or not fit.slope.any():
                 break
             weight = l_curve_corner(fit.slope, right)
-            wanted = tikhonov(fit.slope, right, weight) - log
-            wanted *= min(1.0, _LONGEST / max(float(np.abs(wanted).max()), _LONGEST))
-            step, following = _shortened(space, log, fit, wanted, weight)
-            log, fit = log + step, following
-            moved = float(np.abs(step).max())
+            wanted = tikhonov(fit.slope, right, weight)
+            before = log
+            log, fit = space.advance(log, fit, wanted, squares=weight**2)
+            moved = float(np.abs(log - before).max())
             history.append({"cost": fit.cost, "step": moved, "weight": weight})
             if moved < _SMALL:
                 break
         return factor_result(parts, log, history, weight=weight, paired_modes=float(fit.paired))
-
-
-def _shortened(
-    space: ModalSpace, log: FloatArray, fit: ModalFit, step: FloatArray, weight: float
-) -> tuple[FloatArray, ModalFit]:
-    """Return the step halved until the regularised cost does not grow, at last none."""
-    before = fit.cost + weight**2 * float(log @ log)
-    for halving in range(_HALVINGS):
-        trial = bounded_log(log + step / 2**halving)
-        found = space.fit(trial)
-        if found.cost + weight**2 * float(trial @ trial) <= before:
-            return trial - log, found
-    return 0.0 * step, fit
