@@ -30,6 +30,7 @@ from femubench.core.update.low_rank import total_change, with_measured_frequenci
 from femubench.core.update.modal_space import (
     ModalFit,
     ModalSpace,
+    bounded_fit,
     factor_result,
     modal_space,
 )
@@ -66,6 +67,7 @@ __all__ = [
     "UpdateOptions",
     "all_elements",
     "available_length",
+    "bounded_fit",
     "carried_by",
     "check_used_modes",
     "checked_set",

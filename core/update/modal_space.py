@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
+from scipy.optimize import least_squares
 
 from femubench.core.errors import StrategyFailure
 from femubench.core.fem.model import Model
@@ -24,6 +25,8 @@ _LOST = 1.0 - 1.0 / WINDOW_WITHOUT_SHAPE  # what a mode without a partner counts
 _DEPENDENT = 1e-8
 _LONGEST = 0.5  # step of ln theta
 _HALVINGS = 6
+_EVALUATIONS, _TOLERANCE = 30, 1e-6
+_INSIDE = 0.999  # a start at a bound could not leave it
 _LARGEST_LOG = np.log(5.0)  # a factor beyond 1/5 .. 5 is no error of a stiffness
 
 
@@ -249,6 +252,45 @@ def _few_shapes(
     values, turn = la.eigh(0.5 * (gram + gram.T))
     keep = values > _DEPENDENT * values[-1]
     return np.asarray(basis @ (turn[:, keep] / np.sqrt(values[keep])))
+
+
+def bounded_fit(space: ModalSpace, start: FloatArray, largest: float) -> tuple[FloatArray, float]:
+    """Return the local optimum of ln theta between its bounds, and the cost there.
+
+    Arguments:
+        space: the problem.
+        start: ln theta, (p,).
+        largest: bound of a factor; the least is its inverse.
+
+    Source: Branch, Coleman & Li (1999), trust-region reflective least squares.
+
+    Examples:
+        >>> parts = update.stiffness_parts(model, "sections")
+        >>> space = update.modal_space(parts, measurement, shape_weight=0.0)
+        >>> log, cost = update.bounded_fit(space, np.zeros(1), 3.0)
+        >>> cost < space.fit(np.zeros(1)).cost
+        True
+    """
+    limit, kept = float(np.log(largest)), {}
+
+    def residual(log: FloatArray) -> FloatArray:
+        kept[0] = (log.copy(), space.fit(log))
+        return kept[0][1].residual
+
+    def slope(log: FloatArray) -> FloatArray:
+        at, fit = kept[0]
+        return (fit if np.array_equal(at, log) else space.fit(log)).slope
+
+    found = least_squares(
+        residual,
+        np.clip(start, -_INSIDE * limit, _INSIDE * limit),
+        slope,
+        bounds=(-limit, limit),
+        max_nfev=_EVALUATIONS,
+        xtol=_TOLERANCE,
+        ftol=_TOLERANCE,
+    )
+    return np.asarray(found.x), 2.0 * float(found.cost)
 
 
 def factor_result(

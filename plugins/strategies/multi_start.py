@@ -6,21 +6,16 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.stats import qmc
 
 from femubench import Measurement, Model, Strategy, UpdateResult
-from femubench.fem import FloatArray
 from femubench.update import (
-    ModalFit,
-    ModalSpace,
+    bounded_fit,
     checked_set,
     factor_result,
     modal_space,
     stiffness_parts,
 )
-
-_EVALUATIONS = 30
 
 
 @dataclass(frozen=True)
@@ -74,31 +69,11 @@ class MultiStart(Strategy):
         space = modal_space(parts, measurement, shape_weight=weight, size=self.basis)
         cube = qmc.LatinHypercube(len(parts), rng=rng).random(self.starts)
         starts = [np.zeros(len(parts)), *(limit * (2.0 * cube - 1.0))]
-        found = [_optimum(space, start, limit) for start in starts]
+        found = [bounded_fit(space, start, self.largest) for start in starts]
         best = min(found, key=lambda item: item[1])[0]
         there = modal_space(parts, measurement, shape_weight=weight, at=best, size=self.basis)
-        log, cost = _optimum(there, best, limit)
+        log, cost = bounded_fit(there, best, self.largest)
         costs = np.array([item[1] for item in found])
         history = tuple({"cost": float(value)} for value in costs)
         near = float(np.mean(costs <= 1.1 * costs.min()))
         return factor_result(parts, log, history, cost=cost, share_of_starts_at_best=near)
-
-
-def _optimum(space: ModalSpace, start: FloatArray, limit: float) -> tuple[FloatArray, float]:
-    """Return the local optimum within the bounds and its cost."""
-    fits: dict[bytes, ModalFit] = {}
-
-    def fit(log: FloatArray) -> FloatArray:
-        fits.clear()
-        fits[log.tobytes()] = space.fit(log)
-        return fits[log.tobytes()].residual
-
-    def slope(log: FloatArray) -> FloatArray:
-        kept = fits.get(log.tobytes())
-        return (kept or space.fit(log)).slope
-
-    inside = np.clip(start, -0.999 * limit, 0.999 * limit)
-    found = least_squares(
-        fit, inside, slope, bounds=(-limit, limit), max_nfev=_EVALUATIONS, xtol=1e-6, ftol=1e-6
-    )
-    return np.asarray(found.x), 2.0 * float(found.cost)
