@@ -24,6 +24,7 @@ from femubench.core.update.element_families import (
 from femubench.core.update.element_strategy import ElementStrategy
 from femubench.core.update.entries import update_entries
 from femubench.core.update.equation_error import update_by_equation_error
+from femubench.core.update.factor_strategy import FactorStrategy
 from femubench.core.update.l_curve import l_curve_corner, tikhonov
 from femubench.core.update.lasso import lasso
 from femubench.core.update.low_rank import total_change, with_measured_frequencies
@@ -36,7 +37,6 @@ from femubench.core.update.modal_space import (
 )
 from femubench.core.update.parameter_sets import (
     StiffnessParts,
-    checked_set,
     element_sets,
     stiffness_factors,
     stiffness_parts,
@@ -55,6 +55,7 @@ from femubench.core.update.unknowns import (
 __all__ = [
     "ElementFamily",
     "ElementStrategy",
+    "FactorStrategy",
     "ITERATIONS",
     "JointGroup",
     "ModalFit",
@@ -70,7 +71,6 @@ __all__ = [
     "bounded_fit",
     "carried_by",
     "check_used_modes",
-    "checked_set",
     "element_sets",
     "expand_measured_shapes",
     "factor_result",

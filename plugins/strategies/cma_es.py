@@ -7,12 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import Measurement, Model, Strategy, UpdateResult
-from femubench.update import checked_set, factor_result, modal_space, stiffness_parts
+from femubench import Measurement, Model, UpdateResult
+from femubench.update import FactorStrategy, factor_result, modal_space, stiffness_parts
 
 
 @dataclass(frozen=True)
-class CmaEs(Strategy):
+class CmaEs(FactorStrategy):
     """Search all factors within bounds for the least misfit of frequencies and MAC.
 
     Unknowns are the logarithms of the factors, the cost the sum of squares of relative frequency
@@ -36,17 +36,12 @@ class CmaEs(Strategy):
         "Hansen & Ostermeier (2001), Completely derandomized self-adaptation in evolution "
         "strategies, Evolutionary Computation 9, 159-195; package `cma` (Hansen, Akimoto & Baudis)"
     )
-    promises: ClassVar[frozenset[str]] = frozenset({"rigid-body-modes", "no-negative-eigenvalue"})
 
-    parameters: str = "members"
     evaluations: int = 1500
     largest: float = 3.0
     spread: float = 0.2
     shape_weight: float = 0.1
     basis: int = 40
-
-    def __post_init__(self) -> None:
-        checked_set(self.parameters)
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator
@@ -68,7 +63,9 @@ class CmaEs(Strategy):
         options = {
             "bounds": [-limit, limit],
             "maxfevals": self.evaluations,
-            "seed": int(rng.integers(1, 2**31)),
+            # Its own seed would be that of the whole process.
+            "seed": np.nan,
+            "randn": lambda *shape: rng.standard_normal(shape),
             "tolfun": 1e-9,
             "verbose": -9,
             "verb_log": 0,

@@ -8,11 +8,11 @@ from typing import ClassVar
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from femubench import InputError, Measurement, Model, Modes, Strategy, UpdateResult, solve_modes
+from femubench import InputError, Measurement, Model, Modes, UpdateResult, solve_modes
 from femubench.fem import FloatArray
 from femubench.update import (
+    FactorStrategy,
     StiffnessParts,
-    checked_set,
     expand_measured_shapes,
     factor_result,
     quasi_measured_modes,
@@ -24,7 +24,7 @@ _LEAST, _LARGEST = 0.2, 5.0
 
 
 @dataclass(frozen=True)
-class CrossModel(Strategy):
+class CrossModel(FactorStrategy):
     """Solve for all factors at once from products of model modes and measured modes.
 
     For model mode i and measured mode j, phi_i' K* phi*_j = lambda*_j phi_i' M phi*_j with
@@ -48,15 +48,13 @@ class CrossModel(Strategy):
         "Hu, Li & Wang (2007), Cross-model cross-mode method for model updating, Mechanical "
         "Systems and Signal Processing 21, 1690-1703"
     )
-    needs: ClassVar[frozenset[str]] = frozenset({"shapes"})
-    promises: ClassVar[frozenset[str]] = frozenset({"rigid-body-modes", "no-negative-eigenvalue"})
+    needs: ClassVar[frozenset[str]] = frozenset({"shapes", "elements"})
 
-    parameters: str = "members"
     modes: int = 3
     expansion: str = "rotation"
 
     def __post_init__(self) -> None:
-        checked_set(self.parameters)
+        super().__post_init__()
         if self.expansion not in ("rotation", "force"):
             raise InputError(f"the expansion is rotation or force, not {self.expansion!r}")
 

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import Measurement, Model, Strategy, UpdateResult
+from femubench import Measurement, Model, UpdateResult
 from femubench.update import (
-    checked_set,
+    FactorStrategy,
     factor_result,
     l_curve_corner,
     modal_space,
@@ -22,7 +22,7 @@ _SMALL = 1e-3
 
 
 @dataclass(frozen=True)
-class Eigensensitivity(Strategy):
+class Eigensensitivity(FactorStrategy):
     """Fit frequencies and MAC by factors that Tikhonov's term keeps near 1.
 
     Every iteration linearises relative frequencies and unit shapes in the logarithms x of the
@@ -49,13 +49,8 @@ class Eigensensitivity(Strategy):
         "test data: parametrization and regularization, Phil. Trans. R. Soc. A 359, 169-186; "
         "Hansen & O'Leary (1993), SIAM J. Sci. Comput. 14, 1487-1503 (L-curve)"
     )
-    promises: ClassVar[frozenset[str]] = frozenset({"rigid-body-modes", "no-negative-eigenvalue"})
 
-    parameters: str = "members"
     shape_weight: float = 0.1
-
-    def __post_init__(self) -> None:
-        checked_set(self.parameters)
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator

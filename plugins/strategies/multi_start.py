@@ -8,10 +8,10 @@ from typing import ClassVar
 import numpy as np
 from scipy.stats import qmc
 
-from femubench import Measurement, Model, Strategy, UpdateResult
+from femubench import Measurement, Model, UpdateResult
 from femubench.update import (
+    FactorStrategy,
     bounded_fit,
-    checked_set,
     factor_result,
     modal_space,
     stiffness_parts,
@@ -19,7 +19,7 @@ from femubench.update import (
 
 
 @dataclass(frozen=True)
-class MultiStart(Strategy):
+class MultiStart(FactorStrategy):
     """Fit frequencies and MAC by bounded least squares from the nominal and other starts.
 
     Unknowns are the logarithms of the factors. Every start is followed to a local optimum with
@@ -44,16 +44,11 @@ class MultiStart(Strategy):
         "large-scale bound-constrained minimization problems, SIAM J. Sci. Comput. 21, 1-23; "
         "McKay, Beckman & Conover (1979), Technometrics 21, 239-245 (Latin hypercube)"
     )
-    promises: ClassVar[frozenset[str]] = frozenset({"rigid-body-modes", "no-negative-eigenvalue"})
 
-    parameters: str = "members"
     starts: int = 8
     largest: float = 3.0
     shape_weight: float = 0.1
     basis: int = 60
-
-    def __post_init__(self) -> None:
-        checked_set(self.parameters)
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator

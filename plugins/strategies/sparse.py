@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import Measurement, Model, Strategy, UpdateResult
+from femubench import Measurement, Model, UpdateResult
 from femubench.fem import FloatArray
-from femubench.update import checked_set, factor_result, lasso, modal_space, stiffness_parts
+from femubench.update import FactorStrategy, factor_result, lasso, modal_space, stiffness_parts
 
 _ITERATIONS = 20
 _SMALL = 1e-3
@@ -18,7 +18,7 @@ _ZERO = 1e-3  # a smaller ln(factor) is no change
 
 
 @dataclass(frozen=True)
-class Sparse(Strategy):
+class Sparse(FactorStrategy):
     """Fit the frequencies by few factors, all others left as they are.
 
     Every iteration linearises relative frequencies in the logarithms x of the factors and takes
@@ -40,12 +40,6 @@ class Sparse(Strategy):
         "natural frequencies and mode shapes, Structural Control and Health Monitoring 25, e2107; "
         "Tibshirani (1996), Regression shrinkage and selection via the lasso"
     )
-    promises: ClassVar[frozenset[str]] = frozenset({"rigid-body-modes", "no-negative-eigenvalue"})
-
-    parameters: str = "members"
-
-    def __post_init__(self) -> None:
-        checked_set(self.parameters)
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator

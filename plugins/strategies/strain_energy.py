@@ -7,12 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import Measurement, Model, Strategy, UpdateResult
+from femubench import Measurement, Model, UpdateResult
 from femubench.fem import FloatArray
 from femubench.modal import rigid_modes_of
 from femubench.update import (
+    FactorStrategy,
     bounded_fit,
-    checked_set,
     expand_measured_shapes,
     factor_result,
     modal_space,
@@ -25,7 +25,7 @@ _LARGEST = 5.0
 
 
 @dataclass(frozen=True)
-class StrainEnergy(Strategy):
+class StrainEnergy(FactorStrategy):
     """Name the members whose modal strain energy differs most, and fit their factors alone.
 
     With the nominal matrix K_j of a member in both, its change ratio in mode i is
@@ -50,15 +50,10 @@ class StrainEnergy(Strategy):
         "Shi, Law & Zhang (1998), Structural damage localization from modal strain energy change, "
         "Journal of Sound and Vibration 218, 825-844"
     )
-    needs: ClassVar[frozenset[str]] = frozenset({"shapes"})
-    promises: ClassVar[frozenset[str]] = frozenset({"rigid-body-modes", "no-negative-eigenvalue"})
+    needs: ClassVar[frozenset[str]] = frozenset({"shapes", "elements"})
 
-    parameters: str = "members"
     above: float = 1.0
     shape_weight: float = 0.1
-
-    def __post_init__(self) -> None:
-        checked_set(self.parameters)
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator
