@@ -20,6 +20,7 @@ from femubench.core.update.element_families import (
     generic_family,
     nobari_family,
     physical_family,
+    tied,
 )
 from femubench.core.update.element_strategy import ElementStrategy
 from femubench.core.update.entries import update_entries
@@ -36,7 +37,9 @@ from femubench.core.update.modal_space import (
     modal_space,
 )
 from femubench.core.update.parameter_sets import (
+    OWN,
     StiffnessParts,
+    checked_set,
     element_sets,
     stiffness_factors,
     stiffness_parts,
@@ -60,6 +63,7 @@ __all__ = [
     "JointGroup",
     "ModalFit",
     "ModalSpace",
+    "OWN",
     "QuasiModes",
     "SelfCheckFailed",
     "StiffnessParts",
@@ -71,6 +75,7 @@ __all__ = [
     "bounded_fit",
     "carried_by",
     "check_used_modes",
+    "checked_set",
     "element_sets",
     "expand_measured_shapes",
     "factor_result",
@@ -93,6 +98,7 @@ __all__ = [
     "stiffness_factors",
     "stiffness_parts",
     "tikhonov",
+    "tied",
     "total_change",
     "update_by_equation_error",
     "update_entries",

@@ -68,7 +68,20 @@ def element_sets(structure: Structure, word: str) -> Mapping[str, tuple[str, ...
     found = {name: elements for name, elements in parts.items() if elements}
     if not found:
         raise NotApplicable(f"there are no {word} to scale: parameters={word} needs {_need(word)}")
+    _check_apart(found)
     return found
+
+
+def _check_apart(parts: Mapping[str, tuple[str, ...]]) -> None:
+    """Raise NotApplicable where two parts share an element: factors on both would be one."""
+    owner: dict[str, str] = {}
+    for name, elements in parts.items():
+        for element in elements:
+            if owner.setdefault(element, name) != name:
+                raise NotApplicable(
+                    f"{element} is in {owner[element]} and in {name}: factors need sets that share "
+                    "no element"
+                )
 
 
 def _need(word: str) -> str:

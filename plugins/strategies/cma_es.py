@@ -57,9 +57,6 @@ class CmaEs(FactorStrategy):
         parts = stiffness_parts(model, self.parameters)
         space = modal_space(parts, measurement, shape_weight=self.shape_weight, size=self.basis)
         limit = float(np.log(self.largest))
-        # One factor alone has no covariance to learn, and the package refuses it.
-        single = len(parts) == 1
-        size = len(parts) + single
         options = {
             "bounds": [-limit, limit],
             "maxfevals": self.evaluations,
@@ -70,14 +67,14 @@ class CmaEs(FactorStrategy):
             "verbose": -9,
             "verb_log": 0,
         }
-        search = cma.CMAEvolutionStrategy(np.zeros(size), self.spread, options)
+        search = cma.CMAEvolutionStrategy(np.zeros(len(parts)), self.spread, options)
         history = []
         while not search.stop():
             points = search.ask()
-            costs = [space.fit(np.asarray(x)[: len(parts)], slopes=False).cost for x in points]
+            costs = [space.fit(np.asarray(x), slopes=False).cost for x in points]
             search.tell(points, costs)
             history.append({"cost": float(min(costs)), "spread": float(search.sigma)})
-        log = np.asarray(search.result.xbest)[: len(parts)]
+        log = np.asarray(search.result.xbest)
         return factor_result(
             parts,
             log,
