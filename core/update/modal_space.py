@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from femubench.core.errors import StrategyFailure
 from femubench.core.fem.model import Model
-from femubench.core.modal.correlation import modal_scale_factor, seen_modes
+from femubench.core.modal.correlation import seen_modes
 from femubench.core.modal.eigen import DENSE_LIMIT, Modes, enough_modes, solve_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import WINDOW_WITHOUT_SHAPE, pair_modes
@@ -94,34 +94,29 @@ class ModalSpace:
         eigenvalues, vectors = self.eigenpairs(log)
         readings = self.readings @ vectors
         partner = self.partners(eigenvalues, readings)
-        measured, m, p = self.measurement, len(self.measurement), len(self.parts)
-        shaped = self.shape_weight > 0.0
-        rows = np.full(m, _LOST)
-        shape_rows = np.zeros((m, len(measured.sensors) if shaped else 0))
-        slope, shape_slope = np.zeros((m, p)), np.zeros((*shape_rows.shape, p))
-        factors = np.exp(log)
-        seen = seen_modes(measured.shapes)
+        measured, m = self.measurement, len(self.measurement)
+        parts, factors = self.parts, np.exp(log)
+        if not slopes:
+            parts, factors = parts[:0], factors[:0]
+        seen = seen_modes(measured.shapes) & (self.shape_weight > 0.0)
+        rows, shape_rows = np.full(m, _LOST), np.zeros((m, len(readings) if seen.any() else 0))
+        slope, shape_slope = np.zeros((m, len(parts))), np.zeros((*shape_rows.shape, len(parts)))
         for i in np.flatnonzero(partner >= 0):
             j = partner[i]
             own = np.sqrt(max(eigenvalues[j], 0.0)) / (2.0 * np.pi)
             rows[i] = 1.0 - own / measured.frequencies[i]
-            if slopes:
-                pulled = (self.parts @ vectors[:, j]) * factors[:, None]  # p, r
-                gain = pulled @ vectors  # p, r
-                slope[i] = -(1.0 - rows[i]) * gain[:, j] / (2.0 * eigenvalues[j])
-            if shaped and seen[i]:
-                shape_rows[i], blind = _shape_misfit(measured.shapes[:, i], readings[:, j])
-                if slopes:
-                    gap = eigenvalues[j] - eigenvalues
-                    gap[np.abs(gap) < _DEPENDENT * eigenvalues[j]] = np.inf
-                    turn = readings @ (gain / gap).T  # sensors, p
-                    shape_slope[i] = _misfit_slope(
-                        measured.shapes[:, i], readings[:, j], turn, blind
-                    )
+            gain = ((parts @ vectors[:, j]) * factors[:, None]) @ vectors  # p, r
+            slope[i] = -(1.0 - rows[i]) * gain[:, j] / (2.0 * eigenvalues[j])
+            if seen[i]:
+                gap = eigenvalues[j] - eigenvalues
+                gap[np.abs(gap) < _DEPENDENT * eigenvalues[j]] = np.inf
+                shape_rows[i], shape_slope[i] = _shape_misfit(
+                    measured.shapes[:, i], readings[:, j], readings @ (gain / gap).T
+                )
         weight = self.shape_weight
         return ModalFit(
             np.append(rows, weight * shape_rows.ravel()),
-            np.vstack([slope, weight * shape_slope.reshape(-1, p)]),
+            np.vstack([slope, weight * shape_slope.reshape(shape_rows.size, len(parts))]),
             int((partner >= 0).sum()),
         )
 
@@ -158,29 +153,23 @@ class ModalSpace:
         return log, fit
 
 
-def _unit(measured: FloatArray, own: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the measured shape at unit length, the model's and where both are known."""
+def _shape_misfit(
+    measured: FloatArray, own: FloatArray, turn: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the measured shape at unit length less s times the model's, and its slope.
+
+    Arguments:
+        measured: nan where missing, (n_sensors,).
+        own: the partner at the sensors, (n_sensors,).
+        turn: its slope by every factor, (n_sensors, p); s follows.
+    """
     known = np.isfinite(measured)
-    shape = np.where(known, measured, 0.0)
-    return shape / np.linalg.norm(shape), np.where(known, own, 0.0), known
-
-
-def _shape_misfit(measured: FloatArray, own: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the unit shape less s times the model's, and which sensors count, (n_sensors,)."""
-    shape, seen, known = _unit(measured, own)
-    return shape - float(modal_scale_factor(shape, seen)[0]) * seen, known
-
-
-def _misfit_slope(
-    measured: FloatArray, own: FloatArray, turn: FloatArray, known: FloatArray
-) -> FloatArray:
-    """Return the slope of the misfit, the scale following the shape, (n_sensors, p)."""
-    shape, seen, _ = _unit(measured, own)
-    turn = np.where(known[:, None], turn, 0.0)
+    shape, seen = np.where(known, measured, 0.0), np.where(known, own, 0.0)
+    shape, turn = shape / np.linalg.norm(shape), np.where(known[:, None], turn, 0.0)
     square = max(float(seen @ seen), 1e-300)
     scale = float(shape @ seen) / square
     scale_slope = ((shape - 2.0 * scale * seen) @ turn) / square
-    return np.asarray(-scale * turn - np.outer(seen, scale_slope))
+    return shape - scale * seen, -scale * turn - np.outer(seen, scale_slope)
 
 
 def modal_space(
