@@ -12,7 +12,13 @@ from scipy.optimize import least_squares
 from femubench.core.errors import StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.modal.correlation import seen_modes
-from femubench.core.modal.eigen import DENSE_LIMIT, Modes, enough_modes, solve_modes
+from femubench.core.modal.eigen import (
+    DENSE_LIMIT,
+    Modes,
+    count_evaluation,
+    enough_modes,
+    solve_modes,
+)
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import WINDOW_WITHOUT_SHAPE, pair_modes
 from femubench.core.modal.sparse_eigen import ShiftedModel
@@ -74,6 +80,7 @@ class ModalSpace:
 
     def eigenpairs(self, log: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return eigenvalues (r,) and vectors (r, r) at ln theta, (p,)."""
+        count_evaluation()
         change = np.tensordot(np.expm1(log), self.parts, axes=1)
         values, vectors = la.eigh(self.stiffness + change, check_finite=False, driver="evd")
         return np.asarray(values), np.asarray(vectors)

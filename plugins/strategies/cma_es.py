@@ -37,7 +37,7 @@ class CmaEs(FactorStrategy):
         "strategies, Evolutionary Computation 9, 159-195; package `cma` (Hansen, Akimoto & Baudis)"
     )
 
-    evaluations: int = 1500
+    evaluations: int = 1000
     largest: float = 3.0
     spread: float = 0.2
     shape_weight: float = 0.1
@@ -80,5 +80,4 @@ class CmaEs(FactorStrategy):
             log,
             history,
             cost=float(search.result.fbest),
-            evaluations=float(search.result.evaluations),
         )
