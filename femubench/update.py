@@ -20,11 +20,30 @@ from femubench.core.update.element_families import (
     generic_family,
     nobari_family,
     physical_family,
+    tied,
 )
 from femubench.core.update.element_strategy import ElementStrategy
 from femubench.core.update.entries import update_entries
 from femubench.core.update.equation_error import update_by_equation_error
+from femubench.core.update.factor_strategy import FactorStrategy
+from femubench.core.update.l_curve import l_curve_corner, tikhonov
+from femubench.core.update.lasso import lasso
 from femubench.core.update.low_rank import total_change, with_measured_frequencies
+from femubench.core.update.modal_space import (
+    ModalFit,
+    ModalSpace,
+    bounded_fit,
+    factor_result,
+    modal_space,
+)
+from femubench.core.update.parameter_sets import (
+    OWN,
+    StiffnessParts,
+    checked_set,
+    element_sets,
+    stiffness_factors,
+    stiffness_parts,
+)
 from femubench.core.update.promise import check_used_modes, force_scale
 from femubench.core.update.quasi import ITERATIONS, QuasiModes, quasi_measured_modes
 from femubench.core.update.sensitivity_update import sensitivity_update
@@ -39,18 +58,27 @@ from femubench.core.update.unknowns import (
 __all__ = [
     "ElementFamily",
     "ElementStrategy",
+    "FactorStrategy",
     "ITERATIONS",
     "JointGroup",
+    "ModalFit",
+    "ModalSpace",
+    "OWN",
     "QuasiModes",
     "SelfCheckFailed",
+    "StiffnessParts",
     "Symmetry",
     "Unknown",
     "UpdateOptions",
     "all_elements",
     "available_length",
+    "bounded_fit",
     "carried_by",
     "check_used_modes",
+    "checked_set",
+    "element_sets",
     "expand_measured_shapes",
+    "factor_result",
     "flexible_ends",
     "force_scale",
     "generic_family",
@@ -59,11 +87,18 @@ __all__ = [
     "half_depth",
     "joint_groups",
     "joint_stiffness",
+    "l_curve_corner",
+    "lasso",
+    "modal_space",
     "nobari_family",
     "physical_family",
     "quasi_measured_modes",
     "sensitivity_update",
     "spring_estimates",
+    "stiffness_factors",
+    "stiffness_parts",
+    "tikhonov",
+    "tied",
     "total_change",
     "update_by_equation_error",
     "update_entries",

@@ -45,6 +45,12 @@ def counted_evaluations() -> Iterator[Evaluations]:
         _counting.remove(counter)
 
 
+def count_evaluation() -> None:
+    """Count one more eigenvalue solution, for whoever makes one without `solve_modes`."""
+    for counter in _counting:
+        counter.count += 1
+
+
 @dataclass(frozen=True)
 class Modes:
     """Eigenpairs in ascending order.
@@ -208,8 +214,7 @@ def solve_modes(model: Model, count: int | None = None) -> Modes:
         >>> print(femubench.solve_modes(model).elastic.natural_frequencies[:3].round(1))
         [255.8 277.7 581.3]
     """
-    for counter in _counting:
-        counter.count += 1
+    count_evaluation()
     if model.size <= DENSE_LIMIT:
         mass, stiffness = dense_matrices(model)
         if not (np.isfinite(mass).all() and np.isfinite(stiffness).all()):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -184,6 +184,40 @@ class ElementFamily:
         assert self.cores is not None
         change = np.einsum("ea,eaij->eij", self.spread(x), self.cores)
         return np.asarray(np.eye(self.cores.shape[-1]) + change)
+
+
+def tied(family: ElementFamily, parts: Mapping[str, tuple[str, ...]]) -> ElementFamily:
+    """Return the family with one unknown a pattern for all elements of a part; others stay nominal.
+
+    Arguments:
+        family: with an unknown a pattern and element, as large as another's at the same relative
+            change.
+        parts: from a name to labels of elements; no element is in two.
+
+    Examples:
+        >>> parts = update.element_sets(structure, "members")
+        >>> len(update.tied(update.physical_family(structure), parts))
+        14
+    """
+    part_of = {label: name for name, labels in parts.items() for label in labels}
+    unknowns: dict[tuple[int, str], tuple[int, int]] = {}
+    columns = np.full(family.columns.shape, -1)
+    for row, element in enumerate(family.elements):
+        part = part_of.get(family.structure.labels[element])
+        for a in np.flatnonzero(family.columns[row] >= 0):
+            if part is not None:
+                new = (len(unknowns), int(family.columns[row, a]))
+                columns[row, a] = unknowns.setdefault((int(a), part), new)[0]
+    first = [column for _, column in unknowns.values()]
+    before = (family.before / family.scale)[first]
+    names = tuple(
+        f"{family.names[column].partition(' ')[0]} {part}"
+        for (_, part), (_, column) in unknowns.items()
+    )
+    return replace(
+        family, columns=columns, names=names, before=before,
+        scale=np.ones(len(names)), units=("",) * len(names),
+    )  # fmt: skip
 
 
 def _changeable(structure: Structure) -> tuple[IntArray, FloatArray, list[str]]:

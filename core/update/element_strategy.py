@@ -12,8 +12,9 @@ from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.measurement import Measurement
-from femubench.core.update.element_families import ElementFamily
+from femubench.core.update.element_families import ElementFamily, tied
 from femubench.core.update.equation_error import update_by_equation_error
+from femubench.core.update.parameter_sets import OWN, checked_set, element_sets
 from femubench.core.update.quasi import Expansion, Frequencies
 from femubench.core.update.strategy import Strategy, UpdateResult
 
@@ -29,6 +30,8 @@ class ElementStrategy(Strategy):
             and (17), or `force`, its equation (15) with the nominal model.
         frequencies: that the equations ask for: the `measured` ones, or `nominal`, the nominal
             model's own, which leaves the measured shapes as the only data.
+        parameters: `own` for the unknowns of the family; else those of the elements of every one
+            of the `members`, `sections`, `materials` or `sets` of the case are tied to each other.
     """
 
     needs: ClassVar[frozenset[str]] = frozenset({"shapes", "elements"})
@@ -43,8 +46,10 @@ class ElementStrategy(Strategy):
     orthogonality: bool = True
     expansion: Expansion = "rotation"
     frequencies: Frequencies = "measured"
+    parameters: str = OWN
 
     def __post_init__(self) -> None:
+        checked_set(self.parameters, own=True)
         if self.expansion not in get_args(Expansion):
             raise InputError(f"the expansion is rotation or force, not {self.expansion!r}")
         if self.frequencies not in get_args(Frequencies):
@@ -65,10 +70,14 @@ class ElementStrategy(Strategy):
                 where element cores are, rigid-body modes where they shall be kept.
             NotApplicable: when there are too many unknowns, or no rigid-body modes to keep.
         """
+        structure = model.frame_structure
+        family = self.family(structure)
+        if self.parameters != OWN:
+            family = tied(family, element_sets(structure, self.parameters))
         return update_by_equation_error(
             model,
             measurement,
-            self.family(model.frame_structure),
+            family,
             orthogonality=self.orthogonality,
             keep_rigid=self.keep_rigid,
             expansion=self.expansion,

@@ -9,6 +9,7 @@ CLASSES = {
     "textbook": "textbook:Textbook",
     "baruch": "baruch:Baruch",
     "berman": "berman:Berman",
+    "secant": "secant:Secant",
     "kabe": "kabe:Kabe",
     "kabe-rigid": "kabe:KabeRigid",
     "physical": "physical:Physical",
@@ -21,6 +22,12 @@ CLASSES = {
     "spring": "spring:Spring",
     "offset": "offset:Offset",
     "bayesian": "bayesian:Bayesian",
+    "eigensensitivity": "eigensensitivity:Eigensensitivity",
+    "sparse": "sparse:Sparse",
+    "cross-model": "cross_model:CrossModel",
+    "strain-energy": "strain_energy:StrainEnergy",
+    "multi-start": "multi_start:MultiStart",
+    "cma-es": "cma_es:CmaEs",
     "diagnosed": "diagnosed:Diagnosed",
 }
 

@@ -10,13 +10,16 @@ import numpy as np
 from femubench import Measurement, Model, Strategy, UpdateResult
 from femubench.fem import Parameter, Structure
 from femubench.update import (
+    OWN,
     Unknown,
     UpdateOptions,
     all_elements,
+    checked_set,
     global_stiffness,
     joint_groups,
     joint_stiffness,
     sensitivity_update,
+    stiffness_factors,
 )
 
 _OPTIONS = UpdateOptions(residual="frequency", weighting="statistical", damping=0.0)
@@ -38,6 +41,9 @@ class Bayesian(Strategy):
         joint_std: of the logarithm of a joint factor.
         density_std: of ln(density).
         options: of the iteration; `shapes` takes the shapes at the sensors as data too.
+        parameters: `own` for the parameters above; else one factor on E of each of the `elements`,
+            `members`, `sections`, `materials` or `sets` of the case, with the prior of the
+            stiffness, in place of stiffness, torsion and joints.
 
     Source: Horton et al. (1999), equation (4) with W_ee and W_theta the inverse covariances;
     Friswell & Mottershead (1995), Finite Element Model Updating in Structural Dynamics, ch. 8.
@@ -61,6 +67,10 @@ class Bayesian(Strategy):
     joint_std: float = 0.5
     density_std: float = 0.1
     options: UpdateOptions = _OPTIONS
+    parameters: str = OWN
+
+    def __post_init__(self) -> None:
+        checked_set(self.parameters, own=True)
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator
@@ -78,12 +88,15 @@ class Bayesian(Strategy):
             weighed: whether the total mass was measured.
         """
         everywhere = all_elements(structure)
+        density = Parameter("density all members", "density", everywhere)
+        mass = [Unknown(density, prior_std=self.density_std)] if weighed else []
+        if self.parameters != OWN:
+            factors = stiffness_factors(structure, self.parameters, prior_std=self.stiffness_std)
+            return factors + mass
         unknowns = [global_stiffness(structure, prior_std=self.stiffness_std)]
         if structure.frame.plane != "in-plane":
             torsion = Parameter("GJ all members", "GJ", everywhere)
             unknowns.append(Unknown(torsion, prior_std=self.torsion_std))
-        if weighed:
-            density = Parameter("density all members", "density", everywhere)
-            unknowns.append(Unknown(density, prior_std=self.density_std))
+        unknowns += mass
         groups = joint_groups(structure.frame)
         return unknowns + [joint_stiffness(structure, g, prior_std=self.joint_std) for g in groups]

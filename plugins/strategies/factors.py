@@ -12,12 +12,15 @@ import numpy as np
 from femubench import Measurement, Model, Strategy, UpdateResult
 from femubench.fem import Structure
 from femubench.update import (
+    OWN,
     Unknown,
     UpdateOptions,
+    checked_set,
     global_stiffness,
     groups_within,
     joint_stiffness,
     sensitivity_update,
+    stiffness_factors,
 )
 
 
@@ -26,13 +29,20 @@ class _Factors(Strategy):
     """Base class of updates of stiffness factors by the sensitivity method."""
 
     options: UpdateOptions = field(default_factory=UpdateOptions)
+    parameters: str = OWN
+
+    def __post_init__(self) -> None:
+        checked_set(self.parameters, own=True)
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator
     ) -> UpdateResult:
         """Return the model with the factors that fit the used frequencies."""
         structure = model.frame_structure
-        unknowns = self.unknowns(structure, len(measurement))
+        if self.parameters == OWN:
+            unknowns = self.unknowns(structure, len(measurement))
+        else:
+            unknowns = stiffness_factors(structure, self.parameters)
         return sensitivity_update(structure, unknowns, measurement, self.options)
 
     @abstractmethod
@@ -52,6 +62,8 @@ class Global(_Factors):
         options: of the iteration; the residual is that of frequencies, in which one factor has to
             compromise between all modes, while the paper's absolute eigenvalues
             (``residual=eigenvalue``) leave the choice to the highest.
+        parameters: `own` for the factor above; else one on E of each of the `elements`, `members`,
+            `sections`, `materials` or `sets` of the case.
 
     Source: Horton et al. (1999), table 4(a).
     """
@@ -86,6 +98,8 @@ class Local(_Factors):
 
     Arguments:
         options: of the iteration.
+        parameters: `own` for the factors above; else one on E of each of the `elements`, `members`,
+            `sections`, `materials` or `sets` of the case.
 
     Source: Horton et al. (1999), table 4(b).
     """

@@ -1,0 +1,311 @@
+"""Modal data and their derivatives by stiffness factors, in a space of shapes of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+from scipy.optimize import least_squares
+
+from femubench.core.errors import StrategyFailure
+from femubench.core.fem.model import Model
+from femubench.core.modal.correlation import seen_modes
+from femubench.core.modal.eigen import (
+    DENSE_LIMIT,
+    Modes,
+    count_evaluation,
+    enough_modes,
+    solve_modes,
+)
+from femubench.core.modal.measurement import Measurement
+from femubench.core.modal.pairing import WINDOW_WITHOUT_SHAPE, pair_modes
+from femubench.core.modal.sparse_eigen import ShiftedModel
+from femubench.core.typing import FloatArray, IntArray
+from femubench.core.update.parameter_sets import StiffnessParts
+from femubench.core.update.strategy import ParameterEstimate, UpdateResult
+
+_SPARE = 10  # modes above the measured ones that may become their partners
+_LOST = 1.0 - 1.0 / WINDOW_WITHOUT_SHAPE  # what a mode without a partner counts as, relative
+_DEPENDENT = 1e-8
+_LONGEST = 0.5  # step of ln theta
+_HALVINGS = 6
+_EVALUATIONS, _TOLERANCE = 30, 1e-6
+_INSIDE = 0.999  # a start at a bound could not leave it
+_LARGEST_LOG = np.log(5.0)  # a factor beyond 1/5 .. 5 is no error of a stiffness
+
+
+@dataclass(frozen=True)
+class ModalFit:
+    """How a model with some factors meets the measured modes.
+
+    Arguments:
+        residual: relative errors of the frequencies, then the weighted misfit of shapes of unit
+            length, (m + m n_sensors,) or (m,).
+        slope: d residual / d ln theta, (n_rows, p).
+        paired: how many measured modes have a partner.
+    """
+
+    residual: FloatArray
+    slope: FloatArray
+    paired: int
+
+    @property
+    def cost(self) -> float:
+        """Return the sum of squares."""
+        return float(self.residual @ self.residual)
+
+
+@dataclass(frozen=True)
+class ModalSpace:
+    """The problem K phi = lambda M phi in a space of shapes, as a function of the factors.
+
+    Rigid-body motions are no part of it: no factor gives them stiffness.
+
+    Arguments:
+        measurement: the used modes.
+        stiffness: V' K_0 V, (r, r), V being orthonormal with the mass.
+        parts: V' K_j V, (p, r, r).
+        readings: of the shapes at the sensors, (n_sensors, r).
+        shape_weight: of a shape error of 1 (MAC of 0) beside a frequency error of 1 (100 %); 0 to
+            leave shapes out.
+    """
+
+    measurement: Measurement
+    stiffness: FloatArray
+    parts: FloatArray
+    readings: FloatArray
+    shape_weight: float
+
+    def eigenpairs(self, log: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return eigenvalues (r,) and vectors (r, r) at ln theta, (p,)."""
+        count_evaluation()
+        change = np.tensordot(np.expm1(log), self.parts, axes=1)
+        values, vectors = la.eigh(self.stiffness + change, check_finite=False, driver="evd")
+        return np.asarray(values), np.asarray(vectors)
+
+    def partners(self, eigenvalues: FloatArray, readings: FloatArray) -> IntArray:
+        """Return the partner of every measured mode, -1 where there is none, (m,)."""
+        measured = self.measurement
+        count = 3 * len(measured) + _SPARE
+        own = np.sqrt(np.abs(eigenvalues[:count])) / (2.0 * np.pi)
+        return pair_modes(measured.frequencies, measured.shapes, own, readings[:, :count]).index
+
+    def fit(self, log: FloatArray, *, slopes: bool = True) -> ModalFit:
+        """Return residual and slope at ln theta, (p,).
+
+        The residual of a shape is that of both shapes at unit length, the measured less its share
+        along the model's: the sum of its squares is 1 - MAC, whose own slope vanishes at its best.
+        """
+        eigenvalues, vectors = self.eigenpairs(log)
+        readings = self.readings @ vectors
+        partner = self.partners(eigenvalues, readings)
+        measured, m = self.measurement, len(self.measurement)
+        parts, factors = self.parts, np.exp(log)
+        if not slopes:
+            parts, factors = parts[:0], factors[:0]
+        seen = seen_modes(measured.shapes) & (self.shape_weight > 0.0)
+        rows, shape_rows = np.full(m, _LOST), np.zeros((m, len(readings) if seen.any() else 0))
+        slope, shape_slope = np.zeros((m, len(parts))), np.zeros((*shape_rows.shape, len(parts)))
+        for i in np.flatnonzero(partner >= 0):
+            j = partner[i]
+            own = np.sqrt(max(eigenvalues[j], 0.0)) / (2.0 * np.pi)
+            rows[i] = 1.0 - own / measured.frequencies[i]
+            gain = ((parts @ vectors[:, j]) * factors[:, None]) @ vectors  # p, r
+            slope[i] = -(1.0 - rows[i]) * gain[:, j] / (2.0 * eigenvalues[j])
+            if seen[i]:
+                gap = eigenvalues[j] - eigenvalues
+                gap[np.abs(gap) < _DEPENDENT * eigenvalues[j]] = np.inf
+                shape_rows[i], shape_slope[i] = _shape_misfit(
+                    measured.shapes[:, i], readings[:, j], readings @ (gain / gap).T
+                )
+        weight = self.shape_weight
+        return ModalFit(
+            np.append(rows, weight * shape_rows.ravel()),
+            np.vstack([slope, weight * shape_slope.reshape(shape_rows.size, len(parts))]),
+            int((partner >= 0).sum()),
+        )
+
+    def advance(
+        self,
+        log: FloatArray,
+        fit: ModalFit,
+        wanted: FloatArray,
+        *,
+        squares: float = 0.0,
+        sizes: float = 0.0,
+    ) -> tuple[FloatArray, ModalFit]:
+        """Return the next point: shortened, and halved until cost and penalty do not grow.
+
+        Arguments:
+            log: ln theta, (p,).
+            fit: the fit there.
+            wanted: where a linear problem has its optimum, (p,).
+            squares, sizes: what the sums of squares and of absolute values of ln theta weigh in
+                the penalty, beside the sum of squares of the residual.
+        """
+
+        def penalty(x: FloatArray) -> float:
+            return squares * float(x @ x) + sizes * float(np.abs(x).sum())
+
+        step = wanted - log
+        step *= min(1.0, _LONGEST / max(float(np.abs(step).max()), _LONGEST))
+        before = fit.cost + penalty(log)
+        for halving in range(_HALVINGS):
+            trial = np.clip(log + step / 2**halving, -_LARGEST_LOG, _LARGEST_LOG)
+            found = self.fit(trial)
+            if found.cost + penalty(trial) <= before:
+                return trial, found
+        return log, fit
+
+
+def _shape_misfit(
+    measured: FloatArray, own: FloatArray, turn: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the measured shape at unit length less s times the model's, and its slope.
+
+    Arguments:
+        measured: nan where missing, (n_sensors,).
+        own: the partner at the sensors, (n_sensors,).
+        turn: its slope by every factor, (n_sensors, p); s follows.
+    """
+    known = np.isfinite(measured)
+    shape, seen = np.where(known, measured, 0.0), np.where(known, own, 0.0)
+    shape, turn = shape / np.linalg.norm(shape), np.where(known[:, None], turn, 0.0)
+    square = max(float(seen @ seen), 1e-300)
+    scale = float(shape @ seen) / square
+    scale_slope = ((shape - 2.0 * scale * seen) @ turn) / square
+    return shape - scale * seen, -scale * turn - np.outer(seen, scale_slope)
+
+
+def modal_space(
+    parts: StiffnessParts,
+    measurement: Measurement,
+    *,
+    shape_weight: float,
+    at: FloatArray | None = None,
+    size: int | None = None,
+) -> ModalSpace:
+    """Return the problem in all elastic modes of a model, or in a few shapes.
+
+    The few are the lowest modes, and the static answers to a change of every factor in the
+    measured ones, those that matter most: they keep frequencies true where factors move far.
+
+    Arguments:
+        parts: the model and its factors.
+        measurement: the used modes.
+        shape_weight: as of `ModalSpace`.
+        at: ln theta where the shapes are taken, (p,); None for the nominal model.
+        size: number of shapes at most; None for all, of a large model a hundred.
+
+    Raises:
+        StrategyFailure: when no mode of the model looks like any measured mode.
+
+    Source: Fox & Miura (1971), an approximate analysis technique for design calculations, for the
+    reduced basis of shapes and their derivatives.
+
+    Examples:
+        >>> parts = update.stiffness_parts(model, "members")
+        >>> space = update.modal_space(parts, measurement, shape_weight=0.1)
+        >>> space.fit(np.zeros(7)).paired
+        3
+    """
+    log = np.zeros(len(parts)) if at is None else at
+    model = parts.model if not log.any() else parts.at(np.exp(log))
+    modes = solve_modes(model, enough_modes(model, len(measurement)))
+    observer = model.observe(measurement.sensors)
+    basis = modes.elastic.shapes
+    limit = size or (basis.shape[1] if model.size <= DENSE_LIMIT else 100)
+    if limit < basis.shape[1] or model.size > DENSE_LIMIT:
+        basis = _few_shapes(parts, measurement, model, modes, limit)
+    change = np.expm1(log)
+    inner = parts.energies(basis, basis)
+    nominal = basis.T @ model.stiffness_times(basis) - np.tensordot(change, inner, axes=1)
+    space = ModalSpace(measurement, nominal, inner, observer @ basis, shape_weight)
+    if space.fit(log, slopes=False).paired == 0:
+        raise StrategyFailure("no mode of the model looks like any measured mode")
+    return space
+
+
+def _few_shapes(
+    parts: StiffnessParts, measurement: Measurement, model: Model, modes: Modes, limit: int
+) -> FloatArray:
+    """Return at most so many shapes, orthonormal with the mass and to the rigid ones, (n, r)."""
+    low = modes.elastic.shapes[:, : len(measurement) + _SPARE]
+    first = float(modes.elastic.eigenvalues[0])
+    pulled = np.hstack([part @ low[:, : len(measurement) + 2] for part in parts.matrices])
+    answers = ShiftedModel(model, -first).solve(pulled)
+    fixed = np.hstack([modes.shapes[:, modes.rigid], low])
+    answers = answers - fixed @ (fixed.T @ model.mass_times(answers))
+    # The largest by strain energy: what adds flexibility that the low modes lack.
+    energy = answers.T @ (model.stiffness_times(answers) + first * model.mass_times(answers))
+    values, turn = la.eigh(0.5 * (energy + energy.T))
+    chosen = [i for i in range(len(values))[::-1] if values[i] > _DEPENDENT * values[-1]]
+    chosen = chosen[: max(limit - low.shape[1], 0)]
+    basis = np.hstack([low, answers @ turn[:, chosen] / np.sqrt(values[chosen])])
+    gram = basis.T @ model.mass_times(basis)
+    values, turn = la.eigh(0.5 * (gram + gram.T))
+    keep = values > _DEPENDENT * values[-1]
+    return np.asarray(basis @ (turn[:, keep] / np.sqrt(values[keep])))
+
+
+def bounded_fit(space: ModalSpace, start: FloatArray, largest: float) -> tuple[FloatArray, float]:
+    """Return the local optimum of ln theta between its bounds, and the cost there.
+
+    Arguments:
+        space: the problem.
+        start: ln theta, (p,).
+        largest: bound of a factor; the least is its inverse.
+
+    Source: Branch, Coleman & Li (1999), trust-region reflective least squares.
+
+    Examples:
+        >>> parts = update.stiffness_parts(model, "sections")
+        >>> space = update.modal_space(parts, measurement, shape_weight=0.0)
+        >>> log, cost = update.bounded_fit(space, np.zeros(1), 3.0)
+        >>> cost < space.fit(np.zeros(1)).cost
+        True
+    """
+    limit, kept = float(np.log(largest)), {}
+
+    def residual(log: FloatArray) -> FloatArray:
+        kept[0] = (log.copy(), space.fit(log))
+        return kept[0][1].residual
+
+    def slope(log: FloatArray) -> FloatArray:
+        at, fit = kept[0]
+        return (fit if np.array_equal(at, log) else space.fit(log)).slope
+
+    found = least_squares(
+        residual,
+        np.clip(start, -_INSIDE * limit, _INSIDE * limit),
+        slope,
+        bounds=(-limit, limit),
+        max_nfev=_EVALUATIONS,
+        xtol=_TOLERANCE,
+        ftol=_TOLERANCE,
+    )
+    return np.asarray(found.x), 2.0 * float(found.cost)
+
+
+def factor_result(
+    parts: StiffnessParts,
+    log: FloatArray,
+    history: Sequence[dict[str, float]] = (),
+    **figures: float,
+) -> UpdateResult:
+    """Return the updated model with its factors.
+
+    Arguments:
+        parts: the nominal model and its factors.
+        log: ln theta, (p,).
+        history: one mapping an iteration.
+        figures: diagnostics.
+    """
+    factors = np.exp(log)
+    estimates = tuple(
+        ParameterEstimate(name, 1.0, float(value))
+        for name, value in zip(parts.names, factors, strict=True)
+    )
+    return UpdateResult(parts.at(factors), len(parts), estimates, tuple(history), figures)

@@ -1,0 +1,83 @@
+"""Global search by an evolution strategy that learns its covariance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from femubench import Measurement, Model, UpdateResult
+from femubench.update import FactorStrategy, factor_result, modal_space, stiffness_parts
+
+
+@dataclass(frozen=True)
+class CmaEs(FactorStrategy):
+    """Search all factors within bounds for the least misfit of frequencies and MAC.
+
+    Unknowns are the logarithms of the factors, the cost the sum of squares of relative frequency
+    errors and weighted 1 - MAC. Nothing but costs is used, no derivative. Modes are those of a
+    reduced basis of the nominal model.
+
+    Arguments:
+        parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
+            `materials`, `sets` of the case, or `groups` of matrices.
+        evaluations: at most.
+        largest: bound of a factor; the least is its inverse.
+        spread: standard deviation of the first generation in ln(factor).
+        shape_weight: of a MAC of 0 beside a frequency that is 100 % off; 0 for frequencies alone.
+        basis: shapes in the reduced basis.
+
+    The author's are the method and every setting of its package but those above, which are ours.
+    """
+
+    name: ClassVar[str] = "cma-es"
+    citation: ClassVar[str] = (
+        "Hansen & Ostermeier (2001), Completely derandomized self-adaptation in evolution "
+        "strategies, Evolutionary Computation 9, 159-195; package `cma` (Hansen, Akimoto & Baudis)"
+    )
+
+    evaluations: int = 1000
+    largest: float = 3.0
+    spread: float = 0.2
+    shape_weight: float = 0.1
+    basis: int = 40
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        """Return the model with the best factors that were met.
+
+        Raises:
+            NotApplicable: when the model has no such parameters.
+            StrategyFailure: when no mode of the model looks like any measured mode.
+        """
+        import cma  # it takes longer to import than most updates take
+
+        parts = stiffness_parts(model, self.parameters)
+        space = modal_space(parts, measurement, shape_weight=self.shape_weight, size=self.basis)
+        limit = float(np.log(self.largest))
+        options = {
+            "bounds": [-limit, limit],
+            "maxfevals": self.evaluations,
+            # Its own seed would be that of the whole process.
+            "seed": np.nan,
+            "randn": lambda *shape: rng.standard_normal(shape),
+            "tolfun": 1e-9,
+            "verbose": -9,
+            "verb_log": 0,
+        }
+        search = cma.CMAEvolutionStrategy(np.zeros(len(parts)), self.spread, options)
+        history = []
+        while not search.stop():
+            points = search.ask()
+            costs = [space.fit(np.asarray(x), slopes=False).cost for x in points]
+            search.tell(points, costs)
+            history.append({"cost": float(min(costs)), "spread": float(search.sigma)})
+        log = np.asarray(search.result.xbest)
+        return factor_result(
+            parts,
+            log,
+            history,
+            cost=float(search.result.fbest),
+        )

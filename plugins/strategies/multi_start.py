@@ -1,0 +1,74 @@
+"""Bounded least squares from many starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.stats import qmc
+
+from femubench import Measurement, Model, UpdateResult
+from femubench.update import (
+    FactorStrategy,
+    bounded_fit,
+    factor_result,
+    modal_space,
+    stiffness_parts,
+)
+
+
+@dataclass(frozen=True)
+class MultiStart(FactorStrategy):
+    """Fit frequencies and MAC by bounded least squares from the nominal and other starts.
+
+    Unknowns are the logarithms of the factors. Every start is followed to a local optimum with
+    exact derivatives; of all optima the one of least cost is taken. The search goes on in a
+    reduced basis; the last fit starts from its best point, in a basis made there.
+
+    Arguments:
+        parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
+            `materials`, `sets` of the case, or `groups` of matrices.
+        starts: number of starts from a Latin hypercube, beside the nominal model.
+        largest: bound of a factor; the least is its inverse.
+        shape_weight: of a MAC of 0 beside a frequency that is 100 % off; 0 for frequencies alone.
+        basis: shapes in the reduced basis of the search.
+
+    The authors' are the Latin hypercube (McKay, Beckman & Conover) and the trust-region
+    reflective method (Branch, Coleman & Li); number of starts, bounds and weights are ours.
+    """
+
+    name: ClassVar[str] = "multi-start"
+    citation: ClassVar[str] = (
+        "Branch, Coleman & Li (1999), A subspace, interior, and conjugate gradient method for "
+        "large-scale bound-constrained minimization problems, SIAM J. Sci. Comput. 21, 1-23; "
+        "McKay, Beckman & Conover (1979), Technometrics 21, 239-245 (Latin hypercube)"
+    )
+
+    starts: int = 8
+    largest: float = 3.0
+    shape_weight: float = 0.1
+    basis: int = 60
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        """Return the model with the factors of the best optimum.
+
+        Raises:
+            NotApplicable: when the model has no such parameters.
+            StrategyFailure: when no mode of the model looks like any measured mode.
+        """
+        parts = stiffness_parts(model, self.parameters)
+        weight, limit = self.shape_weight, float(np.log(self.largest))
+        space = modal_space(parts, measurement, shape_weight=weight, size=self.basis)
+        cube = qmc.LatinHypercube(len(parts), rng=rng).random(self.starts)
+        starts = [np.zeros(len(parts)), *(limit * (2.0 * cube - 1.0))]
+        found = [bounded_fit(space, start, self.largest) for start in starts]
+        best = min(found, key=lambda item: item[1])[0]
+        there = modal_space(parts, measurement, shape_weight=weight, at=best, size=self.basis)
+        log, cost = bounded_fit(there, best, self.largest)
+        costs = np.array([item[1] for item in found])
+        history = tuple({"cost": float(value)} for value in costs)
+        near = float(np.mean(costs <= 1.1 * costs.min()))
+        return factor_result(parts, log, history, cost=cost, share_of_starts_at_best=near)

@@ -1,0 +1,302 @@
+"""Strategies of stiffness factors, their parameter sets and steps, and the secant adjustment."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import femubench
+from femubench import InputError, Measurement, Model, NotApplicable, Sensors, Strategy, solve_modes
+from femubench.core.update.l_curve import l_curve_curvature
+from femubench.fem import (
+    Frame,
+    Joint,
+    Material,
+    Member,
+    MemberSet,
+    Place,
+    Section,
+    Structure,
+    Support,
+)
+from femubench.modal import mac, rigid_modes_of
+from femubench.plugins.strategies.cma_es import CmaEs
+from femubench.plugins.strategies.cross_model import CrossModel
+from femubench.plugins.strategies.eigensensitivity import Eigensensitivity
+from femubench.plugins.strategies.multi_start import MultiStart
+from femubench.plugins.strategies.secant import Secant
+from femubench.plugins.strategies.sparse import Sparse
+from femubench.plugins.strategies.strain_energy import StrainEnergy, energy_change_index
+from femubench.update import (
+    element_sets,
+    l_curve_corner,
+    lasso,
+    modal_space,
+    physical_family,
+    stiffness_parts,
+    tied,
+    tikhonov,
+)
+
+STEEL = Material(2.1e11, 0.3, 7850.0)
+BAR = Section(4e-4, 1.2e-8, 1.2e-8, 2e-8, 2.4e-8)
+FACTOR = 0.7
+
+
+def frame_of_five() -> Frame:
+    """Return a free frame in space without any symmetry."""
+    corners = {
+        "A": (0.0, 0.0, 0.0),
+        "B": (0.9, 0.0, 0.0),
+        "C": (1.0, 0.7, 0.1),
+        "D": (0.1, 0.6, 0.0),
+        "E": (0.4, 0.3, 0.5),
+    }
+    ends = ("AB", "BC", "CD", "DA", "DE")
+    members = tuple(Member(f"m-{e}", (e[0], e[1]), 2, BAR, STEEL) for e in ends)
+    joints = tuple(Joint(name, xyz) for name, xyz in corners.items())
+    return Frame("3d", "euler-bernoulli", joints, members)
+
+
+def cantilever() -> Frame:
+    """Return a clamped beam of twenty members."""
+    joints = tuple(Joint(f"J{i}", (0.05 * i, 0.0, 0.0)) for i in range(21))
+    members = tuple(Member(f"m-{i}", (f"J{i}", f"J{i + 1}"), 1, BAR, STEEL) for i in range(20))
+    support = Support(Place("J0"), ("x", "z", "ry"))
+    return Frame("in-plane", "euler-bernoulli", joints, members, supports=(support,))
+
+
+def everywhere(model: Model) -> Sensors:
+    """Return a sensor on every degree of freedom."""
+    labels = tuple(f"{n}{d}" for n, d in zip(model.dofs.node, model.dofs.direction, strict=True))
+    return Sensors(labels, model.dofs.xyz, model.dofs.direction)
+
+
+def exact(truth: Model, sensors: Sensors, count: int) -> Measurement:
+    """Return the lowest elastic modes of a model without error."""
+    modes = solve_modes(truth).elastic.take(np.arange(count))
+    shapes = truth.observe(sensors) @ modes.shapes
+    shapes = shapes / np.abs(shapes).max(axis=0)
+    hertz = modes.natural_frequencies
+    return Measurement(
+        sensors, tuple(range(1, count + 1)), hertz, 1e-3 * hertz, np.full(count, np.nan),
+        shapes, np.full(shapes.shape, 0.01),
+    )  # fmt: skip
+
+
+def planted(frame: Frame, member: str, count: int) -> tuple[Model, Measurement]:
+    """Return a frame and exact modes of the same with one member softer, seen everywhere."""
+    model = Model.of(frame)
+    parts = stiffness_parts(model, "members")
+    factors = np.where(np.array(parts.names) == f"E {member}", FACTOR, 1.0)
+    return model, exact(parts.at(factors), everywhere(model), count)
+
+
+def factors_of(strategy: Strategy, model: Model, measurement: Measurement) -> dict[str, float]:
+    """Return the factors that a strategy finds, by name."""
+    result = strategy.update(model, measurement, np.random.default_rng(1))
+    return {item.name.removeprefix("E "): item.after for item in result.parameters}
+
+
+@pytest.mark.parametrize(
+    ("strategy", "within"),
+    [
+        (Eigensensitivity(), 1e-4),
+        (MultiStart(starts=2, basis=100), 1e-4),
+        (CmaEs(evaluations=1000, basis=60), 0.01),
+        (CrossModel(expansion="force"), 1e-5),
+        (StrainEnergy(), 1e-4),
+        (Sparse(), 0.02),
+    ],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_a_planted_change_is_found_from_exact_modes(strategy: Strategy, within: float) -> None:
+    model, measurement = planted(frame_of_five(), "m-CD", 6)
+    found = factors_of(strategy, model, measurement)
+    assert found.pop("m-CD") == pytest.approx(FACTOR, abs=within)
+    assert list(found.values()) == pytest.approx([1.0] * len(found), abs=within)
+
+
+def test_a_sum_of_sizes_finds_the_one_of_twenty_members_where_squares_blur_it() -> None:
+    model, measurement = planted(cantilever(), "m-6", 8)
+    found = factors_of(Sparse(), model, measurement)
+    changed = {name: value for name, value in found.items() if abs(value - 1.0) > 0.01}
+    assert list(changed) == ["m-6"]
+    assert changed["m-6"] == pytest.approx(FACTOR, abs=0.03)
+    blurred = factors_of(Eigensensitivity(shape_weight=0.0), model, measurement)
+    assert sum(abs(value - 1.0) > 0.01 for value in blurred.values()) > 5
+
+
+def test_the_member_whose_strain_energy_changed_most_is_the_softer_one() -> None:
+    model, measurement = planted(frame_of_five(), "m-DE", 5)
+    assert set(factors_of(StrainEnergy(above=2.0), model, measurement)) == {"m-DE"}
+    before = np.array([[1.0, 2.0], [1.0, 0.0], [2.0, 2.0]])
+    after = np.array([[1.5, 2.0], [1.0, 9.0], [1.0, 1.0]])
+    # A ratio of the second member in the second mode, which it does not strain, says nothing.
+    assert energy_change_index(before, after).tolist() == [0.5, 0.0, 1.0]
+
+
+def test_results_keep_rigid_motion_and_positive_stiffness_far_from_any_fit() -> None:
+    model, measurement = planted(frame_of_five(), "m-AB", 4)
+    wrong = replace(measurement, frequencies=measurement.frequencies * [1.3, 0.8, 1.2, 0.9])
+    for strategy in (Eigensensitivity(), Sparse(), CrossModel(), StrainEnergy(), Secant()):
+        found = strategy.update(model, wrong, np.random.default_rng(0)).model
+        modes = solve_modes(found)
+        assert modes.rigid.sum() == 6
+        assert modes.elastic.eigenvalues[0] > 0.0
+
+
+def test_searches_repeat_with_the_seed_and_leave_the_random_state_alone() -> None:
+    model, measurement = planted(frame_of_five(), "m-BC", 3)
+    state = repr(np.random.get_state())  # noqa: NPY002
+    for strategy in (MultiStart(starts=2), CmaEs(evaluations=100)):
+        first = factors_of(strategy, model, measurement)
+        assert factors_of(strategy, model, measurement) == first
+    assert repr(np.random.get_state()) == state  # noqa: NPY002
+
+
+def test_slopes_are_those_of_differences_and_few_shapes_give_the_same_frequencies() -> None:
+    case = femubench.cases["frame"]
+    measurement = case.used_measurement()
+    parts = stiffness_parts(case.model, "members")
+    log, step = 0.2 * np.sin(np.arange(len(parts))), 1e-5
+    whole = modal_space(parts, measurement, shape_weight=0.1)
+    few = modal_space(parts, measurement, shape_weight=0.1, size=40)
+    for space in (whole, few):
+        ahead, behind = (
+            [space.fit(log + sign * step * unit).residual for unit in np.eye(len(parts))]
+            for sign in (1.0, -1.0)
+        )
+        slope = (np.array(ahead) - np.array(behind)).T / (2.0 * step)
+        assert space.fit(log).slope == pytest.approx(slope, abs=1e-6)
+    fit = whole.fit(log)
+    model = parts.at(np.exp(log))
+    modes = solve_modes(model).elastic
+    likeness = mac(measurement.shapes, model.observe(measurement.sensors) @ modes.shapes[:, :3])
+    misfit = np.square(fit.residual[3:] / 0.1).reshape(3, -1).sum(axis=1)
+    assert misfit == pytest.approx(1.0 - np.diag(likeness), abs=1e-9)
+    assert fit.residual[:3] == pytest.approx(
+        1.0 - modes.natural_frequencies[:3] / measurement.frequencies, abs=1e-9
+    )
+    assert few.fit(log).residual[:3] == pytest.approx(fit.residual[:3], abs=2e-3)
+
+
+def test_the_curvature_is_that_of_the_curve_and_its_corner_beats_other_weights() -> None:
+    rng = np.random.default_rng(3)
+    left, _ = np.linalg.qr(rng.standard_normal((40, 12)))
+    right, _ = np.linalg.qr(rng.standard_normal((12, 12)))
+    matrix = left @ np.diag(10.0 ** (-0.35 * np.arange(12))) @ right
+    truth = right.T @ 0.6 ** np.arange(12)
+    data = matrix @ truth + 2e-3 * rng.standard_normal(40)
+    weights = np.logspace(0.0, -3.0, 1200)
+    answers = [tikhonov(matrix, data, w) for w in weights]
+    x = np.log([np.linalg.norm(matrix @ a - data) for a in answers])
+    y = np.log([np.linalg.norm(a) for a in answers])
+    t = np.log(weights)
+    (dx, dy) = (np.gradient(v, t) for v in (x, y))
+    bend = (dx * np.gradient(dy, t) - dy * np.gradient(dx, t)) / (dx**2 + dy**2) ** 1.5
+    inside = slice(5, -5)
+    curvature = l_curve_curvature(matrix, data, weights)[inside]
+    assert curvature == pytest.approx(bend[inside], abs=0.01 * np.abs(bend[inside]).max())
+
+    def error(weight: float) -> float:
+        return float(np.linalg.norm(tikhonov(matrix, data, weight) - truth))
+
+    corner = l_curve_corner(matrix, data)
+    assert error(corner) < 2.0 * min(error(w) for w in weights)
+    assert error(corner) < 0.5 * min(error(1.0), error(1e-3))
+
+
+def test_the_penalty_of_sizes_meets_its_conditions_and_equal_columns_share() -> None:
+    rng = np.random.default_rng(5)
+    matrix, right = rng.standard_normal((6, 10)), rng.standard_normal(6)
+    weight = 0.2 * float(np.abs(matrix.T @ right).max())
+    x = lasso(matrix, right, weight)
+    pull = matrix.T @ (right - matrix @ x)
+    assert 0 < np.count_nonzero(x) <= 6
+    assert pull[x != 0.0] == pytest.approx(weight * np.sign(x[x != 0.0]), rel=1e-5)
+    assert np.abs(pull[x == 0.0]).max() <= weight
+    assert not lasso(matrix, right, 5.1 * weight).any()
+    twice = lasso(np.ones((1, 2)), np.array([3.0]), 1.0)
+    assert twice == pytest.approx([1.0, 1.0], rel=1e-6)
+
+
+def test_the_secant_adjustment_is_that_of_quasi_newton_methods() -> None:
+    model, measurement = planted(frame_of_five(), "m-AB", 3)
+    result = Secant().update(model, measurement, np.random.default_rng(0))
+    modes = solve_modes(result.model)
+    assert modes.elastic.natural_frequencies[:3] == pytest.approx(measurement.frequencies, rel=1e-8)
+    rigid = rigid_modes_of(model)
+    assert np.abs(result.model.stiffness_times(rigid)).max() < 1e-6 * abs(model.stiffness).max()
+    # One pair of vectors: y = K s exactly, and a change of rank two.
+    one = measurement.select([1])
+    change = Secant().update(model, one, np.random.default_rng(0)).model.stiffness_change
+    assert change is not None
+    assert sorted(np.sign(np.linalg.eigvalsh(change.core))) == [-1.0, 1.0]
+
+
+def test_parts_make_the_stiffness_and_sets_name_what_the_frame_has() -> None:
+    frame = frame_of_five()
+    model = Model.of(frame)
+    parts = stiffness_parts(model, "members")
+    whole = sum(part.toarray() for part in parts.matrices)
+    stiffness = model.stiffness.toarray()
+    assert np.abs(whole - stiffness).max() < 1e-9 * np.abs(stiffness).max()
+    factors = np.array([0.5, 1.0, 2.0, 1.5, 0.8])
+    summed = sum(f * part.toarray() for f, part in zip(factors, parts.matrices, strict=True))
+    assert np.abs(parts.at(factors).stiffness - summed).max() < 1e-9 * np.abs(stiffness).max()
+    assert len(stiffness_parts(model, "elements")) == 10
+    ring = MemberSet("ring", ("m-AB", "m-BC", "m-CD", "m-DA"))
+    sets = replace(frame, sets=(ring, MemberSet("mast", ("m-DE",))))
+    assert list(element_sets(Structure.build(sets), "sets")) == ["set:ring", "set:mast"]
+    overlapping = replace(frame, sets=(ring, MemberSet("side", ("m-DA",))))
+    with pytest.raises(NotApplicable, match=r"m-DA/1 is in set:ring and in set:side"):
+        element_sets(Structure.build(overlapping), "sets")
+    with pytest.raises(NotApplicable, match=r"parameters=sets needs `\[\[model.sets\]\]`"):
+        element_sets(Structure.build(frame), "sets")
+    with pytest.raises(InputError, match="not 'member'"):
+        Eigensensitivity(parameters="member")
+
+
+def test_groups_of_matrices_have_factors_too() -> None:
+    model, measurement = planted(frame_of_five(), "m-CD", 6)
+    parts = stiffness_parts(model, "members")
+    groups = {"mast": parts.matrices[4], "back": parts.matrices[2]}
+    matrices = replace(model, structure=None, groups=groups)
+    for strategy in (Eigensensitivity(parameters="groups"), Sparse(parameters="groups")):
+        assert "elements" not in strategy.needs
+        found = factors_of(strategy, matrices, measurement)
+        assert found == pytest.approx({"mast": 1.0, "back": FACTOR}, abs=0.01)
+    assert "elements" in Eigensensitivity().needs
+    with pytest.raises(NotApplicable, match=r"needs a model from matrices with"):
+        Eigensensitivity(parameters="groups").update(model, measurement, np.random.default_rng(0))
+    with pytest.raises(NotApplicable, match="parameters=members needs a frame of members"):
+        Eigensensitivity().update(matrices, measurement, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("name", ["local", "bayesian", "nobari-rigid"])
+def test_older_strategies_change_the_same_sets(name: str) -> None:
+    case = femubench.cases["frame"]
+    measured = case.used_measurement()
+    strategy = femubench.strategies[name]
+    counts = {
+        word: strategy(parameters=word).update(case.model, measured, None).parameter_count
+        for word in ("sections", "members", "own")
+    }
+    kinds = 2 if name == "nobari-rigid" else 1
+    assert (counts["sections"], counts["members"]) == (kinds, 7 * kinds)
+    assert counts["own"] == strategy.update(case.model, measured, None).parameter_count
+    with pytest.raises(NotApplicable, match=r"parameters=sets needs `\[\[model.sets\]\]`"):
+        strategy(parameters="sets").update(case.model, measured, None)
+
+
+def test_tied_elements_change_alike_and_others_not_at_all() -> None:
+    structure = Structure.build(frame_of_five())
+    family = tied(physical_family(structure), {"two": ("m-AB/1", "m-CD/2")})
+    assert family.names == ("EIy two", "GJ two", "EA two", "EIz two")
+    change = family.change(np.array([1.0, 0.0, 0.0, 0.0]))
+    labels = np.array(structure.labels)
+    touched = np.abs(change).max(axis=(1, 2)) > 0.0
+    assert set(labels[touched]) == {"m-AB/1", "m-CD/2"}
