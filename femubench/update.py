@@ -28,6 +28,7 @@ from femubench.core.update.low_rank import total_change, with_measured_frequenci
 from femubench.core.update.promise import check_used_modes, force_scale
 from femubench.core.update.quasi import ITERATIONS, QuasiModes, quasi_measured_modes
 from femubench.core.update.sensitivity_update import sensitivity_update
+from femubench.core.update.uncertainty import MOST_SAMPLES, Uncertainty
 from femubench.core.update.unknowns import (
     Unknown,
     UpdateOptions,
@@ -41,9 +42,11 @@ __all__ = [
     "ElementStrategy",
     "ITERATIONS",
     "JointGroup",
+    "MOST_SAMPLES",
     "QuasiModes",
     "SelfCheckFailed",
     "Symmetry",
+    "Uncertainty",
     "Unknown",
     "UpdateOptions",
     "all_elements",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femubench.core.schema.results import BLOCKS, JobResult, Run
+from femubench.core.score import predictive
 from femubench.core.score.ranking import (
     SCORE_OF_FAILURE,
     geometric_mean,
@@ -25,6 +26,7 @@ _RESAMPLES = 999
 COLUMNS = (
     *("rank", "strategy", "skill", "skill_low", "skill_high", "skill_unseen"),
     *(f"{block}_percent" for block in BLOCKS),
+    *predictive.COLUMNS,
     *("rigid_modes_lost", "negative_eigenvalues", "parameters", "evaluations", "seconds"),
     *("ok", "not_applicable", "total", "unphysical"),
 )
@@ -81,7 +83,8 @@ def leaderboard(run: Run) -> pd.DataFrame:
     that over all seeds without the block that the strategy was given. The three errors are the
     median over cases of the median over seeds of the rms error in percent, over the jobs that
     are ok; so are `parameters`, `evaluations` and `seconds`. Rigid-body modes lost and negative
-    eigenvalues are sums. A job without result scores 10.
+    eigenvalues are sums. A job without result scores 10. `coverage90`, `crps_percent` and
+    `log_score` are those of docs/scoring.md.
 
     Arguments:
         run: with `reference`, `seeds`, `seed` and `strategies` in its meta.
@@ -130,6 +133,7 @@ def _row(
         "skill_high": high,
         "skill_unseen": _unseen(results, grid, reference),
         **{f"{block}_percent": _median(fine, _error_in(block)) for block in BLOCKS},
+        **predictive.scores(fine, grid.structures),
         "rigid_modes_lost": sum(result.rigid_modes_lost for result in fine),
         "negative_eigenvalues": sum(result.negative_eigenvalues or 0 for result in fine),
         "parameters": _median(fine, lambda result: result.parameter_count),

@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from femubench.core.errors import Diverged, ModelError, NotApplicable, StrategyFailure
+from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.gauss_newton import bounded_step
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import BoolArray, FloatArray
 from femubench.core.update.residuals import Data, Prediction, common_rows, predict
 from femubench.core.update.strategy import ParameterEstimate, UpdateResult
+from femubench.core.update.uncertainty import Uncertainty
 from femubench.core.update.unknowns import Scaling, Unknown, UpdateOptions
 
 _SMALLEST_STEP = 1e-9
@@ -157,19 +159,43 @@ class _Iteration:
                     f" at iteration {len(self.history) - 1}"
                 )
 
-    def deviations(self, point: _Point) -> FloatArray | None:
-        """Return the posterior standard deviations of the values; None without statistics."""
+    def covariance(self, point: _Point) -> FloatArray | None:
+        """Return the posterior covariance of q, (p, p); None without statistics."""
         if not self.data.statistical:
             return None
         s, _ = self.system(point)
-        information = s.T @ s + np.diag(self.scaling.precision)
-        values = self.scaling.values(point.q)
         try:
-            covariance = np.linalg.inv(information)
+            return np.asarray(np.linalg.inv(s.T @ s + np.diag(self.scaling.precision)))
         except np.linalg.LinAlgError:
-            return np.full(len(values), np.inf)
+            return np.full((s.shape[1], s.shape[1]), np.inf)
+
+    def estimates(
+        self, point: _Point, covariance: FloatArray | None
+    ) -> tuple[ParameterEstimate, ...]:
+        """Return the parameters before and after, with deviations where they are known."""
+        values = self.scaling.values(point.q)
         grow = np.where(self.scaling.signed, np.abs(self.scaling.start), values)
-        return np.asarray(np.sqrt(np.diagonal(covariance)) * grow)
+        return tuple(
+            ParameterEstimate(
+                name=unknown.parameter.name,
+                before=float(unknown.start),
+                after=float(value),
+                unit=unknown.parameter.unit,
+                std=None if covariance is None else float(np.sqrt(covariance[i, i]) * grow[i]),
+            )
+            for i, (unknown, value) in enumerate(zip(self.unknowns, values, strict=True))
+        )
+
+    def uncertainty(self, point: _Point, covariance: FloatArray | None) -> Uncertainty | None:
+        """Return models of the posterior; None where some parameter is not determined at all."""
+        if covariance is None or not np.isfinite(covariance).all():
+            return None
+
+        def make(q: FloatArray) -> Model:
+            values = self.scaling.values(np.clip(q, self.scaling.lower, self.scaling.upper))
+            return Model.of(self.structure.with_values(self.parameters, values))
+
+        return Uncertainty.drawn(make, point.q, 0.5 * (covariance + covariance.T))
 
 
 def sensitivity_update(
@@ -208,26 +234,16 @@ def sensitivity_update(
     data = Data(measurement, options.residual, statistical, options.shapes, statistical)
     iteration = _Iteration(structure, unknowns, data, options)
     point = iteration.run()
-    values = iteration.scaling.values(point.q)
-    deviations = iteration.deviations(point)
-    estimates = tuple(
-        ParameterEstimate(
-            name=unknown.parameter.name,
-            before=float(unknown.start),
-            after=float(value),
-            unit=unknown.parameter.unit,
-            std=None if deviations is None else float(deviations[i]),
-        )
-        for i, (unknown, value) in enumerate(zip(unknowns, values, strict=True))
-    )
+    covariance = iteration.covariance(point)
     return UpdateResult(
         model=point.prediction.model,
         parameter_count=len(unknowns),
-        parameters=estimates,
+        parameters=iteration.estimates(point, covariance),
         history=tuple(iteration.history),
         diagnostics={
             "iterations": float(len(iteration.history) - 1),
             "converged": float(iteration.converged),
             "paired_modes": float((point.prediction.partner >= 0).sum()),
         },
+        uncertainty=iteration.uncertainty(point, covariance),
     )
