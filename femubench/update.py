@@ -25,6 +25,7 @@ from femubench.core.update.element_strategy import ElementStrategy
 from femubench.core.update.entries import update_entries
 from femubench.core.update.equation_error import update_by_equation_error
 from femubench.core.update.low_rank import total_change, with_measured_frequencies
+from femubench.core.update.posterior_sampling import Discrepancy, sample_posterior
 from femubench.core.update.promise import check_used_modes, force_scale
 from femubench.core.update.quasi import ITERATIONS, QuasiModes, quasi_measured_modes
 from femubench.core.update.sensitivity_update import sensitivity_update
@@ -38,6 +39,7 @@ from femubench.core.update.unknowns import (
 )
 
 __all__ = [
+    "Discrepancy",
     "ElementFamily",
     "ElementStrategy",
     "ITERATIONS",
@@ -65,6 +67,7 @@ __all__ = [
     "nobari_family",
     "physical_family",
     "quasi_measured_modes",
+    "sample_posterior",
     "sensitivity_update",
     "spring_estimates",
     "total_change",

@@ -25,7 +25,9 @@ _PATIENCE = 3
 
 
 @dataclass(frozen=True)
-class _Point:
+class Point:
+    """Scaled parameters q, (p,), and what the model predicts there."""
+
     q: FloatArray
     prediction: Prediction
 
@@ -35,7 +37,7 @@ class _Point:
         return float(residual @ residual + precision @ np.square(self.q))
 
 
-class _Iteration:
+class Iteration:
     """State of one update."""
 
     def __init__(
@@ -48,19 +50,25 @@ class _Iteration:
         self.beta = 0.0
         self.converged = False
 
-    def at(self, q: FloatArray, previous: Prediction | None = None) -> _Point:
+    def model_at(self, q: FloatArray) -> Model:
+        """Return the model at scaled parameters, (p,), taken within their limits."""
+        values = self.scaling.values(np.clip(q, self.scaling.lower, self.scaling.upper))
+        return Model.of(self.structure.with_values(self.parameters, values))
+
+    def at(self, q: FloatArray, previous: Prediction | None = None) -> Point:
+        """Return the prediction at scaled parameters, its pairs continued from a previous one."""
         values = self.scaling.values(q)
         structure = self.structure.with_values(self.parameters, values)
-        return _Point(q, predict(self.data, structure, previous))
+        return Point(q, predict(self.data, structure, previous))
 
-    def system(self, point: _Point) -> tuple[FloatArray, FloatArray]:
+    def system(self, point: Point) -> tuple[FloatArray, FloatArray]:
         """Return scaled sensitivities s and residual of the data that have a partner."""
         scale = self.scaling.slope(point.q)
         known = np.isfinite(point.prediction.residual)
         sensitivities = point.prediction.jacobian(self.parameters) * scale
         return sensitivities[known], point.prediction.residual[known]
 
-    def step(self, point: _Point) -> FloatArray:
+    def step(self, point: Point) -> FloatArray:
         """Return dtheta / |theta| = (s's + beta I + P)^-1 (s'r - P q), limits respected."""
         s, residual = self.system(point)
         size, weight = len(point.q), np.sqrt(self.scaling.precision)
@@ -73,13 +81,13 @@ class _Iteration:
         low, high = self.scaling.lower, self.scaling.upper
         return bounded_step(solve, point.q, low, high, self.options.max_step)
 
-    def gain(self, before: _Point, after: _Point) -> float:
+    def gain(self, before: Point, after: Point) -> float:
         """Return the share of the cost that a step took away."""
         rows, precision = common_rows(before.prediction, after.prediction), self.scaling.precision
         cost = before.cost(rows, precision)
         return 1.0 - after.cost(rows, precision) / cost if cost > 0.0 else 0.0
 
-    def promise(self, point: _Point, step: FloatArray) -> float:
+    def promise(self, point: Point, step: FloatArray) -> float:
         """Return the share of the cost that a step would take away were the model linear."""
         s, residual = self.system(point)
         after = residual - s @ step
@@ -92,7 +100,7 @@ class _Iteration:
         blur = _ROUNDING * float(np.linalg.norm(self.data.weight * self.data.target))
         return blur * (2.0 * float(np.sqrt(cost)) + blur)
 
-    def advance(self, point: _Point, step: FloatArray) -> _Point | None:
+    def advance(self, point: Point, step: FloatArray) -> Point | None:
         """Return the next point, the step halved until the cost does not grow; None for none.
 
         Costs that differ by no more than rounding are equal, so that the last steps towards an
@@ -113,7 +121,8 @@ class _Iteration:
                 return trial
         return None
 
-    def run(self) -> _Point:
+    def run(self) -> Point:
+        """Return the optimum; raises StrategyFailure or Diverged where there is none."""
         point = self.at(np.zeros(len(self.unknowns)))
         if not (point.prediction.partner >= 0).any():
             raise StrategyFailure("no mode of the model looks like any measured mode")
@@ -137,7 +146,8 @@ class _Iteration:
         self.check(point)
         return point
 
-    def record(self, iteration: int, point: _Point, step: float) -> None:
+    def record(self, iteration: int, point: Point, step: float) -> None:
+        """Add a step to the history."""
         rows = np.isfinite(point.prediction.residual)
         entry = {
             "iteration": float(iteration),
@@ -149,7 +159,7 @@ class _Iteration:
         entry.update((name, float(v)) for name, v in zip(names, values, strict=True))
         self.history.append(entry)
 
-    def check(self, point: _Point) -> None:
+    def check(self, point: Point) -> None:
         """Raise Diverged where a parameter ended at the limit of its sense."""
         at_limit = (point.q <= self.scaling.lower) | (point.q >= self.scaling.upper)
         for unknown, out in zip(self.unknowns, at_limit, strict=True):
@@ -159,7 +169,7 @@ class _Iteration:
                     f" at iteration {len(self.history) - 1}"
                 )
 
-    def covariance(self, point: _Point) -> FloatArray | None:
+    def covariance(self, point: Point) -> FloatArray | None:
         """Return the posterior covariance of q, (p, p); None without statistics."""
         if not self.data.statistical:
             return None
@@ -170,7 +180,7 @@ class _Iteration:
             return np.full((s.shape[1], s.shape[1]), np.inf)
 
     def estimates(
-        self, point: _Point, covariance: FloatArray | None
+        self, point: Point, covariance: FloatArray | None
     ) -> tuple[ParameterEstimate, ...]:
         """Return the parameters before and after, with deviations where they are known."""
         values = self.scaling.values(point.q)
@@ -186,16 +196,11 @@ class _Iteration:
             for i, (unknown, value) in enumerate(zip(self.unknowns, values, strict=True))
         )
 
-    def uncertainty(self, point: _Point, covariance: FloatArray | None) -> Uncertainty | None:
+    def uncertainty(self, point: Point, covariance: FloatArray | None) -> Uncertainty | None:
         """Return models of the posterior; None where some parameter is not determined at all."""
         if covariance is None or not np.isfinite(covariance).all():
             return None
-
-        def make(q: FloatArray) -> Model:
-            values = self.scaling.values(np.clip(q, self.scaling.lower, self.scaling.upper))
-            return Model.of(self.structure.with_values(self.parameters, values))
-
-        return Uncertainty.drawn(make, point.q, 0.5 * (covariance + covariance.T))
+        return Uncertainty.drawn(self.model_at, point.q, 0.5 * (covariance + covariance.T))
 
 
 def sensitivity_update(
@@ -232,7 +237,7 @@ def sensitivity_update(
     options = UpdateOptions() if options is None else options
     statistical = options.weighting == "statistical"
     data = Data(measurement, options.residual, statistical, options.shapes, statistical)
-    iteration = _Iteration(structure, unknowns, data, options)
+    iteration = Iteration(structure, unknowns, data, options)
     point = iteration.run()
     covariance = iteration.covariance(point)
     return UpdateResult(

@@ -21,6 +21,7 @@ CLASSES = {
     "spring": "spring:Spring",
     "offset": "offset:Offset",
     "bayesian": "bayesian:Bayesian",
+    "bayesian-sampling": "sampling:BayesianSampling",
     "diagnosed": "diagnosed:Diagnosed",
 }
 
