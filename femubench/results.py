@@ -6,6 +6,7 @@ from femubench.core.run.frames import modes_frame, results_frame, run_from_json,
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.results import Block, JobResult, PairedMode, Run
+from femubench.core.score import predictive
 from femubench.core.score.leaderboard import interval_kind, leaderboard
 from femubench.core.score.ranking import OFFSET_PERCENT, SCORE_OF_FAILURE, TIE, rank_results, ranked
 from femubench.core.score.scoring import frequency_error, predict_block, score_model
@@ -36,6 +37,7 @@ __all__ = [
     "leaderboard",
     "modes_frame",
     "predict_block",
+    "predictive",
     "rank_results",
     "ranked",
     "results_frame",

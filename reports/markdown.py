@@ -34,6 +34,10 @@ _FOOTNOTES = (
     "**used, higher, modified**: rms relative frequency error in percent over the modes that the "
     "strategy was given, those above that it was not given, and those of the structure with a "
     "known design change; median over the cases. A measured mode without partner counts 100 %.",
+    "**in 90 %, CRPS**: share of unseen modes (higher, modified) in the 90 % interval that the "
+    "strategy states, and the continuous ranked probability score in percent of the frequency, "
+    "less is better; means over structures. Without a stated uncertainty the latter is the "
+    "absolute error.",
     "**rigid lost, negative**: rigid-body modes that the updated models lost and negative "
     "eigenvalues that they have, in all jobs. Either makes a strategy *unphysical*: it ranks below "
     "all physical ones.",
@@ -88,7 +92,18 @@ def _leaderboard(run: Run) -> Iterator[str]:
     tiers, letters = tested.tier_of(), tested.letters()
     headers = [
         *("rank", "strategy", "skill", "unseen", "used %", "higher %", "modified %"),
-        *("rigid lost", "negative", "parameters", "evaluations", "seconds", "ok", "tier", "group"),
+        *(
+            "in 90 %",
+            "CRPS %",
+            "rigid lost",
+            "negative",
+            "parameters",
+            "evaluations",
+            "seconds",
+            "ok",
+            "tier",
+            "group",
+        ),
     ]
     kind = interval_kind(run)
     if kind:
@@ -101,6 +116,8 @@ def _leaderboard(run: Run) -> Iterator[str]:
             fixed(row["skill"], 3, 6),
             fixed(row["skill_unseen"], 3, 6),
             *(fixed(row[f"{block}_percent"], 2, 7) for block in ("used", "higher", "modified")),
+            fixed(row["coverage90"], 2),
+            fixed(row["crps_percent"], 2, 7),
             *(whole(row[key]) for key in ("rigid_modes_lost", "negative_eigenvalues")),
             *(whole(row[key]) for key in ("parameters", "evaluations")),
             fixed(row["seconds"], 3, 7),

@@ -9,16 +9,17 @@ Source: Gneiting & Raftery (2007), J. Am. Stat. Assoc. 102, 359-378: both scores
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ndtr
 
-from femubench.core.schema.results import JobResult, PairedMode
-from femubench.core.typing import FloatArray
+from femubench.core.schema.results import BLOCKS, JobResult, PairedMode
+from femubench.core.typing import BoolArray, FloatArray, IntArray
 
 COLUMNS = ("coverage90", "crps_percent", "log_score")
+UNSEEN = tuple(name for name in BLOCKS if name != "used")
 LEVEL = 0.9
 LOST_PERCENT = 100.0  # the error of a mode that the model does not have
 # A forecast never excludes the rest: it is mixed with so much of anything within 100 %. A lost mode
@@ -34,42 +35,50 @@ class Forecasts:
         error: predicted minus measured frequency in percent of the measured one, (n,).
         std: of the prediction in the same unit, nan where none was given, (n,).
         stated: whether the strategy gave an uncertainty with that model, (n,).
-        weight: 1 in total, the same for every structure and within it for every mode, (n,).
+        structure: number of the structure, (n,).
     """
 
     error: FloatArray
     std: FloatArray
-    stated: FloatArray
-    weight: FloatArray
+    stated: BoolArray
+    structure: IntArray
 
     @classmethod
-    def of(cls, results: Iterable[JobResult], structures: Mapping[str, str]) -> Forecasts:
-        """Return the forecasts of all unseen modes of the jobs that are ok.
+    def of(
+        cls,
+        results: Iterable[JobResult],
+        structures: Mapping[str, str],
+        blocks: Collection[str] = UNSEEN,
+    ) -> Forecasts:
+        """Return the forecasts of the unseen modes of jobs that are ok.
 
         Arguments:
             results: of one strategy.
             structures: by case; one that is not named is a structure of its own.
+            blocks: those of them whose modes are taken.
         """
         rows, places = [], []
         for result in results:
-            modes = [m for name, b in result.blocks.items() if name != "used" for m in b.modes]
-            stated = any(m.predicted_std_hz is not None for m in modes)
+            unseen = {name: b.modes for name, b in result.blocks.items() if name in UNSEEN}
+            stated = any(m.predicted_std_hz is not None for modes in unseen.values() for m in modes)
+            modes = [mode for name in blocks for mode in unseen.get(name, ())]
             rows += [(*_percent(mode), float(stated)) for mode in modes]
             places += [structures.get(result.case, result.case)] * len(modes)
-        table = np.array(rows).reshape(-1, 3)
-        _, place, counts = np.unique(places, return_inverse=True, return_counts=True)
-        weight = 1.0 / (counts[place] * max(len(counts), 1)) if places else np.zeros(0)
-        error, std, stated_at = table.T
-        return cls(error, std, stated_at, np.asarray(weight))
+        error, std, told = np.array(rows).reshape(-1, 3).T
+        place = np.unique(np.array(places, dtype=str), return_inverse=True)[1]
+        return cls(error, std, told > 0.0, np.asarray(place, dtype=np.int64))
+
+    @property
+    def weight(self) -> FloatArray:
+        """Return weights of 1 in total, the same for all structures and all modes of one, (n,)."""
+        counts = np.bincount(self.structure)
+        return np.asarray(1.0 / (counts[self.structure] * np.count_nonzero(counts)))
 
     @property
     def uncertain(self) -> Forecasts:
-        """Return those of models that came with an uncertainty, their weights 1 in total."""
-        kept = self.stated > 0.0
-        total = float(self.weight[kept].sum()) or 1.0
-        return Forecasts(
-            self.error[kept], self.std[kept], self.stated[kept], self.weight[kept] / total
-        )
+        """Return those of models that came with an uncertainty."""
+        own = self.stated
+        return Forecasts(self.error[own], self.std[own], own[own], self.structure[own])
 
     @property
     def level(self) -> FloatArray:
@@ -115,7 +124,7 @@ def crps_normal(error: FloatArray, std: FloatArray) -> FloatArray:
         error: forecast mean minus what was measured, (n,).
         std: of the forecast, (n,).
 
-    Source: Gneiting & Raftery (2007), equation (21) and the normal case below it.
+    Source: Gneiting & Raftery (2007), section 4.2.
     """
     point = ~(std > 0.0)
     s = np.where(point, 1.0, std)

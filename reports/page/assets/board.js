@@ -15,6 +15,8 @@
     { key: "interval", title: "95 % interval", still: true, cell: intervalCell },
     { key: "skill_unseen", title: "Unseen", hint: "skill without the modes that the strategy was given", cell: (row) => value(row.skill_unseen, number) },
     ...(data && data.blocks ? data.blocks : []).map((block, k) => ({ key: `${block}_percent`, title: `${block} rms,\u00a0%`, block: k, hint: `median rms frequency error of the ${block} modes`, cell: (row) => value(row[`${block}_percent`], small) })),
+    { key: "coverage90", title: "In 90\u00a0%", hint: "share of unseen modes in the 90 % interval that the strategy states", cell: (row) => value(row.coverage90, number) },
+    { key: "crps_percent", title: "CRPS,\u00a0%", hint: "continuous ranked probability score of unseen modes in percent of the frequency; the absolute error where no uncertainty is stated", cell: (row) => value(row.crps_percent, small) },
     { key: "flags", title: "Flags", text: true, cell: flagCell },
     { key: "coverage", title: "Coverage", text: true, cell: coverageCell },
     { key: "tier", title: "Tier", hint: "1: no difference from the best shown; 2: none from the best of the others", cell: (row) => el("td", { class: "right" }, bench.count(tiers[row.index])) },
