@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +33,7 @@ _MORE = 8  # modes above the highest one that was measured, which samples may mi
 _POINTS = 1.5  # solutions for every coefficient of the polynomials
 _WIDER = 1.5  # than the normal approximation, from where the first of them are taken
 _ROUNDS = 3
-_OFF = 0.005  # relative rms error of the polynomials over the posterior that is let pass
+_OFF = 0.25  # of a datum's standard deviation: rms error of the polynomials that is let pass
 _SAMPLES = 40
 _WALKERS, _FEWEST_WALKERS = 4, 96  # for each unknown, and in all: few take no less time
 _BLOCK, _LONGEST = 500, 8000  # steps
@@ -106,6 +107,11 @@ class _Target:
             raise StrategyFailure(f"only {len(rows)} of {len(points)} points give a model")
         return np.array(kept), np.array(rows)
 
+    def std(self, v: FloatArray) -> FloatArray:
+        """Return the rms standard deviation of every datum, discrepancy included, (k,)."""
+        _, std, own = self.data
+        return np.asarray(np.sqrt(std**2 + own * np.mean(np.square(self.discrepancy.std(v)))))
+
     def log_density(self, fit: QuadraticFit) -> Callable[[FloatArray], FloatArray]:
         """Return a function from (n, p + 1) to ln of the density, (n,)."""
         log, std, own = self.data
@@ -136,7 +142,8 @@ def sample_posterior(
 
     Logarithms of frequencies are taken as quadratic in those of the parameters, fitted to solutions
     near the most probable ones, and anew with more of them until the rms error over the posterior
-    is at most 0.5 %; what is left after three rounds widens the likelihood.
+    is at most a quarter of each datum's standard deviation, discrepancy included; what is left
+    after three rounds widens the likelihood.
 
     Arguments:
         structure: the nominal frame.
@@ -161,14 +168,17 @@ def sample_posterior(
     points, values = target.predicted(start)
     for _ in range(_ROUNDS):
         fit = QuadraticFit.of(points, values)
-        chain, found = _chain(target, fit, root, rng)
-        drawn = chain[rng.choice(len(chain), max(count, _SAMPLES), replace=False), :-1]
-        more, exact = target.predicted(drawn)
-        off = float(np.sqrt(np.mean(np.square(fit(more) - exact))))
-        if off <= _OFF:
+        sampler = _started(target, fit, root, rng)
+        drawn = sampler.get_chain(discard=_BLOCK // 2, flat=True)
+        drawn = drawn[rng.choice(len(drawn), count, replace=False)]
+        more, exact = target.predicted(drawn[:, :-1])
+        off = np.sqrt(np.mean(np.square(fit(more) - exact), axis=0))
+        if (off <= _OFF * target.std(drawn[:, -1])).all():
             break
         points, values = np.vstack([points, more]), np.vstack([values, exact])
-    return _result(target, chain, more[:_SAMPLES], {**found, "surrogate_error": off})
+    chain, found = _settled(sampler)
+    drawn = chain[rng.choice(len(chain), _SAMPLES, replace=False), :-1]
+    return _result(target, chain, drawn, {**found, "surrogate_error": float(off.max())})
 
 
 def _most_probable(
@@ -192,13 +202,11 @@ def _most_probable(
     return _Target(iteration, point, kept, discrepancy), covariance
 
 
-def _chain(
-    target: _Target, fit: QuadraticFit, root: FloatArray, rng: np.random.Generator
-) -> tuple[FloatArray, dict[str, float]]:
-    """Return draws of q and v, (n, p + 1), and how well they are mixed.
+def _started(target: _Target, fit: QuadraticFit, root: FloatArray, rng: np.random.Generator) -> Any:  # noqa: ANN401 - emcee's sampler, which has no types
+    """Return an `emcee.EnsembleSampler` of q and v after its first steps.
 
-    Raises:
-        StrategyFailure: when the longest chain is too short for its autocorrelation.
+    Arguments:
+        root: of the covariance about the most probable parameters, (p, p).
     """
     import emcee
 
@@ -210,17 +218,26 @@ def _chain(
     near[:, :-1] = np.clip(near[:, :-1], 0.99 * low, 0.99 * high)
     sampler = emcee.EnsembleSampler(walkers, size, target.log_density(fit), vectorize=True)
     sampler.random_state = np.random.RandomState(int(rng.integers(2**32))).get_state()
-    state = near
-    while sampler.iteration < _LONGEST:
-        state = sampler.run_mcmc(state, _BLOCK)
+    sampler.run_mcmc(near, _BLOCK)
+    return sampler
+
+
+def _settled(sampler: Any) -> tuple[FloatArray, dict[str, float]]:  # noqa: ANN401 - emcee's
+    """Return draws of q and v, (n, p + 1), after so many steps as they need, and how many.
+
+    Raises:
+        StrategyFailure: when the longest chain is too short for its autocorrelation.
+    """
+    while True:
         time = float(np.max(sampler.get_autocorr_time(tol=0)))
         if sampler.iteration >= _LONG_ENOUGH * time:
             break
-    else:
-        raise StrategyFailure(
-            f"{sampler.iteration} steps are {sampler.iteration / time:.0f} autocorrelation times, "
-            f"expected {_LONG_ENOUGH:g} at least"
-        )
+        if sampler.iteration >= _LONGEST:
+            raise StrategyFailure(
+                f"{sampler.iteration} steps are {sampler.iteration / time:.0f} autocorrelation "
+                f"times, expected {_LONG_ENOUGH:g} at least"
+            )
+        sampler.run_mcmc(None, _BLOCK)
     chain = sampler.get_chain(discard=int(np.ceil(_BURN_IN * time)), flat=True)
     return chain, {
         "steps": float(sampler.iteration),
