@@ -12,8 +12,8 @@ import pytest
 from femubench import Measurement, StrategyFailure, UpdateResult
 from femubench.core.update import posterior_sampling
 from femubench.core.update.quadratic_fit import QuadraticFit, coefficients_of
-from femubench.plugins.strategies.bayesian import Bayesian
 from femubench.plugins.strategies.sampling import BayesianSampling
+from femubench.update import Discrepancy
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
@@ -44,18 +44,31 @@ def test_a_quadratic_function_is_met_and_others_have_their_error() -> None:
     assert coefficients_of(3) == 10
 
 
-def test_without_discrepancy_the_posterior_is_that_of_bayesian() -> None:
-    """A narrow posterior is normal: both give the same means and standard deviations."""
-    measurement = CASE.used_measurement()
-    narrow = replace(measurement, frequency_std=0.1 * measurement.frequency_std)
-    ours = sampled(narrow, discrepancy_median=1e-6, discrepancy_spread=0.1)
-    theirs = Bayesian().update(CASE.model, narrow, np.random.default_rng(0))
-    for one, other in zip(ours.parameters, theirs.parameters, strict=True):
-        assert one.name == other.name
-        assert one.std is not None
-        assert other.std is not None
-        assert one.std == pytest.approx(other.std, rel=0.15)
-        assert abs(one.after - other.after) < 0.3 * other.std
+def test_the_posterior_is_that_of_exact_solutions() -> None:
+    """Weighed draws of a wider distribution, every one solved, give the same mean and spread."""
+    measurement, discrepancy = CASE.used_measurement(), Discrepancy(0.02, 0.01)
+    strategy = BayesianSampling(discrepancy_median=0.02, discrepancy_spread=0.01)
+    unknowns = strategy.unknowns(CASE.model.frame_structure, weighed=False)
+    target, covariance = posterior_sampling.most_probable(
+        CASE.model.frame_structure, unknowns, measurement, discrepancy, strategy.options
+    )
+    rng = np.random.default_rng(0)
+    z = 1.8 * rng.standard_normal((700, len(unknowns)))
+    points, values = target.predicted(target.point.q + z @ np.linalg.cholesky(covariance).T)
+    assert len(points) == len(z)
+    log, _, _ = target.data
+    misfit = np.square((log - values) / target.std(np.zeros(1))).sum(axis=1)
+    posterior = -0.5 * (misfit + np.square(points) @ target.iteration.scaling.precision)
+    weight = np.exp(posterior + 0.5 * np.square(z / 1.8).sum(axis=1))
+    weight /= weight.sum()
+    assert 1.0 / np.square(weight).sum() > 100.0
+    mean = weight @ points
+    std = np.sqrt(weight @ np.square(points - mean))
+    found = strategy.update(CASE.model, measurement, np.random.default_rng(1))
+    for k, parameter in enumerate(found.parameters):
+        assert parameter.std is not None
+        assert abs(np.log(parameter.after) - mean[k]) < 0.3 * std[k]
+        assert parameter.std / parameter.after == pytest.approx(std[k], rel=0.25)
 
 
 def test_the_discrepancy_grows_with_what_the_model_cannot_follow() -> None:
@@ -69,21 +82,19 @@ def test_the_discrepancy_grows_with_what_the_model_cannot_follow() -> None:
         assert result.uncertainty.discrepancy_std == result.diagnostics["discrepancy_std"]
         assert len(result.uncertainty.samples) == 40
         assert result.diagnostics["effective_samples"] > 1000.0
-        assert result.diagnostics["surrogate_error"] <= 0.005
+        assert result.diagnostics["surrogate_error"] < 0.01
 
 
-def test_the_generator_alone_decides_on_the_result() -> None:
+def test_the_generator_alone_decides_on_the_result(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(posterior_sampling, "_LONG_ENOUGH", 5.0)
     measurement = CASE.used_measurement()
     np.random.seed(1)  # noqa: NPY002 - what other code may have done
     first = sampled(measurement)
     np.random.seed(2)  # noqa: NPY002
-    second, other = sampled(measurement), sampled(measurement, seed=2)
+    second = sampled(measurement)
     assert first.parameters == second.parameters
     assert first.diagnostics == second.diagnostics
     assert (first.model.stiffness != second.model.stiffness).nnz == 0
-    assert first.parameters != other.parameters
-    for one, two in zip(first.parameters, other.parameters, strict=True):
-        assert abs(one.after - two.after) < 0.2 * (one.std or 0.0)
 
 
 def test_a_chain_that_is_too_short_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -59,7 +59,7 @@ class Discrepancy:
 
 
 @dataclass(frozen=True)
-class _Target:
+class Target:
     """The posterior density of scaled parameters q and of the discrepancy's coordinate v.
 
     Arguments:
@@ -161,7 +161,7 @@ def sample_posterior(
     Source: Goodman & Weare (2010), Commun. Appl. Math. Comput. Sci. 5, 65-80, as implemented by
     Foreman-Mackey, Hogg, Lang & Goodman (2013), PASP 125, 306-312.
     """
-    target, covariance = _most_probable(structure, unknowns, measurement, discrepancy, options)
+    target, covariance = most_probable(structure, unknowns, measurement, discrepancy, options)
     count = int(np.ceil(_POINTS * coefficients_of(len(unknowns))))
     root = np.asarray(np.linalg.cholesky(covariance))
     start = target.point.q + rng.standard_normal((count, len(unknowns))) @ root.T * _WIDER
@@ -181,14 +181,22 @@ def sample_posterior(
     return _result(target, chain, drawn, {**found, "surrogate_error": float(off.max())})
 
 
-def _most_probable(
+def most_probable(
     structure: Structure,
     unknowns: Sequence[Unknown],
     measurement: Measurement,
     discrepancy: Discrepancy,
     options: UpdateOptions,
-) -> tuple[_Target, FloatArray]:
-    """Return the posterior about its mode at the median discrepancy, and the covariance there."""
+) -> tuple[Target, FloatArray]:
+    """Return the posterior about its mode at the median discrepancy, and the covariance of q there.
+
+    Arguments:
+        structure, unknowns, measurement, discrepancy, options: as for `sample_posterior`.
+
+    Raises:
+        NotApplicable: when a frequency has no standard deviation.
+        StrategyFailure: when no measured mode has a partner.
+    """
     std = np.hypot(measurement.frequency_std, discrepancy.median * measurement.frequencies)
     whole = replace(measurement, frequency_std=std)
     iteration = Iteration(
@@ -199,10 +207,10 @@ def _most_probable(
     assert covariance is not None
     pairs = zip(measurement.numbers, point.prediction.partner, strict=True)
     kept = measurement.select([number for number, partner in pairs if partner >= 0])
-    return _Target(iteration, point, kept, discrepancy), covariance
+    return Target(iteration, point, kept, discrepancy), covariance
 
 
-def _started(target: _Target, fit: QuadraticFit, root: FloatArray, rng: np.random.Generator) -> Any:  # noqa: ANN401 - emcee's sampler, which has no types
+def _started(target: Target, fit: QuadraticFit, root: FloatArray, rng: np.random.Generator) -> Any:  # noqa: ANN401 - emcee's sampler, which has no types
     """Return an `emcee.EnsembleSampler` of q and v after its first steps.
 
     Arguments:
@@ -247,7 +255,7 @@ def _settled(sampler: Any) -> tuple[FloatArray, dict[str, float]]:  # noqa: ANN4
 
 
 def _result(
-    target: _Target, chain: FloatArray, drawn: FloatArray, diagnostics: dict[str, float]
+    target: Target, chain: FloatArray, drawn: FloatArray, diagnostics: dict[str, float]
 ) -> UpdateResult:
     iteration = target.iteration
     q, std = chain[:, :-1].mean(axis=0), chain[:, :-1].std(axis=0)
