@@ -121,7 +121,11 @@ class Measurement(Protocol):
 
 @runtime_checkable
 class Result(Protocol):
-    """What a strategy hands back; `femubench.UpdateResult` is one."""
+    """What a strategy hands back; `femubench.UpdateResult` is one.
+
+    A result may say more than is asked here: ``uncertainty``, a `update.Uncertainty` or whatever
+    has its two members, from which the judge makes a standard deviation of every frequency.
+    """
 
     @property
     def model(self) -> Model:

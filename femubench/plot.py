@@ -5,6 +5,7 @@ function raises `InputError` for what it cannot draw.
 """
 
 from femubench.core.drawing.wireframe import Wireframe, wireframe_of
+from femubench.core.plot.calibration import calibration
 from femubench.core.plot.cost import error_against_cost
 from femubench.core.plot.diagnosis import (
     MOST_ROWS,
@@ -26,6 +27,7 @@ __all__ = [
     "ResidualDot",
     "Spot",
     "Wireframe",
+    "calibration",
     "convergence",
     "error_against_cost",
     "evidence",

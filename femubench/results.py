@@ -6,6 +6,7 @@ from femubench.core.run.frames import modes_frame, results_frame, run_from_json,
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.results import Block, JobResult, PairedMode, Run
+from femubench.core.score import predictive
 from femubench.core.score.counting import block_weights, counted_blocks
 from femubench.core.score.leaderboard import (
     COMPUTED,
@@ -48,6 +49,7 @@ __all__ = [
     "leaderboard",
     "modes_frame",
     "predict_block",
+    "predictive",
     "rank_results",
     "ranked",
     "ranks_by_floor",

@@ -44,9 +44,11 @@ from femubench.core.update.parameter_sets import (
     stiffness_factors,
     stiffness_parts,
 )
+from femubench.core.update.posterior_sampling import Discrepancy, sample_posterior
 from femubench.core.update.promise import check_used_modes, force_scale
 from femubench.core.update.quasi import ITERATIONS, QuasiModes, quasi_measured_modes
 from femubench.core.update.sensitivity_update import sensitivity_update
+from femubench.core.update.uncertainty import MOST_SAMPLES, Uncertainty
 from femubench.core.update.unknowns import (
     Unknown,
     UpdateOptions,
@@ -56,6 +58,7 @@ from femubench.core.update.unknowns import (
 )
 
 __all__ = [
+    "Discrepancy",
     "ElementFamily",
     "ElementStrategy",
     "FactorStrategy",
@@ -64,10 +67,12 @@ __all__ = [
     "ModalFit",
     "ModalSpace",
     "OWN",
+    "MOST_SAMPLES",
     "QuasiModes",
     "SelfCheckFailed",
     "StiffnessParts",
     "Symmetry",
+    "Uncertainty",
     "Unknown",
     "UpdateOptions",
     "all_elements",
@@ -93,6 +98,7 @@ __all__ = [
     "nobari_family",
     "physical_family",
     "quasi_measured_modes",
+    "sample_posterior",
     "sensitivity_update",
     "spring_estimates",
     "stiffness_factors",

@@ -45,6 +45,10 @@ _FOOTNOTES = (
     "and those of the structure with a known design change, which no strategy is given, and over "
     "the modes that it was given; median over the cases. A measured mode without partner counts "
     "100 %.",
+    "**in 90 %, CRPS**: share of unseen modes (higher, modified) in the 90 % interval that the "
+    "strategy states, and the continuous ranked probability score in percent of the frequency, "
+    "less is better; means over structures. Without a stated uncertainty the latter is the "
+    "absolute error.",
     "**rigid lost, negative**: rigid-body modes that the updated models lost and negative "
     "eigenvalues that they have, in all jobs. Either makes a strategy *unphysical*: it ranks below "
     "all physical ones.",
@@ -112,7 +116,8 @@ def _leaderboard(run: Run) -> Iterator[str]:
     tiers, letters = tested.tier_of(), tested.letters()
     headers = [
         *("rank", "strategy", "skill", "from drawn", "tests", "higher %", "modified %", "given %"),
-        *("rigid lost", "negative", "parameters", "evaluations", "seconds", "ok", "tier", "group"),
+        *("in 90 %", "CRPS %", "rigid lost", "negative", "parameters", "evaluations", "seconds"),
+        *("ok", "tier", "group"),
     ]
     kind = interval_kind(run)
     if kind:
@@ -126,6 +131,8 @@ def _leaderboard(run: Run) -> Iterator[str]:
             fixed(row["skill_drawn"], 3, 6),
             fixed(row["skill_tests"], 3, 6),
             *(fixed(row[f"{block}_percent"], 2, 7) for block in ("higher", "modified", "used")),
+            fixed(row["coverage90"], 2),
+            fixed(row["crps_percent"], 2, 7),
             *(whole(row[key]) for key in ("rigid_modes_lost", "negative_eigenvalues")),
             *(whole(row[key]) for key in ("parameters", "evaluations")),
             fixed(row["seconds"], 3, 7),

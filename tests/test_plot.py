@@ -33,7 +33,7 @@ from femubench.core.schema.diagnosis import LocationRow, ResidualRow
 from femubench.core.schema.results import JobResult
 from femubench.modal import mac
 from femubench.plot import wireframe_of
-from femubench.results import Block
+from femubench.results import Block, PairedMode
 from femubench.scenarios import HERE
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
@@ -225,6 +225,18 @@ class TestUpdating:
         ax = plot.parameters(update(parameters=springs))
         assert [bar.get_width() for bar in ax.patches] == [2.0]
         assert ax.get_xlabel() == "after the update, 1/Nm"
+
+
+def test_calibration_is_the_share_of_modes_in_each_interval() -> None:
+    """One mode 0.5 and one 2 deviations off: in intervals from 0.383 and 0.954 on."""
+    modes = tuple(PairedMode(k, 100.0, 100.0 + d, 1.0, None, 1.0) for k, d in ((1, 0.5), (2, 2.0)))
+    blocks = {"higher": Block(1.0, 1.0, modes)}
+    ax = plot.calibration(run(results=(JobResult("a", "sure", 0, "ok", blocks=blocks),)))
+    (line,) = (line for line in ax.get_lines() if line.get_label() == "sure")
+    levels, observed = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+    assert observed == pytest.approx(0.5 * (levels > 0.383) + 0.5 * (levels > 0.954))
+    with pytest.raises(InputError, match="no strategy of the run says how sure it is"):
+        plot.calibration(run())
 
 
 def test_error_against_cost() -> None:

@@ -320,15 +320,22 @@ def gain_of(before: dict[str, Block], after: dict[str, Block], crossed: Unseen |
 _TIED, _PLACES = 0.1, 6
 
 
-def extended_by(model: Model, explanation: Explanation) -> Model:
+def extended_by(model: Model, explanation: Explanation, x: FloatArray | None = None) -> Model:
     """Return the model with textbook effects and causes in it.
+
+    Arguments:
+        model: the nominal model.
+        explanation: base and causes.
+        x: coordinates of the causes, taken within their bounds, (p,); None for the fitted ones.
 
     Examples:
         >>> diagnosis.extended_by(model, examination.best).size == model.size
         True
     """
     base = extended(model, explanation.base.parts, explanation.base.x)
-    return extended(base, explanation.parts, explanation.fit.state.x)
+    parts = explanation.parts
+    own = explanation.fit.state.x if x is None else np.clip(x, *bounds_of(parts))
+    return extended(base, parts, own)
 
 
 def unseen_of(

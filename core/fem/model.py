@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
@@ -221,6 +221,29 @@ def common_dofs(old: Structure, new: Structure) -> IntArray:
         return np.array([index[key] for key in _keys(old)], dtype=np.int64)
     except KeyError as error:
         raise ModelError("two attachments lie too close to each other on a member") from error
+
+
+def neighbours_of(model: Model, changed: Model, samples: Iterable[Model]) -> tuple[Model, ...]:
+    """Return models near a model as they are after the attachments that made `changed` of it.
+
+    Arguments:
+        model: before the attachments.
+        changed: what its `attach` returned.
+        samples: models on the dofs of `model`.
+    """
+    keep, size = np.arange(model.size), changed.size
+    if model.structure is not None:
+        keep = common_dofs(model.structure, changed.frame_structure)
+    return tuple(
+        replace(
+            changed,
+            mass=changed.mass + _spread(sample.mass - model.mass, keep, size),
+            stiffness=changed.stiffness + _spread(sample.stiffness - model.stiffness, keep, size),
+            mass_change=_spread_low_rank(sample.mass_change, keep, size),
+            stiffness_change=_spread_low_rank(sample.stiffness_change, keep, size),
+        )
+        for sample in samples
+    )
 
 
 def _spread(change: SparseArray, keep: IntArray, size: int) -> SparseArray:

@@ -13,7 +13,6 @@ from femubench.core.score.counting import case_weights
 from femubench.core.score.ranking import geometric_mean, ranked as in_order, score_of
 from femubench.core.score.statistics import structures_of
 
-
 INDEX_SCHEMA = 2  # since more skill is better
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import pickle
 import traceback
 from collections.abc import Mapping
@@ -22,6 +23,7 @@ from femubench.core.schema.results import Status
 
 _HEAD = 8  # bytes that hold the length of the head
 _LONGEST_HEAD = 64 * 2**20  # bytes
+_APART = ("model", "samples")  # what is no JSON
 _LONGEST_TEXT = 100_000
 _LONGEST_NAME = 500
 _LONGEST_REASON = 2_000
@@ -54,8 +56,9 @@ class AnswerError(FemubenchError):
 def packed(outcome: JobOutcome) -> bytes:
     """Return an outcome as bytes; one that cannot be sent has failed."""
     try:
-        model = b"" if outcome.model is None else pickle.dumps(outcome.model, protocol=5)
-        head = {f.name: getattr(outcome, f.name) for f in fields(outcome) if f.name != "model"}
+        parts = outcome.model, outcome.samples
+        model = b"" if outcome.model is None else pickle.dumps(parts, protocol=5)
+        head = {f.name: getattr(outcome, f.name) for f in fields(outcome) if f.name not in _APART}
         text = json.dumps(head).encode()
     except Exception as error:
         reason = f"the result cannot be sent back: {one_line(error)}"
@@ -91,14 +94,17 @@ def unpacked(data: bytes) -> JobOutcome:
         return outcome
     start = _HEAD + int.from_bytes(data[:_HEAD], "big")
     try:
-        model = _ModelReader(io.BytesIO(memoryview(data)[start:])).load()
+        held = _ModelReader(io.BytesIO(memoryview(data)[start:])).load()
     except AnswerError:
         raise
     except Exception as error:
         raise AnswerError(f"the result cannot be read: {one_line(error)}") from error
+    model, samples = held if type(held) is tuple and len(held) == 2 else (held, ())
     if type(model) is not Model:
         raise AnswerError(f"the updated model is {type(model).__name__}, expected femubench.Model")
-    return replace(outcome, model=model)
+    if not (type(samples) is tuple and all(type(sample) is Model for sample in samples)):
+        raise AnswerError("the samples of the updated model are no tuple of femubench.Model")
+    return replace(outcome, model=model, samples=samples)
 
 
 class _ModelReader(pickle.Unpickler):
@@ -136,6 +142,7 @@ def _checked(head: Mapping[str, Any]) -> JobOutcome:
         traceback=str(head["traceback"])[:_LONGEST_TEXT],
         seconds=max(_number(head["seconds"]), 0.0),
         evaluations=_count(head["evaluations"]),
+        discrepancy_std=_std(head.get("discrepancy_std")),
         parameter_count=_count(head["parameter_count"]),
         parameters=tuple(_parameter(item) for item in parameters),
         history=tuple(_figures(item) for item in history),
@@ -149,6 +156,15 @@ def _count(value: object) -> int | None:
     if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < 2**63:
         raise ValueError(f"{str(value)[:40]} is no count")
     return value
+
+
+def _std(value: object) -> float | None:
+    if value is None:
+        return None
+    number = _number(value)
+    if not 0.0 <= number < math.inf:
+        raise ValueError(f"{number} is no standard deviation")
+    return number
 
 
 def _parameter(item: Mapping[str, Any]) -> dict[str, Any]:

@@ -43,8 +43,9 @@ def modes_frame(run: Run) -> pd.DataFrame:
     """Return one row a measured mode of every job that is ok.
 
     Columns: case strategy seed nominal block modification mode measured_hz predicted_hz
-    error_percent mac. The error is signed, (f_p / f_m - 1), and nan for a mode without partner or
-    with an imaginary one; `counted_percent` is what the score takes, 100 for such a mode.
+    error_percent counted_percent mac predicted_std_hz. The error is signed, (f_p / f_m - 1), and
+    nan for a mode without partner or with an imaginary one; `counted_percent` is what the score
+    takes, 100 for such a mode.
 
     Examples:
         >>> len(results.modes_frame(run))
@@ -66,12 +67,16 @@ def modes_frame(run: Run) -> pd.DataFrame:
             "error_percent": _signed(mode.measured_hz, mode.predicted_hz),
             "counted_percent": 100.0 * frequency_error(mode),
             "mac": mode.mac,
+            "predicted_std_hz": mode.predicted_std_hz,
         }
         for result in run.results
         for name, block in result.blocks.items()
         for mode in block.modes
     ]
-    floats = ("measured_hz", "predicted_hz", "error_percent", "counted_percent", "mac")
+    floats = (
+        *("measured_hz", "predicted_hz", "error_percent", "counted_percent", "mac"),
+        "predicted_std_hz",
+    )
     names = ("case", "strategy", "seed", "nominal", "block", "modification", "mode", *floats)
     return pd.DataFrame(rows, columns=list(names)).astype(dict.fromkeys(floats, "float64"))
 

@@ -19,6 +19,7 @@ from femubench.core.modal.eigen import counted_evaluations
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import CAPABILITIES, Result, Strategy, declared
 from femubench.core.schema.results import Status
+from femubench.core.update.uncertainty import MOST_SAMPLES
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,9 @@ class JobOutcome:
         seconds: wall time of the strategy alone.
         evaluations: eigenvalue solutions it made.
         model: the updated model; None unless the status is ``ok``.
+        samples: models that are as probable as each other, their matrices on its dofs.
+        discrepancy_std: relative standard deviation of a frequency beside the samples; None where
+            the strategy says nothing of its uncertainty.
         parameter_count, parameters, history, diagnostics: its own report in plain data.
     """
 
@@ -55,6 +59,8 @@ class JobOutcome:
     seconds: float = 0.0
     evaluations: int | None = None
     model: Model | None = None
+    samples: tuple[Model, ...] = ()
+    discrepancy_std: float | None = None
     parameter_count: int | None = None
     parameters: tuple[Mapping[str, Any], ...] = ()
     history: tuple[Mapping[str, float], ...] = ()
@@ -170,14 +176,37 @@ def _plain(result: Result) -> JobOutcome:
     count = int(result.parameter_count)
     if not 0 <= count < 2**63:
         raise ValueError(f"parameter_count is {str(count)[:20]}, expected the number of unknowns")
+    samples, discrepancy = _uncertainty(result, result.model)
     return JobOutcome(
         status="ok",
         model=result.model,
+        samples=samples,
+        discrepancy_std=discrepancy,
         parameter_count=count,
         parameters=tuple(_parameter(item) for item in result.parameters),
         history=tuple(_figures(item) for item in result.history),
         diagnostics=_figures(result.diagnostics),
     )
+
+
+def _uncertainty(result: Result, model: Model) -> tuple[tuple[Model, ...], float | None]:
+    """Return samples as nothing but matrices, and the discrepancy; None for a mere point."""
+    stated = getattr(result, "uncertainty", None)
+    if stated is None:
+        return (), None
+    samples = tuple(stated.samples)
+    if len(samples) > MOST_SAMPLES:
+        raise ValueError(f"uncertainty has {len(samples)} samples, allowed {MOST_SAMPLES}")
+    discrepancy = float(stated.discrepancy_std)
+    if not (np.isfinite(discrepancy) and discrepancy >= 0.0):
+        raise ValueError(f"discrepancy_std is {discrepancy:g}, expected a finite number >= 0")
+    for number, sample in enumerate(samples, start=1):
+        if not isinstance(sample, Model):
+            raise TypeError(f"sample {number} is {type(sample).__name__}, expected Model")
+        if sample.dofs.direction != model.dofs.direction:
+            raise ValueError(f"sample {number} has other degrees of freedom than the updated model")
+    own = {"dofs": model.dofs, "geometry": model.geometry, "structure": model.structure}
+    return tuple(replace(sample, **own, groups={}) for sample in samples), discrepancy
 
 
 def _parameter(item: Any) -> dict[str, Any]:  # noqa: ANN401 - a `ParameterEstimate`

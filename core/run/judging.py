@@ -10,13 +10,16 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from femubench.core.case.case import Case
-from femubench.core.errors import FemubenchError
+from femubench.core.errors import FemubenchError, StrategyFailure
 from femubench.core.run.answers import AnswerError, packed, unpacked
 from femubench.core.run.jobs import Job, JobOutcome, execute, one_line
 from femubench.core.run.model_checks import check_model
 from femubench.core.schema.records import result_to_json
 from femubench.core.schema.results import JobResult, Nominal
+from femubench.core.score.predicted_spread import Spread
 from femubench.core.score.scoring import Reference, judge, score_of
+
+_JUDGED = ("model", "samples", "discrepancy_std")  # of an outcome, and no part of the result
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,7 @@ def judged(
         outcome: what the strategy left behind.
     """
     strategy, seed, nominal = job
-    own = {f.name: getattr(outcome, f.name) for f in fields(outcome) if f.name != "model"}
+    own = {f.name: getattr(outcome, f.name) for f in fields(outcome) if f.name not in _JUDGED}
     expected = reference.rigid.shape[1]
     result = JobResult(
         case.name, strategy, seed, **own, rigid_body_modes_expected=expected, nominal=nominal
@@ -101,8 +104,20 @@ def _scored(result: JobResult, case: Case, outcome: JobOutcome, reference: Refer
             # An ill-conditioned model shows in its figures.
             warnings.simplefilter("ignore")
             check_model(outcome.model, case.model)
-            judgement = judge(case, outcome.model, reference)
+            judgement = judge(case, outcome.model, reference, _spread(outcome))
     except Exception as error:
         reason = str(error) if isinstance(error, FemubenchError) else one_line(error)
         return replace(result, status="failed", reason=reason, traceback=traceback.format_exc())
     return replace(result, **vars(judgement))
+
+
+def _spread(outcome: JobOutcome) -> Spread | None:
+    """Return what a strategy says of its model's error, every sample checked."""
+    if outcome.discrepancy_std is None or outcome.model is None:
+        return None
+    for number, sample in enumerate(outcome.samples, start=1):
+        try:
+            check_model(sample, outcome.model)
+        except StrategyFailure as error:
+            raise StrategyFailure(f"sample {number}: {error}") from error
+    return Spread(outcome.model, outcome.samples, outcome.discrepancy_std)

@@ -52,6 +52,7 @@ class _ModeRecord(Record):
     predicted_hz: Annotated[float, Field(ge=-1e100, le=1e100)] | None
     mac: _Mac | None
     modification: _Text | None = None
+    predicted_std_hz: Annotated[float, Field(ge=0, le=1e100)] | None = None
 
 
 class _BlockRecord(Record):
@@ -61,10 +62,7 @@ class _BlockRecord(Record):
 
     def block(self) -> Block:
         """Return the block of errors."""
-        modes = (
-            PairedMode(m.mode, m.measured_hz, m.predicted_hz, m.mac, m.modification)
-            for m in self.modes
-        )
+        modes = (PairedMode(number=m.mode, **m.model_dump(exclude={"mode"})) for m in self.modes)
         return Block(self.rms_percent, self.mean_mac, tuple(modes))
 
 

@@ -31,6 +31,8 @@ class PairedMode:
             stands for an imaginary frequency.
         mac: of the two shapes, 0..1; None where nothing was paired or no shape was measured.
         modification: name of the design change; None for the structure as tested.
+        predicted_std_hz: standard deviation of what a test would find about `predicted_hz`, its
+            own error of measurement included; None where the strategy does not say.
     """
 
     number: int
@@ -38,6 +40,7 @@ class PairedMode:
     predicted_hz: float | None
     mac: float | None
     modification: str | None = None
+    predicted_std_hz: float | None = None
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femubench.core.schema.results import BLOCKS, UNSEEN, JobResult, Run
+from femubench.core.score import predictive
 from femubench.core.score.counting import (
     WHOLE,
     References,
@@ -37,6 +38,7 @@ _RESAMPLES = 999
 COLUMNS = (
     *("rank", "strategy", "skill", "skill_low", "skill_high", "skill_drawn", "skill_tests"),
     *(f"{block}_percent" for block in BLOCKS),
+    *predictive.COLUMNS,
     *("rigid_modes_lost", "negative_eigenvalues", "parameters", "evaluations", "seconds"),
     *("ok", "not_applicable", "total", "unphysical"),
 )
@@ -134,7 +136,7 @@ def leaderboard(run: Run, floor_percent: float = OFFSET_PERCENT) -> pd.DataFrame
     without computed truths; nan where there is no such difference. The three errors are the median
     over cases of the median over seeds of the rms error in percent, over the jobs that are ok; so
     are `parameters`, `evaluations` and `seconds`. Rigid-body modes lost and negative eigenvalues
-    are sums.
+    are sums. `coverage90`, `crps_percent` and `log_score` are those of docs/scoring.md.
 
     Arguments:
         run: with `reference`, `seeds`, `seed` and `strategies` in its meta.
@@ -242,6 +244,7 @@ def _row(strategy: str, results: Sequence[JobResult], table: _Table) -> dict[str
         ),
         "skill_tests": _skill(table.tests, results, table.floor_percent),
         **{f"{block}_percent": _median(fine, _error_in(block)) for block in BLOCKS},
+        **predictive.scores(fine, grid.structures),
         "rigid_modes_lost": sum(result.rigid_modes_lost for result in fine),
         "negative_eigenvalues": sum(result.negative_eigenvalues or 0 for result in fine),
         "parameters": _median(fine, lambda result: result.parameter_count),

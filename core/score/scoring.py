@@ -27,6 +27,7 @@ from femubench.core.modal.pairing import LEAST_SENSORS, WINDOW, pair_measured
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.schema.results import Block, PairedMode
 from femubench.core.score.leaderboard import leaderboard
+from femubench.core.score.predicted_spread import Spread
 from femubench.core.score.ranking import rank_results, score_of
 from femubench.core.typing import FloatArray
 
@@ -113,19 +114,25 @@ def predict_block(
     return _predict(model, _modes_for(model, (measurement,)), measurement, modification)
 
 
-def modified_modes(model: Model, change: Modification) -> tuple[PairedMode, ...]:
+def modified_modes(
+    model: Model, change: Modification, spread: Spread | None = None
+) -> tuple[PairedMode, ...]:
     """Return what a model predicts of a modified structure, computed once for this very model.
+
+    Arguments:
+        spread: of the model before the change; None where there is none.
 
     Raises:
         ModelError: when the modified model has no modes or a sensor lies off the structure.
     """
 
-    def make() -> tuple[Modification, tuple[PairedMode, ...]]:
+    def make() -> tuple[Modification, Spread | None, tuple[PairedMode, ...]]:
         changed = model.attach(change.masses, change.springs)
-        # With the change, so that nothing else gets its number as long as this is kept.
-        return change, predict_block(changed, change.measurement, change.name)
+        # With change and spread, so that nothing else gets their numbers as long as this is kept.
+        modes, moved = _modes_for(changed, (change.measurement,)), spread and spread.after(changed)
+        return change, spread, _predict(changed, modes, change.measurement, change.name, moved)
 
-    return once_for(model, ("modified", id(change)), make)[1]
+    return once_for(model, ("modified", id(change), id(spread)), make)[2]
 
 
 def score_model(case: Case, model: Model) -> dict[str, Block]:
@@ -155,11 +162,16 @@ def reference_of(case: Case) -> Reference:
     return Reference(blocks, zero_tolerance(modes), rigid_modes_of(case.model))
 
 
-def judge(case: Case, model: Model, reference: Reference) -> Judgement:
+def judge(
+    case: Case, model: Model, reference: Reference, spread: Spread | None = None
+) -> Judgement:
     """Return errors, rigid-body modes kept and negative eigenvalues of a model.
 
     A rigid-body mode is kept where |lambda| <= 1e-6 times the first elastic eigenvalue of the
     nominal model, an eigenvalue is negative below minus that.
+
+    Arguments:
+        spread: how far the strategy says that its model may be off; None where it says nothing.
 
     Raises:
         ModelError: when the model has no modes.
@@ -167,7 +179,9 @@ def judge(case: Case, model: Model, reference: Reference) -> Judgement:
     modes = _modes_for(model, (case.measurement,))
     negative = int(np.count_nonzero(modes.eigenvalues < -reference.zero))
     return Judgement(
-        _blocks(case, model, modes), _kept_rigid_modes(case, model, modes, reference), negative
+        _blocks(case, model, modes, spread),
+        _kept_rigid_modes(case, model, modes, reference),
+        negative,
     )
 
 
@@ -186,7 +200,11 @@ def _modes_for(model: Model, measurements: Sequence[Measurement]) -> Modes:
 
 
 def _predict(
-    model: Model, modes: Modes, measurement: Measurement, modification: str | None
+    model: Model,
+    modes: Modes,
+    measurement: Measurement,
+    modification: str | None,
+    spread: Spread | None = None,
 ) -> tuple[PairedMode, ...]:
     elastic = modes.elastic
     readings = np.asarray(model.observe(measurement.sensors) @ elastic.shapes)
@@ -196,6 +214,10 @@ def _predict(
     closeness = 2.0 * float(np.median(measurement.frequency_std / measurement.frequencies))
     readings = align_close_modes(frequencies, readings, measurement.shapes, closeness)
     pairing = pair_measured(measurement, elastic, readings)
+    std: list[float | None] = [None] * len(measurement)
+    if spread is not None:
+        whole = np.append(np.flatnonzero(~modes.rigid), -1)[pairing.index]
+        std = spread.std_of(modes, whole, measurement.frequency_std)
     return tuple(
         PairedMode(
             number=number,
@@ -203,23 +225,31 @@ def _predict(
             predicted_hz=float(frequencies[partner]) if partner >= 0 else None,
             mac=None if np.isnan(likeness) else float(likeness),
             modification=modification,
+            predicted_std_hz=deviation,
         )
-        for number, measured, partner, likeness in zip(
-            measurement.numbers, measurement.frequencies, pairing.index, pairing.mac, strict=True
+        for number, measured, partner, likeness, deviation in zip(
+            measurement.numbers,
+            measurement.frequencies,
+            pairing.index,
+            pairing.mac,
+            std,
+            strict=True,
         )
     )
 
 
-def _blocks(case: Case, model: Model, modes: Modes) -> dict[str, Block]:
+def _blocks(
+    case: Case, model: Model, modes: Modes, spread: Spread | None = None
+) -> dict[str, Block]:
     tested = case.measurement.select(chain(case.used, case.held_out))
-    pairs = _predict(model, modes, tested, None)
+    pairs = _predict(model, modes, tested, None, spread)
     shaped = _with_shape(tested)
     first, changes = len(case.used), case.modifications
     parts = {
         "used": (pairs[:first], shaped[:first]),
         "higher": (pairs[first:], shaped[first:]),
         "modified": (  # every mode of every change counts alike
-            tuple(pair for change in changes for pair in modified_modes(model, change)),
+            tuple(pair for change in changes for pair in modified_modes(model, change, spread)),
             [flag for change in changes for flag in _with_shape(change.measurement)],
         ),
     }

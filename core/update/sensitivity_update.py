@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from femubench.core.errors import Diverged, ModelError, NotApplicable, StrategyFailure
+from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.gauss_newton import bounded_step
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import BoolArray, FloatArray
 from femubench.core.update.residuals import Data, Prediction, common_rows, predict
 from femubench.core.update.strategy import ParameterEstimate, UpdateResult
+from femubench.core.update.uncertainty import Uncertainty
 from femubench.core.update.unknowns import Scaling, Unknown, UpdateOptions
 
 _SMALLEST_STEP = 1e-9
@@ -23,7 +25,9 @@ _PATIENCE = 3
 
 
 @dataclass(frozen=True)
-class _Point:
+class Point:
+    """Scaled parameters q, (p,), and what the model predicts there."""
+
     q: FloatArray
     prediction: Prediction
 
@@ -33,7 +37,7 @@ class _Point:
         return float(residual @ residual + precision @ np.square(self.q))
 
 
-class _Iteration:
+class Iteration:
     """State of one update."""
 
     def __init__(
@@ -46,19 +50,25 @@ class _Iteration:
         self.beta = 0.0
         self.converged = False
 
-    def at(self, q: FloatArray, previous: Prediction | None = None) -> _Point:
+    def model_at(self, q: FloatArray) -> Model:
+        """Return the model at scaled parameters, (p,), taken within their limits."""
+        values = self.scaling.values(np.clip(q, self.scaling.lower, self.scaling.upper))
+        return Model.of(self.structure.with_values(self.parameters, values))
+
+    def at(self, q: FloatArray, previous: Prediction | None = None) -> Point:
+        """Return the prediction at scaled parameters, its pairs continued from a previous one."""
         values = self.scaling.values(q)
         structure = self.structure.with_values(self.parameters, values)
-        return _Point(q, predict(self.data, structure, previous))
+        return Point(q, predict(self.data, structure, previous))
 
-    def system(self, point: _Point) -> tuple[FloatArray, FloatArray]:
+    def system(self, point: Point) -> tuple[FloatArray, FloatArray]:
         """Return scaled sensitivities s and residual of the data that have a partner."""
         scale = self.scaling.slope(point.q)
         known = np.isfinite(point.prediction.residual)
         sensitivities = point.prediction.jacobian(self.parameters) * scale
         return sensitivities[known], point.prediction.residual[known]
 
-    def step(self, point: _Point) -> FloatArray:
+    def step(self, point: Point) -> FloatArray:
         """Return dtheta / |theta| = (s's + beta I + P)^-1 (s'r - P q), limits respected."""
         s, residual = self.system(point)
         size, weight = len(point.q), np.sqrt(self.scaling.precision)
@@ -71,13 +81,13 @@ class _Iteration:
         low, high = self.scaling.lower, self.scaling.upper
         return bounded_step(solve, point.q, low, high, self.options.max_step)
 
-    def gain(self, before: _Point, after: _Point) -> float:
+    def gain(self, before: Point, after: Point) -> float:
         """Return the share of the cost that a step took away."""
         rows, precision = common_rows(before.prediction, after.prediction), self.scaling.precision
         cost = before.cost(rows, precision)
         return 1.0 - after.cost(rows, precision) / cost if cost > 0.0 else 0.0
 
-    def promise(self, point: _Point, step: FloatArray) -> float:
+    def promise(self, point: Point, step: FloatArray) -> float:
         """Return the share of the cost that a step would take away were the model linear."""
         s, residual = self.system(point)
         after = residual - s @ step
@@ -90,7 +100,7 @@ class _Iteration:
         blur = _ROUNDING * float(np.linalg.norm(self.data.weight * self.data.target))
         return blur * (2.0 * float(np.sqrt(cost)) + blur)
 
-    def advance(self, point: _Point, step: FloatArray) -> _Point | None:
+    def advance(self, point: Point, step: FloatArray) -> Point | None:
         """Return the next point, the step halved until the cost does not grow; None for none.
 
         Costs that differ by no more than rounding are equal, so that the last steps towards an
@@ -111,7 +121,8 @@ class _Iteration:
                 return trial
         return None
 
-    def run(self) -> _Point:
+    def run(self) -> Point:
+        """Return the optimum; raises StrategyFailure or Diverged where there is none."""
         point = self.at(np.zeros(len(self.unknowns)))
         if not (point.prediction.partner >= 0).any():
             raise StrategyFailure("no mode of the model looks like any measured mode")
@@ -135,7 +146,8 @@ class _Iteration:
         self.check(point)
         return point
 
-    def record(self, iteration: int, point: _Point, step: float) -> None:
+    def record(self, iteration: int, point: Point, step: float) -> None:
+        """Add a step to the history."""
         rows = np.isfinite(point.prediction.residual)
         entry = {
             "iteration": float(iteration),
@@ -147,7 +159,7 @@ class _Iteration:
         entry.update((name, float(v)) for name, v in zip(names, values, strict=True))
         self.history.append(entry)
 
-    def check(self, point: _Point) -> None:
+    def check(self, point: Point) -> None:
         """Raise Diverged where a parameter ended at the limit of its sense."""
         at_limit = (point.q <= self.scaling.lower) | (point.q >= self.scaling.upper)
         for unknown, out in zip(self.unknowns, at_limit, strict=True):
@@ -157,19 +169,38 @@ class _Iteration:
                     f" at iteration {len(self.history) - 1}"
                 )
 
-    def deviations(self, point: _Point) -> FloatArray | None:
-        """Return the posterior standard deviations of the values; None without statistics."""
+    def covariance(self, point: Point) -> FloatArray | None:
+        """Return the posterior covariance of q, (p, p); None without statistics."""
         if not self.data.statistical:
             return None
         s, _ = self.system(point)
-        information = s.T @ s + np.diag(self.scaling.precision)
-        values = self.scaling.values(point.q)
         try:
-            covariance = np.linalg.inv(information)
+            return np.asarray(np.linalg.inv(s.T @ s + np.diag(self.scaling.precision)))
         except np.linalg.LinAlgError:
-            return np.full(len(values), np.inf)
+            return np.full((s.shape[1], s.shape[1]), np.inf)
+
+    def estimates(
+        self, point: Point, covariance: FloatArray | None
+    ) -> tuple[ParameterEstimate, ...]:
+        """Return the parameters before and after, with deviations where they are known."""
+        values = self.scaling.values(point.q)
         grow = np.where(self.scaling.signed, np.abs(self.scaling.start), values)
-        return np.asarray(np.sqrt(np.diagonal(covariance)) * grow)
+        return tuple(
+            ParameterEstimate(
+                name=unknown.parameter.name,
+                before=float(unknown.start),
+                after=float(value),
+                unit=unknown.parameter.unit,
+                std=None if covariance is None else float(np.sqrt(covariance[i, i]) * grow[i]),
+            )
+            for i, (unknown, value) in enumerate(zip(self.unknowns, values, strict=True))
+        )
+
+    def uncertainty(self, point: Point, covariance: FloatArray | None) -> Uncertainty | None:
+        """Return models of the posterior; None where some parameter is not determined at all."""
+        if covariance is None or not np.isfinite(covariance).all():
+            return None
+        return Uncertainty.drawn(self.model_at, point.q, 0.5 * (covariance + covariance.T))
 
 
 def sensitivity_update(
@@ -206,28 +237,18 @@ def sensitivity_update(
     options = UpdateOptions() if options is None else options
     statistical = options.weighting == "statistical"
     data = Data(measurement, options.residual, statistical, options.shapes, statistical)
-    iteration = _Iteration(structure, unknowns, data, options)
+    iteration = Iteration(structure, unknowns, data, options)
     point = iteration.run()
-    values = iteration.scaling.values(point.q)
-    deviations = iteration.deviations(point)
-    estimates = tuple(
-        ParameterEstimate(
-            name=unknown.parameter.name,
-            before=float(unknown.start),
-            after=float(value),
-            unit=unknown.parameter.unit,
-            std=None if deviations is None else float(deviations[i]),
-        )
-        for i, (unknown, value) in enumerate(zip(unknowns, values, strict=True))
-    )
+    covariance = iteration.covariance(point)
     return UpdateResult(
         model=point.prediction.model,
         parameter_count=len(unknowns),
-        parameters=estimates,
+        parameters=iteration.estimates(point, covariance),
         history=tuple(iteration.history),
         diagnostics={
             "iterations": float(len(iteration.history) - 1),
             "converged": float(iteration.converged),
             "paired_modes": float((point.prediction.partner >= 0).sum()),
         },
+        uncertainty=iteration.uncertainty(point, covariance),
     )

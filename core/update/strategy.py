@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from femubench.core.fem.model import Model
     from femubench.core.modal.measurement import Measurement
+    from femubench.core.update.uncertainty import Uncertainty
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ class UpdateResult(Shown):
         parameters: the ones that have a name, with values before and after.
         history: one mapping an iteration, e.g. ``{"residual": 0.1}``.
         diagnostics: any further figures, e.g. the rank of a least-squares problem.
+        uncertainty: how far the model may be off; None where the method does not say.
     """
 
     model: Model
@@ -55,6 +57,7 @@ class UpdateResult(Shown):
     parameters: tuple[ParameterEstimate, ...] = ()
     history: tuple[Mapping[str, float], ...] = ()
     diagnostics: Mapping[str, float] = field(default_factory=dict)
+    uncertainty: Uncertainty | None = None
 
     def rows(self) -> list[tuple[str, str]]:
         """Return the model, and the parameters before and after."""
@@ -66,6 +69,10 @@ class UpdateResult(Shown):
         for p in self.parameters:
             std = "" if p.std is None else f", std {p.std:.2g}"
             found.append((p.name, f"{p.before:.5g} -> {p.after:.5g} {p.unit}".rstrip() + std))
+        if self.uncertainty is not None:
+            samples = counted(len(self.uncertainty.samples), "sample")
+            std = f"{100.0 * self.uncertainty.discrepancy_std:.2g} %"
+            found.append(("uncertainty", f"{samples}, discrepancy of a frequency {std}"))
         return found + [(name, f"{value:.5g}") for name, value in self.diagnostics.items()]
 
 

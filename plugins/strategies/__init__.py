@@ -28,6 +28,7 @@ CLASSES = {
     "strain-energy": "strain_energy:StrainEnergy",
     "multi-start": "multi_start:MultiStart",
     "cma-es": "cma_es:CmaEs",
+    "bayesian-sampling": "sampling:BayesianSampling",
     "diagnosed": "diagnosed:Diagnosed",
 }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -28,7 +29,7 @@ from femubench.diagnosis import (
 )
 from femubench.effect import textbook_values
 from femubench.modal import rigid_modes_of
-from femubench.update import with_measured_frequencies
+from femubench.update import Uncertainty, with_measured_frequencies
 
 # Of the first elastic eigenvalue of the nominal model, as the harness counts them.
 _NEGATIVE = 1e-6
@@ -94,8 +95,14 @@ class Diagnosed(Strategy):
         if not self.meet_frequencies:
             return result
         model = with_measured_frequencies(result.model, measurement)
-        rank = 0 if model.stiffness_change is None else len(model.stiffness_change.core)
-        return replace(result, model=model, diagnostics={**result.diagnostics, "rank": float(rank)})
+        change = model.stiffness_change
+        diagnostics = {**result.diagnostics, "rank": 0.0 if change is None else len(change.core)}
+        uncertainty = result.uncertainty
+        if uncertainty is not None:
+            # What the used modes said last holds for every size of the causes.
+            samples = tuple(replace(s, stiffness_change=change) for s in uncertainty.samples)
+            uncertainty = replace(uncertainty, samples=samples)
+        return replace(result, model=model, diagnostics=diagnostics, uncertainty=uncertainty)
 
     def _extended(self, model: Model, measurement: Measurement) -> UpdateResult:
         """Return the model with the causes in it, or as it was where nothing can be weighed."""
@@ -120,6 +127,7 @@ class Diagnosed(Strategy):
             parameter_count=len(explanation.fit.state.x),
             parameters=_estimates(explanation),
             diagnostics=_figures(examination, explanation),
+            uncertainty=_uncertainty(model, examination, explanation, extended),
         )
 
 
@@ -164,6 +172,22 @@ def _estimates(explanation: Explanation) -> tuple[ParameterEstimate, ...]:
         for cause in causes
         for item in cause.parameters
     )
+
+
+def _uncertainty(
+    model: Model, examination: Examination, explanation: Explanation, extended: Model
+) -> Uncertainty:
+    """Return models with the causes in other sizes, and what the elements' scatter does."""
+    fit = explanation.fit
+    found = Uncertainty.drawn(
+        partial(extended_by, model, explanation),
+        fit.state.x,
+        fit.covariance,
+        discrepancy_std=examination.scatter,
+    )
+    # A cause of another size may have other degrees of freedom.
+    alike = tuple(s for s in found.samples if s.dofs.direction == extended.dofs.direction)
+    return replace(found, samples=alike)
 
 
 def _figures(examination: Examination, explanation: Explanation | None) -> dict[str, float]:

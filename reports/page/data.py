@@ -29,6 +29,7 @@ from femubench.results import (
     Run,
     interval_tail,
     leaderboard,
+    predictive,
     rank_results,
     structures_of,
     tell_apart,
@@ -173,7 +174,19 @@ def _result(result: JobResult, case: int, strategy: int) -> dict[str, Any]:
         "negative": result.negative_eigenvalues or 0,
         "unphysical": result.unphysical,
         "mac": [None if block is None else rounded(block.mean_mac, 5) for block in blocks],
+        "forecast": [_forecast(result, name) for name in BLOCKS],
     }
+
+
+def _forecast(result: JobResult, name: str) -> list[float | None] | None:
+    """Return number of unseen modes of a block, those in their 90 % interval, and summed CRPS."""
+    found = predictive.Forecasts.of([result], {}, blocks=(name,))
+    if not len(found.error):
+        return None
+    stated = bool(found.stated.any())
+    crps = float(predictive.crps_normal(found.error, found.std).sum())
+    covered = int((found.level <= predictive.LEVEL).sum()) if stated else None
+    return [len(found.error), covered, crps]
 
 
 def _statistics(run: Run, order: list[str]) -> dict[str, Any]:

@@ -22,7 +22,7 @@ BLOCKS = ("used", "higher", "modified")
 ROUNDED = {"seconds": 1e-3}  # figures that the page holds with fewer digits
 KEYS = (
     *("rank", "skill", "skill_tests", "used_percent", "higher_percent", "modified_percent"),
-    *("parameters", "seconds"),
+    *("coverage90", "crps_percent", "parameters", "seconds"),
 )
 
 

@@ -16,6 +16,8 @@
     ...(data && data.board && data.board.some((row) => row.skill_drawn !== null) ? [{ key: "skill_drawn", title: "From drawn", down: true, hint: "skill of the start from the models as drawn, against the textbook models too", cell: (row) => value(row.skill_drawn, number) }] : []),
     ...(data && data.board && data.board.some((row) => row.skill_tests !== null) ? [{ key: "skill_tests", title: "On tests", down: true, hint: "skill on tests alone, without computed truths", cell: (row) => value(row.skill_tests, number) }] : []),
     ...(data && data.blocks ? data.blocks : []).map((block, k) => ({ key: `${block}_percent`, title: `${block === "used" ? "given" : block} rms,\u00a0%`, block: k, hint: block === "used" ? "median rms frequency error of the modes that were given; no part of the skill" : `median rms frequency error of the ${block} modes`, cell: (row) => value(row[`${block}_percent`], small) })),
+    { key: "coverage90", title: "In 90\u00a0%", hint: "share of unseen modes in the 90 % interval that the strategy states", cell: (row) => value(row.coverage90, number) },
+    { key: "crps_percent", title: "CRPS,\u00a0%", hint: "continuous ranked probability score of unseen modes in percent of the frequency; the absolute error where no uncertainty is stated", cell: (row) => value(row.crps_percent, small) },
     { key: "flags", title: "Flags", text: true, cell: flagCell },
     { key: "coverage", title: "Coverage", text: true, cell: coverageCell },
     { key: "tier", title: "Tier", hint: "1: no difference from the best shown; 2: none from the best of the others", cell: (row) => el("td", { class: "right" }, bench.count(tiers[row.index])) },

@@ -113,7 +113,22 @@
       logs, perStructure, skills, results, cases: grid.cases, structures: grid.structures,
     };
     data.blocks.forEach((b, k) => (row[`${b}_percent`] = middle(fine, (r) => r.rms[k])));
+    const forecasts = fine.flatMap((r) => filter.blocks.filter((k) => r.forecast[k]).map((k) => [r.c, ...r.forecast[k]]));
+    row.crps_percent = byStructure(forecasts, ([, modes, , crps]) => [modes, crps]);
+    row.coverage90 = byStructure(forecasts.filter(([, , covered]) => covered !== null), ([, modes, covered]) => [modes, covered]);
     return row;
+  }
+  // Return the mean over the modes of every structure, then over structures; null without any.
+  function byStructure(forecasts, parts) {
+    const sums = new Map();
+    for (const item of forecasts) {
+      const { structure } = data.cases[item[0]];
+      const [modes, total] = parts(item);
+      const before = sums.get(structure) || [0, 0];
+      sums.set(structure, [before[0] + modes, before[1] + total]);
+    }
+    const means = [...sums.values()].map(([modes, total]) => total / modes);
+    return means.length ? means.reduce((a, b) => a + b, 0) / means.length : null;
   }
   function sum(results, key) {
     return results.reduce((total, r) => total + (r[key] || 0), 0);
@@ -225,7 +240,7 @@
     const exact = ["rank", "skill", "skill_tests", "rigid_modes_lost", "negative_eigenvalues", "ok", "not_applicable", "total"];
     const errors = data.blocks.map((b) => `${b}_percent`);
     return data.board.flatMap((row) =>
-      [...exact, ...errors, "parameters", "evaluations", "seconds"].flatMap((key) => {
+      [...exact, ...errors, "coverage90", "crps_percent", "parameters", "evaluations", "seconds"].flatMap((key) => {
         const [a, b] = [row[key] ?? null, (mine.get(row.strategy) || {})[key] ?? null];
         const room = key === "seconds" ? 1e-3 : 1e-9;
         const same = a === b || (a !== null && b !== null && Math.abs(a - b) <= room * Math.max(1, Math.abs(a)));

@@ -1,0 +1,57 @@
+"""How often what was measured lies in predicted intervals, against how often it should."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femubench.core.errors import InputError
+from femubench.core.plot.style import SOFT, check_kind, draw_curves, name_of, own_axes
+from femubench.core.schema.results import Run
+from femubench.core.score.predictive import Forecasts
+from femubench.core.score.statistics import structures_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_LEVELS = np.linspace(0.0, 1.0, 101)
+
+
+def calibration(run: Run, *, ax: Axes | None = None) -> Axes:
+    """Draw the coverage of central intervals of every level, a line a strategy with uncertainty.
+
+    Over the unseen modes of all jobs that are ok, every structure with the same weight. Below the
+    diagonal a strategy is surer than it may be, above it less sure than it could be.
+
+    Arguments:
+        run: with results.
+        ax: to draw on; None for axes of a new figure.
+
+    Raises:
+        InputError: when no strategy gave an uncertainty.
+
+    Examples:
+        >>> from femubench.plugins.strategies.bayesian import Bayesian
+        >>> plot.calibration(femubench.rank(case, [Bayesian()])).get_xlabel()
+        'level of the interval'
+    """
+    check_kind(run, (Run,), "strategies")
+    structures = structures_of(run)
+    curves = []
+    for name in dict.fromkeys(result.strategy for result in run.results):
+        fine = [r for r in run.results if r.strategy == name and r.status == "ok"]
+        found = Forecasts.of(fine, structures)
+        if found.stated.any():
+            observed = np.array([found.coverage(level) for level in _LEVELS])
+            curves.append((name_of(name), "predicted", _LEVELS, observed))
+    if not curves:
+        raise InputError(
+            "no strategy of the run says how sure it is", expected="results with an uncertainty"
+        )
+    ax = own_axes(ax, (5.4, 5.0))
+    ax.plot([0.0, 1.0], [0.0, 1.0], color=SOFT, linewidth=0.8, label="calibrated")
+    draw_curves(ax, curves)
+    ax.set(xlabel="level of the interval", ylabel="share of unseen modes in it", ylim=(-0.02, 1.02))
+    ax.legend(fontsize=8.5)
+    return ax

@@ -1,0 +1,281 @@
+"""Bayesian updating by sampling, with a model discrepancy that is inferred beside the parameters.
+
+ln of a measured frequency is that of the model plus normal errors: of the measurement, whose
+standard deviation is known; of the model, whose is not, for what no model of the kind can follow;
+and of the polynomials that stand for the model while sampling.
+
+Source: Kennedy & O'Hagan (2001), J. R. Stat. Soc. B 63, 425-464, for discrepancy and code
+uncertainty; Simoen, De Roeck & Lombaert (2015), Mech. Syst. Signal Process. 56-57, 123-149, for
+updating.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from femubench.core.errors import ModelError, StrategyFailure
+from femubench.core.fem.structure import Structure
+from femubench.core.modal.measurement import Measurement
+from femubench.core.modal.neighbour_modes import followed_frequencies
+from femubench.core.typing import FloatArray
+from femubench.core.update.quadratic_fit import QuadraticFit, coefficients_of
+from femubench.core.update.residuals import Data
+from femubench.core.update.sensitivity_update import Iteration, Point
+from femubench.core.update.strategy import ParameterEstimate, UpdateResult
+from femubench.core.update.uncertainty import Uncertainty
+from femubench.core.update.unknowns import Unknown, UpdateOptions
+
+_MORE = 8  # modes above the highest one that was measured, which samples may mix with it
+_POINTS = 1.5  # solutions for every coefficient of the polynomials
+_WIDER = 1.5  # than the normal approximation, from where the first of them are taken
+_ROUNDS = 3
+_OFF = 0.25  # of a datum's standard deviation: rms error of the polynomials that is let pass
+_SAMPLES = 40
+_WALKERS, _FEWEST_WALKERS = 4, 96  # for each unknown, and in all: few take no less time
+_BLOCK, _LONGEST = 500, 8000  # steps
+_LONG_ENOUGH = 25.0  # autocorrelation times
+_BURN_IN = 3.0  # autocorrelation times
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """What is known beforehand of the relative standard deviation that a model has of its own.
+
+    Arguments:
+        median: of a log-normal prior.
+        spread: standard deviation of its logarithm.
+    """
+
+    median: float
+    spread: float
+
+    def std(self, v: FloatArray) -> FloatArray:
+        """Return the standard deviation at standard normal coordinates."""
+        return np.asarray(self.median * np.exp(self.spread * v))
+
+
+@dataclass(frozen=True)
+class Target:
+    """The posterior density of scaled parameters q and of the discrepancy's coordinate v.
+
+    Arguments:
+        iteration: parameters and their priors.
+        point: the most probable ones at the prior median of the discrepancy.
+        measurement: the modes that have a partner there.
+        discrepancy: its prior.
+    """
+
+    iteration: Iteration
+    point: Point
+    measurement: Measurement
+    discrepancy: Discrepancy
+
+    @property
+    def data(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return logarithms of the data, their standard deviations and which know discrepancy."""
+        m = self.measurement
+        log, std = [*np.log(m.frequencies)], [*(m.frequency_std / m.frequencies)]
+        if m.total_mass is not None:
+            log, std = [*log, np.log(m.total_mass[0])], [*std, m.total_mass[1] / m.total_mass[0]]
+        own = np.arange(len(log)) < len(m)
+        return np.array(log), np.array(std), own.astype(float)
+
+    def predicted(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return those points that give a model, (n, p), and the logarithms of its data, (n, k)."""
+        prediction = self.point.prediction
+        partner = prediction.partner[prediction.partner >= 0]
+        modes = prediction.modes.take(
+            np.arange(min(partner.max() + 1 + _MORE, len(prediction.modes)))
+        )
+        rows, kept = [], []
+        for q in points:
+            try:
+                model = self.iteration.model_at(q)
+                row = followed_frequencies(model, modes)[partner]
+            except ModelError:
+                continue
+            if self.measurement.total_mass is not None:
+                row = np.append(row, model.total_mass)
+            if (row > 0.0).all():
+                rows.append(np.log(row))
+                kept.append(q)
+        if len(rows) < coefficients_of(points.shape[1]):
+            raise StrategyFailure(f"only {len(rows)} of {len(points)} points give a model")
+        return np.array(kept), np.array(rows)
+
+    def std(self, v: FloatArray) -> FloatArray:
+        """Return the rms standard deviation of every datum, discrepancy included, (k,)."""
+        _, std, own = self.data
+        return np.asarray(np.sqrt(std**2 + own * np.mean(np.square(self.discrepancy.std(v)))))
+
+    def log_density(self, fit: QuadraticFit) -> Callable[[FloatArray], FloatArray]:
+        """Return a function from (n, p + 1) to ln of the density, (n,)."""
+        log, std, own = self.data
+        known = np.square(std) + np.square(fit.error)
+        scaling = self.iteration.scaling
+
+        def density(at: FloatArray) -> FloatArray:
+            q, v = at[:, :-1], at[:, -1]
+            variance = known + np.square(self.discrepancy.std(v))[:, None] * own
+            misfit = np.square(log - fit(q)) / variance + np.log(variance)
+            prior = np.square(q) @ scaling.precision + np.square(v)
+            inside = ((q > scaling.lower) & (q < scaling.upper)).all(axis=1)
+            return np.where(inside, -0.5 * (misfit.sum(axis=1) + prior), -np.inf)
+
+        return density
+
+
+def sample_posterior(
+    structure: Structure,
+    unknowns: Sequence[Unknown],
+    measurement: Measurement,
+    rng: np.random.Generator,
+    *,
+    discrepancy: Discrepancy,
+    options: UpdateOptions,
+) -> UpdateResult:
+    """Return the model at the posterior mean, with samples of the posterior.
+
+    Logarithms of frequencies are taken as quadratic in those of the parameters, fitted to solutions
+    near the most probable ones, and anew with more of them until the rms error over the posterior
+    is at most a quarter of each datum's standard deviation, discrepancy included; what is left
+    after three rounds widens the likelihood.
+
+    Arguments:
+        structure: the nominal frame.
+        unknowns: positive parameters, each with a prior.
+        measurement: the used modes, each with a standard deviation.
+        rng: decides on every draw.
+        discrepancy: its prior.
+        options: of the search for the most probable parameters; statistical weighting.
+
+    Raises:
+        NotApplicable: when a frequency has no standard deviation.
+        StrategyFailure: when no measured mode has a partner, too few points give a model, or the
+            chain is too short for its autocorrelation.
+
+    Source: Goodman & Weare (2010), Commun. Appl. Math. Comput. Sci. 5, 65-80, as implemented by
+    Foreman-Mackey, Hogg, Lang & Goodman (2013), PASP 125, 306-312.
+    """
+    target, covariance = most_probable(structure, unknowns, measurement, discrepancy, options)
+    count = int(np.ceil(_POINTS * coefficients_of(len(unknowns))))
+    root = np.asarray(np.linalg.cholesky(covariance))
+    start = target.point.q + rng.standard_normal((count, len(unknowns))) @ root.T * _WIDER
+    points, values = target.predicted(start)
+    for _ in range(_ROUNDS):
+        fit = QuadraticFit.of(points, values)
+        sampler = _started(target, fit, root, rng)
+        drawn = sampler.get_chain(discard=_BLOCK // 2, flat=True)
+        drawn = drawn[rng.choice(len(drawn), count, replace=False)]
+        more, exact = target.predicted(drawn[:, :-1])
+        off = np.sqrt(np.mean(np.square(fit(more) - exact), axis=0))
+        if (off <= _OFF * target.std(drawn[:, -1])).all():
+            break
+        points, values = np.vstack([points, more]), np.vstack([values, exact])
+    chain, found = _settled(sampler)
+    drawn = chain[rng.choice(len(chain), _SAMPLES, replace=False), :-1]
+    return _result(target, chain, drawn, {**found, "surrogate_error": float(off.max())})
+
+
+def most_probable(
+    structure: Structure,
+    unknowns: Sequence[Unknown],
+    measurement: Measurement,
+    discrepancy: Discrepancy,
+    options: UpdateOptions,
+) -> tuple[Target, FloatArray]:
+    """Return the posterior about its mode at the median discrepancy, and the covariance of q there.
+
+    Arguments:
+        structure, unknowns, measurement, discrepancy, options: as for `sample_posterior`.
+
+    Raises:
+        NotApplicable: when a frequency has no standard deviation.
+        StrategyFailure: when no measured mode has a partner.
+    """
+    std = np.hypot(measurement.frequency_std, discrepancy.median * measurement.frequencies)
+    whole = replace(measurement, frequency_std=std)
+    iteration = Iteration(
+        structure, unknowns, Data(whole, options.residual, True, options.shapes, True), options
+    )
+    point = iteration.run()
+    covariance = iteration.covariance(point)
+    assert covariance is not None
+    pairs = zip(measurement.numbers, point.prediction.partner, strict=True)
+    kept = measurement.select([number for number, partner in pairs if partner >= 0])
+    return Target(iteration, point, kept, discrepancy), covariance
+
+
+def _started(target: Target, fit: QuadraticFit, root: FloatArray, rng: np.random.Generator) -> Any:  # noqa: ANN401 - emcee's sampler, which has no types
+    """Return an `emcee.EnsembleSampler` of q and v after its first steps.
+
+    Arguments:
+        root: of the covariance about the most probable parameters, (p, p).
+    """
+    import emcee
+
+    size = len(root) + 1
+    walkers = max(_WALKERS * size, _FEWEST_WALKERS)
+    near = rng.standard_normal((walkers, size))
+    near[:, :-1] = target.point.q + near[:, :-1] @ root.T
+    low, high = target.iteration.scaling.lower, target.iteration.scaling.upper
+    near[:, :-1] = np.clip(near[:, :-1], 0.99 * low, 0.99 * high)
+    sampler = emcee.EnsembleSampler(walkers, size, target.log_density(fit), vectorize=True)
+    sampler.random_state = np.random.RandomState(int(rng.integers(2**32))).get_state()
+    sampler.run_mcmc(near, _BLOCK)
+    return sampler
+
+
+def _settled(sampler: Any) -> tuple[FloatArray, dict[str, float]]:  # noqa: ANN401 - emcee's
+    """Return draws of q and v, (n, p + 1), after so many steps as they need, and how many.
+
+    Raises:
+        StrategyFailure: when the longest chain is too short for its autocorrelation.
+    """
+    while True:
+        time = float(np.max(sampler.get_autocorr_time(tol=0)))
+        if sampler.iteration >= _LONG_ENOUGH * time:
+            break
+        if sampler.iteration >= _LONGEST:
+            raise StrategyFailure(
+                f"{sampler.iteration} steps are {sampler.iteration / time:.0f} autocorrelation "
+                f"times, expected {_LONG_ENOUGH:g} at least"
+            )
+        sampler.run_mcmc(None, _BLOCK)
+    chain = sampler.get_chain(discard=int(np.ceil(_BURN_IN * time)), flat=True)
+    return chain, {
+        "steps": float(sampler.iteration),
+        "autocorrelation_time": time,
+        "effective_samples": len(chain) / time,
+    }
+
+
+def _result(
+    target: Target, chain: FloatArray, drawn: FloatArray, diagnostics: dict[str, float]
+) -> UpdateResult:
+    iteration = target.iteration
+    q, std = chain[:, :-1].mean(axis=0), chain[:, :-1].std(axis=0)
+    own = target.discrepancy.std(chain[:, -1])
+    parameters = tuple(
+        ParameterEstimate(
+            u.parameter.name, u.start, float(value), u.parameter.unit, float(value * s)
+        )
+        for u, value, s in zip(iteration.unknowns, iteration.scaling.values(q), std, strict=True)
+    )
+    rms = float(np.sqrt(np.mean(np.square(own))))
+    return UpdateResult(
+        model=iteration.model_at(q),
+        parameter_count=len(parameters),
+        parameters=parameters,
+        diagnostics={
+            "discrepancy_std": rms,
+            "discrepancy_median": float(np.median(own)),
+            **diagnostics,
+            "paired_modes": float(len(target.measurement)),
+        },
+        uncertainty=Uncertainty(tuple(iteration.model_at(row) for row in drawn), rms),
+    )

@@ -1,0 +1,104 @@
+"""Sampling the posterior: the polynomial, the chain, the discrepancy."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femubench import Measurement, StrategyFailure, UpdateResult
+from femubench.core.update import posterior_sampling
+from femubench.core.update.quadratic_fit import QuadraticFit, coefficients_of
+from femubench.plugins.strategies.sampling import BayesianSampling
+from femubench.update import Discrepancy
+
+sys.path.insert(0, str(Path(__file__).parent / "toys"))
+import harness_toys as toys
+
+CASE = toys.tiny_case()
+
+
+def sampled(measurement: Measurement, seed: int = 1, **options: float) -> UpdateResult:
+    strategy = BayesianSampling(**options)  # type: ignore[arg-type]
+    return strategy.update(CASE.model, measurement, np.random.default_rng(seed))
+
+
+def test_a_quadratic_function_is_met_and_others_have_their_error() -> None:
+    rng = np.random.default_rng(5)
+    points = rng.standard_normal((40, 3)) * [0.1, 1.0, 5.0] + [1.0, 0.0, -2.0]
+    square = rng.standard_normal((3, 3))
+    exact = 0.5 + points @ [1.0, -2.0, 0.3] + np.einsum("ni,ij,nj->n", points, square, points)
+    bent = exact + 0.2 * points[:, 1] ** 3
+    fit = QuadraticFit.of(points, np.column_stack([exact, bent]))
+    assert fit(points)[:, 0] == pytest.approx(exact, rel=1e-9)
+    assert fit.error[0] < 1e-9
+    left_out = []
+    for k in range(len(points)):
+        kept = np.arange(len(points)) != k
+        again = QuadraticFit.of(points[kept], bent[kept, None])
+        left_out.append(again(points[k : k + 1])[0, 0] - bent[k])
+    assert fit.error[1] == pytest.approx(np.sqrt(np.mean(np.square(left_out))), rel=1e-9)
+    assert coefficients_of(3) == 10
+
+
+def test_the_posterior_is_that_of_exact_solutions() -> None:
+    """Weighed draws of a wider distribution, every one solved, give the same mean and spread."""
+    measurement, discrepancy = CASE.used_measurement(), Discrepancy(0.02, 0.01)
+    strategy = BayesianSampling(discrepancy_median=0.02, discrepancy_spread=0.01)
+    unknowns = strategy.unknowns(CASE.model.frame_structure, weighed=False)
+    target, covariance = posterior_sampling.most_probable(
+        CASE.model.frame_structure, unknowns, measurement, discrepancy, strategy.options
+    )
+    rng = np.random.default_rng(0)
+    z = 1.8 * rng.standard_normal((700, len(unknowns)))
+    points, values = target.predicted(target.point.q + z @ np.linalg.cholesky(covariance).T)
+    assert len(points) == len(z)
+    log, _, _ = target.data
+    misfit = np.square((log - values) / target.std(np.zeros(1))).sum(axis=1)
+    posterior = -0.5 * (misfit + np.square(points) @ target.iteration.scaling.precision)
+    weight = np.exp(posterior + 0.5 * np.square(z / 1.8).sum(axis=1))
+    weight /= weight.sum()
+    assert 1.0 / np.square(weight).sum() > 100.0
+    mean = weight @ points
+    std = np.sqrt(weight @ np.square(points - mean))
+    found = strategy.update(CASE.model, measurement, np.random.default_rng(1))
+    for k, parameter in enumerate(found.parameters):
+        assert parameter.std is not None
+        assert abs(np.log(parameter.after) - mean[k]) < 0.3 * std[k]
+        assert parameter.std / parameter.after == pytest.approx(std[k], rel=0.25)
+
+
+def test_the_discrepancy_grows_with_what_the_model_cannot_follow() -> None:
+    measurement = CASE.used_measurement()
+    spoiled = replace(measurement, frequencies=measurement.frequencies * [1.0, 1.25, 0.8])
+    fine, odd = sampled(measurement), sampled(spoiled)
+    assert fine.diagnostics["discrepancy_median"] < 0.02
+    assert odd.diagnostics["discrepancy_median"] > 0.03
+    for result in (fine, odd):
+        assert result.uncertainty is not None
+        assert result.uncertainty.discrepancy_std == result.diagnostics["discrepancy_std"]
+        assert len(result.uncertainty.samples) == 40
+        assert result.diagnostics["effective_samples"] > 1000.0
+        assert result.diagnostics["surrogate_error"] < 0.01
+
+
+def test_the_generator_alone_decides_on_the_result(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(posterior_sampling, "_LONG_ENOUGH", 5.0)
+    measurement = CASE.used_measurement()
+    np.random.seed(1)  # noqa: NPY002 - what other code may have done
+    first = sampled(measurement)
+    np.random.seed(2)  # noqa: NPY002
+    second = sampled(measurement)
+    assert first.parameters == second.parameters
+    assert first.diagnostics == second.diagnostics
+    assert (first.model.stiffness != second.model.stiffness).nnz == 0
+
+
+def test_a_chain_that_is_too_short_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(posterior_sampling, "_LONGEST", 500)
+    monkeypatch.setattr(posterior_sampling, "_LONG_ENOUGH", 400.0)
+    with pytest.raises(StrategyFailure, match=r"^500 steps are \d+ autocorrelation times, expec"):
+        sampled(CASE.used_measurement())
