@@ -20,7 +20,7 @@ from unseen import mean_ratio, unseen_logs
 
 import femubench
 from femubench import Run
-from femubench.core.library.rank import Nominal
+from femubench.core.schema.results import Nominal
 
 WHOLE, ZERO = "diagnosed", "textbook"
 PARTS = {

@@ -77,7 +77,7 @@ class MarkdownReporter:
             *_leaderboard(run),
             lead(run),
             *_FOOTNOTES,
-            *_floors(run),
+            floors_sentence(run),
             *_coverage(run),
             *chain.from_iterable(
                 _case(
@@ -147,17 +147,16 @@ def _leaderboard(run: Run) -> Iterator[str]:
     yield f"**tier, group**: {escape(tested.note)}"
 
 
-def _floors(run: Run) -> Iterator[str]:
+def floors_sentence(run: Run) -> str:
     """Return which ranks rest on what is added to all errors."""
     ranks = ranks_by_floor(run)
     moved = {name: found for name, found in ranks.items() if len(set(found)) > 1}
     floors = ", ".join(f"{floor:g}" for floor in FLOORS)
     said = f"**Ranks with {floors} % added to all errors**: "
     if not moved:
-        yield f"{said}the same."
-        return
+        return f"{said}the same."
     named = (f"{escape(name)} {', '.join(map(str, found))}" for name, found in moved.items())
-    yield f"{said}the same but for {'; '.join(named)}."
+    return f"{said}the same but for {'; '.join(named)}."
 
 
 def _coverage(run: Run) -> Iterator[str]:

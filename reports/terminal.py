@@ -32,20 +32,28 @@ class TerminalReporter:
 
     def render(self, run: Run) -> str:
         """Return the ranking, the failures and what the columns mean."""
-        board = leaderboard(run)
-        parts = [ranking(board)]
-        if interval_kind(run) == "seeds":
-            parts.append(intervals(board))
-        parts.append("\n".join(_legend(run, board)))
-        if board["skill_tests"].notna().any():
-            parts.append(_tests(board))
-        if len(board) > 1:
-            parts.append(_first_tier(run, board))
+        parts = [board_text(run)]
         failed = troubles(run.results)
         if failed:
             parts.append(failures(failed))
         parts += [textwrap.fill(text, WIDTH) for text in _notes(run)]
         return "\n\n".join(parts)
+
+
+def board_text(run: Run) -> str:
+    """Return the ranking, what its columns mean, and which strategies differ from the best."""
+    board = leaderboard(run)
+    parts = [ranking(board)]
+    if interval_kind(run) == "seeds":
+        parts.append(intervals(board))
+    parts.append("\n".join(_legend(run, board)))
+    if board["skill_tests"].notna().any():
+        parts.append(_tests(board))
+    if board["coverage90"].notna().any():
+        parts.append(_stated(board))
+    if len(board) > 1:
+        parts.append(_first_tier(run, board))
+    return "\n\n".join(parts)
 
 
 def ranking(board: pd.DataFrame) -> str:
@@ -130,6 +138,13 @@ def _tests(board: pd.DataFrame) -> str:
         f"{_marks(row)}{plain(row['strategy'])} {fixed(row['skill_tests'], 2)}" for _, row in rows
     )
     return textwrap.fill(f"skill on tests alone, no computed truths: {', '.join(named)}", WIDTH)
+
+
+def _stated(board: pd.DataFrame) -> str:
+    """Return how often the intervals that strategies state hold the truth."""
+    rows = board[board["coverage90"].notna()].to_dict("records")
+    named = (f"{plain(row['strategy'])} {100.0 * row['coverage90']:.0f} %" for row in rows)
+    return textwrap.fill(f"unseen modes inside the stated 90 % interval: {', '.join(named)}", WIDTH)
 
 
 def _first_tier(run: Run, board: pd.DataFrame) -> str:

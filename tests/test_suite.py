@@ -12,14 +12,11 @@ import numpy as np
 import pytest
 
 from femubench import read_case
-from femubench.core.library.cases import read_cases
-from femubench.core.plugin.loader import load_plugins
 from femubench.core.score.scoring import reference_of
-from femubench.results import run_jobs
 from truths.published import write_garteur
 
 sys.path.insert(0, str(Path(__file__).parent))
-from printed_boards import assert_board_is_that_of
+from printed_boards import assert_board_is_that_of, assert_same_errors, stored
 
 ROOT = Path(__file__).parents[1]
 SUITE = ROOT / "scenarios" / "suite"
@@ -80,8 +77,12 @@ def test_no_two_structures_share_their_geometry() -> None:
         assert not alike or np.abs(shapes[one] - shapes[two]).max() > 0.01, (one, two)
 
 
-@pytest.mark.sweep
-def test_the_board_of_all_structures() -> None:
-    plugins = load_plugins()
-    run = run_jobs(read_cases(["suite"], plugins), list(plugins.strategies.values()), jobs=2)
+def test_the_board_of_all_structures_is_that_of_the_run_kept() -> None:
+    run = stored("suite")
+    assert set(run.meta["cases"]) == {f"suite/{name}" for name in NAMES}
     assert_board_is_that_of(run, "docs/suite.md")
+
+
+@pytest.mark.sweep
+def test_the_run_kept_is_what_runs_today() -> None:
+    assert_same_errors(stored("suite"), femubench.rank("suite", jobs=2))

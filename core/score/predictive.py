@@ -15,11 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from femubench.core.schema.results import BLOCKS, JobResult, PairedMode
+from femubench.core.schema.results import UNSEEN, JobResult, PairedMode
 from femubench.core.typing import BoolArray, FloatArray, IntArray
 
 COLUMNS = ("coverage90", "crps_percent", "log_score")
-UNSEEN = tuple(name for name in BLOCKS if name != "used")
 LEVEL = 0.9
 LOST_PERCENT = 100.0  # the error of a mode that the model does not have
 # A forecast never excludes the rest: it is mixed with so much of anything within 100 %. A lost mode

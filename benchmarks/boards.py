@@ -1,0 +1,108 @@
+"""The leaderboards that README and docs print: run, kept in docs/figures, put into the pages.
+
+python benchmarks/boards.py default      # README.md; minutes on two cores
+python benchmarks/boards.py suite        # docs/suite.md
+python benchmarks/boards.py noise        # docs/noise.md
+python benchmarks/boards.py default --from run.json    # of a run that is there
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import femubench
+from femubench import Run
+from femubench.core.display import counted
+from femubench.reports.markdown import floors_sentence
+from femubench.reports.terminal import board_text
+from femubench.results import run_to_json
+
+ROOT = Path(__file__).parents[1]
+_BEGIN, _END = "<!-- {} -->\n", "<!-- /{} -->"
+_META = (
+    *("run", "started", "seed", "seeds", "versions", "machine", "cases", "strategies", "baseline"),
+    *("structures", "classes", "yardstick", "starts", "alike", "reference"),
+)
+
+
+@dataclass(frozen=True)
+class Board:
+    """A leaderboard in a page.
+
+    Arguments:
+        page: where it stands, between marks of its name.
+        cases: words of `bench run`; the default set where there are none.
+        seeds: draws of noise; None for the data as recorded.
+        modes: whether the frequencies are kept too.
+    """
+
+    page: str
+    cases: tuple[str, ...] = ()
+    seeds: int | None = None
+    modes: bool = False
+
+
+BOARDS = {
+    "default": Board("README.md", modes=True),
+    "suite": Board("docs/suite.md", ("suite",)),
+    "noise": Board("docs/noise.md", ("frame", "hframe", "frame-solid", "hframe-solid"), 3),
+}
+
+
+def file_of(name: str) -> Path:
+    """Return where the results of a board are kept."""
+    return ROOT / "docs" / "figures" / f"board-{name}.json"
+
+
+def slim(run: Run, *, modes: bool) -> Run:
+    """Return a run with what a leaderboard rests on."""
+    bare = {"parameters": (), "history": (), "diagnostics": {}, "traceback": "", "key": ""}
+    kept = []
+    for result in run.results:
+        blocks = dict(result.blocks)
+        # An uncertainty is scored mode by mode.
+        if not modes and not any(m.predicted_std_hz for b in blocks.values() for m in b.modes):
+            blocks = {name: replace(block, modes=()) for name, block in blocks.items()}
+        kept.append(replace(result, blocks=blocks, provenance={}, **bare))
+    return Run({name: run.meta[name] for name in _META if name in run.meta}, tuple(kept))
+
+
+def put(name: str, text: str, page: Path) -> None:
+    """Put a text between the marks of a page.
+
+    Raises:
+        ValueError: where the page has no such marks.
+    """
+    before, mark, rest = page.read_text(encoding="utf-8").partition(_BEGIN.format(name))
+    _, end, after = rest.partition(_END.format(name))
+    if not mark or not end:
+        raise ValueError(f"{page} has no marks {name!r}")
+    page.write_text(f"{before}{mark}{text}\n{end}{after}", encoding="utf-8")
+
+
+def main() -> None:
+    """Run a board, keep it and print it into its page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("board", choices=BOARDS)
+    parser.add_argument("--from", dest="file", help="a file of `bench run --json`")
+    parser.add_argument("--jobs", type=int, help="worker processes")
+    words = parser.parse_args()
+    board = BOARDS[words.board]
+    if words.file:
+        run = femubench.read_run(words.file)
+    else:
+        run = femubench.rank(board.cases, seeds=board.seeds, jobs=words.jobs)
+    run = slim(run, modes=board.modes)
+    plain = json.dumps(run_to_json(run), indent=None, separators=(",", ":"))
+    file_of(words.board).write_text(plain.replace('{"case"', '\n{"case"') + "\n", encoding="utf-8")
+    put("leaderboard", f"```\n{board_text(run)}\n```", ROOT / board.page)
+    if words.board == "default":
+        put("floors", floors_sentence(run), ROOT / "docs" / "scoring.md")
+    print(f"{counted(len(run.results), 'job')} in {file_of(words.board)}")
+
+
+if __name__ == "__main__":
+    main()
