@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -52,7 +53,9 @@ class CmaEs(FactorStrategy):
             NotApplicable: when the model has no such parameters.
             StrategyFailure: when no mode of the model looks like any measured mode.
         """
-        import cma  # it takes longer to import than most updates take
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that it cannot draw without matplotlib
+            import cma  # here, since it takes longer to import than most updates take
 
         parts = stiffness_parts(model, self.parameters)
         space = modal_space(parts, measurement, shape_weight=self.shape_weight, size=self.basis)
