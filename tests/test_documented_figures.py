@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
+import femubench
 from femubench import Run
 from femubench.core.cli.main import bench
 from femubench.core.library.cases import read_cases

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import femubench
 from femubench import read_case
 from femubench.core.score.scoring import reference_of
 from truths.published import write_garteur
