@@ -160,6 +160,17 @@ def sample_posterior(
 
     Source: Goodman & Weare (2010), Commun. Appl. Math. Comput. Sci. 5, 65-80, as implemented by
     Foreman-Mackey, Hogg, Lang & Goodman (2013), PASP 125, 306-312.
+
+    Examples:
+        >>> factor = update.global_stiffness(structure, prior_std=0.1)
+        >>> own = update.Discrepancy(median=0.02, spread=0.7)
+        >>> options = update.UpdateOptions(weighting="statistical")
+        >>> rng = np.random.default_rng(0)
+        >>> found = update.sample_posterior(
+        ...     structure, [factor], measurement, rng, discrepancy=own, options=options
+        ... )
+        >>> len(found.uncertainty.samples)
+        40
     """
     target, covariance = most_probable(structure, unknowns, measurement, discrepancy, options)
     count = int(np.ceil(_POINTS * coefficients_of(len(unknowns))))
