@@ -43,7 +43,7 @@ DANGEROUS = (
 )
 HARMLESS = [toy for toy in toys.FAULTS if toy not in DANGEROUS]
 BUILT_IN = load_plugins()
-SLOW = ("spring", "offset", "bayesian", "diagnosed")
+SLOW = ("spring", "offset", "bayesian", "bayesian-sampling", "diagnosed")
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from femubench.core.score.statistics import structures_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_LEVELS = np.linspace(0.0, 1.0, 101)
+_LEVELS = np.linspace(0.0, 0.99, 100)
 
 
 def calibration(run: Run, *, ax: Axes | None = None) -> Axes:

@@ -160,11 +160,33 @@ def sample_posterior(
 
     Source: Goodman & Weare (2010), Commun. Appl. Math. Comput. Sci. 5, 65-80, as implemented by
     Foreman-Mackey, Hogg, Lang & Goodman (2013), PASP 125, 306-312.
+
+    Examples:
+        >>> factor = update.global_stiffness(structure, prior_std=0.1)
+        >>> own = update.Discrepancy(median=0.02, spread=0.7)
+        >>> options = update.UpdateOptions(weighting="statistical")
+        >>> rng = np.random.default_rng(0)
+        >>> found = update.sample_posterior(
+        ...     structure, [factor], measurement, rng, discrepancy=own, options=options
+        ... )
+        >>> len(found.uncertainty.samples)
+        40
     """
     target, covariance = most_probable(structure, unknowns, measurement, discrepancy, options)
-    count = int(np.ceil(_POINTS * coefficients_of(len(unknowns))))
-    root = np.asarray(np.linalg.cholesky(covariance))
-    start = target.point.q + rng.standard_normal((count, len(unknowns))) @ root.T * _WIDER
+    sampler, off = _fitted(target, np.asarray(np.linalg.cholesky(covariance)), rng)
+    chain, found = _settled(sampler)
+    drawn = chain[rng.choice(len(chain), _SAMPLES, replace=False), :-1]
+    return _result(target, chain, drawn, {**found, "surrogate_error": off})
+
+
+def _fitted(target: Target, root: FloatArray, rng: np.random.Generator) -> tuple[Any, float]:
+    """Return a sampler after its first steps, and the largest error of the polynomials there.
+
+    Arguments:
+        root: of the covariance about the most probable parameters, (p, p).
+    """
+    count = int(np.ceil(_POINTS * coefficients_of(len(root))))
+    start = target.point.q + rng.standard_normal((count, len(root))) @ root.T * _WIDER
     points, values = target.predicted(start)
     for _ in range(_ROUNDS):
         fit = QuadraticFit.of(points, values)
@@ -176,9 +198,7 @@ def sample_posterior(
         if (off <= _OFF * target.std(drawn[:, -1])).all():
             break
         points, values = np.vstack([points, more]), np.vstack([values, exact])
-    chain, found = _settled(sampler)
-    drawn = chain[rng.choice(len(chain), _SAMPLES, replace=False), :-1]
-    return _result(target, chain, drawn, {**found, "surrogate_error": float(off.max())})
+    return sampler, float(off.max())
 
 
 def most_probable(
