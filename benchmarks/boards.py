@@ -12,6 +12,7 @@ import argparse
 import json
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import femubench
 from femubench import Run
@@ -70,6 +71,16 @@ def slim(run: Run, *, modes: bool) -> Run:
     return Run({name: run.meta[name] for name in _META if name in run.meta}, tuple(kept))
 
 
+def brief(data: Any) -> Any:  # noqa: ANN401 - JSON data of any form
+    """Return plain data with eight digits, and without what a reader takes for granted."""
+    if isinstance(data, float):
+        return float(f"{data:.8g}")
+    if isinstance(data, dict):
+        needed = ("predicted_hz", "mac")
+        return {k: brief(v) for k, v in data.items() if k in needed or v not in (None, "", [], {})}
+    return [brief(item) for item in data] if isinstance(data, list) else data
+
+
 def put(name: str, text: str, page: Path) -> None:
     """Put a text between the marks of a page.
 
@@ -96,8 +107,8 @@ def main() -> None:
     else:
         run = femubench.rank(board.cases, seeds=board.seeds, jobs=words.jobs)
     run = slim(run, modes=board.modes)
-    plain = json.dumps(run_to_json(run), indent=None, separators=(",", ":"))
-    file_of(words.board).write_text(plain.replace('{"case"', '\n{"case"') + "\n", encoding="utf-8")
+    text = json.dumps(brief(run_to_json(run)), separators=(",", ":"))
+    file_of(words.board).write_text(text.replace('{"case"', '\n{"case"') + "\n", encoding="utf-8")
     put("leaderboard", f"```\n{board_text(run)}\n```", ROOT / board.page)
     if words.board == "default":
         put("floors", floors_sentence(run), ROOT / "docs" / "scoring.md")

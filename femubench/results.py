@@ -9,9 +9,9 @@ from femubench.core.schema.results import Block, JobResult, PairedMode, Run
 from femubench.core.score import predictive
 from femubench.core.score.counting import block_weights, counted_blocks
 from femubench.core.score.leaderboard import (
-    COMPUTED,
     FLOORS,
     interval_kind,
+    is_test,
     leaderboard,
     ranks_by_floor,
     scored_on,
@@ -28,7 +28,6 @@ from femubench.core.score.statistics import (
 
 __all__ = [
     "Block",
-    "COMPUTED",
     "FEWEST",
     "FLOORS",
     "JobResult",
@@ -46,6 +45,7 @@ __all__ = [
     "frequency_error",
     "interval_kind",
     "interval_tail",
+    "is_test",
     "leaderboard",
     "modes_frame",
     "predict_block",

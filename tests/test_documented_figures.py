@@ -21,12 +21,14 @@ from femubench import Run
 from femubench.core.cli.main import bench
 from femubench.core.library.cases import read_cases
 from femubench.core.plugin.loader import load_plugins
+from femubench.core.schema.results import Nominal
 from femubench.reproduction import VERDICTS
-from femubench.results import JobResult, leaderboard
+from femubench.results import JobResult, leaderboard, tell_apart
 
 sys.path.insert(0, str(Path(__file__).parent))
 from printed_boards import (
     ROOT,
+    as_printed,
     assert_board_is_that_of,
     assert_same_errors,
     stored,
@@ -34,7 +36,7 @@ from printed_boards import (
 )
 
 PAGES = ("README.md", *(f"docs/{path.name}" for path in sorted((ROOT / "docs").glob("*.md"))))
-NUMBERS = {"eleven": 11, "twelve": 12, "twenty-five": 25}
+NUMBERS = {"eleven": 11, "twelve": 12, "seventeen": 17, "twenty-three": 23, "twenty-five": 25}
 QUICK = (
     *("unchanged", "textbook", "baruch", "berman", "global", "local", "bayesian", "physical"),
     *("eigensensitivity", "sparse", "diagnosed"),
@@ -52,8 +54,9 @@ def rows(run: Run) -> dict[str, dict[str, Any]]:
     return {row["strategy"]: row for row in leaderboard(run).to_dict("records")}
 
 
-def result(run: Run, case: str, strategy: str) -> JobResult:
-    (found,) = (r for r in run.ranked if (r.case, r.strategy) == (case, strategy))
+def result(run: Run, case: str, strategy: str, nominal: Nominal = "textbook") -> JobResult:
+    chosen = run.started_from(nominal)
+    (found,) = (r for r in chosen if (r.case, r.strategy) == (case, strategy))
     return found
 
 
@@ -82,18 +85,87 @@ def test_all_of_the_run_kept_is_what_runs_today(run: Run) -> None:
     assert_same_errors(run, femubench.rank(jobs=2))
 
 
-# PROSE
+@pytest.mark.parametrize(("case", "strategy"), [("hframe", "diagnosed"), ("frame", "baruch")])
+def test_frequencies_of_the_higher_modes(run: Run, case: str, strategy: str) -> None:
+    nominal: Nominal = "textbook" if strategy == "diagnosed" else "drawn"
+    pattern = {
+        "diagnosed": r"at (\d+) and (\d+) Hz \(measured (\d+) and (\d+)\)",
+        "baruch": r"at (\d+) and (\d+) Hz, where (\d+) and (\d+) Hz were measured",
+    }
+    modes = result(run, case, strategy, nominal).blocks["higher"].modes[:2]
+    found = [mode.predicted_hz for mode in modes] + [mode.measured_hz for mode in modes]
+    assert [as_printed(text) for text in only(pattern[strategy], "README.md")] == found
 
 
-@pytest.mark.parametrize("page", ["docs/strategies-matrix.md", "docs/strategies-element.md"])
-def test_numbers_of_unknowns(run: Run, page: str) -> None:
+def test_the_textbook_model_of_the_ladder(run: Run) -> None:
+    modes = result(run, "frame", "textbook", "drawn").blocks["higher"].modes[:2]
+    said = only(r"the textbook model has them at (\d+) and (\d+) Hz", "README.md")
+    assert [as_printed(text) for text in said] == [mode.predicted_hz for mode in modes]
+
+
+def test_how_many_meet_what_they_were_given(run: Run) -> None:
+    met = [
+        r
+        for r in run.ranked
+        if r.case == "frame" and r.status == "ok" and r.blocks["used"].rms_percent < 0.1
+    ]
+    often, of = only(r"(\S+) of the (\S+) strategies meet them within 0\.1 %", "README.md")
+    assert (NUMBERS[often], NUMBERS[of]) == (len(met), len(run.meta["strategies"]))
+    (worse,) = only(r"(\S+) of these predict the next two worse than the handbook", "README.md")
+    assert NUMBERS[worse] == sum((item.score or 0.0) > 1.005 for item in met)
+
+
+def test_what_the_readme_says_of_the_board(run: Run, rows: dict[str, dict[str, Any]]) -> None:
+    text = text_of("README.md")
+    best, second = list(rows)[:2]
+    assert best == "diagnosed"
+    for name, key, pattern in (
+        (best, "skill", r"leads with (0\.\d+)"),
+        (best, "skill_tests", r"two published tests \((0\.\d+)\)"),
+        (best, "skill_low", r"interval reaches from (-0\.\d+) to"),
+        (best, "skill_high", r"interval reaches from -0\.\d+ to (0\.\d+)"),
+        ("berman", "skill", r"take away (0\.\d+) and 0\.\d+ of"),
+        ("baruch", "skill", r"take away 0\.\d+ and (0\.\d+) of"),
+        (best, "skill_drawn", r"`diagnosed` \((0\.\d+)\), which knows"),
+        ("global", "skill_drawn", r"`global` \((0\.\d+)\), one factor"),
+    ):
+        (said,) = only(pattern, "README.md")
+        assert rows[name][key] == as_printed(said), (name, key)
+    own, rival = only(r"there its skill is (0\.\d+), the next one's (0\.\d+)")
+    assert (rows[best]["skill"], rows[second]["skill"]) == (as_printed(own), as_printed(rival))
+    assert "no strategy is shown to differ from it" in text
+    assert set(tell_apart(run, list(rows)).tiers[0]) == set(rows)
+    above = {name for name, row in rows.items() if row["skill_low"] > 1e-9}
+    assert above == {"berman", "baruch"}
+    data = {name: row for name, row in rows.items() if name not in ("unchanged", "textbook")}
+    past = {name for name, row in data.items() if row["skill_drawn"] > 0.0}
+    assert past == {"diagnosed", "global"}
+    worse = [name for name, row in data.items() if row["skill"] < 0.0]
+    said, of = only(r"(\S+) of the (\S+) leave it worse", "README.md")
+    assert (NUMBERS[said], NUMBERS[of]) == (len(worse), len(data))
+
+
+def test_the_stated_uncertainties(rows: dict[str, dict[str, Any]]) -> None:
+    pattern = (
+        r"unseen modes (\d+) % lie in the 90 % intervals of `bayesian-sampling`.{0,80}those of "
+        r"`bayesian` and `diagnosed`, which do not, (\d+) % and (\d+) %"
+    )
+    said = only(pattern, "README.md")
+    names = ("bayesian-sampling", "bayesian", "diagnosed")
+    assert [as_printed(text) for text in said] == [100.0 * rows[n]["coverage90"] for n in names]
+
+
+@pytest.mark.parametrize(
+    ("page", "count"), [("docs/strategies-matrix.md", 6), ("docs/strategies-element.md", 5)]
+)
+def test_numbers_of_unknowns(run: Run, page: str, count: int) -> None:
     """The last column of the first table: on the ladder of the first paper."""
     text = (ROOT / page).read_text(encoding="utf-8")
     table = text.partition("\n\n## ")[0]
     listed = re.findall(r"^\| `([a-z-]+)` \|.*\| (\d+) \|$", table, re.M)
-    assert len(listed) == 5
-    for strategy, count in listed:
-        assert result(run, "frame", strategy).parameter_count == int(count)
+    assert len(listed) == count
+    for strategy, unknowns in listed:
+        assert result(run, "frame", strategy).parameter_count == int(unknowns)
 
 
 def test_the_cells_of_the_papers(tmp_path: Path) -> None:

@@ -351,7 +351,7 @@ def test_a_case_that_holds_nothing_back_counts_only_among_its_like() -> None:
 def test_tests_stand_apart_from_computed_truths() -> None:
     reference = {"a": {"higher": 1.0}, "b": {"higher": 1.0}}
     results = (with_blocks("a", higher=0.5), with_blocks("b", higher=3.0))
-    row = board(reference, *results, classes={"b": ["free", "computed truth"]})
+    row = board(reference, *results, classes={"b": ["free"]})
     assert row["skill_tests"] == pytest.approx(1.0 - 0.55 / 1.05)
     assert np.isnan(board(reference, *results)["skill_tests"])
 

@@ -31,7 +31,7 @@ from femubench.core.typing import FloatArray
 if TYPE_CHECKING:
     import pandas as pd
 
-COMPUTED = "computed truth"  # the class of a case whose truth is no test
+TESTED = "published test"  # the class of a scenario whose data were measured
 # What is added to all errors; ranks that move within are no ranks.
 FLOORS = (0.005, 0.02, OFFSET_PERCENT, 0.1, 0.2)  # percent
 _RESAMPLES = 999
@@ -180,6 +180,19 @@ def scored_on(run: Run) -> str:
     return "unseen" if blocks & set(UNSEEN) else "given"
 
 
+def is_test(classes: Sequence[str] | None) -> bool:
+    """Tell whether a case was measured: what has no class is somebody's own structure.
+
+    Arguments:
+        classes: of its scenario.
+
+    Examples:
+        >>> results.is_test(["grid", "published test"]), results.is_test(["grid", "clamped"])
+        (True, False)
+    """
+    return not classes or TESTED in classes
+
+
 @dataclass(frozen=True)
 class _Table:
     """What the rows of a leaderboard are made from.
@@ -203,7 +216,7 @@ class _Table:
     def of(cls, run: Run, floor_percent: float) -> _Table:
         grid = _Grid.of(run)
         classes = run.meta.get("classes") or {}
-        tests = [case for case in grid.cases if COMPUTED not in classes.get(case, ())]
+        tests = [case for case in grid.cases if is_test(classes.get(case))]
         drawn: dict[str, list[JobResult]] | None = None
         if len(run.nominals) > 1:
             drawn = defaultdict(list)

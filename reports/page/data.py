@@ -20,7 +20,6 @@ from femubench.reports.summary import (
     strategies_of,
 )
 from femubench.results import (
-    COMPUTED,
     FEWEST,
     OFFSET_PERCENT,
     SCORE_OF_FAILURE,
@@ -28,6 +27,7 @@ from femubench.results import (
     JobResult,
     Run,
     interval_tail,
+    is_test,
     leaderboard,
     predictive,
     rank_results,
@@ -138,7 +138,7 @@ def _case(run: Run, case: str, exhibits: Exhibits | None) -> dict[str, Any]:
         "name": case,
         "scenario": _scenario(case),
         "structure": structures_of(run).get(case, case),
-        "test": COMPUTED not in (run.meta.get("classes") or {}).get(case, ()),
+        "test": is_test((run.meta.get("classes") or {}).get(case)),
         "title": about.get("title") or "",
         "reference": {name: reference[name] for name in BLOCKS if name in reference},
         "stage": plain_data(None if stage is None else _with_short_points(stage)),
