@@ -76,7 +76,7 @@ def brief(data: Any) -> Any:  # noqa: ANN401 - JSON data of any form
     if isinstance(data, float):
         return float(f"{data:.8g}")
     if isinstance(data, dict):
-        needed = ("predicted_hz", "mac")
+        needed = ("predicted_hz", "mac", "modes")
         return {k: brief(v) for k, v in data.items() if k in needed or v not in (None, "", [], {})}
     return [brief(item) for item in data] if isinstance(data, list) else data
 

@@ -196,9 +196,10 @@ class TestInstalled:
         assert "Your name (year)" in shown
 
     def test_strategy_is_ranked(self, bench_with: Any) -> None:
-        result = bench_with(["strategy"], "run", "frame", "-s", "my-strategy", "-s", "unchanged")
+        words = ("run", "frame", "-s", "my-strategy", "-s", "unchanged", "--nominal", "drawn")
+        result = bench_with(["strategy"], *words)
         assert result.returncode == 0, result.stderr
-        assert re.search(r"1  my-strategy +0\.3.*\n2  unchanged +1\.000", result.stdout)
+        assert re.search(r"1  my-strategy +0\.3.*\n2  unchanged +-1\.97", result.stdout)
 
     def test_scenario_is_run(self, bench_with: Any) -> None:
         result = bench_with(["scenario"], "run", "my-scenario", "-s", "global", "-s", "unchanged")
@@ -314,7 +315,8 @@ class TestShow:
         known = load_plugins().strategies
         for name in known:
             text = invoke("plugins", "show", name).stdout
-            pairs = [line.split(": ")[-1].strip() for line in text.splitlines() if " = " in line]
+            shown = text.rpartition("\n  options: ")[2].partition("\n  run: ")[0]
+            pairs = [line.split(": ")[-1].strip() for line in shown.splitlines() if " = " in line]
             for pair in pairs:
                 if "(none)" not in pair:
                     strategy_of(f"{name}:{pair.replace(' ', '')}", known)

@@ -13,11 +13,14 @@ import pytest
 
 import femubench
 from femubench import read_case
+from femubench.core.schema.results import UNSEEN, Nominal
+from femubench.core.score.predictive import Forecasts
 from femubench.core.score.scoring import reference_of
+from femubench.results import leaderboard, structures_of, tell_apart
 from truths.published import write_garteur
 
 sys.path.insert(0, str(Path(__file__).parent))
-from printed_boards import assert_board_is_that_of, assert_same_errors, stored
+from printed_boards import as_printed, assert_board_is_that_of, assert_same_errors, stored, text_of
 
 ROOT = Path(__file__).parents[1]
 SUITE = ROOT / "scenarios" / "suite"
@@ -82,6 +85,42 @@ def test_the_board_of_all_structures_is_that_of_the_run_kept() -> None:
     run = stored("suite")
     assert set(run.meta["cases"]) == {f"suite/{name}" for name in NAMES}
     assert_board_is_that_of(run, "docs/suite.md")
+
+
+def test_the_stated_uncertainties() -> None:
+    run = stored("suite")
+    text = (ROOT / "docs" / "scoring.md").read_text(encoding="utf-8")
+    rows = re.findall(
+        r"^\| `([a-z-]+)` \| (drawn|textbook) \| (\S+) \| (\S+) \| (\S+) \|", text, re.M
+    )
+    assert len(rows) == 6
+    for name, start, *said in rows:
+        nominal: Nominal = "drawn" if start == "drawn" else "textbook"
+        own = [r for r in run.started_from(nominal) if r.strategy == name and r.status == "ok"]
+        for blocks, cell in zip((UNSEEN, UNSEEN[:1], UNSEEN[1:]), said, strict=True):
+            found = Forecasts.of(own, structures_of(run), blocks).coverage()
+            assert found == as_printed(cell), (name, start, blocks)
+
+
+def test_what_the_documents_say_of_the_board() -> None:
+    run = stored("suite")
+    board = leaderboard(run).set_index("strategy")
+    (skill, low, high), below = board.iloc[0][["skill", "skill_low", "skill_high"]], 13
+    for page in ("README.md", "docs/suite.md"):
+        text = text_of(page)
+        said = re.search(r"takes away (\d+) %.{0,60}?\((\d+) to (\d+)", text)
+        assert said is not None, page
+        assert [as_printed(number) for number in said.groups()] == [
+            100.0 * skill,
+            100.0 * low,
+            100.0 * high,
+        ]
+        assert "thirteen of the twenty-five" in text
+    first, *rest = tell_apart(run, list(board.index)).tiers
+    assert (len(board) - len(first), first[0]) == (below, "diagnosed")
+    assert "textbook" in {name for tier in rest for name in tier}
+    data = board.drop(["unchanged", "textbook"])
+    assert int((data["skill"] < 0.0).sum()) == 11
 
 
 @pytest.mark.sweep
