@@ -43,7 +43,7 @@ def interval(low: float, high: float) -> str:
     """Return ``low to high``, nothing where there is none."""
     if not (math.isfinite(low) and math.isfinite(high)):
         return NOTHING
-    return f"{low:.3f} to {high:.3f}"
+    return " to ".join(f"{end:.3f}".replace("-0.000", "0.000") for end in (low, high))
 
 
 def shortened(text: str, width: int) -> str:
