@@ -11,12 +11,12 @@
   const COLUMNS = [
     { key: "rank", title: "Rank", cell: (row) => value(row.rank, bench.count) },
     { key: "strategy", title: "Strategy", text: true, cell: nameCell },
-    { key: "skill", title: "Skill", down: true, hint: "part of the textbook model's error on unseen data that is taken away: 1 is all of it, 0 none, less than 0 is worse; more is better", cell: (row) => value(row.skill, number, "strong") },
+    { key: "skill", title: "Skill", down: true, hint: "part of the textbook model's error on unseen data that is taken away: 1 is all of it, 0 none, less than 0 is worse; more is better", cell: (row) => value(row.skill, share, "strong") },
     { key: "interval", title: "95 % interval", still: true, cell: intervalCell },
-    ...(data && data.board && data.board.some((row) => row.skill_drawn !== null) ? [{ key: "skill_drawn", title: "From drawn", down: true, hint: "skill of the start from the models as drawn, against the textbook models too", cell: (row) => value(row.skill_drawn, number) }] : []),
-    ...(data && data.board && data.board.some((row) => row.skill_tests !== null) ? [{ key: "skill_tests", title: "On tests", down: true, hint: "skill on tests alone, without computed truths", cell: (row) => value(row.skill_tests, number) }] : []),
+    ...(data && data.board && data.board.some((row) => row.skill_drawn !== null) ? [{ key: "skill_drawn", title: "From drawn", down: true, hint: "skill of the start from the models as drawn, against the textbook models too", cell: (row) => value(row.skill_drawn, share) }] : []),
+    ...(data && data.board && data.board.some((row) => row.skill_tests !== null) ? [{ key: "skill_tests", title: "On tests", down: true, hint: "skill on tests alone, without computed truths", cell: (row) => value(row.skill_tests, share) }] : []),
     ...(data && data.blocks ? data.blocks : []).map((block, k) => ({ key: `${block}_percent`, title: `${block === "used" ? "given" : block} rms,\u00a0%`, block: k, hint: block === "used" ? "median rms frequency error of the modes that were given; no part of the skill" : `median rms frequency error of the ${block} modes`, cell: (row) => value(row[`${block}_percent`], small) })),
-    { key: "coverage90", title: "In 90\u00a0%", hint: "share of unseen modes in the 90 % interval that the strategy states", cell: (row) => value(row.coverage90, number) },
+    { key: "coverage90", title: "In 90\u00a0%", hint: "share of unseen modes in the 90 % interval that the strategy states", cell: (row) => value(row.coverage90, share) },
     { key: "crps_percent", title: "CRPS,\u00a0%", hint: "continuous ranked probability score of unseen modes in percent of the frequency; the absolute error where no uncertainty is stated", cell: (row) => value(row.crps_percent, small) },
     { key: "flags", title: "Flags", text: true, cell: flagCell },
     { key: "coverage", title: "Coverage", text: true, cell: coverageCell },
@@ -26,6 +26,10 @@
     { key: "seconds", title: "Time,\u00a0s", hint: "wall time, median over the cases", cell: (row) => value(row.seconds, small) },
   ];
 
+  // Parts of a whole have three decimals; rounding errors are none.
+  function share(v) {
+    return v === null || v === undefined ? number(v) : v.toFixed(3).replace(/^-(?=0\.000$)/, "").replace("-", "\u2212");
+  }
   function small(v) {
     return v !== null && v > 0 && v < 0.001 ? "< 0.001" : number(v);
   }
@@ -42,7 +46,7 @@
     return cell;
   }
   function fillInterval(cell, row) {
-    const text = row.skill_low === null ? "" : `${number(row.skill_low)} – ${number(row.skill_high)}`;
+    const text = row.skill_low === null ? "" : `${share(row.skill_low)} to ${share(row.skill_high)}`;
     cell.replaceChildren(bar(row), el("span", { class: "range", "data-low": row.skill_low ?? "", "data-high": row.skill_high ?? "" }, text || "–"));
   }
 
@@ -60,7 +64,7 @@
     return el("span", { class: "whisker", style });
   }
   function scaleBar() {
-    const ticks = [-1, -0.5, 0, 0.5, 1].filter((t) => t >= state.range[0]);
+    const ticks = [-1, 0, 1].filter((t) => t >= state.range[0]);
     const node = svg("svg", { class: "scale", width: WIDE, height: 14, viewBox: `0 0 ${WIDE} 14`, "aria-hidden": "true" });
     for (const t of ticks) node.append(svg("text", { class: "tick mid", x: Math.min(Math.max(across(t), 12), WIDE - 8), y: 11 }, String(t).replace("-", "\u2212")));
     return node;

@@ -45,7 +45,7 @@
 
   const picker = (label, entries, chosen, change) => {
     const options = entries.map((entry) => {
-      const end = entry.ok ? `score ${bench.number(entry.result.score, 3)}${entry.result.unphysical ? ", unphysical" : ""}` : bench.statusWord(entry.result.status);
+      const end = entry.ok ? `error left ${bench.number(entry.result.score, 3)}${entry.result.unphysical ? ", unphysical" : ""}` : bench.statusWord(entry.result.status);
       const option = bench.el("option", { value: entry.name }, `${entry.name} (${end})`);
       option.selected = entry.name === chosen;
       return option;

@@ -70,7 +70,7 @@
     for (const unit of kept) unit.structure = structures.indexOf(data.cases[unit.c].structure);
     const tested = cases.filter((c) => data.cases[c].test);
     const tests = tested.length && tested.length < cases.length ? new Set(tested) : null;
-    return { cases, units: kept, structures, seeds: all.seeds, whole, tests };
+    return { cases, blocks: filter.blocks, units: kept, structures, seeds: all.seeds, whole, tests };
   }
 
   // Return the weighted mean of values by group; null where a group has none.
@@ -113,7 +113,7 @@
       logs, perStructure, skills, results, cases: grid.cases, structures: grid.structures,
     };
     data.blocks.forEach((b, k) => (row[`${b}_percent`] = middle(fine, (r) => r.rms[k])));
-    const forecasts = fine.flatMap((r) => filter.blocks.filter((k) => r.forecast[k]).map((k) => [r.c, ...r.forecast[k]]));
+    const forecasts = fine.flatMap((r) => grid.blocks.filter((k) => r.forecast[k]).map((k) => [r.c, ...r.forecast[k]]));
     row.crps_percent = byStructure(forecasts, ([, modes, , crps]) => [modes, crps]);
     row.coverage90 = byStructure(forecasts.filter(([, , covered]) => covered !== null), ([, modes, covered]) => [modes, covered]);
     return row;
