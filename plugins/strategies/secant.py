@@ -94,4 +94,4 @@ def stiffness_change(
     force = force - model.mass_times(rigid) @ (rigid.T @ force)
     energy = shapes.T @ force
     core = la.block_diag(np.diag(eigenvalues), -la.inv(0.5 * (energy + energy.T)))
-    return LowRank(np.hstack([momentum, force]), core)
+    return LowRank(np.hstack([momentum, force]), np.asarray(core))
