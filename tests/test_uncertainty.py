@@ -86,7 +86,7 @@ def test_samples_take_three_lines_more() -> None:
 
 
 def test_a_point_is_scored_by_its_absolute_error() -> None:
-    (result,) = femubench.rank(CASE, [Point()]).results
+    (result,) = femubench.rank(CASE, [Point()], nominal="drawn").results
     unseen = [m for name in ("higher", "modified") for m in result.blocks[name].modes]
     errors = [abs(m.predicted_hz / m.measured_hz - 1.0) for m in unseen if m.predicted_hz]
     found = predictive.scores([result], {})
@@ -218,7 +218,7 @@ def test_an_uncertainty_that_is_none_fails_in_one_line(stated: object, says: str
     outcome = outcome_of(stated)
     if outcome.status == "ok":  # what only the judge looks into
         outcome = unpacked(packed(outcome))
-    result = judged(CASE, reference_of(CASE), "stating", 0, outcome)
+    result = judged(CASE, reference_of(CASE), ("stating", 0, "drawn"), outcome)
     assert result.status == "failed"
     assert says in result.reason
     assert "\n" not in result.reason
@@ -231,7 +231,7 @@ def test_samples_that_are_no_models_do_not_get_out_of_a_worker() -> None:
 
 
 def test_deviations_survive_json_and_older_records_load() -> None:
-    run = femubench.rank(CASE, [Sampled()])
+    run = femubench.rank(CASE, [Sampled()], nominal="drawn")
     data = run_to_json(run)
     assert run_from_json(data).results == run.results
     for block in ("used", "higher", "modified"):
@@ -305,7 +305,7 @@ def test_a_lost_mode_is_covered_by_nothing_and_counts_a_hundred_percent() -> Non
 
 @pytest.mark.parametrize("name", ["bayesian", "diagnosed"])
 def test_built_in_strategies_say_how_sure_they_are(name: str) -> None:
-    run = femubench.rank(CASE, [name])
+    run = femubench.rank(CASE, [name], nominal="drawn")
     (result,) = run.results
     assert result.status == "ok"
     stds = [m.predicted_std_hz for b in result.blocks.values() for m in b.modes]
@@ -323,7 +323,7 @@ def test_posterior_samples_have_the_spread_of_the_sensitivities() -> None:
     outcome = JobOutcome("ok", model=result.model, samples=tuple(result.uncertainty.samples),
                          discrepancy_std=0.0)  # fmt: skip
     spread: Callable[[JobOutcome], JobResult] = lambda o: judged(  # noqa: E731
-        case, reference_of(case), "bayesian", 0, o
+        case, reference_of(case), ("bayesian", 0, "drawn"), o
     )
     for mode in spread(outcome).blocks["used"].modes:
         # What was measured to 1 % is predicted to no worse than that, and its test adds as much.

@@ -231,7 +231,7 @@ def rank(
 
     Examples:
         >>> femubench.rank(case, [nominal, scaled]).leaderboard["skill"].round(2).tolist()
-        [0.0, -0.17]
+        [0.0, -0.15]
     """
     kept = None if store is None else store_in(store)
     plan = plan_of(
@@ -405,7 +405,7 @@ def read_run(
     Examples:
         >>> file = femubench.report(run, "results.json")
         >>> femubench.read_run(file).leaderboard["skill"].round(2).tolist()
-        [0.44, -2.16]
+        [0.47, -1.97]
     """
     if isinstance(run, results.Run):
         return Run.of(run)

@@ -144,7 +144,7 @@ def leaderboard(run: Run, floor_percent: float = OFFSET_PERCENT) -> pd.DataFrame
 
     Examples:
         >>> results.leaderboard(run)[["rank", "skill"]].round(2).values.tolist()
-        [[1.0, 0.44], [2.0, -2.16]]
+        [[1.0, 0.47], [2.0, -1.97]]
     """
     import pandas as pd
 

@@ -117,7 +117,7 @@ def rank_results(
 
     Examples:
         >>> [(round(one.score, 2), one.rank) for one in results.rank_results(run.results)]
-        [(3.16, 2), (0.56, 1)]
+        [(2.97, 2), (0.53, 1)]
     """
     listed = tuple(results)
     given = {

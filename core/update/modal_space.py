@@ -302,6 +302,11 @@ def factor_result(
         log: ln theta, (p,).
         history: one mapping an iteration.
         figures: diagnostics.
+
+    Examples:
+        >>> parts = update.stiffness_parts(model, "sections")
+        >>> update.factor_result(parts, np.zeros(len(parts))).parameters[0].after
+        1.0
     """
     factors = np.exp(log)
     estimates = tuple(

@@ -32,6 +32,9 @@ def checked_set(word: str, *, own: bool = False) -> None:
     Arguments:
         word: an option as it was typed.
         own: whether a strategy has parameters of its own, under the word ``own``.
+
+    Examples:
+        >>> update.checked_set("members")
     """
     known = (*((OWN,) if own else ()), *get_args(ParameterSet))
     if word not in known:
