@@ -11,6 +11,7 @@ from femubench.results import Run, leaderboard, run_to_json, tell_apart
 _FIGURES = {"given_percent": "used_percent", "higher_percent": "higher_percent"}
 _FIGURES |= {"modified_percent": "modified_percent", "skill_drawn": "skill_drawn"}
 _FIGURES |= {"skill_tests": "skill_tests", "ok": "ok", "of": "total"}
+_FIGURES |= {"coverage90": "coverage90", "crps_percent": "crps_percent"}
 
 
 class JsonReporter:

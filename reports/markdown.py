@@ -38,7 +38,7 @@ _SPECIAL = re.compile(r"([\\`*_\[\]|~])")
 _ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
 _FOOTNOTES = (
     "**skill**: 1 - r, where r is the geometric mean over structures, each the mean of its blocks "
-    "of unseen data, of (rms + 0.05 %) / (rms of the nominal model + 0.05 %). A job that failed, "
+    "of unseen data, of (rms + 0.05 %) / (rms of the textbook model + 0.05 %). A job that failed, "
     "crashed or timed out counts 10 in r, one that is not applicable 1. **from drawn**: the same "
     "with the start from the models as drawn. **tests**: on tests alone, no computed truths.",
     "**higher, modified, given**: rms relative frequency error in percent over the higher modes "
@@ -162,6 +162,8 @@ def floors_sentence(run: Run) -> str:
 def _coverage(run: Run) -> Iterator[str]:
     """Return how many jobs each strategy finished, then the failures and what did not apply."""
     yield "## Coverage"
+    if len(run.nominals) > 1:
+        yield "Jobs from both nominal models."
     rows = []
     for name in strategies_of(run):
         found = [result.status for result in run.results if result.strategy == name]

@@ -21,8 +21,9 @@ _LEVELS = np.linspace(0.0, 0.99, 100)
 def calibration(run: Run, *, ax: Axes | None = None) -> Axes:
     """Draw the coverage of central intervals of every level, a line a strategy with uncertainty.
 
-    Over the unseen modes of all jobs that are ok, every structure with the same weight. Below the
-    diagonal a strategy is surer than it may be, above it less sure than it could be.
+    Over the unseen modes of all jobs that are ok and make the ranks, every structure with the same
+    weight. Below the diagonal a strategy is surer than it may be, above it less sure than it could
+    be.
 
     Arguments:
         run: with results.
@@ -39,8 +40,8 @@ def calibration(run: Run, *, ax: Axes | None = None) -> Axes:
     check_kind(run, (Run,), "strategies")
     structures = structures_of(run)
     curves = []
-    for name in dict.fromkeys(result.strategy for result in run.results):
-        fine = [r for r in run.results if r.strategy == name and r.status == "ok"]
+    for name in dict.fromkeys(result.strategy for result in run.ranked):
+        fine = [r for r in run.ranked if r.strategy == name and r.status == "ok"]
         found = Forecasts.of(fine, structures)
         if found.stated.any():
             observed = np.array([found.coverage(level) for level in _LEVELS])

@@ -86,7 +86,7 @@ def _histories(run: Run, case: str | None) -> dict[str, History]:
     if case is not None and case not in cases:
         raise InputError(f"the run has no case {case!r}", expected=f"one of {', '.join(cases)}")
     found: dict[str, History] = {}
-    for result in run.results:
+    for result in run.ranked:
         if result.case == (case or cases[0]) and result.history:
             found.setdefault(result.strategy, result.history)
     if not found:

@@ -6,10 +6,11 @@ import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from femubench.core.errors import InputError
 from femubench.core.publish.agreement import Finding, References, findings_of, machine_of
 from femubench.core.publish.submissions import Submission, slug
 from femubench.core.schema.results import BLOCKS, DONE, JobResult
-from femubench.core.score.counting import case_weights
+from femubench.core.score.counting import block_shares
 from femubench.core.score.ranking import geometric_mean, ranked as in_order, score_of
 from femubench.core.score.statistics import structures_of
 
@@ -29,14 +30,24 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
 
     Arguments:
         submissions: oldest first.
+
+    Raises:
+        InputError: when the runs do not share what they are measured against.
     """
+    if len({item.run.meta.get("yardstick") or "drawn" for item in submissions}) > 1:
+        what = "some runs are measured against the textbook models, others against the drawn ones"
+        raise InputError(what, expected="one of both: run again with this version")
     references = _references(submissions)
     findings = findings_of(submissions, references)
     current = {name: case["digest"] for item in submissions for name, case in _cases(item).items()}
     versions = _versions(findings)
     latest = {version.strategy: version for version in versions}  # the last one stays
     ranked = _ranked(latest.values(), versions, current)
-    structures = {n: s for item in submissions for n, s in structures_of(item.run).items()}
+    structures: dict[str, str] = {}
+    for item in submissions:
+        own = structures_of(item.run)
+        for name in _cases(item):
+            structures.setdefault(name, own.get(name, name))
     described = {
         version: _described(version, listed, current, ranked, references, structures)
         for version, listed in versions.items()
@@ -118,18 +129,19 @@ def _described(
     for item in findings:
         job = item.result.case, str(item.result.provenance["case"])
         groups.setdefault(job, []).append(item)
+    known = {name: references[name, digest] for name, digest in groups if digest == current[name]}
+    known = {name: errors for name, errors in known.items() if name in ranked}
+    shares = block_shares(known, structures)
     cases = [
         {
-            **_on_case(listed, references[case]),
+            **_on_case(listed, references[case], shares.get(case[0])),
             "current": case[1] == current[case[0]],
             "ranked": case[1] == current[case[0]] and case[0] in ranked,
         }
         for case, listed in sorted(groups.items())
     ]
     counted = [case for case in cases if case["ranked"]]
-    known = {case["case"]: references[case["case"], case["digest"]] for case in counted}
-    weights = case_weights(known, structures)
-    scores = [(case["score"], weights.get(case["case"], 1.0)) for case in counted]
+    weights = [sum(shares.get(case["case"], {"": 1.0}).values()) for case in counted]
     runs = sorted({run.order: run for item in findings for run in item.runs}.items())
     machines = {machine_of(run): run.run.meta["machine"] for _, run in runs}
     return {
@@ -139,7 +151,7 @@ def _described(
         "last": runs[-1][1].started,
         "machines": [machines[key] for key in sorted(machines)],
         "runs": [run.name for _, run in runs],
-        "skill": 1.0 - geometric_mean(*zip(*scores, strict=True)) if counted else None,
+        "skill": 1.0 - geometric_mean([c["score"] for c in counted], weights) if counted else None,
         **{f"{name}_percent": _median(counted, f"{name}_percent") for name in BLOCKS},
         "seconds": _median([c for c in counted if c["status"] == "ok"], "seconds"),
         "covered": len(counted),
@@ -152,12 +164,14 @@ def _described(
     }
 
 
-def _on_case(findings: Sequence[Finding], reference: Mapping[str, float]) -> dict[str, Any]:
+def _on_case(
+    findings: Sequence[Finding], reference: Mapping[str, float], shares: Mapping[str, float] | None
+) -> dict[str, Any]:
     """Return the result on one case: of the data as recorded, or the median over noise draws."""
     recorded = [item for item in findings if item.result.seed == 0]
     listed = recorded[-1:] or list(findings)
     results = [item.result for item in listed]
-    scores = [score_of(result, reference) for result in results]
+    scores = [score_of(result, reference, shares) for result in results]
     failed = [result.status for result in results if result.status not in DONE]
     return {
         "case": results[0].case,

@@ -22,7 +22,7 @@ from femubench.core.schema.records import (
     result_to_json,
     run_from_json,
 )
-from femubench.core.schema.results import Block, JobResult, Run
+from femubench.core.schema.results import Block, JobResult, Nominal, Run
 from femubench.core.score.ranking import rank_results
 from femubench.core.score.scoring import frequency_error
 
@@ -62,6 +62,9 @@ class _Meta(_Record):
     strategies: list[Name] = []
     baseline: Name | None = None
     structures: dict[Name, Name] = {}
+    yardstick: Nominal | None = None
+    starts: dict[Name, list[Nominal]] = {}
+    alike: list[Name] = []
     cases: dict[Name, _Case]
     citations: dict[Name, Annotated[str, Field(max_length=5_000)]] = {}
     reference: dict[Name, dict[Literal["used", "higher", "modified"], float]]
@@ -193,6 +196,10 @@ def _check(result: JobResult, meta: Mapping[str, Any], file: Path, key: str) -> 
     case = meta["cases"].get(result.case)
     if case is None or case["digest"] != result.provenance["case"]:
         refuse("another case", f"{key}.provenance.case", "the digest that meta.cases has")
+    starts = meta.get("starts") or {}
+    if meta.get("yardstick") == "textbook" and "textbook" not in starts.get(result.case, ()):
+        expected = "textbook among them: `bench run --nominal textbook`, or both"
+        refuse("starts from the drawn model alone", f"meta.starts.{result.case}", expected)
     reference = meta["reference"].get(result.case)
     if not reference:
         refuse("missing", f"meta.reference.{result.case}", "the errors of the nominal model")

@@ -66,8 +66,10 @@ class Results:
             if result is None:
                 missing.append(index)
                 continue
+            # A model as drawn that has all that handbooks give is one job from either start.
+            result = replace(result, nominal=slot.nominal)
             if before is not None and before.status == result.status:
-                result = before
+                result = replace(before, nominal=slot.nominal)
             elif store is not None:
                 store.append(self._run, result)
             self._tell(index, result)

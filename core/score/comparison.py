@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 
 from femubench.core.errors import InputError
 from femubench.core.schema.results import BLOCKS, DONE, NOMINALS, JobResult, Nominal, Run
-from femubench.core.score.counting import case_weights, counted_blocks
+from femubench.core.score.counting import block_shares, counted_blocks
 from femubench.core.score.ranking import OFFSET_PERCENT, geometric_mean, score_of
 from femubench.core.score.repeatability import environment_differences
 from femubench.core.score.statistics import Evidence, ScoreTable, evidence_of, structures_of
@@ -147,13 +147,18 @@ _ROUNDING = 1e-9  # relative; two machines may differ by it
 
 @dataclass(frozen=True)
 class _Pair:
-    """One job in both runs; the errors of the nominal model and the weight stand for both."""
+    """One job in both runs; the errors of the nominal model and its shares stand for both."""
 
     strategy: str
     before: JobResult
     after: JobResult
     reference: Mapping[str, float]
-    weight: float
+    shares: Mapping[str, float] | None
+
+    @property
+    def weight(self) -> float:
+        """Return how much it counts, nothing without unseen data where others have some."""
+        return 1.0 if self.shares is None else sum(self.shares.values())
 
     @property
     def blocks(self) -> dict[str, float]:
@@ -175,7 +180,10 @@ class _Pair:
             counted = [ratios[name] for name in counted_blocks(ratios)]
             return geometric_mean(counted) if counted else None
         if reference:
-            return score_of(self.after, reference) / score_of(self.before, reference)
+            shares = self.shares
+            return score_of(self.after, reference, shares) / score_of(
+                self.before, reference, shares
+            )
         scores = self.before.score, self.after.score
         return None if scores[0] is None or scores[1] is None else scores[1] / scores[0]
 
@@ -214,10 +222,11 @@ def compare_runs(
         expected = "one (case, strategy, seed) with the same case files"
         raise InputError("the two runs have no job in common", expected=expected)
     references = {**(after.meta.get("reference") or {}), **(before.meta.get("reference") or {})}
+    references = {case: references[case] for case in {j.case for j in shared} & set(references)}
     structures = {**structures_of(after), **structures_of(before)}
-    weights = case_weights(references, structures)
+    shares = block_shares(references, structures)
     pairs = [
-        _Pair(j.strategy, old[j], new[j], references.get(j.case) or {}, weights.get(j.case, 1.0))
+        _Pair(j.strategy, old[j], new[j], references.get(j.case) or {}, shares.get(j.case))
         for j in shared
     ]
     rows = tuple(_rows(pairs))
@@ -247,6 +256,9 @@ def _common_start(before: Run, after: Run) -> Nominal:
     Raises:
         InputError: when there is none.
     """
+    for nominal in reversed(NOMINALS):
+        if nominal in before.nominals and nominal in after.nominals:
+            return nominal
     for nominal in reversed(NOMINALS):
         if before.started_from(nominal) and after.started_from(nominal):
             return nominal

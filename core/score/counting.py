@@ -51,16 +51,22 @@ def block_weights(references: References, structures: Mapping[str, str]) -> Weig
     return {block: 1.0 / often[data] for block, data in named.items()}
 
 
-def case_weights(references: References, structures: Mapping[str, str]) -> dict[str, float]:
-    """Return by case how much it counts; the cases of a structure come to 1.
+def block_shares(
+    references: References, structures: Mapping[str, str]
+) -> dict[str, dict[str, float]]:
+    """Return by case and block how much it counts; the blocks of a structure come to 1.
 
     Arguments:
         references, structures: as for `block_weights`.
     """
-    found = dict.fromkeys((case for case, errors in references.items() if errors), 0.0)
-    totals: dict[str, float] = {}
-    for (case, _), weight in block_weights(references, structures).items():
-        found[case] += weight
-        owner = structures.get(case, case)
-        totals[owner] = totals.get(owner, 0.0) + weight
-    return {case: w / totals.get(structures.get(case, case), 1.0) for case, w in found.items()}
+    weights = block_weights(references, structures)
+    owner = {case: structures.get(case, case) for case in references}
+    shares: dict[str, dict[str, float]] = {
+        case: {} for case, errors in references.items() if errors
+    }
+    counted: dict[str, float] = {}
+    for (case, _), weight in weights.items():
+        counted[owner[case]] = counted.get(owner[case], 0.0) + weight
+    for (case, name), weight in weights.items():
+        shares[case][name] = weight / counted[owner[case]]
+    return shares

@@ -222,7 +222,7 @@ class _Table:
             drawn = defaultdict(list)
             for result in run.started_from("drawn"):
                 drawn[result.strategy].append(result)
-        names = tuple(run.meta.get("strategies", ()))
+        names = tuple(dict.fromkeys(run.meta.get("strategies", ())))
         names += tuple(sorted({result.strategy for result in run.results} - set(names)))
         both = 0 < len(tests) < len(grid.cases)
         seed = int(run.meta.get("seed", 0))

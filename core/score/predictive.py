@@ -125,7 +125,7 @@ def crps_normal(error: FloatArray, std: FloatArray) -> FloatArray:
 
     Source: Gneiting & Raftery (2007), section 4.2.
     """
-    point = ~(std > 0.0)
+    point = ~(std > 1e-12 * np.abs(error))
     s = np.where(point, 1.0, std)
     z = error / s
     density = np.exp(-0.5 * np.square(z)) / np.sqrt(2.0 * np.pi)

@@ -20,7 +20,9 @@ TIE = 1e-6  # relative; scores that differ by less share a rank: rounding differ
 _Item = TypeVar("_Item")
 
 
-def score_of(result: JobResult, reference: Mapping[str, float]) -> float:
+def score_of(
+    result: JobResult, reference: Mapping[str, float], shares: Mapping[str, float] | None = None
+) -> float:
     """Return how much of the nominal error on unseen data is left: 1 is all of it, less is better.
 
     It is the geometric mean over the unseen blocks of (rms + 0.05 %) / (nominal rms + 0.05 %); of
@@ -29,12 +31,16 @@ def score_of(result: JobResult, reference: Mapping[str, float]) -> float:
 
     Arguments:
         reference: rms error of the nominal model in percent by block name.
+        shares: how much each block counts; alike by default.
     """
     if result.status == "not-applicable":
         return SCORE_OF_NOTHING_DONE
     if result.status != "ok" or not reference:
         return SCORE_OF_FAILURE
-    return geometric_mean(score_in(result, name, reference) for name in counted_blocks(reference))
+    known = shares or dict.fromkeys(counted_blocks(reference), 1.0)
+    return geometric_mean(
+        (score_in(result, name, reference) for name in known), weights=known.values()
+    )
 
 
 def score_in(

@@ -103,7 +103,7 @@ class Target:
             if (row > 0.0).all():
                 rows.append(np.log(row))
                 kept.append(q)
-        if len(rows) < coefficients_of(points.shape[1]):
+        if len(rows) <= coefficients_of(points.shape[1]):
             raise StrategyFailure(f"only {len(rows)} of {len(points)} points give a model")
         return np.array(kept), np.array(rows)
 

@@ -200,7 +200,10 @@ class Iteration:
         """Return models of the posterior; None where some parameter is not determined at all."""
         if covariance is None or not np.isfinite(covariance).all():
             return None
-        return Uncertainty.drawn(self.model_at, point.q, 0.5 * (covariance + covariance.T))
+        try:
+            return Uncertainty.drawn(self.model_at, point.q, 0.5 * (covariance + covariance.T))
+        except StrategyFailure:  # rounding made it no covariance; the model is none the worse
+            return None
 
 
 def sensitivity_update(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femubench.core.errors import ModelError, StrategyFailure
+from femubench.core.errors import FemubenchError, StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.typing import FloatArray
 
@@ -66,7 +66,7 @@ class Uncertainty:
         for draw in _normal(root.shape[1]) @ root.T:
             try:
                 models.append(make(mean + draw))
-            except ModelError:
+            except FemubenchError:
                 continue
         return cls(tuple(models), discrepancy_std)
 

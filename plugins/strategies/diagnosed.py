@@ -16,6 +16,7 @@ from femubench import (
     NotApplicable,
     ParameterEstimate,
     Strategy,
+    StrategyFailure,
     UpdateResult,
     solve_modes,
 )
@@ -176,15 +177,21 @@ def _estimates(explanation: Explanation) -> tuple[ParameterEstimate, ...]:
 
 def _uncertainty(
     model: Model, examination: Examination, explanation: Explanation, extended: Model
-) -> Uncertainty:
-    """Return models with the causes in other sizes, and what the elements' scatter does."""
+) -> Uncertainty | None:
+    """Return models with the causes in other sizes, and what the elements' scatter does.
+
+    None where rounding made the covariance none.
+    """
     fit = explanation.fit
-    found = Uncertainty.drawn(
-        partial(extended_by, model, explanation),
-        fit.state.x,
-        fit.covariance,
-        discrepancy_std=examination.scatter,
-    )
+    try:
+        found = Uncertainty.drawn(
+            partial(extended_by, model, explanation),
+            fit.state.x,
+            0.5 * (fit.covariance + fit.covariance.T),
+            discrepancy_std=examination.scatter,
+        )
+    except StrategyFailure:
+        return None
     # A cause of another size may have other degrees of freedom.
     alike = tuple(s for s in found.samples if s.dofs.direction == extended.dofs.direction)
     return replace(found, samples=alike)

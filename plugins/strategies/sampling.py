@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from femubench import Measurement, Model, UpdateResult
+from femubench import InputError, Measurement, Model, UpdateResult
 from femubench.plugins.strategies.bayesian import Bayesian
 from femubench.update import Discrepancy, sample_posterior
 
@@ -37,6 +37,8 @@ class BayesianSampling(Bayesian):
         "review; sampled after Goodman & Weare (2010) by emcee, Foreman-Mackey et al. (2013)"
     )
 
+    settings: ClassVar[tuple[str, ...]] = tuple(s for s in Bayesian.settings if "shapes" not in s)
+
     discrepancy_median: float = 0.02
     discrepancy_spread: float = 0.69
 
@@ -46,8 +48,13 @@ class BayesianSampling(Bayesian):
         """Return the model at the posterior mean, with samples and the discrepancy.
 
         Raises:
+            InputError: for shapes as data, of which the likelihood knows none.
             StrategyFailure: when the chain has not converged, with the figure that says so.
         """
+        if self.options.shapes:
+            raise InputError(
+                "the likelihood is of frequencies alone", key="shapes", expected="false"
+            )
         structure = model.frame_structure
         unknowns = self.unknowns(structure, weighed=measurement.total_mass is not None)
         return sample_posterior(

@@ -186,7 +186,7 @@ def _forecast(result: JobResult, name: str) -> list[float | None] | None:
     stated = bool(found.stated.any())
     crps = float(predictive.crps_normal(found.error, found.std).sum())
     covered = int((found.level <= predictive.LEVEL).sum()) if stated else None
-    return [len(found.error), covered, crps]
+    return [len(found.error), covered, clean(crps)]
 
 
 def _statistics(run: Run, order: list[str]) -> dict[str, Any]:

@@ -114,7 +114,7 @@
         svg("line", { class: "grid", x1: x(t), x2: x(t), y1: top, y2: height - 36 }),
         svg("text", { class: "tick mid", x: x(t), y: height - 22 }, t),
       );
-    node.append(svg("text", { class: "name mid", x: (names + right) / 2, y: height - 5 }, "mean rank over the cases (1 is best)"));
+    node.append(svg("text", { class: "name mid", x: (names + right) / 2, y: height - 5 }, "mean rank over the structures (1 is best)"));
     ranks.forEach((item, k) => {
       const name = bench.shortened(data.strategies[item.s].name, Math.floor(names / 6.6));
       node.append(

@@ -252,8 +252,9 @@
   // Return every (case, block) with the rms error of each strategy, median over seeds: what a strategy
   // without model leaves open is null, and "not applicable" leaves the nominal error.
   function problems(rows, filter) {
+    const hidden = filter.blocks.filter((k) => data.blocks[k] !== "used");
     return gridOf(filter).cases.flatMap((c) =>
-      filter.blocks.map((b) => ({ c, b, errors: rows.map((row) => errorOf(row.index, c, b)) })).filter((p) => p.errors.some((e) => e !== null)),
+      (hidden.length ? hidden : filter.blocks).map((b) => ({ c, b, errors: rows.map((row) => errorOf(row.index, c, b)) })).filter((p) => p.errors.some((e) => e !== null)),
     );
   }
   function errorOf(s, c, b) {
