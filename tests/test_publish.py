@@ -408,3 +408,19 @@ def test_pages_need_nothing_from_elsewhere(data: Data, site: Site) -> None:
             assert "default-src 'none'" in text
             assert "unsafe" not in text
             assert not re.search(r"(?:https?:)?//\w", text.partition("<script>")[0])
+
+
+def test_one_yardstick_and_one_start_for_all(data: Data, site: Site) -> None:
+    drawn = json.loads(json.dumps(data))
+    drawn["meta"]["yardstick"] = "textbook"
+    drawn["meta"]["starts"] = {case: ["drawn"] for case in drawn["meta"]["cases"]}
+    refused = site.add(drawn)
+    assert refused.exit_code == 2
+    assert "starts from the drawn model alone" in refused.stderr
+    drawn["meta"]["starts"] = {case: ["textbook"] for case in drawn["meta"]["cases"]}
+    for result in drawn["results"]:
+        result["nominal"] = "textbook"
+    assert site.add(drawn).exit_code == 0
+    mixed = site.add(called(data, "older", 2))
+    assert mixed.exit_code == 2
+    assert "others against the drawn ones" in mixed.stderr

@@ -128,3 +128,13 @@ def test_the_screen_says_where_all_start_from(tmp_path: Path) -> None:
     locked = CliRunner().invoke(bench, ["run", "--locked", "x", "--nominal", "textbook"])
     assert locked.exit_code == 2
     assert "nominal cannot be given beside it" in locked.output
+
+
+def test_a_result_that_is_reused_starts_from_where_it_is_asked_to(tmp_path: Path) -> None:
+    case = femubench.cases["frame"]
+    plain = replace(case, name="plain", model=as_matrices(case.model))
+    femubench.rank(plain, "unchanged", jobs=1, store=tmp_path, nominal="drawn")
+    both = femubench.rank(plain, "unchanged", jobs=1, store=tmp_path, overwrite="missing")
+    assert [item.nominal for item in both.results] == ["textbook"]
+    (row,) = both.leaderboard.to_dict("records")
+    assert (row["ok"], row["total"]) == (1, 1)

@@ -47,7 +47,7 @@ class Record(BaseModel):
 
 class _ModeRecord(Record):
     mode: _Whole = 0
-    measured_hz: Annotated[float, Field(ge=1e-30, le=1e30)]
+    measured_hz: Annotated[float, Field(ge=1e-45, le=1e30)]
     # Bounded so that the square of a relative error is a number.
     predicted_hz: Annotated[float, Field(ge=-1e100, le=1e100)] | None
     mac: _Mac | None

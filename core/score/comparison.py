@@ -221,8 +221,7 @@ def compare_runs(
     if not shared:
         expected = "one (case, strategy, seed) with the same case files"
         raise InputError("the two runs have no job in common", expected=expected)
-    references = {**(after.meta.get("reference") or {}), **(before.meta.get("reference") or {})}
-    references = {case: references[case] for case in {j.case for j in shared} & set(references)}
+    references = _references(before, after, shared)
     structures = {**structures_of(after), **structures_of(before)}
     shares = block_shares(references, structures)
     pairs = [
@@ -248,6 +247,12 @@ def compare_runs(
             t.metric for t in thresholds if all(row.values[t.metric] is None for row in rows)
         ),
     )
+
+
+def _references(before: Run, after: Run, jobs: Iterable[Job]) -> dict[str, Mapping[str, float]]:
+    """Return the nominal errors of the cases of jobs, as A has them where both do."""
+    known = {**(after.meta.get("reference") or {}), **(before.meta.get("reference") or {})}
+    return {case: known[case] for case in dict.fromkeys(job.case for job in jobs) if case in known}
 
 
 def _common_start(before: Run, after: Run) -> Nominal:
