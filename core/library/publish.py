@@ -29,7 +29,7 @@ def publish(
         InputError: for a file that is not sound, or a folder with something else in it.
 
     Examples:
-        >>> len(femubench.publish("site", run).added)
+        >>> len(femubench.publish("site", femubench.rank(case, [nominal, scaled])).added)
         1
     """
     from femubench.reports.publish_page import pages_of

@@ -30,7 +30,10 @@ def addresses(
     other.write_text(json.dumps(called(scaled(data, "local", 1.5), "later")))
     compared, diagnosis = folder / "compared.html", folder / "diagnosis.html"
     command("compare", real.json_file, other, "-f", "html", "-o", compared, code=1)
-    command("publish", folder / "site", real.json_file, "-q")
+    fair = folder / "fair.json"
+    words = ("run", "frame", "-s", "unchanged", "-s", "baruch", "-s", "local", "-q")
+    command(*words, "--store", folder / "store", "--json", fair)
+    command("publish", folder / "site", fair, "-q")
     command("diagnose", "hframe", "--no-pairs", "-q", "--report", diagnosis)
     command("reproduce", "hframe", "-q", "-o", folder / "reproduced")
     site = folder / "site"
