@@ -1,6 +1,6 @@
 """What each part of `diagnosed` is worth: the same strategy with one part left out at a time.
 
-    python benchmarks/ablation.py             # the default set, about five minutes on two cores
+    python benchmarks/ablation.py             # the default set, six minutes on two cores
     python benchmarks/ablation.py frame hframe --jobs 2
 
 An effect is left out where `diagnosed` put it into the model; elsewhere the model stays. Figures
