@@ -8,6 +8,7 @@ from math import log
 import numpy as np
 
 from femubench import Run
+from femubench.core.schema.results import UNSEEN
 from femubench.core.score.statistics import interval_over_structures
 from femubench.results import (
     FEWEST,
@@ -16,8 +17,6 @@ from femubench.results import (
     JobResult,
     structures_of,
 )
-
-UNSEEN = ("higher", "modified")
 
 
 def unseen_logs(run: Run, zero: str = "textbook") -> dict[str, dict[str, float]]:

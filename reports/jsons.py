@@ -8,10 +8,13 @@ from typing import Any
 from femubench.reports.page.rounding import clean
 from femubench.results import Run, leaderboard, run_to_json, tell_apart
 
-_FIGURES = {"given_percent": "used_percent", "higher_percent": "higher_percent"}
-_FIGURES |= {"modified_percent": "modified_percent", "skill_drawn": "skill_drawn"}
-_FIGURES |= {"skill_tests": "skill_tests", "ok": "ok", "of": "total"}
-_FIGURES |= {"coverage90": "coverage90", "crps_percent": "crps_percent"}
+# Names of the contract, and the columns of the leaderboard that they stand for.
+_FIGURES = {
+    **{f"{name}_percent": f"{name}_percent" for name in ("higher", "modified", "crps")},
+    **{name: name for name in ("skill_drawn", "skill_tests", "coverage90", "ok")},
+    "given_percent": "used_percent",
+    "of": "total",
+}
 
 
 class JsonReporter:

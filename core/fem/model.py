@@ -206,6 +206,12 @@ class Model(Shown):
         )
 
 
+def differ(first: Model, second: Model) -> bool:
+    """Tell whether two models have other matrices."""
+    pairs = (first.mass, second.mass), (first.stiffness, second.stiffness)
+    return any(one.shape != other.shape or (one != other).nnz > 0 for one, other in pairs)
+
+
 def _keys(structure: Structure) -> list[tuple[object, ...]]:
     """Return a name of every dof that stays the same when other elements are split."""
     nodes = structure.mesh.node_keys(len(structure.frame.joints))

@@ -15,7 +15,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError, NotApplicable
-from femubench.core.fem.model import Model
+from femubench.core.fem.model import differ
 from femubench.core.files import make_folder
 from femubench.core.library.cases import CaseLike, case_words, listed, read_cases, usable_plugins
 from femubench.core.plugin.loader import Plugins
@@ -322,16 +322,10 @@ def _textbook(cases: Sequence[Case]) -> dict[str, Case]:
     for case in cases:
         with suppress(NotApplicable):
             model = textbook_model(case.model, known)
-            if _differ(model, case.model):
+            if differ(model, case.model):
                 digest = hashlib.sha256(f"textbook of {case.digest}".encode()).hexdigest()
                 found[case.name] = replace(case, model=model, digest=digest)
     return found
-
-
-def _differ(first: Model, second: Model) -> bool:
-    """Tell whether two models have other matrices."""
-    pairs = (first.mass, second.mass), (first.stiffness, second.stiffness)
-    return any(one.shape != other.shape or (one != other).nnz > 0 for one, other in pairs)
 
 
 def _classes(plugins: Plugins) -> dict[str, tuple[str, ...]]:

@@ -12,6 +12,7 @@ from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import LowRank, Model
+from femubench.core.modal.generalised_mass import mass_normalised
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.typing import FloatArray
 
@@ -204,8 +205,7 @@ def _shift_invert(
     shapes = np.hstack([vectors for _, vectors in pieces])
     order = np.argsort(eigenvalues)
     shapes = shapes[:, order]
-    norm = np.sqrt(np.einsum("ij,ij->j", shapes, model.mass_times(shapes)))
-    return eigenvalues[order], shapes / norm
+    return eigenvalues[order], mass_normalised(model, shapes)
 
 
 def _missed(model: Model, eigenvalues: FloatArray, rigid: int, wanted: int) -> int:

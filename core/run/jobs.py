@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from femubench.core.errors import Diverged, NotApplicable, StrategyFailure
-from femubench.core.fem.model import Model
+from femubench.core.fem.model import Model, differ
 from femubench.core.modal.eigen import counted_evaluations
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import CAPABILITIES, Result, Strategy, declared
@@ -130,15 +130,9 @@ def execute(job: Job) -> JobOutcome:
         # A result is judged by its figures; what numerical libraries mutter on the way is not.
         warnings.simplefilter("ignore")
         outcome = _attempt(strategy, model, measurement, rng)
-    if outcome.status == "ok" and _changed(model, pickle.loads(job.model)):
+    if outcome.status == "ok" and differ(model, pickle.loads(job.model)):
         outcome = JobOutcome("failed", "the nominal model was changed in place, expected a new one")
     return replace(outcome, seconds=time.perf_counter() - start, evaluations=counter.count)
-
-
-def _changed(model: Model, nominal: Model) -> bool:
-    """Tell whether a strategy wrote into the matrices that it was given."""
-    pairs = ((model.mass, nominal.mass), (model.stiffness, nominal.stiffness))
-    return any((now != before).nnz > 0 for now, before in pairs)
 
 
 def one_line(error: BaseException) -> str:

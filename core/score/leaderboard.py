@@ -50,7 +50,7 @@ class _Grid:
 
     Arguments:
         cases: of the run.
-        weights: how much a block counts; the blocks of a structure come to 1.
+        weights: how much a block counts beside the others of its structure.
         seeds: of the run.
         structures: by case; one that is not named is a structure of its own.
         reference: rms error of the nominal model in percent by case and block.
@@ -162,9 +162,9 @@ def ranks_by_floor(run: Run) -> dict[str, tuple[int, ...]]:
         >>> list(results.ranks_by_floor(run).values())
         [(1, 1, 1, 1, 1), (2, 2, 2, 2, 2)]
     """
-    order = leaderboard(run)["strategy"]
-    boards = [leaderboard(run, floor).set_index("strategy")["rank"] for floor in FLOORS]
-    return {name: tuple(int(board[name]) for board in boards) for name in order}
+    ranks = {floor: leaderboard(run, floor).set_index("strategy")["rank"] for floor in FLOORS}
+    order = ranks[OFFSET_PERCENT].index
+    return {name: tuple(int(found[name]) for found in ranks.values()) for name in order}
 
 
 def scored_on(run: Run) -> str:

@@ -200,21 +200,17 @@ def structures_of(run: Run) -> dict[str, str]:
     return dict(run.meta.get("structures") or {})
 
 
-def interval_over_structures(
-    logs: FloatArray, weights: FloatArray | None = None
-) -> tuple[float, float]:
+def interval_over_structures(logs: FloatArray) -> tuple[float, float]:
     """Return the 95 % interval of a geometric mean by resampling structures.
 
     Arguments:
         logs: logarithm of the mean of every structure.
-        weights: of the structures; equal by default.
 
     Source: percentile bootstrap; Hesterberg (2015), American Statistician 69, 371-386.
     """
     count = len(logs)
-    shares = np.ones(count) if weights is None else weights
     drawn = np.random.default_rng(0).integers(0, count, (_RESAMPLES, count))
-    means = (shares * logs)[drawn].sum(axis=1) / shares[drawn].sum(axis=1)
+    means = logs[drawn].mean(axis=1)
     tail = interval_tail(count)
     low, high = np.exp(np.quantile(means, (tail, 1.0 - tail)))
     return float(low), float(high)

@@ -12,6 +12,7 @@ from femubench.core.errors import NotApplicable, StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import DENSE_LIMIT, Modes, enough_modes, solve_modes
 from femubench.core.modal.expansion import expand_by_dynamics, expand_by_rotation, measured_rows
+from femubench.core.modal.generalised_mass import mass_normalised
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import pair_measured
 from femubench.core.typing import FloatArray, IntArray
@@ -145,4 +146,4 @@ class WantedModes:
         rows = measured_rows(measured.shapes)
         sensors = sp.csr_array(model.observe(measured.sensors))[rows]
         shapes = expand_by_dynamics(model, sensors, measured.shapes[rows], measured.eigenvalues)
-        return np.asarray(shapes / np.sqrt(np.einsum("ij,ij->j", shapes, model.mass_times(shapes))))
+        return mass_normalised(model, shapes)

@@ -10,6 +10,7 @@ from scipy.optimize import lsq_linear
 
 from femubench import InputError, Measurement, Model, Modes, UpdateResult, solve_modes
 from femubench.fem import FloatArray
+from femubench.modal import mass_normalised
 from femubench.update import (
     FactorStrategy,
     StiffnessParts,
@@ -71,9 +72,7 @@ class CrossModel(FactorStrategy):
         own = solve_modes(model).elastic
         own = own.take(np.arange(min(len(own), self.modes * len(measurement))))
         if self.expansion == "force":
-            shapes = expand_measured_shapes(model, measurement)
-            square = np.einsum("ij,ij->j", shapes, model.mass_times(shapes))
-            shapes = shapes / np.sqrt(square)
+            shapes = mass_normalised(model, expand_measured_shapes(model, measurement))
         else:
             shapes = quasi_measured_modes(model, measurement).shapes
         matrix, right = cross_equations(parts, own, shapes, measurement.eigenvalues)

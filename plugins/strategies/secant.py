@@ -10,7 +10,7 @@ import scipy.linalg as la
 
 from femubench import Measurement, Model, Strategy, StrategyFailure, UpdateResult
 from femubench.fem import FloatArray, LowRank
-from femubench.modal import rigid_modes_of
+from femubench.modal import mass_normalised, rigid_modes_of
 from femubench.update import check_used_modes, expand_measured_shapes, total_change
 
 # Below this share of independent motion two expanded shapes are one.
@@ -68,7 +68,7 @@ def orthonormal_shapes(model: Model, shapes: FloatArray, rigid: FloatArray) -> F
     Source: Baruch & Bar-Itzhack (1978), Phi (Phi' M Phi)^-1/2.
     """
     shapes = shapes - rigid @ (rigid.T @ model.mass_times(shapes))
-    shapes = shapes / np.sqrt(np.einsum("ij,ij->j", shapes, model.mass_times(shapes)))
+    shapes = mass_normalised(model, shapes)
     values, turn = la.eigh(shapes.T @ model.mass_times(shapes))
     if not values[0] > _DEPENDENT:
         raise StrategyFailure(

@@ -9,7 +9,7 @@ import numpy as np
 
 from femubench import Measurement, Model, UpdateResult
 from femubench.fem import FloatArray
-from femubench.modal import rigid_modes_of
+from femubench.modal import mass_normalised, rigid_modes_of
 from femubench.update import (
     FactorStrategy,
     bounded_fit,
@@ -68,7 +68,7 @@ class StrainEnergy(FactorStrategy):
         paired = quasi_measured_modes(model, measurement)
         own = paired.modes.shapes[:, paired.partners]
         shapes = expand_measured_shapes(model, measurement, rigid_modes_of(model))
-        shapes = shapes / np.sqrt(np.einsum("ij,ij->j", shapes, model.mass_times(shapes)))
+        shapes = mass_normalised(model, shapes)
         energies = (np.einsum("pjj->pj", parts.energies(s, s)) for s in (own, shapes))
         index = energy_change_index(*energies)
         named = np.flatnonzero(index >= index.mean() + self.above * index.std())

@@ -1,0 +1,23 @@
+"""Shapes scaled to a generalised mass of 1."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from femubench.core.fem.model import Model
+from femubench.core.typing import FloatArray
+
+
+def mass_normalised(model: Model, shapes: FloatArray) -> FloatArray:
+    """Return shapes with phi' M phi = 1 each, (n, m).
+
+    Arguments:
+        model: whose mass counts.
+        shapes: at all its dofs, each with some mass in it, (n, m).
+
+    Examples:
+        >>> shapes = modal.mass_normalised(model, 3.0 * modes.shapes)
+        >>> np.allclose(np.diag(shapes.T @ model.mass_times(shapes)), 1.0)
+        True
+    """
+    return np.asarray(shapes / np.sqrt(np.einsum("ij,ij->j", shapes, model.mass_times(shapes))))
