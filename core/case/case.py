@@ -57,6 +57,7 @@ class Case(Shown):
             model with ordinary scatter.
         structure: the physical structure, which several cases may share; empty for one that no
             other case is known to share.
+        notes: what was understood otherwise than it stands in the files, one sentence each.
     """
 
     name: str
@@ -76,6 +77,7 @@ class Case(Shown):
     model_error: float | None = None
     beam_share: float = BEAM_SHARE
     structure: str = ""
+    notes: tuple[str, ...] = ()
 
     def rows(self) -> list[tuple[str, str]]:
         """Return where the case is from, its model, and what was measured on it."""
@@ -95,7 +97,8 @@ class Case(Shown):
         if self.reference is not None:
             known = self.reference.select(self.reference_used).frequencies
             found.append(("reference", modes_line(self.reference_used, known)))
-        return [*found, *(("modified", str(change)) for change in self.modifications)]
+        found += [("modified", str(change)) for change in self.modifications]
+        return [*found, *(("note", note) for note in self.notes)]
 
     @property
     def error_width(self) -> float:

@@ -70,7 +70,7 @@ def _frequencies(table: Table) -> tuple[FloatArray, FloatArray, FloatArray]:
         frequency = row.number("frequency", "a number > 0 in Hz", _positive)
         if frequency is None:
             raise row.error("frequency", "empty cell", "a number > 0 in Hz")
-        std = row.number("frequency_std", "a number > 0 in Hz, or nothing", _positive)
+        std = row.number("frequency_std", "a number >= 0 in Hz, or nothing", _not_negative)
         damping = row.number("damping", "a ratio >= 0 and < 1, or nothing", lambda v: 0 <= v < 1)
         std = FREQUENCY_STD * frequency if std is None else std
         columns.append((frequency, std, np.nan if damping is None else damping))
@@ -80,6 +80,10 @@ def _frequencies(table: Table) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _positive(value: float) -> bool:
     return value >= SMALLEST
+
+
+def _not_negative(value: float) -> bool:
+    return value >= 0.0
 
 
 def _shapes(table: Table, labels: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
@@ -96,7 +100,7 @@ def _shapes(table: Table, labels: tuple[str, ...]) -> tuple[FloatArray, FloatArr
             elif value is not None:
                 shapes[s, m] = value
             if f"{label}_std" not in labels:
-                deviation = row.number(f"{label}_std", "a number > 0, or nothing", _positive)
+                deviation = row.number(f"{label}_std", "a number >= 0, or nothing", _not_negative)
                 std[s, m] = np.nan if deviation is None else deviation
         measured = np.abs(shapes[np.isfinite(shapes[:, m]), m])
         if len(measured) and measured.max() < SMALLEST:

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from femubench.core.case.case import Case, Modification
 from femubench.core.case.checks import check_unique
+from femubench.core.case.deviations import with_floor
 from femubench.core.case.faults import (
     Fault,
     KeyPath,
@@ -27,6 +28,7 @@ from femubench.core.case.files import LARGEST_CASE, CaseFiles
 from femubench.core.case.frames import FrameSite, Site, attachments, frame_of
 from femubench.core.case.matrices import matrix_model, reader_of, reading_with
 from femubench.core.case.modes import (
+    FREQUENCY_STD,
     NO_SENSORS,
     fitted_modes,
     fitted_sensors,
@@ -132,6 +134,7 @@ class _Building:
     spec: CaseSpec
     readers: tuple[Reader, ...]
     readings: dict[Path, Measurement] = field(default_factory=dict)
+    notes: dict[str, None] = field(default_factory=dict)
 
     def case(self, name: str | None) -> Case:
         """Return the case; raises Fault or InputError."""
@@ -143,7 +146,7 @@ class _Building:
         )
         measurement = self.measurement(site)
         info = self.spec.case
-        return Case(
+        case = Case(
             name=info.name if name is None else name,
             title=info.title or info.name,
             source=info.source,
@@ -162,6 +165,7 @@ class _Building:
             beam_share=self.spec.diagnosis.beam_share,
             structure=info.structure,
         )
+        return replace(case, notes=tuple(self.notes))
 
     def model(self) -> Model:
         spec = self.spec.model
@@ -261,8 +265,12 @@ class _Building:
         share = self.spec.measurement.shape_std
         path, read = self.reading(key, name)
         if read is None:
-            return read_modes(path, sensors, share)
-        return fitted_modes(read, path, sensors, share)
+            found = read_modes(path, sensors, share)
+        else:
+            found = fitted_modes(read, path, sensors, share)
+        found, told = with_floor(found, name, FREQUENCY_STD, share)
+        self.notes |= dict.fromkeys(told)
+        return found
 
     def modifications(self, model: Model, site: Site, sensors: Sensors) -> tuple[Modification, ...]:
         specs = self.spec.modification
