@@ -48,7 +48,7 @@ def with_floor(
         shape_std[known, k] = raised
         lows[known, k] = low
     if lows.any():
-        share = (shape_std / np.nanmax(np.abs(m.shapes), axis=0, initial=0.0))[lows]
+        share = (shape_std / np.abs(np.nan_to_num(m.shapes)).max(axis=0, initial=0.0))[lows]
         told.append(_sentence(file, _places(m, lows), share, "the largest component"))
     if not told:
         return m, ()
