@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import ValidationError
 
-from femubench.core.case.case import Case, Modification
+from femubench.core.case.case import Case, Match, Modification
 from femubench.core.case.checks import check_unique
 from femubench.core.case.deviations import with_floor
 from femubench.core.case.faults import (
@@ -26,8 +26,9 @@ from femubench.core.case.faults import (
 )
 from femubench.core.case.files import LARGEST_CASE, CaseFiles
 from femubench.core.case.frames import FrameSite, Site, attachments, frame_of
-from femubench.core.case.matching import Alignment, Match, fitted_sensors, told_of
-from femubench.core.case.matrices import matrix_model, reader_of, reading_with
+from femubench.core.case.matching import Alignment, fitted_sensors, told_of
+from femubench.core.case.matrices import model_of_matrices, reader_of, reading_with
+from femubench.core.case.model_files import model_of_file
 from femubench.core.case.modes import (
     FREQUENCY_STD,
     NO_SENSORS,
@@ -37,7 +38,7 @@ from femubench.core.case.modes import (
     seen_at,
 )
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.case.schema import CaseSpec, FrameSpec, ModificationSpec, parse_spec
+from femubench.core.case.schema import CaseSpec, FileSpec, FrameSpec, ModificationSpec, parse_spec
 from femubench.core.case.tables import read_sensors, read_table
 from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import Frame
@@ -171,8 +172,10 @@ class _Building:
     def model(self) -> Model:
         spec = self.spec.model
         with at_key("model"), np.errstate(all="ignore"):
+            if isinstance(spec, FileSpec):
+                return model_of_file(spec, self.files, self.readers)
             if not isinstance(spec, FrameSpec):
-                return matrix_model(spec, self.files, self.readers)
+                return model_of_matrices(spec, self.files, self.readers)
             frame = frame_of(spec)
             try:
                 model = Model.of(frame)

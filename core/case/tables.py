@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from femubench.core.case.case import Match
 from femubench.core.case.faults import Misfit, WrongDirection
 from femubench.core.case.files import LARGEST_TEXT
 from femubench.core.case.frames import Site
 from femubench.core.case.matching import (
     Alignment,
-    Match,
     check_apart,
     check_near,
     matches_of,
