@@ -769,7 +769,7 @@ def test_any_names_and_numbers(
         frequencies / 7.0,
         np.array([np.nan, 1.0 / (1.0 + numbers[0])]),
         shapes,
-        np.abs(shapes) / 3.0,
+        np.tile(np.nanmax(np.abs(shapes), axis=0) / 3.0, (4, 1)),
     )
     case = replace(
         base,

@@ -10,8 +10,9 @@ from femubench.core.case.files import CASE_FILE
 from femubench.core.case.frames import FrameSite, attachments, frame_of
 from femubench.core.case.matching import Alignment
 from femubench.core.case.schema import FrameSpec, parse_spec
+from femubench.core.case.sensors import read_sensors
 from femubench.core.case.table_text import csv_bytes
-from femubench.core.case.tables import RESERVED, read_sensors
+from femubench.core.case.tables import RESERVED
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Frame, JointSpring
 from femubench.core.fem.model import Model

@@ -14,12 +14,13 @@ import numpy as np
 from femubench.core.case.case import Match
 from femubench.core.case.faults import Misfit, WrongDirection
 from femubench.core.case.frames import Site
+from femubench.core.case.schema import LengthUnit
+from femubench.core.case.units import METRES
 from femubench.core.errors import InputError
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.sensors import Sensors, axis_of, direction_of
 from femubench.core.typing import FloatArray
 
-UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048}  # m
 TOLERANCE = 0.01  # of the size of the structure
 AXES = 'three of x, y, z with an optional minus, each once and right-handed, e.g. "x,z,-y"'
 _EXTENT = (0.1, 1.2)  # of the size of the structure, that of a test of it
@@ -41,10 +42,10 @@ class Alignment:
     tolerance: float
 
     @classmethod
-    def of(cls, unit: str | None, frame: str | None, tolerance: float | None) -> Alignment:
+    def of(cls, unit: LengthUnit | None, frame: str | None, tolerance: float | None) -> Alignment:
         """Return what the keys of a case say; raises Misfit for a frame of axes that is none."""
         turn = np.eye(3) if frame is None else parse_frame(frame)
-        known = None if unit is None else UNITS[unit]
+        known = None if unit is None else METRES[unit]
         return cls(known, turn, TOLERANCE if tolerance is None else tolerance)
 
     def direction(self, name: str) -> str:
@@ -81,7 +82,7 @@ def size_of(points: FloatArray) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
 
 
-def unit_of(xyz: FloatArray, site: Site, turn: FloatArray) -> str:
+def unit_of(xyz: FloatArray, site: Site, turn: FloatArray) -> LengthUnit:
     """Return the unit in which coordinates fit the structure, by its size: m where that may be.
 
     Arguments:
@@ -90,10 +91,10 @@ def unit_of(xyz: FloatArray, site: Site, turn: FloatArray) -> str:
         turn: the axes of the model in those of the test.
     """
     ratio = size_of(xyz) / (size_of(site.points) or 1.0)
-    fitting = [name for name, unit in UNITS.items() if _EXTENT[0] <= ratio * unit <= _EXTENT[1]]
+    fitting = [name for name, unit in METRES.items() if _EXTENT[0] <= ratio * unit <= _EXTENT[1]]
     if "m" in fitting or not fitting:
         return "m"
-    return min(fitting, key=lambda name: float(np.median(_gaps(xyz @ turn.T * UNITS[name], site))))
+    return min(fitting, key=lambda name: float(np.median(_gaps(xyz @ turn.T * METRES[name], site))))
 
 
 def _gaps(xyz: FloatArray, site: Site) -> FloatArray:
@@ -149,7 +150,7 @@ def check_near(match: Match, site: Site, alignment: Alignment, every: FloatArray
 def _advice(every: FloatArray, site: Site, limit: float) -> str:
     """Return the frame of axes, or the unit, with which all points of a test would fit."""
     ratio = size_of(every) / (size_of(site.points) or 1.0)
-    for name, unit in UNITS.items():
+    for name, unit in METRES.items():
         fits = name != "m" and _EXTENT[0] <= unit * ratio <= _EXTENT[1]
         if fits and _gaps(unit * every, site).max() <= limit:
             return f'; with unit = "{name}" all fit'
@@ -220,7 +221,7 @@ def fitted_sensors(
     if rows:
         xyz = read.xyz[rows]
         unit = unit_of(xyz, site, alignment.turn)
-        scale = UNITS[unit] if alignment.unit is None else alignment.unit
+        scale = METRES[unit] if alignment.unit is None else alignment.unit
         matches = matches_of([read.labels[i] for i in rows], xyz, site, alignment, scale)
         ways = [alignment.direction(read.directions[i]) for i in rows]
         kept = _fitting(list(zip(matches, ways, strict=True)), file, site, alignment)

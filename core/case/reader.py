@@ -39,7 +39,8 @@ from femubench.core.case.modes import (
 )
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.schema import CaseSpec, FileSpec, FrameSpec, ModificationSpec, parse_spec
-from femubench.core.case.tables import read_sensors, read_table
+from femubench.core.case.sensors import read_sensors
+from femubench.core.case.tables import read_table
 from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model

@@ -357,8 +357,8 @@ class MeasurementSpec(Table):
     held_out: Many[Count] = Field((), description="a list of mode numbers")
     band: tuple[NotNegative, Positive] | None = Field(None, description=BAND)
     mass: WeightSpec | None = Field(None, description="{value, std} in kg")
-    unit: Literal["m", "mm", "cm", "in", "ft"] | None = Field(
-        None, description="'m', 'mm', 'cm', 'in' or 'ft', of the coordinates of sensors"
+    unit: LengthUnit | None = Field(
+        None, description=f"one of {', '.join(get_args(LengthUnit))}, of sensors' coordinates"
     )
     frame: Annotated[str, Field(strict=True, max_length=40)] | None = Field(
         None, description='the axes of the model in those of the test, e.g. "x,z,-y"'
