@@ -245,6 +245,7 @@ class Reader(Protocol):
       models whose own files have none.
     - ``write_model(model, path, original)``: writes an updated model in the format of
       `original`, and keeps of it what an update does not change.
+    - ``read_outline(path) -> Outline``: the title of a test, and lines that draw its structure.
     - ``write_matrix(matrix, path, original)``: likewise one matrix of a pair.
 
     Attributes:

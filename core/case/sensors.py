@@ -67,10 +67,9 @@ def _placed(table: Table, site: Site, alignment: Alignment) -> tuple[Match, ...]
     labels = [row.cells["label"] for row in table.rows]
     xyz = np.array([row.vector() for row in table.rows], dtype=float)
     matches = matches_of(labels, xyz, site, alignment, alignment.unit or 1.0)
-    every = np.array([match.measured for match in matches])
     for row, match in zip(table.rows, matches, strict=True):
         try:
-            check_near(match, site, alignment, every)
+            check_near(match, site, alignment, xyz)
         except Misfit as misfit:
             raise row.error("x", misfit.what, misfit.expected) from None
     return tuple(matches)
