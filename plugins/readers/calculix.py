@@ -49,9 +49,10 @@ class CalculixReader:
         n = len(labels)
         places = nodes.read_nodes(path.with_suffix(".inp"))
         numbers, along = zip(*labels, strict=True)
-        xyz = np.array([places.get(number, (np.nan,) * 3) for number in numbers])
         groups = {name: _matrix(file, n) for name, file in _groups(path).items()}
         mass, stiffness = (_matrix(path.with_suffix(s), n) for s in (".mas", ".sti"))
+        xyz = np.array([places.get(number, (np.nan,) * 3) for number in numbers])
+        xyz = _with_inner_nodes(xyz, np.array(numbers), stiffness)
         return matrix_model(mass, stiffness, numbers, along, xyz, groups)
 
     def model_files(self, path: Path) -> Sequence[Path]:
@@ -103,6 +104,24 @@ def _labels(path: Path) -> list[tuple[str, str]]:
         found.append((str(int(node)), directions([int(direction[:9])], path)[0]))
     if not found:
         raise InputError("no rows", file=path, expected=_LABELS)
+    return found
+
+
+def _with_inner_nodes(xyz: np.ndarray, numbers: np.ndarray, stiffness: SparseArray) -> np.ndarray:
+    """Return places where nodes that CalculiX adds inside elements lie amid their neighbours.
+
+    Arguments:
+        xyz: of every row, nan for nodes that the input file does not have, (n, 3).
+        numbers: of the node of every row, (n,).
+        stiffness: (n, n).
+    """
+    lost = np.isnan(xyz[:, 0])
+    found = xyz.copy()
+    for number in np.unique(numbers[lost]):
+        near = np.unique(stiffness[:, np.flatnonzero(numbers == number)].indices)
+        near = near[~lost[near]]
+        if len(near):
+            found[numbers == number] = xyz[near].mean(axis=0)
     return found
 
 
