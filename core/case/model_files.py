@@ -80,7 +80,9 @@ def read_as_it_is(paths: ModelFiles, readers: Sequence[Reader]) -> Model:
         return model
     mass = checked(model.mass, paths.mass or paths.model, model.size)
     stiffness = checked(model.stiffness, paths.model, model.size)
-    return _labelled(replace(model, mass=mass, stiffness=stiffness), paths, readers)
+    groups = {name: checked(part, paths.model, model.size) for name, part in model.groups.items()}
+    found = replace(model, mass=mass, stiffness=stiffness, groups=groups)
+    return _labelled(found, paths, readers)
 
 
 def further_files(path: Path, readers: Sequence[Reader]) -> tuple[Path, ...]:
