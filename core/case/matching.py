@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import permutations, product
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,6 +59,22 @@ class Alignment:
             return name
         axis = axis_of(name)
         return direction_of(np.concatenate([self.turn @ axis[:3], self.turn @ axis[3:]]))
+
+
+class Placed(NamedTuple):
+    """Sensors on a structure.
+
+    Arguments:
+        sensors: that fit it.
+        matches: where each was taken to sit.
+        told: what to say of units and places.
+        turn: from coordinates of the test to those of the model in m, (3, 3).
+    """
+
+    sensors: Sensors
+    matches: tuple[Match, ...]
+    told: tuple[str, ...]
+    turn: FloatArray
 
 
 def parse_frame(text: str) -> FloatArray:
@@ -203,7 +220,7 @@ def check_apart(found: Sequence[tuple[Match, str]]) -> None:
 
 def fitted_sensors(
     read: Sensors, file: Path, site: Site, alignment: Alignment, wanted: Collection[str] | None
-) -> tuple[Sensors, tuple[Match, ...], tuple[str, ...]]:
+) -> Placed:
     """Return the sensors of a file that a plugin has read, those that fit the structure.
 
     Files of three components a point list directions that a planar model does not have, and
@@ -217,17 +234,17 @@ def fitted_sensors(
         alignment: how the test lies beside it; the unit is detected where it has none.
         wanted: labels with a shape; None for all.
 
-    Returns:
-        The sensors, where each was taken to sit, and what to say of units and places.
-
     Raises:
         InputError: when a sensor lies off the structure, or none is left.
     """
-    rows = [
-        i
-        for i, label in enumerate(read.labels)
-        if np.isfinite(read.xyz[i]).all() and (wanted is None or label in wanted)
-    ]
+    scale, rows = (
+        1.0,
+        [
+            i
+            for i, label in enumerate(read.labels)
+            if np.isfinite(read.xyz[i]).all() and (wanted is None or label in wanted)
+        ],
+    )
     kept: list[tuple[Match, str]] = []
     told: tuple[str, ...] = ()
     if rows:
@@ -246,7 +263,8 @@ def fitted_sensors(
     found = tuple(match for match, _ in kept)
     places = np.array([match.xyz for match in found])
     labels = tuple(match.sensor for match in found)
-    return Sensors(labels, places, tuple(way for _, way in kept)), found, told
+    sensors = Sensors(labels, places, tuple(way for _, way in kept))
+    return Placed(sensors, found, told, scale * alignment.turn)
 
 
 def _fitting(
