@@ -208,8 +208,15 @@ class _Building:
             known = [".csv", *(suffix for r in self.readers for suffix in r.suffixes)]
             raise Fault(key, f"unknown kind of file {name!r}", ", ".join(known))
         if path not in self.readings:
+            names, named = (
+                self.spec.measurement.variables,
+                getattr(reader, "read_named_modes", None),
+            )
+            if names and named is None:
+                path_of = ("measurement", "variables")
+                raise Fault(path_of, f"{reader.name} has no variables", "no such key")
             with reading_with(reader, path):
-                found = reader.read_modes(path)
+                found = reader.read_modes(path) if named is None else named(path, names)
             if not isinstance(found, Measurement):
                 what = f"{reader.name} gave {type(found).__name__}"
                 raise Fault(key, what, "femubench.Measurement")

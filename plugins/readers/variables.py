@@ -11,7 +11,8 @@ import scipy.sparse as sp
 
 from femubench import InputError, Measurement, Model
 from femubench.fem import ModelError, SparseArray, matrix_model
-from femubench.plugins.readers.reading import DIRECTIONS, directions, no_modes
+from femubench.plugins.readers.modal_variables import read_modal
+from femubench.plugins.readers.reading import DIRECTIONS, directions
 
 Variables: TypeAlias = Mapping[str, Any]  # arrays, sparse matrices, arrays of words
 STIFFNESS = ("stiffness", "k", "kaa", "kgg", "kaax", "kjj", "kll", "k_whole", "k0")
@@ -162,8 +163,12 @@ class VariablesReader:
         return model_of({**first, STIFFNESS[0]: own, MASS[0]: other}, stiffness)
 
     def read_modes(self, path: Path) -> Measurement:
-        """Refuse to read modes; raises InputError."""
-        no_modes(path, f"a file of kind {self.name}")
+        """Return the modes among the variables, by their common names; raises InputError."""
+        return read_modal(self.variables(path), path, {})
+
+    def read_named_modes(self, path: Path, names: Mapping[str, str]) -> Measurement:
+        """Return the modes by names that a case gives; raises InputError."""
+        return read_modal(self.variables(path), path, names)
 
     def write_model(self, model: Model, path: Path, original: Path) -> None:
         """Write an updated model, and all else that is in the original; raises InputError."""
