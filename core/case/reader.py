@@ -39,6 +39,7 @@ from femubench.core.case.modes import (
     seen_at,
 )
 from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.case.repeats import with_covariance, with_repeats
 from femubench.core.case.schema import CaseSpec, FileSpec, FrameSpec, ModificationSpec, parse_spec
 from femubench.core.case.sensors import read_sensors
 from femubench.core.case.tables import read_table
@@ -232,6 +233,7 @@ class _Building:
         if from_plugin:
             measured = measured_only(sensors, measurement.shapes)
             measurement = self.modes(("measurement", "modes"), spec.modes, measured)
+        measurement = self.with_scatter(measurement)
         listed = [
             (("measurement", key, i), number)
             for key, numbers in (("used", spec.used), ("held_out", spec.held_out))
@@ -241,6 +243,25 @@ class _Building:
         if spec.mass is None:
             return measurement
         return replace(measurement, total_mass=(spec.mass.value, spec.mass.std))
+
+    def with_scatter(self, measurement: Measurement) -> Measurement:
+        """Return the measurement with what repeats, or a covariance, say of its frequencies."""
+        spec = self.spec.measurement
+        if spec.repeats is not None and spec.covariance is not None:
+            what = "both repeats and covariance"
+            raise Fault(("measurement", "covariance"), what, "one of the two")
+        if spec.covariance is not None:
+            with at_key("measurement", "covariance"):
+                path = self.files.path(spec.covariance)
+            return with_covariance(measurement, path)
+        if spec.repeats is None:
+            return measurement
+        with at_key("measurement", "repeats"):
+            path = self.files.path(spec.repeats)
+        found, told = with_repeats(measurement, path)
+        found, more = with_floor(found, spec.repeats, FREQUENCY_STD, spec.shape_std)
+        self.notes |= dict.fromkeys((*told, *more))
+        return found
 
     @property
     def reference_used(self) -> tuple[int, ...]:
