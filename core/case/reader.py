@@ -305,7 +305,7 @@ class _Building:
     def placed(self, path: Path, read: Measurement | None, site: Site, modes: str) -> Placed:
         """Return the sensors of a file and where each was taken to sit."""
         spec = self.spec.measurement
-        with at_key("measurement", "frame"):
+        with at_key("measurement", "frame"):  # of axes
             alignment = Alignment.of(spec.unit, spec.frame, spec.tolerance)
         if read is None:
             found = read_sensors(path, site, alignment)
