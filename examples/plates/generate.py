@@ -71,7 +71,7 @@ def mesh(nx: int, ny: int) -> str:
         lower, upper = sorted((right - 1, right), key=lambda plate: PLATES[plate][1])
         middle: dict[tuple[int, int], int] = {}
         for i, j in np.ndindex(nx // 4, ny):
-            if not (nx // 16 <= i < nx // 4 - nx // 16 and j // (ny // 4) in (0, 3)):
+            if j // (ny // 4) in (1, 2):  # two rows of bolts, along either edge
                 continue
             shift = {right - 1: i + nx - nx // 4, right: i}
             for a, b in ((0, 0), (2, 0), (2, 2), (0, 2)):
