@@ -23,7 +23,7 @@ from bytes_changed import broken
 from test_model_readers import FORMATS, JOB, WRITERS, Files, base, rounded
 from watch import watched
 
-FEW, MANY, MANY_APART = 12, 3000, 60
+FEW, MANY, MANY_APART = 12, 400, 40
 LARGEST = 2**30  # bytes, of memory
 MOST_CHARACTERS = 2500
 REAL = ("ascii_fabiola.op4", "matrix_factory.pch", "heat_engine_housing.uff",

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from importlib.util import find_spec
@@ -13,16 +16,20 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse as sp
+from click.testing import CliRunner
 
 import femubench
 from femubench import InputError, Model
 from femubench.core.case.units import in_si
+from femubench.core.cli.main import bench
+from femubench.core.plugin.loader import load_plugins
 from femubench.fem import LowRank, MatrixGeometry, matrix_model
 
 FORMATS = Path(__file__).parent / "formats"
 PLATES = Path(__file__).parents[1] / "examples" / "plates"
 JOB = FORMATS / "calculix" / "job.inp"
 CCX = shutil.which("ccx")
+READERS = tuple(load_plugins().readers.values())
 NUMBERS = {"x": 1, "y": 2, "z": 3, "rx": 4, "ry": 5, "rz": 6}
 Files = dict[str, str]  # of read_model: model, mass, dofs
 
@@ -360,3 +367,143 @@ def test_a_solid_has_the_frequencies_of_calculix(plates: Path) -> None:
     np.testing.assert_allclose(frequencies(model, 20)[6:], expected[6:], rtol=1e-6)
     weight = 7850.0 * (3 * 160.0 * 60.0 * 6.0 + 2 * 2 * 40.0 * 15.0) * 1e-9
     assert model.total_mass == pytest.approx(weight, rel=1e-3)
+
+
+def documented_commands() -> list[str]:
+    """Return the commands of docs/readers.md that lead from a job to a ranking."""
+    text = (PLATES.parents[1] / "docs" / "readers.md").read_text(encoding="utf-8")
+    section = text.partition("### Three bolted plates")[2]
+    (block,) = re.findall(r"```console\n(.*?)```", section.partition("\n## ")[0], re.DOTALL)
+    return [line.removeprefix("$ ") for line in block.splitlines()]
+
+
+def run_documented(folder: Path, last: str = "") -> str:
+    """Run them word for word and return what the last one prints."""
+    commands = documented_commands()
+    assert len(commands) == 5
+    for i, command in enumerate(commands):
+        words = shlex.split(command + (last if i == 4 else ""))
+        words = [sys.executable, "-m", "femubench", *words[1:]] if words[0] == "bench" else words
+        done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        assert done.stderr == "" or words[0] != "bench"
+    return done.stdout
+
+
+def fresh_plates(folder: Path) -> Path:
+    if CCX is None:
+        pytest.skip("ccx is not installed")
+    return Path(shutil.copytree(PLATES, folder / "plates"))
+
+
+def test_five_commands_lead_from_a_job_to_a_ranking(tmp_path: Path) -> None:
+    told = run_documented(fresh_plates(tmp_path), last=" -s unchanged -s berman --nominal drawn")
+    case = femubench.read_case(tmp_path / "plates" / "case", readers=READERS)
+    assert list(case.model.groups) == ["left", "right"]
+    assert len(case.measurement.sensors) == 90
+    assert np.ptp(case.model.dofs.xyz, axis=0) == pytest.approx([0.4, 0.06, 0.013])
+    ranked = re.findall(r"^ *(\d+) +(\S+)", told, re.MULTILINE)
+    assert ranked[:2] == [("1", "berman"), ("2", "unchanged")]
+
+
+@pytest.mark.sweep
+def test_five_commands_rank_all_strategies(tmp_path: Path) -> None:
+    told = run_documented(fresh_plates(tmp_path))
+    assert "diagnosed" in told.splitlines()[2]
+
+
+_CASE = """\
+[case]
+name = "bricks"
+[model]
+kind = "file"
+file = "job.inp"
+unit = "mm"
+[[model.groups]]
+name = "tip"
+dofs = ["9", "10:x", "11:z"]
+[measurement]
+sensors = "sensors.csv"
+modes = "modes.csv"
+used = [1, 2]
+"""
+
+
+def test_bench_update_writes_a_job_with_the_measured_frequencies(tmp_path: Path) -> None:
+    folder = tmp_path / "case"
+    folder.mkdir()
+    for suffix in (".inp", ".sti", ".mas", ".dof"):
+        shutil.copy(JOB.with_suffix(suffix), folder)
+    model = femubench.read_model(JOB, unit="mm")
+    modes = femubench.solve_modes(model, 2)
+    places = [(node, d) for node in ("9", "10", "11", "12") for d in ("y", "z")]
+    rows = [rows_of(model).index(place) for place in places]
+    labels = [f"{node}{d}" for node, d in places]
+    sensors = [f"{label},{node},{d}" for label, (node, d) in zip(labels, places, strict=True)]
+    (folder / "sensors.csv").write_text("\n".join(["label,at,direction", *sensors]))
+    measured = 0.97 * frequencies(model, 2)
+    lines = [",".join(["mode", "frequency", *labels])]
+    lines += [",".join(map(repr, [i + 1, float(measured[i]), *modes.shapes[rows, i].tolist()]))
+              for i in range(2)]  # fmt: skip
+    (folder / "modes.csv").write_text("\n".join(lines))
+    (folder / "case.toml").write_text(_CASE)
+    before = femubench.read_case(folder, readers=READERS)
+    assert before.model.groups["tip"].nnz > 0
+    new = tmp_path / "new"
+    done = CliRunner().invoke(bench, ["update", str(folder), "-s", "baruch", "-o", str(new)])
+    assert done.exit_code == 0, done.output
+    assert f"wrote {new / 'job.sti'}" in done.output
+    shutil.copy(JOB, new)
+    np.testing.assert_allclose(
+        frequencies(femubench.read_model(new / "job.inp", unit="mm"), 2), measured, rtol=1e-6
+    )
+    # All files that were read are in the digest.
+    (folder / "job.mas").write_text((folder / "job.mas").read_text() + "\n")
+    assert femubench.read_case(folder, readers=READERS).digest != before.digest
+
+
+def test_files_outside_of_the_case_are_refused(tmp_path: Path) -> None:
+    folder = tmp_path / "case"
+    folder.mkdir()
+    for suffix in (".sti", ".mas", ".dof"):
+        shutil.copy(JOB.with_suffix(suffix), folder)
+    (tmp_path / "mesh.inp").write_text(JOB.read_text())
+    (folder / "job.inp").write_text("*INCLUDE, INPUT=../mesh.inp\n")
+    (folder / "case.toml").write_text(_CASE)
+    with pytest.raises(InputError, match="leads out of the folder"):
+        femubench.read_case(folder, readers=READERS)
+
+
+def test_a_missing_library_is_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("femubench.plugins.readers.reading.find_spec", lambda name: None)
+    for name, extra in (("K.op4", "nastran"), ("K.h5", "hdf5"), ("K.full", "ansys")):
+        (tmp_path / name).write_bytes(b"x")
+        with pytest.raises(InputError, match=rf"pip install 'femubench\[{extra}\]'"):
+            femubench.read_model(tmp_path / name)
+
+
+def test_rows_without_labels_or_places_are_told(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", K=np.eye(2), M=np.eye(2))
+    with pytest.raises(InputError, match=r"no labels.*row,node,direction"):
+        femubench.read_model(tmp_path / "a.npz")
+    labels = {"node": [7, 8], "direction": ["x", "y"]}
+    np.savez(tmp_path / "b.npz", K=np.eye(2), M=np.eye(2), **labels)
+    with pytest.raises(InputError, match=r"node '7' has no coordinates.*node,x,y,z"):
+        femubench.read_model(tmp_path / "b.npz")
+    (tmp_path / "nodes.csv").write_text("node,x,y,z\n7,0,0,0\n8,1,0,0\n")
+    model = femubench.read_model(tmp_path / "b.npz", dofs=tmp_path / "nodes.csv", unit="cm")
+    np.testing.assert_allclose(model.dofs.xyz[1], [0.01, 0.0, 0.0])
+    np.savez(tmp_path / "c.npz", K=np.eye(2), M=np.eye(2), node=[1], direction=["x"])
+    with pytest.raises(InputError, match="size"):
+        femubench.read_model(tmp_path / "c.npz")
+
+
+def test_data_in_other_files_is_refused(tmp_path: Path) -> None:
+    import h5py
+
+    (tmp_path / "secret").write_bytes(np.eye(2).tobytes())
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["M"] = np.eye(2)
+        file.create_dataset("K", (2, 2), float, external=[(str(tmp_path / "secret"), 0, 32)])
+    with pytest.raises(InputError, match="'K' is kept in another file"):
+        femubench.read_model(tmp_path / "a.h5")

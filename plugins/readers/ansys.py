@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 import scipy.sparse as sp
 
-from femubench import InputError, Model
-from femubench.fem import SparseArray, matrix_model
+from femubench import InputError
 from femubench.plugins.readers.apart import apart, limit_memory
 from femubench.plugins.readers.reading import directions, needs, no_modes
+
+if TYPE_CHECKING:
+    from femubench import Model
+    from femubench.fem import SparseArray
 
 
 class AnsysReader:
@@ -30,6 +33,8 @@ class AnsysReader:
 
     def read_model(self, path: Path) -> Model:
         """Return mass and stiffness by node and direction; raises InputError."""
+        from femubench.fem import matrix_model
+
         needs("ansys", "ansys", path)
         found = apart(full_file, path, "a .full file with stiffness and mass")
         numbers = found["node"].tolist()

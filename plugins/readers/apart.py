@@ -67,10 +67,10 @@ def in_child(module: str, function: str, path: str, result: str) -> None:
     called: Callable[[Path], dict[str, Any]] = getattr(import_module(module), function)
     try:
         with opened(Path(path), ""):
-            found = called(Path(path))
+            found = _split(called(Path(path)))
     except InputError as error:
         sys.exit(" ".join(error.what.split()))
-    np.savez(result, **_split(found))
+    np.savez(result, **found)
 
 
 def limit_memory(path: Path) -> None:
@@ -92,6 +92,7 @@ def _split(found: dict[str, Any]) -> dict[str, Any]:
         key = f"v{len(names)}"
         if sp.issparse(value):
             matrix = sp.csc_array(value)
+            matrix.check_format(full_check=True)
             arrays |= {f"{key}.{part}": np.asarray(getattr(matrix, part)) for part in _PARTS}
         elif isinstance(value, np.ndarray) and value.dtype.kind in "fiuUS":
             arrays[key] = value
