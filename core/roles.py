@@ -243,6 +243,8 @@ class Reader(Protocol):
     - ``model_files(path) -> Sequence[Path]``: further files that `read_model` opens.
     - ``read_nodes(path) -> Mapping[str, Sequence[float]]``: coordinates of nodes by name, for
       models whose own files have none.
+    - ``read_named_modes(path, names) -> Measurement``: instead of `read_modes` where a case names
+      the variables of a file, from ``frequencies``, ``shapes``, ... to what they are called there.
     - ``read_outline(path) -> Outline``: the title of a test, and lines that draw its structure.
     - ``write_model(model, path, original)``, ``write_pair(model, stiffness, mass, originals)``:
       write an updated model in the format of the original file or files, and keep of these what
@@ -261,7 +263,11 @@ class Reader(Protocol):
         ...
 
     def read_modes(self, path: Path) -> Measurement:
-        """Return sensors and modes; raises InputError where the file holds none."""
+        """Return sensors and modes, nan for deviations and places that the file does not state.
+
+        Raises:
+            InputError: where the file holds none.
+        """
         ...
 
 

@@ -1,6 +1,7 @@
 """Modal analysis: pairing and correlation of modes, expansion, sensitivities, receptances."""
 
 from femubench.core.modal.complex_modes import real_modes
+from femubench.core.modal.correlated_errors import shrunk_correlation
 from femubench.core.modal.correlation import auto_mac, mac, modal_scale_factor
 from femubench.core.modal.expansion import expand_by_dynamics, expand_by_rotation, expand_by_serep
 from femubench.core.modal.frf import receptance
@@ -31,4 +32,5 @@ __all__ = [
     "rigid_body_vectors",
     "rigid_modes_of",
     "shape_sensitivities",
+    "shrunk_correlation",
 ]

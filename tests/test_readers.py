@@ -110,7 +110,7 @@ def test_nodes_and_modes(tmp_path: Path, nodes: Dataset) -> None:
     np.testing.assert_allclose(read.sensors.xyz, XYZ)
     assert read.numbers == (1, 2)
     np.testing.assert_allclose(read.frequencies, [10.0, 20.0])
-    np.testing.assert_allclose(read.frequency_std, [0.05, 0.1])
+    assert np.isnan(read.frequency_std).all()  # a case gives what a file does not state
     np.testing.assert_allclose(read.damping, [0.01, 0.02])
     np.testing.assert_allclose(read.shapes, SHAPES.T)
 

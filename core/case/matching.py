@@ -25,6 +25,7 @@ from femubench.core.typing import FloatArray
 TOLERANCE = 0.01  # of the size of the structure
 AXES = 'three of x, y, z with an optional minus, each once and right-handed, e.g. "x,z,-y"'
 _EXTENT = (0.1, 1.2)  # of the size of the structure, that of a test of it
+_NEAR = 0.05  # of the size of the structure: so far from it half of the sensors may be in a unit
 _NAMED = re.compile(r"([+-]?)([xyz])", re.ASCII)
 
 
@@ -118,7 +119,7 @@ def unit_of(xyz: FloatArray, site: Site, alignment: Alignment) -> LengthUnit:
     gap = {unit: float(np.median(_gaps(turned * METRES[unit], site))) for unit in fitting}
     best = min(fitting, key=gap.__getitem__)
     # One wrong coordinate may make any unit fit by size.
-    return best if gap[best] <= alignment.limit(site) else "m"
+    return best if gap[best] <= _NEAR * size_of(site.points) else "m"
 
 
 def _units_by_size(xyz: FloatArray, site: Site) -> list[LengthUnit]:

@@ -128,15 +128,21 @@ def fitted_modes(read: Measurement, file: Path, sensors: Sensors, share: float) 
     if not len(read):
         raise InputError("no modes", file=file, expected="frequencies and mode shapes")
     rows = {label: i for i, label in enumerate(read.sensors.labels)}
-    shapes = np.full((len(sensors), len(read)), np.nan)
+    shapes, std = np.full((2, len(sensors), len(read)), np.nan)
     found = [(s, rows[label]) for s, label in enumerate(sensors.labels) if label in rows]
     if not found and len(sensors) and len(rows):
         expected = f"labels as in the file, e.g. {read.sensors.labels[0]!r}"
         raise InputError("no shape belongs to a sensor of the case", file=file, expected=expected)
     for s, row in found:
-        shapes[s] = read.shapes[row]
-    std = with_default_std(shapes, np.full(shapes.shape, np.nan), share)
-    return replace(read, sensors=sensors, shapes=shapes, shape_std=std)
+        shapes[s], std[s] = read.shapes[row], read.shape_std[row]
+    usual = FREQUENCY_STD * read.frequencies
+    return replace(
+        read,
+        sensors=sensors,
+        frequency_std=np.where(np.isnan(read.frequency_std), usual, read.frequency_std),
+        shapes=shapes,
+        shape_std=with_default_std(shapes, std, share),
+    )
 
 
 def seen_at(measurement: Measurement, sensors: Sensors) -> Measurement:

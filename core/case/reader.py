@@ -39,6 +39,7 @@ from femubench.core.case.modes import (
     seen_at,
 )
 from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.case.repeats import with_covariance, with_repeats
 from femubench.core.case.schema import CaseSpec, FileSpec, FrameSpec, ModificationSpec, parse_spec
 from femubench.core.case.sensors import read_sensors
 from femubench.core.case.tables import read_table
@@ -208,8 +209,15 @@ class _Building:
             known = [".csv", *(suffix for r in self.readers for suffix in r.suffixes)]
             raise Fault(key, f"unknown kind of file {name!r}", ", ".join(known))
         if path not in self.readings:
+            names, named = (
+                self.spec.measurement.variables,
+                getattr(reader, "read_named_modes", None),
+            )
+            if names and named is None:
+                path_of = ("measurement", "variables")
+                raise Fault(path_of, f"{reader.name} has no variables", "no such key")
             with reading_with(reader, path):
-                found = reader.read_modes(path)
+                found = reader.read_modes(path) if named is None else named(path, names)
             if not isinstance(found, Measurement):
                 what = f"{reader.name} gave {type(found).__name__}"
                 raise Fault(key, what, "femubench.Measurement")
@@ -225,6 +233,7 @@ class _Building:
         if from_plugin:
             measured = measured_only(sensors, measurement.shapes)
             measurement = self.modes(("measurement", "modes"), spec.modes, measured)
+        measurement = self.with_scatter(measurement)
         listed = [
             (("measurement", key, i), number)
             for key, numbers in (("used", spec.used), ("held_out", spec.held_out))
@@ -234,6 +243,25 @@ class _Building:
         if spec.mass is None:
             return measurement
         return replace(measurement, total_mass=(spec.mass.value, spec.mass.std))
+
+    def with_scatter(self, measurement: Measurement) -> Measurement:
+        """Return the measurement with what repeats, or a covariance, say of its frequencies."""
+        spec = self.spec.measurement
+        if spec.repeats is not None and spec.covariance is not None:
+            what = "both repeats and covariance"
+            raise Fault(("measurement", "covariance"), what, "one of the two")
+        if spec.covariance is not None:
+            with at_key("measurement", "covariance"):
+                path = self.files.path(spec.covariance)
+            return with_covariance(measurement, path)
+        if spec.repeats is None:
+            return measurement
+        with at_key("measurement", "repeats"):
+            path = self.files.path(spec.repeats)
+        found, told = with_repeats(measurement, path)
+        found, more = with_floor(found, spec.repeats, FREQUENCY_STD, spec.shape_std)
+        self.notes |= dict.fromkeys((*told, *more))
+        return found
 
     @property
     def reference_used(self) -> tuple[int, ...]:
@@ -277,7 +305,7 @@ class _Building:
     def placed(self, path: Path, read: Measurement | None, site: Site, modes: str) -> Placed:
         """Return the sensors of a file and where each was taken to sit."""
         spec = self.spec.measurement
-        with at_key("measurement", "frame"):
+        with at_key("measurement", "frame"):  # of axes
             alignment = Alignment.of(spec.unit, spec.frame, spec.tolerance)
         if read is None:
             found = read_sensors(path, site, alignment)

@@ -366,6 +366,11 @@ class MeasurementSpec(Table):
     tolerance: Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)] | None = Field(
         None, description="a number >= 0 and <= 1, of the size of the structure"
     )
+    repeats: FileName | None = Field(None, description="a CSV file in the case folder")
+    covariance: FileName | None = Field(None, description="a CSV file in the case folder")
+    variables: dict[Name, Text] = Field(
+        {}, description='names of variables, e.g. {frequencies = "f_exp", shapes = "Psi"}'
+    )
 
 
 class ReferenceSpec(Table):

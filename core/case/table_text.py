@@ -66,6 +66,15 @@ def modes_csv(measurement: Measurement, share: float) -> bytes:
     return csv_bytes(header, rows)
 
 
+def covariance_csv(measurement: Measurement) -> bytes:
+    """Return the table of the covariance of the frequencies in Hz^2."""
+    covariance, numbers = measurement.frequency_covariance, measurement.numbers
+    assert covariance is not None
+    pairs = zip(numbers, covariance, strict=True)
+    rows = [[mode, *(number(value) for value in row)] for mode, row in pairs]
+    return csv_bytes(["mode", *map(str, numbers)], rows)
+
+
 def _is_share(m: Measurement, share: float) -> Any:  # noqa: ANN401 - a bool array
     return m.shape_std == with_default_std(m.shapes, np.full(m.shapes.shape, np.nan), share)
 

@@ -40,6 +40,7 @@ from femubench.core.case.reader import read_case
 from femubench.core.case.table_text import (
     SHAPE_STD,
     common_share,
+    covariance_csv,
     modes_csv,
     sensors_csv,
     toml_bytes,
@@ -137,6 +138,8 @@ def _differing(one: Measurement, other: Measurement) -> str | None:
             same = first.labels == second.labels
             same = same and np.array_equal(first.xyz, second.xyz)
             same = same and np.array_equal(first.axes, second.axes)
+        elif f.name == "frequency_correlation" and first is not None and second is not None:
+            same = np.allclose(first, second, rtol=0.0, atol=1e-9)
         elif isinstance(first, np.ndarray):
             same = np.array_equal(first, second, equal_nan=True)
         else:
@@ -224,6 +227,9 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
         measurement = {"sensors": "sensors.csv", **measurement}
         files["sensors.csv"] = sensors_csv(case.measurement.sensors)
     files["modes.csv"] = modes_csv(case.measurement, share)
+    if case.measurement.frequency_correlation is not None:
+        measurement["covariance"] = "covariance.csv"
+        files["covariance.csv"] = covariance_csv(case.measurement)
     measurement |= _settings(case)
     told = {key: getattr(case, key) for key in ("name", "title", "source", "structure")}
     info = {key: value for key, value in told.items() if value}

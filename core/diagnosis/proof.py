@@ -180,10 +180,10 @@ def held_out(
     own_data = data if own_bias is None else Data(everything, own_bias)
     exact = raw_residual(replace(whole, data=own_data), extended)
     relative = everything.frequency_std[rows] / everything.frequencies[rows]
-    spread = after.jacobian[rows]
+    spread = data.by_mode(after.jacobian)[rows]
     own = np.einsum("ik,kl,il->i", spread, found.covariance, spread) if spread.shape[1] else 0.0
     std = np.sqrt(np.square(relative) * (1.0 + own) + scatter**2)
-    first, last = before.raw[rows], exact[rows]
+    first, last = data.by_mode(before.raw)[rows], data.by_mode(exact)[rows]
     if examination is None or found.state.problem.noise.beam:
         return Unseen(first * relative, last * relative, std)
     nothing = examination.posterior.nothing.fit.state
@@ -286,10 +286,11 @@ def left_out(
         )
         found, problem = again.best.fit, again.problem_of(again.best)
         point = state_at(replace(problem, data=data, noise=noise), found.parts, found.state.x)
-        spread = point.jacobian[j] @ found.covariance @ point.jacobian[j]
+        slope = data.by_mode(point.jacobian)[j]
+        spread = slope @ found.covariance @ slope
         relative = data.measurement.frequency_std[j] / data.measurement.frequencies[j]
-        before.append(nothing.raw[j] * relative)
-        after.append(point.raw[j] * relative)
+        before.append(data.by_mode(nothing.raw)[j] * relative)
+        after.append(data.by_mode(point.raw)[j] * relative)
         std.append(np.sqrt(relative**2 * (1.0 + spread) + examination.scatter**2))
     return Unseen(np.array(before), np.array(after), np.array(std))
 

@@ -48,8 +48,9 @@ def residual_rows(before: State, after: State) -> tuple[ResidualRow, ...]:
     m = data.measurement
     mode, sensor = data.shape_rows
     rows = []
+    first, last = before.problem.data.by_mode(before.raw), data.by_mode(after.raw)
     for i, number in enumerate(m.numbers):
-        pair = float(before.raw[i]), float(after.raw[i])
+        pair = float(first[i]), float(last[i])
         rows.append(ResidualRow("frequency", number, "", float(m.frequencies[i]), *pair))
     for k, (j, s) in enumerate(zip(mode, sensor, strict=True), start=len(m)):
         pair = float(before.raw[k]), float(after.raw[k])

@@ -294,7 +294,8 @@ class _Drawn:
             return True
         wide = self.mended(charge).measurement
         m = self.measurement
-        rows = (self.state.raw - self.state.problem.noise.mean)[: len(m)]
+        raw = self.state.raw - self.state.problem.noise.mean
+        rows = self.state.problem.data.by_mode(raw)[: len(m)]
         error = np.square(rows * m.frequency_std / m.frequencies)
         own = wide.frequency_std != m.frequency_std
         return not own.any() or bool(error[~own].sum() < _LITTLE * error.sum())
@@ -364,7 +365,7 @@ class _Drawn:
         """Return faults of what was typed in with what each gains at the present scales."""
         problem, noise = self.state.problem, self.state.problem.noise
         count = len(self.measurement)
-        error = self.state.raw[:count] * self.measurement.frequency_std
+        error = problem.data.by_mode(self.state.raw)[:count] * self.measurement.frequency_std
         if not (np.abs(error / self.measurement.frequencies) > _GROSS).any():
             return []
         found = []

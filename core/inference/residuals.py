@@ -10,6 +10,7 @@ from scipy.optimize import linear_sum_assignment
 
 from femubench.core.errors import NotApplicable
 from femubench.core.modal.close_modes import clusters_of, turn_towards
+from femubench.core.modal.correlated_errors import root_of, undone
 from femubench.core.modal.correlation import UNSEEN, seen_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray, IntArray
@@ -21,6 +22,8 @@ _LABEL = 0.03
 @dataclass(frozen=True)
 class Data:
     """Used modes as residuals in standard deviations: frequencies, shapes, mass.
+
+    Frequencies whose errors go together are turned so that the residuals are independent.
 
     Arguments:
         measurement: the used modes.
@@ -200,7 +203,10 @@ class Data:
         mode, sensor = self.shape_rows
         scaled, _ = self.scaled(readings)
         misfit = self.weight * (self.shapes - scaled)
-        parts = [(m.frequencies - frequencies) / m.frequency_std, misfit[:, sensor, mode]]
+        apart = (m.frequencies - frequencies) / m.frequency_std
+        if m.frequency_correlation is not None:
+            apart = undone(m.frequency_correlation, apart.T).T
+        parts = [apart, misfit[:, sensor, mode]]
         if self.mass is not None:
             parts.append((self.mass[0] - mass[:, None]) / self.mass[1])
         return np.concatenate(parts, axis=1)
@@ -224,10 +230,25 @@ class Data:
         slip = slip * self._inverse_norm(readings[None])[0][:, None]
         change = factor[0][None, :, None] * turn + readings[:, :, None] * slip[None]
         change = self.weight[:, :, None] * change
-        parts = [frequency / self.measurement.frequency_std[:, None], change[sensor, mode]]
+        apart = frequency / self.measurement.frequency_std[:, None]
+        if self.measurement.frequency_correlation is not None:
+            apart = undone(self.measurement.frequency_correlation, apart)
+        parts = [apart, change[sensor, mode]]
         if self.mass is not None:
             parts.append(mass[None, :] / self.mass[1])
         return np.vstack(parts)
+
+    def by_mode(self, rows: FloatArray) -> FloatArray:
+        """Return residuals or slopes with those of frequencies as of each mode by itself.
+
+        Arguments:
+            rows: as `residual` of one candidate or `slope` gives them, (n_data, ...).
+        """
+        correlation = self.measurement.frequency_correlation
+        if correlation is None:
+            return rows
+        m = len(self.measurement)
+        return np.concatenate([np.tensordot(root_of(correlation), rows[:m], 1), rows[m:]])
 
     def predicted(
         self, frequencies: FloatArray, readings: FloatArray, rigid: float

@@ -32,8 +32,8 @@ def init_case(
         folder: new or empty.
         model, modes: files with the model and with the measured modes; without both a commented
             example is written.
-        told: ``mass``, ``dofs`` and ``sensors``, further files; ``model_unit``, ``unit``,
-            ``frame`` and ``tolerance``, as the keys of a case.
+        told: ``mass``, ``dofs`` and ``sensors``, further files; ``model_unit``, ``unit`` and
+            ``tolerance``, and ``frame`` for the axes, as the keys of a case.
 
     Raises:
         InputError: when the folder holds anything or cannot be written, or for what is wrong in

@@ -25,6 +25,8 @@ class Measurement(Shown):
         shapes: real mode shapes, (n_sensors, m), every one with its own scale; nan where missing.
         shape_std: standard deviations in the unit of each shape, (n_sensors, m).
         total_mass: mass of the whole structure and its standard deviation in kg, if weighed.
+        frequency_correlation: of the errors of the frequencies, (m, m); None where they are
+            independent.
     """
 
     sensors: Sensors
@@ -35,6 +37,7 @@ class Measurement(Shown):
     shapes: FloatArray
     shape_std: FloatArray
     total_mass: tuple[float, float] | None = None
+    frequency_correlation: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -57,6 +60,28 @@ class Measurement(Shown):
         return np.square(2.0 * np.pi * self.frequencies)
 
     @property
+    def frequency_covariance(self) -> FloatArray | None:
+        """Return the covariance of the frequencies in Hz^2, (m, m); None where independent."""
+        if self.frequency_correlation is None:
+            return None
+        return np.asarray(
+            self.frequency_std[:, None] * self.frequency_correlation * self.frequency_std
+        )
+
+    def widened(self, std: FloatArray) -> Measurement:
+        """Return the same modes with errors of their own besides.
+
+        Arguments:
+            std: of the further, independent errors of the frequencies in Hz, (m,).
+        """
+        wide, correlation = np.hypot(self.frequency_std, std), None
+        if self.frequency_correlation is not None:
+            share = self.frequency_std / wide
+            correlation = share[:, None] * self.frequency_correlation * share
+            np.fill_diagonal(correlation, 1.0)
+        return replace(self, frequency_std=wide, frequency_correlation=correlation)
+
+    @property
     def has_shapes(self) -> bool:
         """Tell whether every mode has a shape at one sensor at least."""
         return len(self.sensors) > 0 and bool(np.isfinite(self.shapes).any(axis=0).all())
@@ -72,6 +97,7 @@ class Measurement(Shown):
         if missing:
             raise KeyError(f"no measured mode {missing[0]}; there are {list(self.numbers)}")
         columns = [self.numbers.index(number) for number in wanted]
+        correlation = self.frequency_correlation
         return replace(
             self,
             numbers=wanted,
@@ -80,10 +106,14 @@ class Measurement(Shown):
             damping=self.damping[columns],
             shapes=self.shapes[:, columns],
             shape_std=self.shape_std[:, columns],
+            frequency_correlation=None if correlation is None else correlation[columns][:, columns],
         )
 
     def with_noise(self, rng: np.random.Generator) -> Measurement:
         """Return the same modes with one draw of Gaussian noise at their standard deviations."""
-        frequencies = self.frequencies + self.frequency_std * rng.standard_normal(len(self))
+        drawn = rng.standard_normal(len(self))
+        if self.frequency_correlation is not None:
+            drawn = np.linalg.cholesky(self.frequency_correlation) @ drawn
+        frequencies = self.frequencies + self.frequency_std * drawn
         shapes = self.shapes + self.shape_std * rng.standard_normal(self.shapes.shape)
         return replace(self, frequencies=np.abs(frequencies), shapes=shapes)

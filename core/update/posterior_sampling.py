@@ -12,7 +12,7 @@ updating.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -112,6 +112,24 @@ class Target:
         _, std, own = self.data
         return np.asarray(np.sqrt(std**2 + own * np.mean(np.square(self.discrepancy.std(v)))))
 
+    def _misfit(self, apart: FloatArray, variance: FloatArray) -> FloatArray:
+        """Return the squared misfit and ln of the determinant of its covariance, (n,).
+
+        Arguments:
+            apart: logarithms, measured minus predicted, (n, k).
+            variance: of each by itself, (n, k).
+        """
+        correlation = self.measurement.frequency_correlation
+        if correlation is None:
+            return np.asarray((np.square(apart) / variance + np.log(variance)).sum(axis=1))
+        _, std, _ = self.data
+        m = len(self.measurement)
+        shared = std[:m, None] * (correlation - np.eye(m)) * std[:m]
+        covariance = variance[:, None] * np.eye(variance.shape[1])
+        covariance[:, :m, :m] += shared
+        solved = np.linalg.solve(covariance, apart[..., None])[..., 0]
+        return np.asarray((apart * solved).sum(axis=1) + np.linalg.slogdet(covariance)[1])
+
     def log_density(self, fit: QuadraticFit) -> Callable[[FloatArray], FloatArray]:
         """Return a function from (n, p + 1) to ln of the density, (n,)."""
         log, std, own = self.data
@@ -121,10 +139,10 @@ class Target:
         def density(at: FloatArray) -> FloatArray:
             q, v = at[:, :-1], at[:, -1]
             variance = known + np.square(self.discrepancy.std(v))[:, None] * own
-            misfit = np.square(log - fit(q)) / variance + np.log(variance)
+            misfit = self._misfit(log - fit(q), variance)
             prior = np.square(q) @ scaling.precision + np.square(v)
             inside = ((q > scaling.lower) & (q < scaling.upper)).all(axis=1)
-            return np.where(inside, -0.5 * (misfit.sum(axis=1) + prior), -np.inf)
+            return np.where(inside, -0.5 * (misfit + prior), -np.inf)
 
         return density
 
@@ -217,8 +235,7 @@ def most_probable(
         NotApplicable: when a frequency has no standard deviation.
         StrategyFailure: when no measured mode has a partner.
     """
-    std = np.hypot(measurement.frequency_std, discrepancy.median * measurement.frequencies)
-    whole = replace(measurement, frequency_std=std)
+    whole = measurement.widened(discrepancy.median * measurement.frequencies)
     iteration = Iteration(
         structure, unknowns, Data(whole, options.residual, True, options.shapes, True), options
     )

@@ -14,6 +14,7 @@ from femubench.core.fem.derivatives import Derivatives, derivatives
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.structure import Structure
+from femubench.core.modal.correlated_errors import undone
 from femubench.core.modal.correlation import modal_scale_factor, seen_modes
 from femubench.core.modal.eigen import Modes, enough_modes, solve_modes
 from femubench.core.modal.measurement import Measurement
@@ -82,6 +83,20 @@ class Data:
         measured = self.measurement.eigenvalues
         return np.asarray(1.0 / (self.slope(measured) * 4.0 * np.pi * np.sqrt(measured) * std))
 
+    def independent(self, rows: FloatArray, there: BoolArray) -> FloatArray:
+        """Return weighted frequencies, or their slopes, as independent data.
+
+        Arguments:
+            rows: along the first axis, (m, ...).
+            there: which of the modes have a partner, (m,).
+        """
+        correlation = self.measurement.frequency_correlation
+        if correlation is None or not self.statistical or not there.any():
+            return rows
+        result = rows.copy()
+        result[there] = undone(correlation[there][:, there], rows[there])
+        return result
+
     @cached_property
     def shape_weight(self) -> FloatArray:
         """Return 1/sigma of every shape component, 0 where there is none, (n_sensors, m)."""
@@ -116,7 +131,7 @@ class Prediction:
         data, lost = self.data, self.partner < 0
         eigenvalues = self.modes.eigenvalues[self.partner]
         rows = data.weight * (data.target - data.quantity(eigenvalues))
-        parts = [np.where(lost, np.nan, rows)]
+        parts = [np.where(lost, np.nan, data.independent(rows, ~lost))]
         if data.shapes:
             misfit = data.shape_weight * (np.nan_to_num(data.measurement.shapes) - self._scaled)
             parts.append(np.where(lost, np.nan, misfit).T.ravel())
@@ -145,7 +160,8 @@ class Prediction:
         paired = self.modes.take(self.partner)
         slope = eigenvalue_sensitivities(self.model, paired, parameters, change)
         scale = data.weight * data.slope(paired.eigenvalues) * (self.partner >= 0)
-        parts = [np.where(scale[:, None] > 0.0, slope * scale[:, None], 0.0)]
+        rows = np.where(scale[:, None] > 0.0, slope * scale[:, None], 0.0)
+        parts = [data.independent(rows, self.partner >= 0)]
         if data.shapes:
             parts.append(self._shape_rows(parameters, change))
         if data.weigh and data.measurement.total_mass is not None:

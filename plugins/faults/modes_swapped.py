@@ -45,9 +45,11 @@ class ModesSwapped:
         order = np.arange(len(measurement))
         i, j = (measurement.numbers.index(number) for number in numbers)
         order[[i, j]] = j, i
+        correlation = measurement.frequency_correlation
         return model, replace(
             measurement,
             frequencies=measurement.frequencies[order],
             frequency_std=measurement.frequency_std[order],
             damping=measurement.damping[order],
+            frequency_correlation=None if correlation is None else correlation[order][:, order],
         )

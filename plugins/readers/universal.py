@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from femubench import InputError, Measurement, Sensors
 from femubench.fem import Outline
 from femubench.modal import real_modes
+from femubench.plugins.readers.reading import opened
 
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _COORDINATES, _UNITS, _SYSTEMS, _SHAPES = (15, 2411), 164, (18, 2420), (55, 2414)
@@ -25,7 +26,6 @@ _HEADER, _TRACES, _ELEMENTS = 151, 82, 2412
 _WANTED = (*_COORDINATES, _UNITS, *_SYSTEMS, *_SHAPES, _HEADER, _TRACES, _ELEMENTS)
 _NORMAL_MODE, _COMPLEX_MODES = 2, (3, 7)
 _MOTIONS = (0, 1, 8, 11, 12)  # unknown, general, displacement, velocity, acceleration
-_FREQUENCY_STD, _SHAPE_STD = 0.005, 0.015
 _LARGEST, _MOST_NUMBERS = 256, 20_000_000  # MiB of a file; modes times places
 _GLOBAL = (0, 1)  # numbers that writers use for the global axes without defining them
 _DRAWN = (_HEADER, _TRACES, _ELEMENTS)  # of no use to modes, and left out where they are broken
@@ -65,14 +65,15 @@ class UniversalReader:
         """Return sensors ``node:direction`` and modes.
 
         A component that is zero in every mode counts as not measured. Without modes every node
-        is a sensor in x, y and z; nodes without coordinates get nan.
+        is a sensor in x, y and z; nodes without coordinates get nan, and so do deviations.
 
         Raises:
             InputError: when the file is broken, or holds neither nodes nor modes.
         """
         datasets, other = _datasets(path)
-        nodes = _nodes(path, datasets)
-        modes = _modes(path, datasets)
+        # A dataset that is cut short may lack any column.
+        with opened(path, "whole datasets"):
+            nodes, modes = _nodes(path, datasets), _modes(path, datasets)
         if not nodes and not modes:
             expected = "datasets 15 or 2411 with nodes, 55 or 2414 with modes"
             what = "neither nodes nor modes"
@@ -88,7 +89,8 @@ class UniversalReader:
             InputError: when the file is broken.
         """
         datasets, _ = _datasets(path)
-        nodes = _nodes(path, datasets)
+        with opened(path, "whole datasets"):
+            nodes = _nodes(path, datasets)
         pairs = dict.fromkeys(tuple(sorted(pair)) for pair in _lines(datasets, nodes))
         ends = [[nodes[number].xyz for number in pair] for pair in pairs]
         about = next(iter(_of(datasets, _HEADER)), {})
@@ -362,15 +364,14 @@ def _measurement(path: Path, nodes: Mapping[int, _Node], modes: Sequence[_Mode])
     # The complex scale of a mode is arbitrary: residues and velocities come out imaginary.
     shapes = real_modes(complex_shapes, align_phase=True)
     frequencies = np.array([mode.frequency for mode in modes])
-    largest = np.abs(np.nan_to_num(shapes)).max(axis=0, initial=0.0)
     return Measurement(
         sensors=sensors,
         numbers=tuple(mode.number for mode in modes),
         frequencies=frequencies,
-        frequency_std=_FREQUENCY_STD * frequencies,
+        frequency_std=np.full(len(modes), math.nan),
         damping=np.array([mode.damping for mode in modes]),
         shapes=shapes,
-        shape_std=np.broadcast_to(_SHAPE_STD * largest, shapes.shape).copy(),
+        shape_std=np.full(shapes.shape, math.nan),
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench import InputError
-from femubench.plugins.readers.reading import DIRECTIONS, directions, no_modes
+from femubench.plugins.readers.reading import DIRECTIONS, directions, opened
 
 if TYPE_CHECKING:
     from femubench import Measurement, Model
@@ -168,8 +168,16 @@ class VariablesReader:
         return model_of({**first, STIFFNESS[0]: own, MASS[0]: other}, stiffness)
 
     def read_modes(self, path: Path) -> Measurement:
-        """Refuse to read modes; raises InputError."""
-        no_modes(path, f"a file of kind {self.name}")
+        """Return the modes among the variables, by their common names; raises InputError."""
+        return self.read_named_modes(path, {})
+
+    def read_named_modes(self, path: Path, names: Mapping[str, str]) -> Measurement:
+        """Return the modes by names that a case gives; raises InputError."""
+        from femubench.plugins.readers.modal_variables import read_modal
+
+        found = self.variables(path)
+        with opened(path, "frequencies and mode shapes by name"):
+            return read_modal(found, path, names)
 
     def write_model(self, model: Model, path: Path, original: Path) -> None:
         """Write an updated model, and all else that is in the original; raises InputError."""

@@ -1,0 +1,183 @@
+"""Measured modes in files that hold variables by name: MATLAB, NumPy, HDF5."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from femubench import InputError, Measurement, Sensors
+from femubench.modal import real_modes
+
+# What a variable may be called, without case and underscores; the first is its key in a case.
+NAMES: Mapping[str, tuple[str, ...]] = {
+    "frequencies": ("frequencies", "frequency", "freq", "freqs", "f", "fn", "fexp", "hz"),
+    "eigenvalues": ("eigenvalues", "lambda", "lambdaexp", "lambdaexpm"),
+    "shapes": ("shapes", "shape", "phi", "phiexp", "psi", "psiexp", "psiexpm", "modeshapes"),
+    "frequency_std": ("frequencystd", "freqstd", "stdf", "stdfreq", "stdfrequency"),
+    "eigenvalue_std": ("eigenvaluestd", "lambdastd", "stdlambda", "stdlambdaexp"),
+    "shape_std": ("shapestd", "phistd", "psistd", "stdphi", "stdpsi", "stdpsiexp"),
+    "damping": ("damping", "zeta", "xi", "dampingratio", "dampingratios"),
+    "numbers": ("numbers", "mode", "modenumbers"),
+    "labels": ("labels", "label", "sensor", "sensors", "channels"),
+    "nodes": ("nodes", "node"),
+    "directions": ("directions", "direction"),
+    "xyz": ("xyz", "coordinates", "positions"),
+}
+EXPECTED = (
+    "variables frequencies (Hz, m numbers) or eigenvalues (rad2/s2), shapes (sensors x m); and "
+    "where there are: frequency_std, shape_std, damping, labels, or nodes and directions, xyz"
+)
+_MOST = 20_000_000
+_DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+
+Array = NDArray[np.float64]
+
+
+def read_modal(variables: Mapping[str, Any], path: Path, names: Mapping[str, str]) -> Measurement:
+    """Return the modes that are among variables.
+
+    Rows of the shapes without labels are called 1, 2, ...; deviations, places and directions that
+    are not there are nan, nan and x.
+
+    Arguments:
+        variables: by their name.
+        path: for messages.
+        names: from a key of `NAMES` to the name of a variable, where that is another one.
+
+    Raises:
+        InputError: where frequencies are missing, or sizes do not fit.
+    """
+    found = _found(variables, path, names)
+    hertz = _hertz(found, path)
+    m = len(hertz)
+    shapes = _table(found, "shapes", m, path)
+    n = 0 if shapes is None else len(shapes)
+    std = _table(found, "shape_std", m, path)
+    if std is not None and std.shape != (n, m):
+        raise _wrong("shape_std", f"{std.shape[0]} x {std.shape[1]}", f"{n} x {m} as shapes", path)
+    numbers = _column(found, "numbers", m, path)
+    damping = _column(found, "damping", m, path)
+    return Measurement(
+        sensors=_sensors(found, n, path),
+        numbers=tuple(range(1, m + 1) if numbers is None else (int(v) for v in numbers)),
+        frequencies=hertz,
+        frequency_std=_hertz_std(found, hertz, path),
+        damping=np.full(m, np.nan) if damping is None else damping,
+        shapes=np.zeros((0, m)) if shapes is None else real_modes(shapes, align_phase=True),
+        shape_std=np.full((n, m), np.nan) if std is None else np.abs(std),
+    )
+
+
+def _found(variables: Mapping[str, Any], path: Path, names: Mapping[str, str]) -> dict[str, Any]:
+    """Return what is there, by key of `NAMES`."""
+    plain = {name.lower().replace("_", ""): name for name in variables}
+    found: dict[str, Any] = {}
+    for key, known in NAMES.items():
+        wanted = names.get(key)
+        if wanted is not None and wanted not in variables:
+            there = ", ".join(list(variables)[:12])
+            raise InputError(f"there is no variable {wanted!r}", file=path, expected=there)
+        name = wanted or next((plain[word] for word in known if word in plain), None)
+        if name is not None:
+            found[key] = variables[name]
+    return found
+
+
+def _numbers(found: Mapping[str, Any], key: str, path: Path) -> NDArray[Any] | None:
+    if key not in found:
+        return None
+    value = np.asarray(found[key])
+    if value.dtype.kind not in "fiuc" or value.size > _MOST or not np.isfinite(value).all():
+        raise _wrong(key, "not finite numbers", "numbers", path)
+    return value
+
+
+def _column(found: Mapping[str, Any], key: str, count: int | None, path: Path) -> Array | None:
+    value = _numbers(found, key, path)
+    if value is None:
+        return None
+    column = np.asarray(value.reshape(-1).real, dtype=float)
+    if count is not None and len(column) != count:
+        raise _wrong(key, f"{len(column)} numbers", f"{count}, one a mode", path)
+    return column
+
+
+def _table(found: Mapping[str, Any], key: str, count: int, path: Path) -> NDArray[Any] | None:
+    """Return a table of one column a mode, turned where it has one row a mode."""
+    value = _numbers(found, key, path)
+    if value is None:
+        return None
+    table = value.reshape(-1, 1) if value.ndim < 2 and count == 1 else value
+    if table.ndim == 2 and table.shape[1] != count and table.shape[0] == count:
+        table = table.T
+    if table.ndim != 2 or table.shape[1] != count:
+        size = " x ".join(map(str, value.shape))
+        raise _wrong(key, size, f"{count} columns, one a mode", path)
+    return table
+
+
+def _wrong(key: str, what: str, expected: str, path: Path) -> InputError:
+    return InputError(f"{key}: {what}", file=path, expected=expected)
+
+
+def _hertz(found: Mapping[str, Any], path: Path) -> Array:
+    hertz = _column(found, "frequencies", None, path)
+    squared = _column(found, "eigenvalues", None, path)
+    if hertz is None:
+        if squared is None:
+            raise InputError("no frequencies", file=path, expected=EXPECTED)
+        hertz = np.sqrt(np.maximum(squared, 0.0)) / (2.0 * np.pi)
+    if not len(hertz) or not (hertz > 0.0).all():
+        raise _wrong("frequencies", "one is not positive", "numbers > 0", path)
+    return hertz
+
+
+def _hertz_std(found: Mapping[str, Any], hertz: Array, path: Path) -> Array:
+    std = _column(found, "frequency_std", len(hertz), path)
+    if std is not None:
+        return np.abs(std)
+    squared = _column(found, "eigenvalue_std", len(hertz), path)
+    if squared is not None:  # of (2 pi f)^2
+        return np.asarray(np.abs(squared) / (8.0 * np.pi**2 * hertz))
+    return np.full(len(hertz), np.nan)
+
+
+def _words(value: Any) -> list[str]:  # noqa: ANN401 - numbers or words
+    array = np.asarray(value).reshape(-1)
+    if array.dtype.kind == "f" and (array % 1 == 0).all():
+        array = array.astype(np.int64)
+    texts = [v.decode("utf-8", "replace") if isinstance(v, bytes) else str(v) for v in array]
+    return [text.strip() for text in texts]
+
+
+def _sensors(found: Mapping[str, Any], count: int, path: Path) -> Sensors:
+    """Return the sensors: by their labels, by nodes and directions, or 1, 2, ..."""
+    words = {key: _words(found[key]) for key in ("labels", "nodes", "directions") if key in found}
+    for key, listed in words.items():
+        if len(listed) != count:
+            raise _wrong(key, f"{len(listed)} entries", f"{count}, one a row of shapes", path)
+    ways = [
+        _DIRECTIONS[int(way) - 1] if way in ("1", "2", "3", "4", "5", "6") else way
+        for way in words.get("directions", ["x"] * count)
+    ]
+    if wrong := [way for way in ways if way.lstrip("+-") not in _DIRECTIONS]:
+        raise _wrong("directions", repr(wrong[0]), f"{', '.join(_DIRECTIONS)}, or 1 to 6", path)
+    labels = words.get("labels")
+    if labels is None and "nodes" in words:
+        labels = [f"{node}:{way}" for node, way in zip(words["nodes"], ways, strict=True)]
+    labels = labels or [str(row + 1) for row in range(count)]
+    if len(set(labels)) < count:
+        twice = next(label for label in labels if labels.count(label) > 1)
+        raise _wrong("labels", f"{twice!r} is listed twice", "a label of its own", path)
+    xyz = np.full((count, 3), np.nan)
+    places = _numbers(found, "xyz", path)
+    if places is not None and "directions" in words:
+        if places.shape != xyz.shape:
+            size = " x ".join(map(str, places.shape))
+            raise _wrong("xyz", size, f"{count} x 3, one row a row of shapes", path)
+        xyz = np.asarray(places.real, dtype=float)
+    return Sensors(tuple(labels), xyz, tuple(ways))
