@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from femubench import InputError, Measurement, Sensors
 from femubench.fem import Outline
 from femubench.modal import real_modes
+from femubench.plugins.readers.reading import opened
 
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _COORDINATES, _UNITS, _SYSTEMS, _SHAPES = (15, 2411), 164, (18, 2420), (55, 2414)
@@ -70,8 +71,9 @@ class UniversalReader:
             InputError: when the file is broken, or holds neither nodes nor modes.
         """
         datasets, other = _datasets(path)
-        nodes = _nodes(path, datasets)
-        modes = _modes(path, datasets)
+        # A dataset that is cut short may lack any column.
+        with opened(path, "whole datasets"):
+            nodes, modes = _nodes(path, datasets), _modes(path, datasets)
         if not nodes and not modes:
             expected = "datasets 15 or 2411 with nodes, 55 or 2414 with modes"
             what = "neither nodes nor modes"
@@ -87,7 +89,8 @@ class UniversalReader:
             InputError: when the file is broken.
         """
         datasets, _ = _datasets(path)
-        nodes = _nodes(path, datasets)
+        with opened(path, "whole datasets"):
+            nodes = _nodes(path, datasets)
         pairs = dict.fromkeys(tuple(sorted(pair)) for pair in _lines(datasets, nodes))
         ends = [[nodes[number].xyz for number in pair] for pair in pairs]
         about = next(iter(_of(datasets, _HEADER)), {})

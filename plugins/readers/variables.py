@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 
-from femubench import InputError, Measurement, Model
-from femubench.fem import ModelError, SparseArray, matrix_model
-from femubench.plugins.readers.modal_variables import read_modal
-from femubench.plugins.readers.reading import DIRECTIONS, directions
+from femubench import InputError
+from femubench.plugins.readers.reading import DIRECTIONS, directions, opened
+
+if TYPE_CHECKING:
+    from femubench import Measurement, Model
+    from femubench.fem import SparseArray
 
 Variables: TypeAlias = Mapping[str, Any]  # arrays, sparse matrices, arrays of words
 STIFFNESS = ("stiffness", "k", "kaa", "kgg", "kaax", "kjj", "kll", "k_whole", "k0")
@@ -88,6 +90,9 @@ def model_of(variables: Variables, path: Path) -> Model:
     Raises:
         InputError: where a matrix is missing, or labels do not fit.
     """
+    # Not on top: a process that reads a file apart does without models.
+    from femubench.fem import ModelError, matrix_model
+
     stiffness, mass = chosen(variables, STIFFNESS, path), chosen(variables, MASS, path)
     groups = group_variables(variables, stiffness)
     words = {name.lower(): value for name, value in variables.items()}
@@ -164,11 +169,15 @@ class VariablesReader:
 
     def read_modes(self, path: Path) -> Measurement:
         """Return the modes among the variables, by their common names; raises InputError."""
-        return read_modal(self.variables(path), path, {})
+        return self.read_named_modes(path, {})
 
     def read_named_modes(self, path: Path, names: Mapping[str, str]) -> Measurement:
         """Return the modes by names that a case gives; raises InputError."""
-        return read_modal(self.variables(path), path, names)
+        from femubench.plugins.readers.modal_variables import read_modal
+
+        found = self.variables(path)
+        with opened(path, "frequencies and mode shapes by name"):
+            return read_modal(found, path, names)
 
     def write_model(self, model: Model, path: Path, original: Path) -> None:
         """Write an updated model, and all else that is in the original; raises InputError."""
