@@ -13,7 +13,8 @@ ROOT = Path(__file__).parents[1]
 SUFFIXES = (".py", ".js", ".html", ".jinja")
 # Words of models and of English that are names too, and what a line says that may have them.
 ALLOWED = {
-    "frame": r"kind\b|'frame' or 'matrices'|`parameters` and `frame`|axes",  # kind of model, a method
+    # a kind of model, a method, the axes of a test
+    "frame": r"kind\b|'frame' or 'matrices'|`parameters` and `frame`|axes",
     "density": r"rhoA|\"E\"",  # a quantity of elements, beside the others
     # likewise, and a symbol in drawings
     "spring": r"quantity|properties|lookup|weights|name|property|rigid|: \(\)|counted|marker|stiff",
