@@ -8,4 +8,7 @@ from femubench import hookimpl
 @hookimpl
 def femubench_readers() -> dict[str, str]:
     """Return where the built-in readers are."""
-    return {"universal file": f"{__name__}.universal:UniversalReader"}
+    return {
+        "Nastran bulk data": f"{__name__}.bulk_data:BulkDataReader",
+        "universal file": f"{__name__}.universal:UniversalReader",
+    }
