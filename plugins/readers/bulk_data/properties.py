@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 from femubench.fem import (
     Material,
@@ -22,6 +21,21 @@ from femubench.plugins.readers.bulk_data.cards import Card
 _SAME = 1e-9
 # What is left of a row of a PBEAM station, besides A, I1, I2, I12, J, NSM.
 _STATION = ("A", "I1", "I2", "I12", "J", "NSM")
+
+
+@dataclass(frozen=True)
+class Shear:
+    """Shear coefficients of a section, whatever Poisson's ratio is.
+
+    A 0 stands for a bar without shear flexibility, whose share is taken out elsewhere.
+    """
+
+    along_y: float
+    along_z: float
+
+    def __call__(self, nu: float) -> tuple[float, float]:
+        """Return the coefficients for shear along y and along z."""
+        return self.along_y or 1.0, self.along_z or 1.0
 
 
 @dataclass(frozen=True)
@@ -82,14 +96,9 @@ class Bar:
             Iz=of.I1,
             J=share * of.J,
             Jp=of.I1 + of.I2,
-            kappa=partial(_kappa, share * of.K1, share * of.K2),
+            kappa=Shear(share * of.K1, share * of.K2),
             name=name,
         )
-
-
-def _kappa(along_y: float, along_z: float, nu: float) -> tuple[float, float]:
-    """Return shear coefficients; a 0 stands for no shear, whose share is taken out elsewhere."""
-    return along_y or 1.0, along_z or 1.0
 
 
 def bar_of(card: Card, materials: Mapping[int, Card]) -> Bar:

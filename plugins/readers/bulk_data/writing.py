@@ -190,9 +190,10 @@ class _Cards:
         """Return from a material and its new numbers to the number of a card that has them."""
         variants: dict[str, dict[Numbers, Bar]] = {}
         for number, bar in self.reading.bars.items():
-            own = variants.setdefault(bar.card.text(2), {})
-            for _, numbers in wanted.get(number, {((), ()): None}):  # no bar: as it is
-                own[numbers] = bar
+            rods: dict[tuple[Numbers, Numbers], object] = {((), ()): None}  # stay as they are
+            groups = rods if bar.card.name == "PROD" else wanted.get(number, {})
+            for _, numbers in groups:
+                variants.setdefault(bar.card.text(2), {})[numbers] = bar
         found: dict[tuple[str, Numbers], str] = {}
         for material, own in variants.items():
             new: list[bytes] = []
