@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import os
 import stat
+import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
@@ -99,6 +102,28 @@ def _check(found: os.stat_result, path: Path, largest: int) -> None:
 def _too_large(path: Path, largest: int) -> InputError:
     limit = f"{largest // MIB} MiB" if largest >= MIB else f"{largest} bytes"
     return InputError("file is too large", file=path, expected=f"at most {limit}")
+
+
+@contextmanager
+def limited_memory(most: int) -> Iterator[None]:
+    """Let what is done inside take so many bytes more than now; beyond, MemoryError is raised.
+
+    Libraries take memory for what the header of a file claims. Only Linux counts it; elsewhere
+    nothing is limited.
+    """
+    if not sys.platform.startswith("linux"):
+        yield
+        return
+    import resource
+
+    taken = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
+    soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    lower = min(v for v in (taken + most, soft, hard) if v != resource.RLIM_INFINITY)
+    resource.setrlimit(resource.RLIMIT_DATA, (lower, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
 
 
 def write_atomically(path: Path, content: str | bytes) -> None:

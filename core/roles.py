@@ -238,14 +238,14 @@ class Reader(Protocol):
 
     - ``read_model(path) -> Model``: mass, stiffness and labelled dofs, made by
       `fem.matrix_model`, or `Model.of(frame)` where the file holds elements.
-    - ``read_pair(stiffness, mass) -> Model``: likewise, from two files, for a format that keeps
-      labels in each; without it `read_matrix` reads them.
+    - ``read_pair(stiffness, mass) -> Model``: likewise, from two files; without it `read_matrix`
+      reads them, and a table must give the labels.
     - ``model_files(path) -> Sequence[Path]``: further files that `read_model` opens.
     - ``read_nodes(path) -> Mapping[str, Sequence[float]]``: coordinates of nodes by name, for
       models whose own files have none.
-    - ``write_model(model, path, original)``: writes an updated model in the format of
-      `original`, and keeps of it what an update does not change.
-    - ``write_matrix(matrix, path, original)``: likewise one matrix of a pair.
+    - ``write_model(model, path, original)``, ``write_pair(model, stiffness, mass, originals)``:
+      write an updated model in the format of the original file or files, and keep of these what
+      an update does not change.
 
     Attributes:
         name: for messages, e.g. ``"universal file"``.

@@ -65,12 +65,14 @@ __all__ = [
     "publish",
     "rank",
     "read_case",
+    "read_model",
     "read_run",
     "report",
     "reproduce",
     "score_challenge",
     "solve_modes",
     "strategies",
+    "write_model",
 ]
 
 if not os.path.isdir(os.path.join(os.path.dirname(__file__), "core")):
@@ -93,6 +95,7 @@ _NAMES = {
     "femubench.core.library.challenge": "Challenge challenge score_challenge",
     "femubench.core.library.compare": "compare",
     "femubench.core.library.diagnose": "diagnose",
+    "femubench.core.library.models": "read_model write_model",
     "femubench.core.library.plugins": "check init_case new_plugin",
     "femubench.core.library.publish": "publish",
     "femubench.core.library.rank": "Run rank read_run",
@@ -126,6 +129,7 @@ if TYPE_CHECKING:
     from femubench.core.library.challenge import Challenge, challenge, score_challenge
     from femubench.core.library.compare import compare
     from femubench.core.library.diagnose import diagnose
+    from femubench.core.library.models import read_model, write_model
     from femubench.core.library.plugins import check, init_case, new_plugin
     from femubench.core.library.publish import publish
     from femubench.core.library.rank import Run, rank, read_run

@@ -194,7 +194,7 @@ HEAD = "%%MatrixMarket matrix coordinate {} general\n{} {} {}\n"
         ("dofs.csv", "row,node,direction,x,y,z\n1,a,z,0,0,0\n2,a,z,0,0,0\n", "node", "twice"),
         ("dofs.csv", "row,node,direction,x,y,z\n1,a,z,0,0,0\n2,a,x,1,0,0\n", ":3: x", "two places"),
         ("dofs.csv", "row,node,direction,x,y,z\n1,a,z,0,0,0\n2,b,-z,1,0,0\n", "direction", "-z"),
-        ("sensors.csv", "label,x,y,z,direction\ns,2,0,0,z\n", "sensors.csv:2: x", "no node"),
+        ("sensors.csv", "label,x,y,z,direction\ns,2,0,0,z\n", "sensors.csv:2: x", "1 m off"),
         ("sensors.csv", "label,x,y,z,direction\ns,1,0,0,x\n", ":2: direction", "no dof"),
         ("sensors.csv", "label,at,direction\ns,c,z\n", "sensors.csv:2: at", "no node 'c'"),
         ("mass.mtx", "rubbish\n", "mass.mtx", "Matrix Market"),

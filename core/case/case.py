@@ -11,6 +11,7 @@ from femubench.core.display import Shown, counted, modes_line
 from femubench.core.fem.frame import GroundSpring, PointMass
 from femubench.core.fem.model import Model
 from femubench.core.modal.measurement import Measurement
+from femubench.core.typing import FloatArray
 
 TOLERANCE = 0.005
 BEAM_SHARE = 0.5
@@ -29,6 +30,28 @@ class Modification:
         attached = counted(len(self.masses), "mass"), counted(len(self.springs), "spring")
         modes = modes_line(self.measurement.numbers, self.measurement.frequencies)
         return f"{self.name}: {', '.join(attached)}; {modes}"
+
+
+@dataclass(frozen=True)
+class Match:
+    """Where a sensor was taken to sit.
+
+    Arguments:
+        sensor: its label.
+        place: the node, the joint or the station of a member.
+        xyz: where that is in m.
+        measured: where the test says that the sensor is, in m along the axes of the model.
+    """
+
+    sensor: str
+    place: str
+    xyz: FloatArray
+    measured: FloatArray
+
+    @property
+    def distance(self) -> float:
+        """Return how far apart the two are in m."""
+        return float(np.linalg.norm(self.xyz - self.measured))
 
 
 @dataclass(frozen=True, repr=False)
@@ -57,6 +80,8 @@ class Case(Shown):
             model with ordinary scatter.
         structure: the physical structure, which several cases may share; empty for one that no
             other case is known to share.
+        notes: what was understood otherwise than it stands in the files, one sentence each.
+        matches: where each sensor that came with coordinates was taken to sit.
     """
 
     name: str
@@ -76,6 +101,8 @@ class Case(Shown):
     model_error: float | None = None
     beam_share: float = BEAM_SHARE
     structure: str = ""
+    notes: tuple[str, ...] = ()
+    matches: tuple[Match, ...] = ()
 
     def rows(self) -> list[tuple[str, str]]:
         """Return where the case is from, its model, and what was measured on it."""
@@ -95,7 +122,8 @@ class Case(Shown):
         if self.reference is not None:
             known = self.reference.select(self.reference_used).frequencies
             found.append(("reference", modes_line(self.reference_used, known)))
-        return [*found, *(("modified", str(change)) for change in self.modifications)]
+        found += [("modified", str(change)) for change in self.modifications]
+        return [*found, *(("note", note) for note in self.notes)]
 
     @property
     def error_width(self) -> float:

@@ -8,9 +8,11 @@ from pathlib import Path
 
 from femubench.core.case.files import CASE_FILE
 from femubench.core.case.frames import FrameSite, attachments, frame_of
+from femubench.core.case.matching import Alignment
 from femubench.core.case.schema import FrameSpec, parse_spec
+from femubench.core.case.sensors import read_sensors
 from femubench.core.case.table_text import csv_bytes
-from femubench.core.case.tables import RESERVED, read_sensors
+from femubench.core.case.tables import RESERVED
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Frame, JointSpring
 from femubench.core.fem.model import Model
@@ -151,7 +153,7 @@ def _measured(sensor_file: Path) -> dict[str, str]:
     assert isinstance(spec.model, FrameSpec)
     better = _better(frame_of(spec.model))
     site = FrameSite(better)
-    sensors = read_sensors(sensor_file, site)
+    sensors, _ = read_sensors(sensor_file, site, Alignment.of(None, None, None))
     change = spec.modification[0]
     heavier = better.with_attachments(
         attachments("masses", change.masses, site), attachments("springs", change.springs, site)

@@ -36,8 +36,10 @@ from femubench.core.fem.frame import (
     Support,
     Vector,
 )
-from femubench.core.fem.mesh import locate
+from femubench.core.fem.mesh import locate, nearest_place
 from femubench.core.fem.sections import SHAPES, Section, constant_kappa
+from femubench.core.fem.sensors import moved_names
+from femubench.core.typing import FloatArray
 
 _SIZES = ("width", "height", "diameter", "wall")
 CONSTANTS = ("A", "Iy", "Iz", "J", "Jp")
@@ -116,6 +118,15 @@ class Site(Protocol):
         """Check that a point lies on the structure and can be measured in a direction."""
         ...
 
+    @property
+    def points(self) -> FloatArray:
+        """Return what the size of the structure is told from, in m, (k, 3)."""
+        ...
+
+    def nearest(self, xyz: FloatArray) -> list[tuple[str, FloatArray]]:
+        """Return the place of the structure nearest to every point, by name, and where it is."""
+        ...
+
 
 class FrameSite:
     """The site of a frame: joints, and stations of members."""
@@ -140,7 +151,7 @@ class FrameSite:
     def check_direction(self, place: Place, direction: str) -> None:
         """Check that the plane has a direction."""
         allowed = ACTIVE[self.frame.plane]
-        if direction.lstrip("+-") not in allowed:
+        if not set(moved_names(direction)) <= set(allowed):
             expected = f"{', '.join(allowed)}, the directions of plane {self.frame.plane!r}"
             raise WrongDirection(f"direction {direction!r} is not there", expected)
 
@@ -151,6 +162,19 @@ class FrameSite:
         except ModelError as error:
             raise Misfit(str(error), "a point within 1e-6 m of a member") from None
         self.check_direction(place, direction)
+
+    @property
+    def points(self) -> FloatArray:
+        """Return the corners in m, (k, 3)."""
+        return np.asarray(self.frame.corners)
+
+    def nearest(self, xyz: FloatArray) -> list[tuple[str, FloatArray]]:
+        """Return the joint or station of a member nearest to every point, and where it is in m.
+
+        Arguments:
+            xyz: in m, (k, 3).
+        """
+        return [nearest_place(self.frame, point) for point in xyz]
 
 
 # The tables of `[model]` bear the names of the frame's lists, their keys those of its fields.

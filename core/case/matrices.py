@@ -22,7 +22,7 @@ from femubench.core.case.nodes import MatrixGeometry, read_dofs
 from femubench.core.case.schema import LARGEST, GroupSpec, MatricesSpec
 from femubench.core.errors import FemubenchError, InputError
 from femubench.core.fem.model import Model
-from femubench.core.files import MIB, open_regular
+from femubench.core.files import MIB, limited_memory, open_regular
 from femubench.core.roles import Reader
 from femubench.core.typing import SparseArray
 
@@ -77,6 +77,7 @@ class MatrixText(BufferedIOBase):
 _MOST_DENSE = 10_000  # rows of a matrix in array form
 _MOST_ENTRIES = 50_000_000  # of a matrix in coordinate form
 _BROKEN = (ValueError, OverflowError, OSError, EOFError, IndexError, TypeError, MemoryError)
+_MEMORY, _PER_BYTE = 768 * MIB, 64  # that a reader may take, and more for every byte of a file
 _ASYMMETRY = 1e-8  # of the largest entry
 _MATRIX_MARKET = (".mtx", ".mtx.gz", ".mtx.bz2")
 
@@ -168,9 +169,13 @@ def reader_of(file: Path, readers: Sequence[Reader]) -> Reader | None:
 
 @contextmanager
 def reading_with(reader: Reader, file: Path) -> Iterator[None]:
-    """Turn whatever a reader plugin raises into one line that names it and the file."""
+    """Turn whatever a reader plugin raises into one line that names it and the file.
+
+    What it may take of memory grows with the file, whatever the file claims to hold.
+    """
     try:
-        yield
+        with limited_memory(_MEMORY + _PER_BYTE * file.stat().st_size):
+            yield
     except FemubenchError:
         raise
     except Exception as error:

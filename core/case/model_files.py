@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import bz2
+import gzip
 import os
-from collections.abc import Mapping, Sequence
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from femubench.core.case.faults import at_key
-from femubench.core.case.files import CaseFiles
+from femubench.core.case.faults import Fault, at_key
+from femubench.core.case.files import CASE_FILE, LARGEST_CASE, CaseFiles
 from femubench.core.case.matrices import (
     checked,
     is_matrix_market,
@@ -20,19 +23,22 @@ from femubench.core.case.matrices import (
     reader_of,
     reading_with,
 )
+from femubench.core.case.matrix_files import matrices_of, matrix_market
 from femubench.core.case.nodes import (
     MatrixGeometry,
     matrix_model,
     read_dofs,
     read_nodes,
 )
-from femubench.core.case.schema import FileSpec, LengthUnit
+from femubench.core.case.schema import FileSpec, FrameSpec, LengthUnit, parse_spec
 from femubench.core.case.tables import read_table
-from femubench.core.case.units import in_si
+from femubench.core.case.units import from_si, in_si
 from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
+from femubench.core.files import read_text, write_atomically
 from femubench.core.roles import Reader
 
+_PACKERS: dict[str, Callable[[bytes], bytes]] = {".gz": gzip.compress, ".bz2": bz2.compress}
 _TABLES = (".csv", ".txt")
 _LABELS = "dofs: a table row,node,direction,x,y,z"
 _PLACES = "dofs: a table node,x,y,z, or a file with nodes"
@@ -80,7 +86,9 @@ def read_as_it_is(paths: ModelFiles, readers: Sequence[Reader]) -> Model:
         return model
     mass = checked(model.mass, paths.mass or paths.model, model.size)
     stiffness = checked(model.stiffness, paths.model, model.size)
-    return _labelled(replace(model, mass=mass, stiffness=stiffness), paths, readers)
+    groups = {name: checked(part, paths.model, model.size) for name, part in model.groups.items()}
+    found = replace(model, mass=mass, stiffness=stiffness, groups=groups)
+    return _labelled(found, paths, readers)
 
 
 def further_files(path: Path, readers: Sequence[Reader]) -> tuple[Path, ...]:
@@ -200,3 +208,68 @@ def _placed(
         what = f"no node is called as in the matrices, e.g. {geometry.names[0]!r}"
         raise InputError(what, file=file, expected="coordinates of the same nodes")
     return replace(geometry, dofs=replace(geometry.dofs, xyz=xyz))
+
+
+def write_model(
+    model: Model,
+    folder: Path,
+    like: ModelFiles,
+    readers: Sequence[Reader],
+    unit: LengthUnit = "m",
+) -> None:
+    """Write a model in the format of the files that it came from, under the same names.
+
+    Arguments:
+        model: in SI.
+        folder: another one than that of the files.
+        like: the files that the model came from.
+        readers: reader plugins.
+        unit: of the lengths in the files.
+
+    Raises:
+        InputError: for a format that is not written, or a model that is none of these files.
+    """
+    made = folder / like.model.name
+    if folder.resolve() == like.model.parent.resolve():
+        raise InputError("holds the files of the model", file=folder, expected="another folder")
+    try:
+        model = from_si(_multiplied_out(model), unit)
+    except Fault as fault:
+        what = f"cannot be written: {fault.what}"
+        raise InputError(what, file=made, expected=fault.expected) from None
+    reader = _reader(like.model, readers)
+    if like.mass is None and hasattr(reader, "write_model"):
+        with reading_with(reader, like.model):
+            reader.write_model(model, made, like.model)
+        return
+    if like.mass is not None and _reader(like.mass, readers) is reader:
+        if reader is None and is_matrix_market(like.model):
+            for file, matrix in ((like.model, model.stiffness), (like.mass, model.mass)):
+                pack = _PACKERS.get(file.suffix.lower(), bytes)
+                write_atomically(folder / file.name, pack(matrix_market(matrix)))
+            return
+        if hasattr(reader, "write_pair"):
+            with reading_with(reader, like.model):
+                originals = (like.model, like.mass)
+                reader.write_pair(model, made, folder / like.mass.name, originals)
+            return
+    expected = "a format that goes both ways: see docs/readers.md"
+    raise InputError("no such file is written", file=made, expected=expected)
+
+
+def _multiplied_out(model: Model) -> Model:
+    if model.mass_change is None and model.stiffness_change is None:
+        return model
+    mass, stiffness = matrices_of(model)
+    return replace(model, mass=mass, stiffness=stiffness, mass_change=None, stiffness_change=None)
+
+
+def files_of(folder: Path) -> tuple[ModelFiles, LengthUnit] | None:
+    """Return the files of the model of a case, and their unit; None where it has no such files."""
+    spec = parse_spec(tomllib.loads(read_text(folder / CASE_FILE, LARGEST_CASE))).model
+    if isinstance(spec, FrameSpec):
+        return None
+    parts = (spec.file, spec.mass) if isinstance(spec, FileSpec) else (spec.stiffness, spec.mass)
+    model, mass, dofs = (None if name is None else folder / name for name in (*parts, spec.dofs))
+    assert model is not None
+    return ModelFiles(model, mass, dofs), spec.unit if isinstance(spec, FileSpec) else "m"

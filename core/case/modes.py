@@ -7,13 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from femubench.core.case.faults import Misfit, WrongDirection
-from femubench.core.case.frames import Site
 from femubench.core.case.schema import SMALLEST
 from femubench.core.case.tables import RESERVED, Complex, Table, read_table
 from femubench.core.errors import InputError
 from femubench.core.fem.mesh import ON_MEMBER
-from femubench.core.fem.sensors import DIRECTIONS, Sensors
+from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.complex_modes import real_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray
@@ -70,7 +68,7 @@ def _frequencies(table: Table) -> tuple[FloatArray, FloatArray, FloatArray]:
         frequency = row.number("frequency", "a number > 0 in Hz", _positive)
         if frequency is None:
             raise row.error("frequency", "empty cell", "a number > 0 in Hz")
-        std = row.number("frequency_std", "a number > 0 in Hz, or nothing", _positive)
+        std = row.number("frequency_std", "a number >= 0 in Hz, or nothing", _not_negative)
         damping = row.number("damping", "a ratio >= 0 and < 1, or nothing", lambda v: 0 <= v < 1)
         std = FREQUENCY_STD * frequency if std is None else std
         columns.append((frequency, std, np.nan if damping is None else damping))
@@ -80,6 +78,10 @@ def _frequencies(table: Table) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _positive(value: float) -> bool:
     return value >= SMALLEST
+
+
+def _not_negative(value: float) -> bool:
+    return value >= 0.0
 
 
 def _shapes(table: Table, labels: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
@@ -96,7 +98,7 @@ def _shapes(table: Table, labels: tuple[str, ...]) -> tuple[FloatArray, FloatArr
             elif value is not None:
                 shapes[s, m] = value
             if f"{label}_std" not in labels:
-                deviation = row.number(f"{label}_std", "a number > 0, or nothing", _positive)
+                deviation = row.number(f"{label}_std", "a number >= 0, or nothing", _not_negative)
                 std[s, m] = np.nan if deviation is None else deviation
         measured = np.abs(shapes[np.isfinite(shapes[:, m]), m])
         if len(measured) and measured.max() < SMALLEST:
@@ -115,36 +117,6 @@ def with_default_std(shapes: FloatArray, std: FloatArray, share: float) -> Float
     largest = np.max(np.abs(np.nan_to_num(shapes)), axis=0, initial=0.0)
     default = share * np.where(largest > 0.0, largest, np.nan)
     return np.where(np.isnan(std), default[None, :], std)
-
-
-def fitted_sensors(read: Measurement, file: Path, site: Site) -> Sensors:
-    """Return the sensors of a file that a plugin has read, those that fit the structure.
-
-    Files of three components a point list directions that a planar model does not have, and
-    points whose place is in another file; such sensors are left out, one that lies off the
-    structure is an error.
-
-    Raises:
-        InputError: when a sensor lies off the structure, or none is left.
-    """
-    sensors = read.sensors
-    keep = []
-    for i, (label, direction) in enumerate(zip(sensors.labels, sensors.directions, strict=True)):
-        x, y, z = (float(v) for v in sensors.xyz[i])
-        if direction.lstrip("+-") not in DIRECTIONS or not np.isfinite([x, y, z]).all():
-            continue
-        try:
-            site.check_sensor((x, y, z), direction)
-        except WrongDirection:
-            continue
-        except Misfit as misfit:
-            what = f"sensor {label!r}: {misfit.what}"
-            raise InputError(what, file=file, expected=misfit.expected) from None
-        keep.append(i)
-    if not keep:
-        expected = "nodes with coordinates, in a direction that the model has"
-        raise InputError("no sensor fits the structure", file=file, expected=expected)
-    return _some(sensors, keep)
 
 
 def fitted_modes(read: Measurement, file: Path, sensors: Sensors, share: float) -> Measurement:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 from femubench.core.case.faults import Misfit, WrongDirection
 from femubench.core.case.tables import read_table
@@ -17,7 +18,7 @@ from femubench.core.fem.frame import GroundSpring, Place, PointMass, Vector
 from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.model import Dofs, Model
-from femubench.core.fem.sensors import DIRECTIONS, Sensors
+from femubench.core.fem.sensors import DIRECTIONS, Sensors, moved_names
 from femubench.core.typing import FloatArray, SparseArray
 
 _MOST_DOFS = 1_000_000
@@ -61,6 +62,20 @@ class MatrixGeometry:
     def _points(self) -> FloatArray:
         return np.array(list(self.places.values()))
 
+    @cached_property
+    def points(self) -> FloatArray:
+        """Return what the size of the structure is told from, in m, (k, 3)."""
+        return self._points
+
+    def nearest(self, xyz: FloatArray) -> list[tuple[str, FloatArray]]:
+        """Return the nearest node of every point, by name, and where it is in m.
+
+        Arguments:
+            xyz: in m, (k, 3).
+        """
+        found = cKDTree(self._points).query(xyz)[1]
+        return [(self.names[i], self._points[i]) for i in np.atleast_1d(found)]
+
     def node(self, place: Place) -> str:
         """Return the node of a place; raises Misfit."""
         if place.joint is None or place.joint not in self.places:
@@ -85,7 +100,8 @@ class MatrixGeometry:
 
     def check_sensor(self, xyz: Vector, direction: str) -> None:
         """Check that a node with that direction lies at a point; raises Misfit."""
-        self.row_at(np.array(xyz), direction.lstrip("+-"))
+        for name in moved_names(direction):
+            self.row_at(np.array(xyz), name)
 
     def near(self, xyz: Vector | FloatArray) -> list[tuple[str, float]]:
         """Return the nodes within 1e-6 m of a point with their distances."""
@@ -109,15 +125,15 @@ class MatrixGeometry:
 
     def observe(self, sensors: Sensors) -> SparseArray:
         """Return sensor readings from dofs, sparse (n_sensors, n)."""
-        directions = [direction.lstrip("+-") for direction in sensors.directions]
+        axes = sensors.axes
+        row, column = np.nonzero(axes)
         try:
-            pairs = zip(sensors.xyz, directions, strict=True)
-            columns = [self.row_at(xyz, direction) for xyz, direction in pairs]
+            pairs = zip(sensors.xyz[row], column, strict=True)
+            found = [self.row_at(xyz, DIRECTIONS[k]) for xyz, k in pairs]
         except Misfit as misfit:
             raise ModelError(misfit.what) from None
-        signs = sensors.axes.sum(axis=1)
         shape = (len(sensors), len(self.dofs))
-        return sp.csr_array((signs, (np.arange(len(sensors)), columns)), shape=shape)
+        return sp.csr_array((axes[row, column], (row, np.array(found, dtype=int))), shape=shape)
 
     def attached(
         self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]

@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 from pydantic import ValidationError
 
-from femubench.core.case.case import Case, Modification
+from femubench.core.case.case import Case, Match, Modification
 from femubench.core.case.checks import check_unique
+from femubench.core.case.deviations import with_floor
 from femubench.core.case.faults import (
     Fault,
     KeyPath,
@@ -25,19 +26,21 @@ from femubench.core.case.faults import (
 )
 from femubench.core.case.files import LARGEST_CASE, CaseFiles
 from femubench.core.case.frames import FrameSite, Site, attachments, frame_of
+from femubench.core.case.matching import Alignment, fitted_sensors, told_of
 from femubench.core.case.matrices import model_of_matrices, reader_of, reading_with
 from femubench.core.case.model_files import model_of_file
 from femubench.core.case.modes import (
+    FREQUENCY_STD,
     NO_SENSORS,
     fitted_modes,
-    fitted_sensors,
     measured_only,
     read_modes,
     seen_at,
 )
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.schema import CaseSpec, FileSpec, FrameSpec, ModificationSpec, parse_spec
-from femubench.core.case.tables import read_sensors
+from femubench.core.case.sensors import read_sensors
+from femubench.core.case.tables import read_table
 from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
@@ -134,6 +137,8 @@ class _Building:
     spec: CaseSpec
     readers: tuple[Reader, ...]
     readings: dict[Path, Measurement] = field(default_factory=dict)
+    notes: dict[str, None] = field(default_factory=dict)
+    matches: tuple[Match, ...] = ()
 
     def case(self, name: str | None) -> Case:
         """Return the case; raises Fault or InputError."""
@@ -145,7 +150,7 @@ class _Building:
         )
         measurement = self.measurement(site)
         info = self.spec.case
-        return Case(
+        case = Case(
             name=info.name if name is None else name,
             title=info.title or info.name,
             source=info.source,
@@ -164,6 +169,7 @@ class _Building:
             beam_share=self.spec.diagnosis.beam_share,
             structure=info.structure,
         )
+        return replace(case, notes=tuple(self.notes), matches=self.matches)
 
     def model(self) -> Model:
         spec = self.spec.model
@@ -242,7 +248,7 @@ class _Building:
         own = sensors
         if spec.sensors is not None:
             path, read = self.reading(("reference", "sensors"), spec.sensors)
-            own = read_sensors(path, site) if read is None else fitted_sensors(read, path, site)
+            own, _ = self.placed(path, read, site, spec.modes)
         found = seen_at(self.modes(("reference", "modes"), spec.modes, own), sensors)
         key = "modes" if spec.used is None else "used"
         listed = [(("reference", key), number) for number in self.reference_used]
@@ -257,16 +263,41 @@ class _Building:
         path, read = self.reading(("measurement", key), name)
         if spec.sensors is None and (read is None or not len(read.sensors)):
             return NO_SENSORS, False
+        found, matches = self.placed(path, read, site, spec.modes)
+        self.matches = matches
+        return found, read is not None
+
+    def placed(
+        self, path: Path, read: Measurement | None, site: Site, modes: str
+    ) -> tuple[Sensors, tuple[Match, ...]]:
+        """Return the sensors of a file and where each was taken to sit."""
+        spec = self.spec.measurement
+        with at_key("measurement", "frame"):
+            alignment = Alignment.of(spec.unit, spec.frame, spec.tolerance)
         if read is None:
-            return read_sensors(path, site), False
-        return fitted_sensors(read, path, site), True
+            found, matches = read_sensors(path, site, alignment)
+            told = told_of(matches, path.name)
+        else:
+            labels = self.labels(modes)
+            found, matches, told = fitted_sensors(read.sensors, path, site, alignment, labels)
+        self.notes |= dict.fromkeys(told)
+        return found, matches
+
+    def labels(self, modes: str) -> frozenset[str]:
+        """Return the labels of what a file of modes may have a shape at."""
+        path, read = self.reading(("measurement", "modes"), modes)
+        return frozenset(read_table(path).columns if read is None else read.sensors.labels)
 
     def modes(self, key: KeyPath, name: str, sensors: Sensors) -> Measurement:
         share = self.spec.measurement.shape_std
         path, read = self.reading(key, name)
         if read is None:
-            return read_modes(path, sensors, share)
-        return fitted_modes(read, path, sensors, share)
+            found = read_modes(path, sensors, share)
+        else:
+            found = fitted_modes(read, path, sensors, share)
+        found, told = with_floor(found, name, FREQUENCY_STD, share)
+        self.notes |= dict.fromkeys(told)
+        return found
 
     def modifications(self, model: Model, site: Site, sensors: Sensors) -> tuple[Modification, ...]:
         specs = self.spec.modification

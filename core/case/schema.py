@@ -369,6 +369,15 @@ class MeasurementSpec(Table):
     held_out: Many[Count] = Field((), description="a list of mode numbers")
     band: tuple[NotNegative, Positive] | None = Field(None, description=BAND)
     mass: WeightSpec | None = Field(None, description="{value, std} in kg")
+    unit: LengthUnit | None = Field(
+        None, description=f"one of {', '.join(get_args(LengthUnit))}, of sensors' coordinates"
+    )
+    frame: Annotated[str, Field(strict=True, max_length=40)] | None = Field(
+        None, description='the axes of the model in those of the test, e.g. "x,z,-y"'
+    )
+    tolerance: Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)] | None = Field(
+        None, description="a number >= 0 and <= 1, of the size of the structure"
+    )
 
 
 class ReferenceSpec(Table):

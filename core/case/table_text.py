@@ -21,7 +21,7 @@ from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray
 
-_SHAPE_STD = 0.015
+SHAPE_STD = 0.015
 
 
 def number(value: float) -> str:
@@ -77,7 +77,7 @@ def common_share(measurements: Sequence[Measurement], known: float | None) -> fl
         measurements: those of one case.
         known: what the case's own file says, which wins where others fit as well.
     """
-    candidates = [*([] if known is None else [known]), _SHAPE_STD]
+    candidates = [*([] if known is None else [known]), SHAPE_STD]
     ratios = Counter(ratio for m in measurements for ratio in _ratios(m))
     candidates += [ratio for ratio, _ in ratios.most_common(4)]
     fits = [sum(int(_is_share(m, share).sum()) for m in measurements) for share in candidates]

@@ -1,4 +1,4 @@
-"""Read the CSV files of a case: cells, sensors, dofs."""
+"""Read the CSV files of a case: rows and cells, told with file and line when they are wrong."""
 
 from __future__ import annotations
 
@@ -11,19 +11,15 @@ from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
-from femubench.core.case.faults import Misfit, WrongDirection
+from femubench.core.case.faults import Misfit
 from femubench.core.case.files import LARGEST_TEXT
-from femubench.core.case.frames import Site
 from femubench.core.case.schema import LARGEST
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Place, Vector
-from femubench.core.fem.sensors import DIRECTIONS, Sensors
+from femubench.core.fem.sensors import DIRECTIONS, axis_of
 from femubench.core.files import read_text
 
 _MOST_ROWS, _MOST_COLUMNS, _MOST_CELLS = 1_000_000, 50_000, 10_000_000
-_MOST_SENSORS = 50_000
 _LONGEST_NUMBER = 100
 _REAL = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _NUMBER = re.compile(_REAL, re.ASCII)
@@ -110,11 +106,15 @@ class Row:
         return values[0], values[1], values[2]
 
     def direction(self) -> str:
-        """Return the column direction, in the spelling of `DIRECTIONS` with an optional minus."""
+        """Return the column direction as `Sensors` has it."""
         cell = self.cells["direction"]
-        if cell.lstrip("+-") not in DIRECTIONS or len(cell) - len(cell.lstrip("+-")) > 1:
-            expected = f"one of {', '.join(DIRECTIONS)}, with an optional sign"
-            raise self.error("direction", _refused(cell), expected)
+        try:
+            axis_of(cell)
+        except ValueError:
+            expected = (
+                f"one of {', '.join(DIRECTIONS)}, with an optional sign, or a vector as 0.6 0 0.8"
+            )
+            raise self.error("direction", _refused(cell), expected) from None
         return cell.removeprefix("+")
 
 
@@ -197,41 +197,6 @@ def _header(file: Path, line: int, cells: list[str]) -> tuple[str, ...]:
             raise InputError(what, file=file, line=line, key=cell[:60], expected=expected)
         seen.add(cell)
     return tuple(cells)
-
-
-def read_sensors(file: Path, site: Site) -> Sensors:
-    """Return the sensors of a CSV file: label,x,y,z,direction or label,at,direction.
-
-    Raises:
-        InputError: for a duplicate label, a sensor off the structure, an impossible direction.
-    """
-    table = read_table(file)
-    by_place = "at" in table.columns
-    place = ("at",) if by_place else ("x", "y", "z")
-    table.check_columns(("label", *place, "direction"))
-    if len(table.rows) > _MOST_SENSORS:
-        raise InputError("too many sensors", file=file, expected=f"at most {_MOST_SENSORS}")
-    labels: dict[str, None] = {}
-    points, directions = [], []
-    for row in table.rows:
-        label = row.text("label")
-        if label in labels or label in RESERVED:
-            what = f"{label!r} is listed twice" if label in labels else f"{label!r} is reserved"
-            raise row.error("label", what, "a label of its own")
-        direction = row.direction()
-        try:
-            xyz = site.point(parse_place(row.text("at"))) if by_place else row.vector()
-            site.check_sensor(xyz, direction)
-        except Misfit as misfit:
-            what = f"sensor {label!r}: {misfit.what}"
-            faulty = "direction" if isinstance(misfit, WrongDirection) else place[0]
-            raise row.error(faulty, what, misfit.expected) from None
-        labels[label] = None
-        points.append(xyz)
-        directions.append(direction)
-    if not labels:
-        raise InputError("no sensors", file=file, expected="a row for every sensor")
-    return Sensors(tuple(labels), np.array(points, dtype=float), tuple(directions))
 
 
 def parse_place(text: str) -> Place:

@@ -32,6 +32,10 @@ VERBS = {
         "Compare run B with run A; exit with 1 if B is worse.",
     ),
     "publish": ("femubench.core.cli.publish", "Merge result files into a static site in DIR."),
+    "update": (
+        "femubench.core.cli.update",
+        "Write the updated model of CASE in the format that it came in.",
+    ),
     "diagnose": ("femubench.core.cli.diagnose", "Find what a model lacks, and extend it."),
     "reproduce": (
         "femubench.core.cli.reproduce",

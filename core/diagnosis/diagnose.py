@@ -138,7 +138,7 @@ def diagnose(
     looks = _looks(given.model, case, (*registered, *known))
     faults_told = fault_causes(inquiry.mended), fault_causes(inquiry.loose)
     found = _written(case, examination, decision, adequate, proof, looks, faults_told, begin)
-    return replace(found, notes=(*found.notes, *_cut_short(effort)))
+    return replace(found, notes=(*given.notes, *found.notes, *_cut_short(effort)))
 
 
 def _looks(drawn: Model, case: Case, effects: Iterable[Effect]) -> tuple[LookWarning, ...]:

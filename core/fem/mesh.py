@@ -282,17 +282,38 @@ def locate(frame: Frame, xyz: FloatArray) -> Place:
     Raises:
         ModelError: when the point lies further than 1e-6 m from every member.
     """
+    place, _, gap = _foot(frame, xyz)
+    if gap > ON_MEMBER:
+        where = ", ".join(f"{v:g}" for v in xyz)
+        raise ModelError(f"point ({where}) lies {gap:.3g} m off the structure")
+    return place
+
+
+def nearest_place(frame: Frame, xyz: FloatArray) -> tuple[str, FloatArray]:
+    """Return the joint or the station of a member nearest to a point, and where it is in m.
+
+    Arguments:
+        frame: any.
+        xyz: the point in m, (3,).
+    """
+    place, foot, _ = _foot(frame, xyz)
+    return place.joint or f"{place.member}@{place.s:.4g}", foot
+
+
+def _foot(frame: Frame, xyz: FloatArray) -> tuple[Place, FloatArray, float]:
+    """Return the place nearest to a point, where it is and how far away in m."""
     corners, ends = frame.corners, frame.member_ends
     distance = np.linalg.norm(corners - xyz, axis=1)
-    if distance.min() <= ON_MEMBER:
-        return Place(joint=frame.joints[int(distance.argmin())].name)
+    nearest = int(distance.argmin())
+    if distance[nearest] <= ON_MEMBER:
+        return Place(joint=frame.joints[nearest].name), corners[nearest], float(distance[nearest])
     start, along = corners[ends[:, 0]], corners[ends[:, 1]] - corners[ends[:, 0]]
     s = np.einsum("ij,ij->i", xyz - start, along) / np.einsum("ij,ij->i", along, along)
     foot = start + np.clip(s, 0.0, 1.0)[:, None] * along
     gap = np.linalg.norm(xyz - foot, axis=1)
     best = int(gap.argmin())
-    if gap[best] > ON_MEMBER:
-        raise ModelError(
-            f"point ({', '.join(f'{v:g}' for v in xyz)}) lies {gap[best]:.3g} m off the structure"
-        )
-    return Place(member=frame.members[best].name, s=float(np.clip(s[best], 0.0, 1.0)))
+    station = float(np.clip(s[best], 0.0, 1.0))
+    if station in (0.0, 1.0) and gap[best] > ON_MEMBER:
+        joint = int(ends[best, int(station)])
+        return Place(joint=frame.joints[joint].name), corners[joint], float(gap[best])
+    return Place(member=frame.members[best].name, s=station), foot[best], float(gap[best])

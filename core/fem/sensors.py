@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,60 @@ from femubench.core.typing import FloatArray
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 
+_TINY = 1e-9  # of a unit vector
+
+
+def axis_of(direction: str) -> FloatArray:
+    """Return the unit vector of a direction in (x, y, z, rx, ry, rz), (6,).
+
+    Arguments:
+        direction: ``z``, ``-rx``, or along no axis: ``0.6 0 0.8``, about it ``r 0.6 0 0.8``.
+
+    Raises:
+        ValueError: when it is none of these.
+    """
+    axis = np.zeros(6)
+    name = direction.removeprefix("+").removeprefix("-")
+    if name in DIRECTIONS and len(direction) - len(name) <= 1:
+        axis[DIRECTIONS.index(name)] = -1.0 if direction.startswith("-") else 1.0
+        return axis
+    first, words = 3 if direction[:1] == "r" else 0, direction.removeprefix("r").split()
+    try:
+        vector = np.array([float(word) for word in words])
+    except ValueError:
+        vector = np.zeros(0)
+    if len(vector) != 3 or not np.isfinite(vector).all() or not np.abs(vector).max() > _TINY:
+        raise ValueError(f"{direction[:40]!r} is no direction")
+    axis[first : first + 3] = vector / np.linalg.norm(vector)
+    return axis
+
+
+def direction_of(axis: FloatArray) -> str:
+    """Return the text of a direction, as short as it reads back.
+
+    Arguments:
+        axis: a translation or a rotation in (x, y, z, rx, ry, rz), (6,).
+    """
+    turns = bool(np.abs(axis[3:]).max() > np.abs(axis[:3]).max())
+    vector = axis[3:] if turns else axis[:3]
+    vector = vector / np.linalg.norm(vector)
+    vector = np.where(np.abs(vector) < _TINY, 0.0, vector)
+    along = np.flatnonzero(vector)
+    if len(along) == 1:
+        sign = "-" if vector[along[0]] < 0.0 else ""
+        return f"{sign}{DIRECTIONS[along[0] + (3 if turns else 0)]}"
+    return ("r " if turns else "") + " ".join(repr(float(v)) for v in vector)
+
+
+def moved_names(direction: str) -> tuple[str, ...]:
+    """Return the directions of `DIRECTIONS` that a sensor reads.
+
+    Raises:
+        ValueError: when it is no direction.
+    """
+    return tuple(DIRECTIONS[k] for k in np.flatnonzero(axis_of(direction)))
+
+
 @dataclass(frozen=True)
 class Sensors:
     """Points and directions at which mode shapes are measured.
@@ -18,12 +73,24 @@ class Sensors:
     Arguments:
         labels: one name a sensor.
         xyz: positions in m, (n_sensors, 3).
-        directions: one of x y z rx ry rz a sensor, with an optional leading minus.
+        directions: one of x y z rx ry rz a sensor, with an optional leading minus; or three
+            numbers, the vector along which it measures (about which, behind an r).
     """
 
     labels: tuple[str, ...]
     xyz: FloatArray
     directions: tuple[str, ...]
+
+    @classmethod
+    def along(cls, labels: Iterable[str], xyz: FloatArray, axes: FloatArray) -> Sensors:
+        """Return sensors along any axes.
+
+        Arguments:
+            labels: one name a sensor.
+            xyz: positions in m, (n_sensors, 3).
+            axes: translations or rotations in (x, y, z, rx, ry, rz), (n_sensors, 6).
+        """
+        return cls(tuple(labels), xyz, tuple(direction_of(axis) for axis in axes))
 
     def __len__(self) -> int:
         return len(self.labels)
@@ -31,8 +98,5 @@ class Sensors:
     @property
     def axes(self) -> FloatArray:
         """Return the signed unit vectors in (x, y, z, rx, ry, rz), (n_sensors, 6)."""
-        axes = np.zeros((len(self), 6))
-        for row, direction in enumerate(self.directions):
-            sign, name = (-1.0, direction[1:]) if direction[:1] in "-+" else (1.0, direction)
-            axes[row, DIRECTIONS.index(name)] = 1.0 if direction[:1] == "+" else sign
-        return axes
+        rows = [axis_of(direction) for direction in self.directions]
+        return np.array(rows, dtype=float).reshape(-1, 6)

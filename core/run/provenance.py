@@ -189,6 +189,7 @@ def run_meta(
         },
         "git_commit": git_commit(),
         "structures": {case.name: case.structure or case.name for case in cases},
+        "notes": [f"{case.name}: {note.rstrip('.')}" for case in cases for note in case.notes],
         "cases": {case.name: {"title": case.title, "digest": case.digest} for case in cases},
         **about,
         "strategies": [strategy.name for strategy in strategies],

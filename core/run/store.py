@@ -180,7 +180,9 @@ class Store:
         reference = meta.get("reference") or None
         check_extent(meta, tuple(results.values()), file=self.path)
         listed = in_order_of_jobs(meta, results.values())
-        notes = [*notes, *damage.notes(self.path)]
+        told = meta.get("notes")
+        cases = told if isinstance(told, list) else []
+        notes = [*cases, *notes, *damage.notes(self.path)]
         return Run({**meta, "notes": notes}, rank_results(listed, reference, meta.get("baseline")))
 
     def by_key(self, run_id: str | None = None) -> dict[str, JobResult]:

@@ -9,6 +9,14 @@ from femubench import hookimpl
 def femubench_readers() -> dict[str, str]:
     """Return where the built-in readers are."""
     return {
-        "Nastran bulk data": f"{__name__}.bulk_data:BulkDataReader",
         "universal file": f"{__name__}.universal:UniversalReader",
+        "npz": f"{__name__}.npz:NpzReader",
+        "HDF5": f"{__name__}.hdf5:Hdf5Reader",
+        "MATLAB": f"{__name__}.matlab:MatlabReader",
+        "Nastran OP4": f"{__name__}.op4:Op4Reader",
+        "Nastran DMIG": f"{__name__}.dmig:DmigReader",
+        "Nastran bulk data": f"{__name__}.bulk_data:BulkDataReader",
+        "CalculiX": f"{__name__}.calculix:CalculixReader",
+        "Abaqus": f"{__name__}.abaqus:AbaqusReader",
+        "Ansys": f"{__name__}.ansys:AnsysReader",
     }

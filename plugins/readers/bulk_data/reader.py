@@ -7,7 +7,7 @@ from typing import NoReturn
 
 from femubench import InputError, Model
 from femubench.plugins.readers.bulk_data.cards import read_deck
-from femubench.plugins.readers.bulk_data.structure import Reading
+from femubench.plugins.readers.bulk_data.structure import Reading, grids_of
 from femubench.plugins.readers.bulk_data.writing import write_cards
 
 
@@ -32,6 +32,11 @@ class BulkDataReader:
             InputError: at the line of the first card that is wrong or is not read.
         """
         return Reading(read_deck(path)).model()
+
+    def read_nodes(self, path: Path) -> dict[str, tuple[float, float, float]]:
+        """Return where the grids are, whatever the elements are; raises InputError."""
+        grids = grids_of(read_deck(path)).values()
+        return {g.name: (float(g.xyz[0]), float(g.xyz[1]), float(g.xyz[2])) for g in grids}
 
     def model_files(self, path: Path) -> tuple[Path, ...]:
         """Return the files that a file includes; raises InputError."""

@@ -32,7 +32,7 @@ from femubench.plugins.readers.bulk_data.systems import KINDS, system_of
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 PROPERTIES = ("PBAR", "PBARL", "PBEAM", "PROD")
 _BARS = ("CBAR", "CBEAM")
-_MOST_MEMBERS = 20_000
+_MOST_MEMBERS, _MOST_CARDS = 20_000, 1_000_000
 _ALONG = 1e-6  # how far a spring between two grids may point off the line between them
 _SAME = 1e-9
 
@@ -64,6 +64,42 @@ class Grid:
     def name(self) -> str:
         """Return its number as a text."""
         return str(int(self.card.text(1)))
+
+
+def numbered(deck: Deck, *names: str) -> dict[int, Card]:
+    """Return cards of some kinds by their number, in the order of the file.
+
+    Raises:
+        InputError: when a number is there twice, for different cards.
+    """
+    found: dict[int, Card] = {}
+    for card in deck.cards:
+        if card.name not in names:
+            continue
+        other = found.setdefault(card.id(1, "the number"), card)
+        if other is not card and (other.name, other.fields) != (card.name, card.fields):
+            raise card.error(f"{other} is there already", "a number of its own")
+    if len(found) > _MOST_CARDS:
+        what, expected = f"{len(found)} cards", f"at most {_MOST_CARDS}"
+        raise InputError(what, file=deck.file, key=names[0], expected=expected)
+    return found
+
+
+def grids_of(deck: Deck) -> dict[int, Grid]:
+    """Return the grids by their numbers; raises InputError."""
+    systems = numbered(deck, *KINDS)
+    usual = next((card for card in deck.cards if card.name == "GRDSET"), None)
+    first = 0 if usual is None else usual.id(2, "CP", 0)
+    shown = 0 if usual is None else usual.id(6, "CD", 0)
+    found = {}
+    for number, card in numbered(deck, "GRID").items():
+        place = system_of(card.id(2, "CP", first), systems, card, "CP")
+        xyz = place.point(np.array(card.vector(3, "X")))
+        if card.text(6) == "-1":
+            raise card.error("a point of a fluid", "a grid of a structure", "CD")
+        motion = system_of(card.id(6, "CD", shown), systems, card, "CD")
+        found[number] = Grid(card, xyz, motion.axes_at(xyz))
+    return found
 
 
 @dataclass
@@ -112,10 +148,10 @@ class Reading:
                 raise card.error("this card is not read", expected)
             self.named.setdefault(card.name, []).append(card)
         self.weight = self._parameters()
-        self.systems = self._numbered(*KINDS)
-        self.grids = {number: self._grid(c) for number, c in self._numbered("GRID").items()}
-        materials = self._numbered("MAT1")
-        properties = self._numbered(*PROPERTIES).items()
+        self.systems = numbered(deck, *KINDS)
+        self.grids = grids_of(deck)
+        materials = numbered(deck, "MAT1")
+        properties = numbered(deck, *PROPERTIES).items()
         self.bars = {number: bar_of(card, materials) for number, card in properties}
         self.parts = Parts()
         self.pid: dict[str, int] = {}  # of every member
@@ -123,7 +159,7 @@ class Reading:
 
     def frame(self) -> Frame:
         """Return the frame, in the units of the file."""
-        elements = self._numbered("CBAR", "CBEAM", "CROD", "CELAS1", "CELAS2", "CONM2", "RBE2")
+        elements = numbered(self.deck, "CBAR", "CBEAM", "CROD", "CELAS1", "CELAS2", "CONM2", "RBE2")
         actions: dict[str, Callable[[Card], None]] = {
             **dict.fromkeys(_BARS, self._bar),
             **dict.fromkeys(("CELAS1", "CELAS2"), self._spring),
@@ -160,37 +196,11 @@ class Reading:
         for name in names:
             yield from self.named.get(name, ())
 
-    def _numbered(self, *names: str) -> dict[int, Card]:
-        """Return cards of some kinds by their number, in the order of the file."""
-        found: dict[int, Card] = {}
-        for card in self.deck.cards:
-            if card.name not in names:
-                continue
-            other = found.setdefault(card.id(1, "the number"), card)
-            if other is not card and (other.name, other.fields) != (card.name, card.fields):
-                raise card.error(f"{other} is there already", "a number of its own")
-        if len(found) > _MOST_MEMBERS * 10:
-            what, expected = f"{len(found)} cards", f"at most {_MOST_MEMBERS * 10}"
-            raise InputError(what, file=self.deck.file, key=names[0], expected=expected)
-        return found
-
     def _parameters(self) -> float:
         """Return what all masses are multiplied by (PARAM,WTMASS)."""
         chosen = (card for card in self._cards("PARAM") if card.text(1) == "WTMASS")
         values = {card.real(2, "WTMASS") for card in chosen}
         return values.pop() if len(values) == 1 else 1.0
-
-    def _grid(self, card: Card) -> Grid:
-        usual = next(self._cards("GRDSET"), None)
-        first, shown = (
-            0 if usual is None else usual.id(i, k, 0) for i, k in ((2, "CP"), (6, "CD"))
-        )
-        place = system_of(card.id(2, "CP", first), self.systems, card, "CP")
-        xyz = place.point(np.array(card.vector(3, "X")))
-        if card.text(6) == "-1":
-            raise card.error("a point of a fluid", "a grid of a structure", "CD")
-        motion = system_of(card.id(6, "CD", shown), self.systems, card, "CD")
-        return Grid(card, xyz, motion.axes_at(xyz))
 
     def grid(self, card: Card, number: int, key: str) -> Grid:
         """Return the grid that a field names, and make a joint of it; raises InputError."""

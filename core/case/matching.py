@@ -1,0 +1,279 @@
+"""The sensors of a test beside the structure: units, axes, and the nearest place of each."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import permutations, product
+from pathlib import Path
+
+import numpy as np
+
+from femubench.core.case.case import Match
+from femubench.core.case.faults import Misfit, WrongDirection
+from femubench.core.case.frames import Site
+from femubench.core.case.schema import LengthUnit
+from femubench.core.case.units import METRES
+from femubench.core.errors import InputError
+from femubench.core.fem.mesh import ON_MEMBER
+from femubench.core.fem.sensors import Sensors, axis_of, direction_of
+from femubench.core.typing import FloatArray
+
+TOLERANCE = 0.01  # of the size of the structure
+AXES = 'three of x, y, z with an optional minus, each once and right-handed, e.g. "x,z,-y"'
+_EXTENT = (0.1, 1.2)  # of the size of the structure, that of a test of it
+_NAMED = re.compile(r"([+-]?)([xyz])", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """How coordinates and directions of a test become those of the model.
+
+    Arguments:
+        unit: of its coordinates in m; None where the size of the structure tells it.
+        turn: the axes of the model in those of the test, (3, 3).
+        tolerance: how far a sensor may be from the structure, of the size of the structure.
+    """
+
+    unit: float | None
+    turn: FloatArray
+    tolerance: float
+
+    @classmethod
+    def of(cls, unit: LengthUnit | None, frame: str | None, tolerance: float | None) -> Alignment:
+        """Return what the keys of a case say; raises Misfit for a frame of axes that is none."""
+        turn = np.eye(3) if frame is None else parse_frame(frame)
+        known = None if unit is None else METRES[unit]
+        return cls(known, turn, TOLERANCE if tolerance is None else tolerance)
+
+    def direction(self, name: str) -> str:
+        """Return a direction of the test as one of the model."""
+        if np.array_equal(self.turn, np.eye(3)):
+            return name
+        axis = axis_of(name)
+        return direction_of(np.concatenate([self.turn @ axis[:3], self.turn @ axis[3:]]))
+
+
+def parse_frame(text: str) -> FloatArray:
+    """Return the axes of the model in those of the test, (3, 3).
+
+    Arguments:
+        text: ``x,z,-y``: the model's x is the test's x, its y the test's z, its z minus its y.
+
+    Raises:
+        Misfit: when these are no three axes of a right-handed system.
+    """
+    found = [_NAMED.fullmatch(word.strip()) for word in text.split(",")]
+    turn = np.zeros((len(found), 3))
+    for row, match in zip(turn, found, strict=True):
+        if match is not None:
+            row["xyz".index(match[2])] = -1.0 if match[1] == "-" else 1.0
+    if turn.shape != (3, 3) or abs(np.linalg.det(turn)) != 1.0:
+        raise Misfit(f"{text[:40]!r} is no frame of axes", AXES)
+    if np.linalg.det(turn) < 0.0:
+        raise Misfit(f"{text[:40]!r} is left-handed", AXES)
+    return turn
+
+
+def size_of(points: FloatArray) -> float:
+    """Return the diagonal of the box around points in m."""
+    return float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+
+
+def unit_of(xyz: FloatArray, site: Site, turn: FloatArray) -> LengthUnit:
+    """Return the unit in which coordinates fit the structure, by its size: m where that may be.
+
+    Arguments:
+        xyz: of the test, finite, (k, 3).
+        site: the structure.
+        turn: the axes of the model in those of the test.
+    """
+    ratio = size_of(xyz) / (size_of(site.points) or 1.0)
+    fitting = [name for name, unit in METRES.items() if _EXTENT[0] <= ratio * unit <= _EXTENT[1]]
+    if "m" in fitting or not fitting:
+        return "m"
+    return min(fitting, key=lambda name: float(np.median(_gaps(xyz @ turn.T * METRES[name], site))))
+
+
+def _gaps(xyz: FloatArray, site: Site) -> FloatArray:
+    feet = np.array([foot for _, foot in site.nearest(xyz)])
+    return np.asarray(np.linalg.norm(feet - xyz, axis=1))
+
+
+def matches_of(
+    labels: Sequence[str], xyz: FloatArray, site: Site, alignment: Alignment, unit: float
+) -> list[Match]:
+    """Return the nearest place of every sensor, near enough or not.
+
+    Arguments:
+        labels: of the sensors.
+        xyz: of the test, finite, (k, 3).
+        site: the structure.
+        alignment: how the test lies beside it.
+        unit: of the coordinates in m.
+    """
+    points = unit * xyz @ alignment.turn.T
+    found = zip(labels, points, site.nearest(points), strict=True)
+    # What sits where it should keeps its coordinates to the last bit.
+    return [
+        Match(label, place, at if np.linalg.norm(foot - at) <= ON_MEMBER else foot, at)
+        for label, at, (place, foot) in found
+    ]
+
+
+def check_near(match: Match, site: Site, alignment: Alignment, every: FloatArray) -> None:
+    """Check that a sensor is not too far from the structure.
+
+    Arguments:
+        match: of the sensor.
+        site: the structure.
+        alignment: how the test lies beside it.
+        every: all points of the test in m along the axes of the model, for advice, (k, 3).
+
+    Raises:
+        Misfit: naming the nearest place and the distance.
+    """
+    limit = max(alignment.tolerance * size_of(site.points), ON_MEMBER)
+    if match.distance <= limit:
+        return
+    at, foot = (", ".join(f"{v:.6g}" for v in point) for point in (match.measured, match.xyz))
+    what = (
+        f"sensor {match.sensor!r} at ({at}) lies {match.distance:.3g} m off the structure, nearest "
+        f"{match.place} at ({foot})"
+    )
+    expected = f"at most {limit:.3g} m (tolerance = {alignment.tolerance:g} of its size)"
+    raise Misfit(what, f"{expected}{_advice(every, site, limit)}")
+
+
+def _advice(every: FloatArray, site: Site, limit: float) -> str:
+    """Return the frame of axes, or the unit, with which all points of a test would fit."""
+    ratio = size_of(every) / (size_of(site.points) or 1.0)
+    for name, unit in METRES.items():
+        fits = name != "m" and _EXTENT[0] <= unit * ratio <= _EXTENT[1]
+        if fits and _gaps(unit * every, site).max() <= limit:
+            return f'; with unit = "{name}" all fit'
+    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+        turn = _turn(order, signs)
+        if np.linalg.det(turn) > 0.0 and _gaps(every @ turn.T, site).max() <= limit:
+            words = (f"{'-' if s < 0 else ''}{'xyz'[k]}" for k, s in zip(order, signs, strict=True))
+            return f'; turned by frame = "{",".join(words)}" all fit'
+    return ""
+
+
+def _turn(order: Sequence[int], signs: Sequence[float]) -> FloatArray:
+    turn = np.zeros((3, 3))
+    turn[range(3), list(order)] = signs
+    return turn
+
+
+def check_apart(found: Sequence[tuple[Match, str]]) -> None:
+    """Check that no two sensors of different places went to one place and direction.
+
+    Arguments:
+        found: every match and its direction.
+
+    Raises:
+        Misfit: naming both sensors and the place.
+    """
+    taken: dict[tuple[str, str], Match] = {}
+    for match, direction in found:
+        way = direction.lstrip("+-")
+        other = taken.setdefault((match.place, way), match)
+        if np.linalg.norm(other.measured - match.measured) > ON_MEMBER:
+            what = (
+                f"sensors {other.sensor!r} and {match.sensor!r} both lie nearest to {match.place}, "
+                f"direction {way} ({other.distance:.3g} and {match.distance:.3g} m away)"
+            )
+            raise Misfit(what, "a finer model, or one of the two left out")
+
+
+def fitted_sensors(
+    read: Sensors, file: Path, site: Site, alignment: Alignment, wanted: Collection[str] | None
+) -> tuple[Sensors, tuple[Match, ...], tuple[str, ...]]:
+    """Return the sensors of a file that a plugin has read, those that fit the structure.
+
+    Files of three components a point list directions that a planar model does not have, and
+    points whose place is in another file; such sensors are left out, one that lies off the
+    structure is an error.
+
+    Arguments:
+        read: what the plugin read.
+        file: for messages.
+        site: the structure.
+        alignment: how the test lies beside it; the unit is detected where it has none.
+        wanted: labels with a shape; None for all.
+
+    Returns:
+        The sensors, where each was taken to sit, and what to say of units and places.
+
+    Raises:
+        InputError: when a sensor lies off the structure, or none is left.
+    """
+    rows = [
+        i
+        for i, label in enumerate(read.labels)
+        if np.isfinite(read.xyz[i]).all() and (wanted is None or label in wanted)
+    ]
+    kept: list[tuple[Match, str]] = []
+    told: tuple[str, ...] = ()
+    if rows:
+        xyz = read.xyz[rows]
+        unit = unit_of(xyz, site, alignment.turn)
+        scale = METRES[unit] if alignment.unit is None else alignment.unit
+        matches = matches_of([read.labels[i] for i in rows], xyz, site, alignment, scale)
+        ways = [alignment.direction(read.directions[i]) for i in rows]
+        kept = _fitting(list(zip(matches, ways, strict=True)), file, site, alignment)
+        told = told_of([match for match, _ in kept], file.name)
+        if alignment.unit is None and unit != "m":
+            told = (_detected(file.name, unit, size_of(xyz) / size_of(site.points)), *told)
+    if not kept:
+        expected = "nodes with coordinates, in a direction that the model has"
+        raise InputError("no sensor fits the structure", file=file, expected=expected)
+    found = tuple(match for match, _ in kept)
+    places = np.array([match.xyz for match in found])
+    labels = tuple(match.sensor for match in found)
+    return Sensors(labels, places, tuple(way for _, way in kept)), found, told
+
+
+def _fitting(
+    found: Sequence[tuple[Match, str]], file: Path, site: Site, alignment: Alignment
+) -> list[tuple[Match, str]]:
+    """Return those matches whose direction the model has; raises InputError for one too far."""
+    every, kept = np.array([match.measured for match, _ in found]), []
+    try:
+        for match, direction in found:
+            check_near(match, site, alignment, every)
+            x, y, z = (float(v) for v in match.xyz)
+            with suppress(WrongDirection):
+                site.check_sensor((x, y, z), direction)
+                kept.append((match, direction))
+        check_apart(kept)
+    except Misfit as misfit:
+        raise InputError(misfit.what, file=file, expected=misfit.expected) from None
+    return kept
+
+
+def _detected(file: str, unit: str, ratio: float) -> str:
+    return (
+        f"{file}: coordinates were taken in {unit}, since in m the sensors would span {ratio:.3g} "
+        "times the structure."
+    )
+
+
+def told_of(matches: Sequence[Match], file: str) -> tuple[str, ...]:
+    """Return what to say of sensors that were moved to the structure, in one sentence.
+
+    Arguments:
+        matches: of all sensors.
+        file: that lists them.
+    """
+    moved = [match for match in matches if match.distance > ON_MEMBER]
+    if not moved:
+        return ()
+    worst = max(moved, key=lambda match: match.distance)
+    return (
+        f"{len(moved)} of the {len(matches)} sensors of {file} were moved to the nearest place of "
+        f"the structure, {worst.sensor} furthest: {worst.distance:.3g} m to {worst.place}.",
+    )

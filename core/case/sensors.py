@@ -1,0 +1,96 @@
+"""Read the table of sensors: at coordinates or at places of the structure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from femubench.core.case.case import Match
+from femubench.core.case.faults import Misfit, WrongDirection
+from femubench.core.case.frames import Site
+from femubench.core.case.matching import Alignment, check_apart, check_near, matches_of
+from femubench.core.case.tables import RESERVED, Row, Table, parse_place, read_table
+from femubench.core.errors import InputError
+from femubench.core.fem.frame import Vector
+from femubench.core.fem.sensors import Sensors
+from femubench.core.typing import FloatArray
+
+_MOST_SENSORS = 50_000
+
+
+def read_sensors(file: Path, site: Site, alignment: Alignment) -> tuple[Sensors, tuple[Match, ...]]:
+    """Return the sensors of a CSV file and where coordinates put them on the structure.
+
+    Arguments:
+        file: label,x,y,z,direction or label,at,direction.
+        site: the structure.
+        alignment: of coordinates and their directions; metres where it has no unit.
+
+    Raises:
+        InputError: for a duplicate label, a sensor off the structure, an impossible direction.
+    """
+    table = read_table(file)
+    by_place = "at" in table.columns
+    place = ("at",) if by_place else ("x", "y", "z")
+    table.check_columns(("label", *place, "direction"))
+    if len(table.rows) > _MOST_SENSORS:
+        raise InputError("too many sensors", file=file, expected=f"at most {_MOST_SENSORS}")
+    labels: dict[str, None] = {}
+    for row in table.rows:
+        label = row.text("label")
+        if label in labels or label in RESERVED:
+            what = f"{label!r} is listed twice" if label in labels else f"{label!r} is reserved"
+            raise row.error("label", what, "a label of its own")
+        labels[label] = None
+    if not labels:
+        raise InputError("no sensors", file=file, expected="a row for every sensor")
+    directions = [row.direction() for row in table.rows]
+    if by_place:
+        pairs = zip(table.rows, directions, strict=True)
+        points = [_point_at(row, way, site) for row, way in pairs]
+        return Sensors(tuple(labels), np.array(points, dtype=float), tuple(directions)), ()
+    matches = _placed(table, site, alignment)
+    directions = [alignment.direction(way) for way in directions]
+    for row, match, way in zip(table.rows, matches, directions, strict=True):
+        _check_sensor(row, match.xyz, way, site, "x")
+    try:
+        check_apart(list(zip(matches, directions, strict=True)))
+    except Misfit as misfit:
+        raise InputError(misfit.what, file=file, expected=misfit.expected) from None
+    xyz = np.array([match.xyz for match in matches], dtype=float)
+    return Sensors(tuple(labels), xyz, tuple(directions)), matches
+
+
+def _placed(table: Table, site: Site, alignment: Alignment) -> tuple[Match, ...]:
+    """Return where the coordinates of a table put its sensors."""
+    labels = [row.cells["label"] for row in table.rows]
+    xyz = np.array([row.vector() for row in table.rows], dtype=float)
+    matches = matches_of(labels, xyz, site, alignment, alignment.unit or 1.0)
+    every = np.array([match.measured for match in matches])
+    for row, match in zip(table.rows, matches, strict=True):
+        try:
+            check_near(match, site, alignment, every)
+        except Misfit as misfit:
+            raise row.error("x", misfit.what, misfit.expected) from None
+    return tuple(matches)
+
+
+def _point_at(row: Row, direction: str, site: Site) -> Vector:
+    try:
+        xyz = site.point(parse_place(row.text("at")))
+    except Misfit as misfit:
+        what = f"sensor {row.cells['label']!r}: {misfit.what}"
+        raise row.error("at", what, misfit.expected) from None
+    _check_sensor(row, np.array(xyz), direction, site, "at")
+    return xyz
+
+
+def _check_sensor(row: Row, xyz: FloatArray, direction: str, site: Site, column: str) -> None:
+    x, y, z = (float(v) for v in xyz)
+    try:
+        site.check_sensor((x, y, z), direction)
+    except Misfit as misfit:
+        what = f"sensor {row.cells['label']!r}: {misfit.what}"
+        faulty = "direction" if isinstance(misfit, WrongDirection) else column
+        raise row.error(faulty, what, misfit.expected) from None

@@ -1,0 +1,60 @@
+"""Read and write models in MATLAB's files: up to version 7 through SciPy, version 7.3 as HDF5."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.io
+
+from femubench.plugins.readers.hdf5 import read_hdf5, save_hdf5
+from femubench.plugins.readers.reading import opened
+from femubench.plugins.readers.variables import Variables, VariablesReader
+
+_KIND = "a MATLAB file"
+_HDF5 = b"\x89HDF"
+_USER_BLOCK = 512  # bytes before the HDF5 of version 7.3
+
+
+class MatlabReader(VariablesReader):
+    """Reads full and sparse matrices, and labels as numbers, words or cells of words."""
+
+    name: str = "MATLAB"
+    suffixes: tuple[str, ...] = (".mat",)
+
+    def variables(self, path: Path) -> dict[str, Any]:
+        """Return the variables by name; raises InputError."""
+        if is_hdf5(path):
+            return read_hdf5(path)
+        with opened(path, _KIND):
+            return {name: _plain(value) for name, value in _loaded(path).items()}
+
+    def save(self, path: Path, original: Path, new: Variables) -> None:
+        """Write a file of the same version with some variables renewed."""
+        if is_hdf5(original):
+            save_hdf5(path, original, new)
+            return
+        with path.open("wb") as stream:
+            scipy.io.savemat(stream, {**_loaded(original), **new}, do_compression=True)
+
+
+def is_hdf5(path: Path) -> bool:
+    """Tell whether a file is one of MATLAB 7.3."""
+    with path.open("rb") as stream:
+        start = stream.read(_USER_BLOCK + len(_HDF5))
+    return start.startswith(_HDF5) or start[_USER_BLOCK:] == _HDF5
+
+
+def _loaded(path: Path) -> dict[str, Any]:
+    found = scipy.io.loadmat(path)
+    return {name: value for name, value in found.items() if not name.startswith("__")}
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 - whatever MATLAB holds
+    """Return cells of words as an array of words, all else as it is."""
+    if getattr(value, "dtype", np.dtype(float)).kind != "O":
+        return value
+    return np.array(
+        [str(np.asarray(cell).reshape(-1)[0]) if np.size(cell) else "" for cell in value.flat]
+    )

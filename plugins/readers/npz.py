@@ -1,0 +1,64 @@
+"""Read and write models in archives of NumPy and SciPy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench.plugins.readers.reading import opened
+from femubench.plugins.readers.variables import Variables, VariablesReader
+
+_KIND = "an archive of numpy.savez or scipy.sparse.save_npz"
+_SPARSE = ("data", "indices", "indptr", "shape")
+
+
+class NpzReader(VariablesReader):
+    """Reads `scipy.sparse.save_npz` (one matrix) and `numpy.savez` (variables by name).
+
+    A sparse matrix K among the variables is four arrays: K.data, K.indices, K.indptr, K.shape.
+    """
+
+    name: str = "npz"
+    suffixes: tuple[str, ...] = (".npz",)
+
+    def variables(self, path: Path) -> dict[str, Any]:
+        """Return the arrays, those of every sparse matrix put together; raises InputError."""
+        with opened(path, _KIND):
+            arrays = _arrays(path)
+            if "format" in arrays:
+                return {path.stem: sp.csc_array(sp.load_npz(path))}
+            found = {name: value for name, value in arrays.items() if "." not in name}
+            for name in arrays:
+                base, dot, part = name.rpartition(".")
+                if dot and part == "indptr":
+                    found[base] = _sparse(*(arrays[f"{base}.{one}"] for one in _SPARSE))
+            return found
+
+    def save(self, path: Path, original: Path, new: Variables) -> None:
+        """Write an archive with some variables renewed."""
+        arrays = _arrays(original)
+        for name, value in new.items():
+            if "format" in arrays:
+                sp.save_npz(path, value)
+                return
+            if sp.issparse(value):
+                arrays |= {f"{name}.{part}": getattr(value, part) for part in _SPARSE}
+            else:
+                arrays[name] = value
+        with path.open("wb") as stream:
+            np.savez_compressed(stream, **arrays)
+
+
+def _arrays(path: Path) -> dict[str, Any]:
+    with np.load(path, allow_pickle=False) as archive:
+        return {name: archive[name] for name in archive.files}
+
+
+def _sparse(data: Any, indices: Any, indptr: Any, shape: Any) -> Any:  # noqa: ANN401
+    rows, columns = (int(value) for value in shape)
+    matrix = sp.csc_array((data, indices, indptr), shape=(rows, columns))
+    matrix.check_format(full_check=True)
+    return matrix
