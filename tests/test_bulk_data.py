@@ -10,10 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import femubench
-from femubench import InputError, Model
+from femubench import InputError, Model, Sensors
 from femubench.core.case.units import from_si, in_si
+from femubench.core.cli.main import bench
 from femubench.core.typing import FloatArray
 from femubench.fem import LowRank, Parameter, Place, PointMass
 from femubench.plugins.readers.bulk_data import BulkDataReader
@@ -493,3 +495,61 @@ def test_numbers_have_the_digits_that_a_field_can_hold(power: int) -> None:
             assert "." in text
             back = Card("X", (text,), Path(), 0, 0).real(1, "x")
             assert back == pytest.approx(number, rel=tolerance, abs=0.0)
+
+
+def plane_case(folder: Path) -> Path:
+    """Write a case of the plane whose wing is a quarter stiffer than its cards say."""
+    truth = changed(garteur(), {("E", f"E2{k:02d}"): 1.25 for k in range(1, 13)})
+    frame = truth.frame_structure.frame
+    points = [j for j in frame.joints if j.name[0] in "26"] + [frame.joints[0], frame.joints[6]]
+    labels = [(joint.name, d) for joint in points for d in ("x", "z")]
+    xyz = np.array([joint.xyz for joint in points for _ in "xz"])
+    sensors = Sensors(tuple(map("-".join, labels)), xyz, tuple(d for _, d in labels))
+    modes = femubench.solve_modes(truth)
+    shapes, frequencies = truth.observe(sensors) @ modes.shapes, hertz(truth)
+    elastic = np.flatnonzero(frequencies > 1.0)[1:9]  # but for the bounce on its cords
+    rows = [
+        f"{k},{frequencies[i]},{0.002 * frequencies[i]},0.01,"
+        + ",".join(f"{value:.6g}" for value in shapes[:, i])
+        for k, i in enumerate(elastic, 1)
+    ]
+    folder.mkdir()
+    (folder / "plane.bdf").write_bytes(garteur_plane.FILE.read_bytes())
+    places = [
+        f"{s},{x},{y},{z},{d}"
+        for s, (x, y, z), (_, d) in zip(sensors.labels, xyz, labels, strict=True)
+    ]
+    (folder / "sensors.csv").write_text("\n".join(["label,x,y,z,direction", *places]))
+    head = "mode,frequency,frequency_std,damping," + ",".join(sensors.labels)
+    (folder / "modes.csv").write_text("\n".join([head, *rows]))
+    (folder / "case.toml").write_text(
+        '[case]\nname = "plane"\n[model]\nkind = "file"\nfile = "plane.bdf"\nunit = "mm"\n'
+        '[measurement]\nsensors = "sensors.csv"\nmodes = "modes.csv"\n'
+        "used = [1, 2, 3, 4, 5]\nheld_out = [6, 7, 8]\n"
+    )
+    return folder
+
+
+def test_from_a_file_to_a_ranking_and_back_to_a_file(tmp_path: Path) -> None:
+    case = plane_case(tmp_path / "plane")
+    strategy = "global"
+    words = ["run", str(case), "-s", "unchanged", "-s", strategy, "--nominal", "drawn"]
+    ran = CliRunner().invoke(bench, [*words, "--store", str(tmp_path / "store")])
+    assert ran.exit_code == 0, ran.output
+    ranks = [line.split()[:2] for line in ran.output.splitlines() if line[:1].isdigit()]
+    assert ranks == [["1", strategy], ["2", "unchanged"]]
+    out = tmp_path / "updated"
+    ran = CliRunner().invoke(bench, ["update", str(case), "-s", strategy, "-o", str(out)])
+    assert ran.exit_code == 0, ran.output
+    before, after = (READER.read_model(f / "plane.bdf") for f in (case, out))
+    ratio = after.stiffness.trace() / before.stiffness.trace()
+    assert 1.02 < ratio < 1.3
+    assert (out / "plane.bdf").read_text().count("MAT1") == 1
+
+
+def test_coordinates_for_matrices_of_other_files(tmp_path: Path) -> None:
+    file = tmp_path / "shell.bdf"
+    file.write_text("GRID,1,,1.,2.,3.\nGRID,7,5,1.,0.,0.\nCQUAD4,1,1,1,7,1,7\n"
+                    "CORD2R,5,0,1.,0.,0.,2.,0.,0.,+\n+,1.,1.,0.\n")  # fmt: skip
+    nodes = READER.read_nodes(file)
+    np.testing.assert_allclose([nodes["1"], nodes["7"]], [[1, 2, 3], [1, 1, 0]], atol=1e-12)

@@ -11,12 +11,14 @@ from pathlib import Path
 from femubench import InputError
 
 LARGEST = 64  # MiB of a file with all that it includes
+_MOST_LINES = 500_000  # likewise
 _MOST_FILES = 100
 _HIGHEST_ID = 99_999_999
 _LARGEST_NUMBER = 1e30
 _SMALL, _LARGE = 8, 16  # characters of a field
 _INTEGER = re.compile(r"[+-]?\d{1,15}")
 _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[eEdD]?([+-]\d{1,3})|[eEdD](\d{1,3}))?")
+_ENDS = re.compile(rb"\r\n?|\n")
 _NAME = re.compile(r"[A-Z][A-Z0-9]{0,7}")
 _BEGIN = re.compile(r"\s*BEGIN\b", re.IGNORECASE)
 _BULK = re.compile(r"\s*BEGIN[\s,]*BULK\s*", re.IGNORECASE)
@@ -24,7 +26,7 @@ _INCLUDE = re.compile(r"""\s*INCLUDE\s*['"]?([^'"]+?)['"]?\s*""", re.IGNORECASE)
 _CHOICE = re.compile(r"\s*(SPC|MPC)\s*=\s*(\d{1,8})\s*", re.IGNORECASE)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Card:
     """One card: its name, its data fields without those of continuation, and where it stands.
 
@@ -160,7 +162,7 @@ class _Reading:
 
     def __init__(self, file: Path) -> None:
         self.deck = Deck(file)
-        self.left = LARGEST * 2**20
+        self.left, self.lines_left = LARGEST * 2**20, _MOST_LINES
         self.ended = False
         lines = self.load(file)
         start = self.control(lines)
@@ -182,25 +184,28 @@ class _Reading:
             raise InputError("file is too large", file=file, expected=expected)
         if b"\0" in content:
             raise InputError("not a text: a NUL byte", file=file, expected="bulk data")
+        self.lines_left -= len(_ENDS.findall(content))
+        if self.lines_left < 0:
+            what, expected = "file has too many lines", f"at most {_MOST_LINES} with all included"
+            raise InputError(what, file=file, expected=expected)
         self.deck.lines[file] = content.splitlines(keepends=True)
         return self.deck.lines[file]
 
     def control(self, lines: list[bytes]) -> int:
         """Return where bulk data start, and keep which constraints case control chooses."""
-        texts = [_text(line) for line in lines]
-        begin = next((i for i, text in enumerate(texts) if _BEGIN.match(text)), None)
+        begin = next((i for i, line in enumerate(lines) if _BEGIN.match(_text(line))), None)
         if begin is None:
-            control = [i for i, text in enumerate(texts) if text.strip().upper() == "CEND"]
+            control = [i for i, line in enumerate(lines) if _text(line).strip().upper() == "CEND"]
             if control:
                 what, line = "case control without bulk data", control[0] + 1
                 raise InputError(what, file=self.deck.file, line=line, expected="BEGIN BULK")
             return 0
-        if not _BULK.fullmatch(texts[begin]):
-            what = f"{texts[begin].strip()[:40]!r}"
+        if not _BULK.fullmatch(_text(lines[begin])):
+            what = repr(_text(lines[begin]).strip()[:40])
             raise InputError(what, file=self.deck.file, line=begin + 1, expected="BEGIN BULK")
         self.deck.controlled = True
-        for i, text in enumerate(texts[:begin]):
-            if found := _CHOICE.fullmatch(text):
+        for i in range(begin):
+            if found := _CHOICE.fullmatch(_text(lines[i])):
                 word, number = found[1].upper(), int(found[2])
                 if self.deck.chosen.setdefault(word, number) != number:
                     what = f"subcases choose different sets of {word}"
