@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from bisect import bisect_left, bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -103,8 +104,14 @@ class Card:
             raise self.error(_shown(text), "digits from 1 to 6, each once", key)
         return text
 
-    def numbers(self, first: int, key: str, known: set[int]) -> list[int]:
-        """Return the grids of a list with ``THRU``, of whose ranges only known ones count."""
+    def numbers(self, first: int, key: str, known: Sequence[int]) -> list[int]:
+        """Return the grids of a list with ``THRU``.
+
+        Arguments:
+            first: the field in which the list starts.
+            key: its name.
+            known: the grids that there are, sorted; of ranges only these count.
+        """
         texts = [text for text in self.fields[first - 1 :] if text]
         found: list[int] = []
         position = 0
@@ -115,12 +122,7 @@ class Card:
             if not all(map(_INTEGER.fullmatch, words)) or len(words) < 1 + ranged:
                 raise self.error(_shown(" ".join(words)), "numbers, or FIRST THRU LAST", key)
             low, high = int(words[0]), int(words[-1])
-            if not ranged:
-                found.append(low)
-            elif high - low < len(known):
-                found += [number for number in range(low, high + 1) if number in known]
-            else:
-                found += sorted(number for number in known if low <= number <= high)
+            found += known[bisect_left(known, low) : bisect_right(known, high)] if ranged else [low]
         return found
 
 
@@ -340,8 +342,3 @@ def _inside(main: Path, file: Path, name: str, line: int) -> Path:
     except (OSError, ValueError):
         raise wrong from None
     return main.parent / path.relative_to(main.parent.resolve())
-
-
-def by_name(cards: list[Card], *names: str) -> Iterator[Card]:
-    """Return the cards of some names."""
-    return (card for card in cards if card.name in names)

@@ -27,7 +27,7 @@ from femubench.fem import (
 )
 from femubench.plugins.readers.bulk_data.cards import Card, Deck
 from femubench.plugins.readers.bulk_data.properties import Bar, bar_of
-from femubench.plugins.readers.bulk_data.systems import KINDS, system_of
+from femubench.plugins.readers.bulk_data.systems import KINDS, Systems
 
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 PROPERTIES = ("PBAR", "PBARL", "PBEAM", "PROD")
@@ -87,17 +87,17 @@ def numbered(deck: Deck, *names: str) -> dict[int, Card]:
 
 def grids_of(deck: Deck) -> dict[int, Grid]:
     """Return the grids by their numbers; raises InputError."""
-    systems = numbered(deck, *KINDS)
+    systems = Systems(numbered(deck, *KINDS))
     usual = next((card for card in deck.cards if card.name == "GRDSET"), None)
     first = 0 if usual is None else usual.id(2, "CP", 0)
     shown = 0 if usual is None else usual.id(6, "CD", 0)
     found = {}
     for number, card in numbered(deck, "GRID").items():
-        place = system_of(card.id(2, "CP", first), systems, card, "CP")
+        place = systems.find(card.id(2, "CP", first), card, "CP")
         xyz = place.point(np.array(card.vector(3, "X")))
         if card.text(6) == "-1":
             raise card.error("a point of a fluid", "a grid of a structure", "CD")
-        motion = system_of(card.id(6, "CD", shown), systems, card, "CD")
+        motion = systems.find(card.id(6, "CD", shown), card, "CD")
         found[number] = Grid(card, xyz, motion.axes_at(xyz))
     return found
 
@@ -108,6 +108,7 @@ class Parts:
 
     Arguments:
         offsets: joints at the ends of bars beside their grids, by grid and offset.
+        arms: how many such joints a grid has.
         of: the card of a part of the frame, by the part's id in memory.
     """
 
@@ -120,6 +121,7 @@ class Parts:
     braces: list[Brace] = field(default_factory=list)
     joints: dict[str, Joint] = field(default_factory=dict)
     offsets: dict[tuple[float, ...], str] = field(default_factory=dict)
+    arms: dict[str, int] = field(default_factory=dict)
     of: dict[int, Card] = field(default_factory=dict)
 
     def add(self, key: str, part: Any, card: Card) -> None:  # noqa: ANN401 - a part of a frame
@@ -148,8 +150,11 @@ class Reading:
                 raise card.error("this card is not read", expected)
             self.named.setdefault(card.name, []).append(card)
         self.weight = self._parameters()
-        self.systems = numbered(deck, *KINDS)
+        self.systems = Systems(numbered(deck, *KINDS))
         self.grids = grids_of(deck)
+        self.sorted = sorted(self.grids)
+        self.listed = 0  # grids in lists so far
+        self.stiffnesses = self._pelas()
         materials = numbered(deck, "MAT1")
         properties = numbered(deck, *PROPERTIES).items()
         self.bars = {number: bar_of(card, materials) for number, card in properties}
@@ -253,7 +258,9 @@ class Reading:
             raise card.error(
                 "offsets along the axes of the bar", "along those of its grids", "OFFT"
             )
-        names = tuple(self._end(grid, w @ grid.axes) for grid, w in zip(ends, offsets, strict=True))
+        names = tuple(
+            self._end(grid, w @ grid.axes, card) for grid, w in zip(ends, offsets, strict=True)
+        )
         start, stop = (np.array(self.parts.joints[name].xyz) for name in names)
         if names[0] == names[1] or not np.linalg.norm(stop - start) > 0.0:
             raise card.error("the bar has no length", "two grids apart", "GB")
@@ -284,16 +291,16 @@ class Reading:
             raise card.error(f"there is no {wanted} {number}", f"the number of a {wanted}", "PID")
         return bar
 
-    def _end(self, grid: Grid, offset: FloatArray) -> str:
+    def _end(self, grid: Grid, offset: FloatArray, card: Card) -> str:
         """Return the joint of an end of a bar: its grid, or a joint that is linked to it."""
         if not offset.any():
             return grid.name
         key = (float(grid.name), *(float(v) for v in offset))
         if key not in self.parts.offsets:
-            count = sum(other[0] == key[0] for other in self.parts.offsets)
-            name = self._joint(f"{grid.name}.{count + 1}", grid.xyz + offset)
+            count = self.parts.arms[grid.name] = self.parts.arms.get(grid.name, 0) + 1
+            name = self._joint(f"{grid.name}.{count}", grid.xyz + offset)
             self.parts.offsets[key] = name
-            self.parts.links.append(Link(grid.name, (name,)))
+            self.parts.add("links", Link(grid.name, (name,)), card)
         return self.parts.offsets[key]
 
     def _orientation(
@@ -339,7 +346,7 @@ class Reading:
 
     def _spring(self, card: Card) -> None:
         direct = card.name == "CELAS2"
-        stiffness = card.real(2, "K") if direct else self._pelas(card)
+        stiffness = card.real(2, "K") if direct else self._of_pelas(card)
         if stiffness < 0.0:
             raise card.error(f"{stiffness:g}", "a stiffness >= 0", "K")
         ends = []
@@ -367,13 +374,24 @@ class Reading:
             raise card.error("a spring between two grids across their line", expected)
         self.parts.add("braces", Brace((first.name, second.name), stiffness), card)
 
-    def _pelas(self, card: Card) -> float:
+    def _pelas(self) -> dict[int, float]:
+        pairs = [(card, i) for card in self._cards("PELAS") for i in (1, 5) if card.text(i)]
+        return {card.id(i, "PID"): card.real(i + 1, "K") for card, i in pairs}
+
+    def _of_pelas(self, card: Card) -> float:
         wanted = card.id(2, "PID", card.id(1, "EID"))
-        for found in self._cards("PELAS"):
-            for i in (1, 5):
-                if found.text(i) and found.id(i, "PID") == wanted:
-                    return found.real(i + 1, "K")
-        raise card.error(f"there is no PELAS {wanted}", "the number of a PELAS", "PID")
+        if wanted not in self.stiffnesses:
+            what = f"there is no PELAS {wanted}"
+            raise card.error(what, "the number of a PELAS", "PID")
+        return self.stiffnesses[wanted]
+
+    def _list(self, card: Card, first: int, key: str) -> list[int]:
+        """Return the grids of a list; raises InputError for more than any structure needs."""
+        found = card.numbers(first, key, self.sorted)
+        self.listed += len(found)
+        if self.listed > _MOST_CARDS:
+            raise card.error("the lists name too many grids", f"at most {_MOST_CARDS}", key)
+        return found
 
     def _mass(self, card: Card) -> None:
         grid = self.grid(card, 2, "G")
@@ -385,7 +403,7 @@ class Reading:
         if card.text(3) == "-1":
             offset = offset - grid.xyz
         else:
-            system = system_of(card.id(3, "CID", 0), self.systems, card, "CID")
+            system = self.systems.find(card.id(3, "CID", 0), card, "CID")
             axes = system.axes_at(grid.xyz)
             offset = offset @ axes
         keys = ("I11", "I21", "I22", "I31", "I32", "I33")
@@ -403,7 +421,7 @@ class Reading:
             last -= 1  # the coefficient of thermal expansion
         listed = Card(card.name, card.fields[:last], card.file, card.first, card.last)
         follows: dict[tuple[str, ...], list[str]] = {}
-        for number in listed.numbers(4, "GM", set(self.grids)):
+        for number in self._list(listed, 4, "GM"):
             grid = self._known(card, number, "GM")
             motions = tuple(self._motions(grid, components, card, "CM"))
             follows.setdefault(motions, []).append(grid.name)
@@ -457,7 +475,7 @@ class Reading:
     def _held_by(self, card: Card) -> Iterator[tuple[Grid, str, Card]]:
         if card.name == "SPC1":
             components = card.components(2, "C")
-            numbers = card.numbers(3, "G", set(self.grids))
+            numbers = self._list(card, 3, "G")
             pairs = [(number, components) for number in numbers]
         else:
             rows = [i for i in (2, 5) if card.text(i)]
@@ -474,16 +492,18 @@ class Reading:
         ends = {name for member in self.parts.members for name in member.ends}
         linked = {name for link in self.parts.links for name in (link.leads, *link.follows)}
         braced = {name for brace in self.parts.braces for name in brace.ends}
-        sprung = {spring.at.joint for spring in self.parts.springs}
+        sprung: dict[str | None, set[str]] = {}
+        for spring in self.parts.springs:
+            sprung.setdefault(spring.at.joint, set()).add(spring.direction)
         for name in self.parts.joints:
-            if name in ends | linked:
+            if name in ends or name in linked:
                 continue
-            if name not in braced | sprung:
+            if name not in braced and name not in sprung:
                 card = self.grids[int(name)].card
                 raise card.error("nothing holds this grid", "a bar, a rod, a spring or an RBE2")
-            turned = {s.direction for s in self.parts.springs if s.at.joint == name}
-            idle = tuple(d for d in ("rx", "ry", "rz") if d not in turned)
-            self.parts.supports.append(Support(Place(joint=name), idle))
+            idle = tuple(d for d in _DIRECTIONS[3:] if d not in sprung.get(name, ()))
+            if idle:
+                self.parts.supports.append(Support(Place(joint=name), idle))
 
     def _assembled(self) -> Frame:
         parts = self.parts

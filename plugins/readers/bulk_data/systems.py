@@ -44,27 +44,41 @@ BASIC = System(np.zeros(3), np.eye(3))
 KINDS = ("CORD2R", "CORD2C")
 
 
-def system_of(
-    number: int, cards: Mapping[int, Card], user: Card, key: str, depth: int = 0
-) -> System:
-    """Return a coordinate system by its number, 0 for the basic one.
+class Systems:
+    """The coordinate systems of a file by their numbers, 0 for the basic one.
 
     Arguments:
-        number: as a card names it.
         cards: the CORD2R and CORD2C by number.
-        user: the card that names it.
-        key: the field of that card.
-
-    Raises:
-        InputError: when there is none, or its points give no axes.
     """
-    if number == 0:
-        return BASIC
-    card = cards.get(number)
-    if card is None or depth > _DEEPEST:
-        expected = f"0 or the number of a {' or '.join(KINDS)}, none within itself"
-        raise user.error(f"there is no coordinate system {number}", expected, key)
-    base = system_of(card.id(2, "RID", 0), cards, card, "RID", depth + 1)
+
+    def __init__(self, cards: Mapping[int, Card]) -> None:
+        self._cards = cards
+        self._known = {0: BASIC}
+
+    def find(self, number: int, user: Card, key: str, depth: int = 0) -> System:
+        """Return a system.
+
+        Arguments:
+            number: as a card names it.
+            user: the card that names it.
+            key: the field of that card.
+            depth: how many systems stand between.
+
+        Raises:
+            InputError: when there is none, or its points give no axes.
+        """
+        if number not in self._known:
+            card = self._cards.get(number)
+            if card is None or depth > _DEEPEST:
+                expected = f"0 or the number of a {' or '.join(KINDS)}, none within itself"
+                raise user.error(f"there is no coordinate system {number}", expected, key)
+            base = self.find(card.id(2, "RID", 0), card, "RID", depth + 1)
+            self._known[number] = _system(card, base)
+        return self._known[number]
+
+
+def _system(card: Card, base: System) -> System:
+    """Return the system of three points: origin, on z, in x-z."""
     points = [np.array(card.vector(3 + 3 * i, name)) for i, name in enumerate("ABC")]
     origin, on_z, in_xz = (base.point(point) for point in points)
     z, towards_x = on_z - origin, in_xz - origin
