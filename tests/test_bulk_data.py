@@ -406,6 +406,52 @@ TWO = SMALL.replace("GRID    2               .8 ", "GRID    3               .8 "
 TWO = TWO.replace("ENDDATA\n", "") + "ENDDATA\nbehind the end\n"
 
 
+KINDS = """SPC = 1
+BEGIN BULK
+GRDSET,,,,,,,456
+CORD2R,5,0,1.,0.,0.,2.,0.,0.,+
++,1.,1.,0.
+CORD2C,6,5,0.,0.,0.,0.,0.,1.,+
++,0.,1.,0.
+GRID,1,,0.,0.,0.
+GRID,2,6,.8,30.,0.,6
+GRID,3,,.5,.5,.5
+BAROR,,10,,,0.,1.,0.
+CBAR,1,,1,2,,,,,+
++,5,,0.,.1,0.
+CBEAM,2,11,2,3,1
+PBAR,10,1,1.-4,2.-9,5.-10,1.-9
+PBEAM,11,1,1.-4,2.-9,5.-10,,1.-9,.1,+
++,0.,0.,,,,,,,+
++,YES,1.,1.-4,2.-9,5.-10,,1.-9,.1
+MAT1,1,7.+10,,.3,2700.
+CROD,3,12,1,3
+PROD,12,1,2.-5
+CONM2,4,3,5,1.5,.1,.2,.3,,+
++,3.-2,1.-3,4.-2,2.-3,-1.-3,5.-2
+CELAS1,5,8,2,3
+PELAS,8,20.
+RBE2,6,1,123,3
+SPC1,1,123456,1,THRU,2
+SPC,2,3,1
+SPCADD,3,1,2
+"""
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_every_kind_of_card_says_comes_back(tmp_path: Path, seed: int) -> None:
+    original, path = tmp_path / "model.bdf", tmp_path / "new.bdf"
+    original.write_text(KINDS)
+    rng = np.random.default_rng(seed)
+    quantities = ("E", "EI", "EA", "GJ", "density", "rhoA")
+    draws = {(q, bar): rng.uniform(0.8, 1.3) for q in quantities for bar in ("E1", "E2")}
+    wanted = changed(READER.read_model(original), draws)
+    READER.write_model(wanted, path, original)
+    assert near(READER.read_model(path), wanted, 1e-11)
+    kept = [line for line in KINDS.splitlines() if line[:3] in ("SPC", "COR", "GRI", "RBE", "CON")]
+    assert set(kept) <= set(path.read_text().splitlines())
+
+
 @pytest.mark.parametrize(
     ("factors", "cards"),
     [

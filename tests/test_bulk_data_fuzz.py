@@ -18,41 +18,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parent / "fuzz"))
 import garteur_plane
 from mutations import NUMBERS, Edit, edits, mutated
-from test_bulk_data import LARGE, TWO
+from test_bulk_data import KINDS, LARGE, TWO
 from test_fuzz import outcome_of
 
 READER = BulkDataReader()
-EXTRA = """SPC = 1
-BEGIN BULK
-GRDSET,,,,,,,456
-CORD2R,5,0,1.,0.,0.,2.,0.,0.,+
-+,1.,1.,0.
-CORD2C,6,5,0.,0.,0.,0.,0.,1.,+
-+,0.,1.,0.
-GRID,1,,0.,0.,0.
-GRID,2,6,.8,30.,0.,6
-GRID,3,,.5,.5,.5
-BAROR,,10,,,0.,1.,0.
-CBAR,1,,1,2,,,,,+
-+,5,,0.,.1,0.
-CBEAM,2,11,2,3,1
-PBAR,10,1,1.-4,2.-9,5.-10,1.-9
-PBEAM,11,1,1.-4,2.-9,5.-10,,1.-9,.1,+
-+,0.,0.,,,,,,,+
-+,YES,1.,1.-4,2.-9,5.-10,,1.-9,.1
-MAT1,1,7.+10,,.3,2700.
-CROD,3,12,1,3
-PROD,12,1,2.-5
-CONM2,4,3,5,1.5,.1,.2,.3,,+
-+,3.-2,1.-3,4.-2,2.-3,-1.-3,5.-2
-CELAS1,5,8,2,3
-PELAS,8,20.
-RBE2,6,1,123,3
-SPC1,1,123456,1,THRU,2
-SPC,2,3,1
-SPCADD,3,1,2
-"""
-SEEDS = (garteur_plane.cards(), TWO, LARGE, EXTRA)
+SEEDS = (garteur_plane.cards(), TWO, LARGE, KINDS)
 FEW, MANY = 100, 20_000
 
 
