@@ -10,6 +10,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from femubench.fem import (
     Frame,
     GroundSpring,
@@ -45,7 +47,7 @@ def _along(axis: int, stations: Sequence[float], at: Sequence[float]) -> list[Po
     """Return points on a line along an axis, the other two coordinates given."""
     points: list[Point] = []
     for station in stations:
-        x, y, z = (*at[:axis], station, *at[axis:])
+        x, y, z = np.insert(np.array(at, dtype=float), axis, station).tolist()
         points.append((x, y, z))
     return points
 
@@ -100,9 +102,9 @@ def cards() -> str:
     lines += ["METHOD = 1", "BEGIN BULK", "EIGRL,1,,,20", "PARAM,COUPMASS,1"]
     for (x, y, z), n in number.items():
         lines += [f"GRID*   {n:>16}{'':16}{x:>16}{y:>16}", f"*       {z:>16}"]
-    for bar, part, first, last in bars():
-        v = "".join(f"{float(c):>8}" for c in PARTS[part - 1].wide)
-        lines.append(f"CBAR    {bar:>8}{part:>8}{first:>8}{last:>8}{v}")
+    for bar, i, first, last in bars():
+        v = "".join(f"{float(c):>8}" for c in PARTS[i - 1].wide)
+        lines.append(f"CBAR    {bar:>8}{i:>8}{first:>8}{last:>8}{v}")
     for i, part in enumerate(PARTS, 1):
         lines += [f"$ {part.name}", f"PBARL,{i},1,,BAR,,,,,+"]
         lines.append(f"+,{float(part.height)},{float(part.width)}")
@@ -133,8 +135,8 @@ def frame() -> Frame:
         joints=tuple(Joint(str(n), (x / 1e3, y / 1e3, z / 1e3)) for (x, y, z), n in number.items()),
         members=tuple(members),
         masses=tuple(
-            PointMass(Place(joint=str(number[at])), mass, tuple(c / 1e3 for c in offset))
-            for mass, at, offset in MASSES
+            PointMass(Place(joint=str(number[at])), mass, (x / 1e3, y / 1e3, z / 1e3))
+            for mass, at, (x, y, z) in MASSES
         ),
         springs=(GroundSpring(Place(joint=str(number[HUNG])), "z", CORD),),
         links=tuple(Link(str(number[one]), (str(number[other]),)) for one, other in LINKS),

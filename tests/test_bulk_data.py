@@ -17,7 +17,7 @@ from femubench import InputError, Model, Sensors
 from femubench.core.case.units import from_si, in_si
 from femubench.core.cli.main import bench
 from femubench.core.typing import FloatArray
-from femubench.fem import LowRank, Parameter, Place, PointMass
+from femubench.fem import Coupling, Eccentricity, LowRank, Parameter, Place, PointMass
 from femubench.plugins.readers.bulk_data import BulkDataReader
 from femubench.plugins.readers.bulk_data.cards import Card
 from femubench.plugins.readers.bulk_data.writing import real
@@ -524,6 +524,8 @@ def test_what_cards_of_properties_cannot_say_is_refused(tmp_path: Path) -> None:
         replace(model, stiffness=1.1 * model.stiffness),
         replace(model, mass_change=LowRank(basis, np.eye(1))),
         Model.of(laden),
+        Model.of(replace(frame, eccentricities=(Eccentricity("E1", y=0.01),))),
+        Model.of(replace(frame, couplings=(Coupling("E2", 0.1),))),
         changed(model, {("rotary", "E1"): 1.3}),
     ):
         with pytest.raises(InputError, match=r"op4 and \.mtx"):
@@ -579,7 +581,7 @@ def plane_case(folder: Path) -> Path:
 def test_from_a_file_to_a_ranking_and_back_to_a_file(tmp_path: Path) -> None:
     case = plane_case(tmp_path / "plane")
     strategy = "global"
-    words = ["run", str(case), "-s", "unchanged", "-s", strategy, "--nominal", "drawn"]
+    words = ["run", str(case), "-s", "unchanged", "-s", strategy, "--nominal", "drawn", "-j", "1"]
     ran = CliRunner().invoke(bench, [*words, "--store", str(tmp_path / "store")])
     assert ran.exit_code == 0, ran.output
     ranks = [line.split()[:2] for line in ran.output.splitlines() if line[:1].isdigit()]

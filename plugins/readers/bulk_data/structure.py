@@ -149,7 +149,7 @@ class Reading:
                 expected = "a frame of CBAR, CBEAM, CROD, CONM2, CELAS2, RBE2, SPC; see the docs"
                 raise card.error("this card is not read", expected)
             self.named.setdefault(card.name, []).append(card)
-        self.weight = self._parameters()
+        self.weight = self._weight()
         self.systems = Systems(numbered(deck, *KINDS))
         self.grids = grids_of(deck)
         self.sorted = sorted(self.grids)
@@ -201,11 +201,15 @@ class Reading:
         for name in names:
             yield from self.named.get(name, ())
 
-    def _parameters(self) -> float:
+    def _weight(self) -> float:
         """Return what all masses are multiplied by (PARAM,WTMASS)."""
-        chosen = (card for card in self._cards("PARAM") if card.text(1) == "WTMASS")
-        values = {card.real(2, "WTMASS") for card in chosen}
-        return values.pop() if len(values) == 1 else 1.0
+        weight = 1.0
+        for i, card in enumerate(c for c in self._cards("PARAM") if c.text(1) == "WTMASS"):
+            value = card.real(2, "WTMASS")
+            if not value > 0.0 or (i and value != weight):
+                raise card.error(f"{value:g}", "one number > 0", "WTMASS")
+            weight = value
+        return weight
 
     def grid(self, card: Card, number: int, key: str) -> Grid:
         """Return the grid that a field names, and make a joint of it; raises InputError."""
@@ -265,7 +269,7 @@ class Reading:
         if names[0] == names[1] or not np.linalg.norm(stop - start) > 0.0:
             raise card.error("the bar has no length", "two grids apart", "GB")
         x = (stop - start) / np.linalg.norm(stop - start)
-        v = self._orientation(card, usual, ends[0], start, flags[0])
+        v = self._orientation(card, usual, ends[0], flags[0])
         up = np.cross(x, v)
         if not np.linalg.norm(up) > 1e-6 * np.linalg.norm(v):
             raise card.error("the orientation vector lies along the bar", "one across it", "X1")
@@ -303,9 +307,7 @@ class Reading:
             self.parts.add("links", Link(grid.name, (name,)), card)
         return self.parts.offsets[key]
 
-    def _orientation(
-        self, card: Card, usual: Card | None, first: Grid, start: FloatArray, frame: str
-    ) -> FloatArray:
+    def _orientation(self, card: Card, usual: Card | None, first: Grid, system: str) -> FloatArray:
         """Return a vector in the plane 1 of a bar, in basic axes."""
         source = card if usual is None or any(card.text(i) for i in (5, 6, 7)) else usual
         if source.is_integer(5) and not source.text(6) and not source.text(7):
@@ -316,7 +318,7 @@ class Reading:
         vector = np.array(source.vector(5, "X"))
         if not vector.any():
             raise card.error("no orientation vector", "X1, X2, X3 or G0", "X1")
-        return np.asarray(vector if frame == "B" else vector @ first.axes)
+        return np.asarray(vector if system == "B" else vector @ first.axes)
 
     def _pins(self, card: Card, member: Member) -> None:
         """Let the ends of a bar go where pin flags say so."""

@@ -23,6 +23,8 @@ _SAME = 1e-12  # far below any update, above the rounding of a change of units
 _KEPT = 1e-9  # to which the matrices must be those of bars with other properties
 _WIDTH = 16  # of a large field, the widest that Nastran knows
 _EXPECTED = "factors on properties of bars; .op4 and .mtx hold any matrices"
+# Properties of elements that follow from the numbers of cards.
+_SAID = ("EA", "EIy", "EIz", "GJ", "flex_y", "flex_z", "rhoA", "rhoJp", "rhoIy", "rhoIz")
 # Field of a PBAR or PBEAM -> the number; the first row, and K1 and K2.
 _ROW = ("A", "I1", "I2", "J", "nsm")
 
@@ -64,10 +66,16 @@ def _changed(
     new = model.structure.properties
     if model.structure.labels != nominal.labels or model.size != len(nominal.kinematics.node):
         raise refusal
-    wanted = replace(nominal, properties=new).matrices()
-    if not all(_alike(a, b) for a, b in zip((model.mass, model.stiffness), wanted, strict=True)):
+    wanted: Structure = replace(nominal, properties=new)
+    mass, stiffness = wanted.matrices()
+    if not (_alike(model.mass, mass) and _alike(model.stiffness, stiffness)):
         raise refusal
-    found = {}
+    for f in fields(BeamProperties):
+        before, after = getattr(nominal.properties, f.name), getattr(new, f.name)
+        arisen = (before == 0.0) & (after != 0.0)
+        if arisen.any() or (f.name not in _SAID and not np.allclose(before, after, _KEPT, 0.0)):
+            raise refusal
+    found: dict[str, tuple[Numbers, Numbers]] = {}
     for i, (name, bar) in enumerate(bars.items()):
         ratio = _ratios(nominal.properties, new, i)
         found[name] = _numbers(bar, ratio)
