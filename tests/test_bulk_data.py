@@ -595,6 +595,22 @@ def test_from_a_file_to_a_ranking_and_back_to_a_file(tmp_path: Path) -> None:
     assert (out / "plane.bdf").read_text().count("MAT1") == 1
 
 
+def test_an_included_file_belongs_to_the_case(tmp_path: Path) -> None:
+    part = tmp_path / "parts" / "bar.inc"
+    part.parent.mkdir()
+    part.write_text(BAR)
+    (tmp_path / "bar.bdf").write_text("INCLUDE 'parts/bar.inc'\nSPC1,1,123456,1\n")
+    (tmp_path / "modes.csv").write_text("mode,frequency,frequency_std,damping\n1,15.0,0.1,\n")
+    (tmp_path / "case.toml").write_text(
+        '[case]\nname = "bar"\n[model]\nkind = "file"\nfile = "bar.bdf"\n'
+        '[measurement]\nmodes = "modes.csv"\nused = [1]\n'
+    )
+    before = femubench.read_case(tmp_path, readers=(READER,))
+    assert before.model.size == 6
+    part.write_text(BAR.replace("2700.0", "7800.0"))
+    assert femubench.read_case(tmp_path, readers=(READER,)).digest != before.digest
+
+
 def test_coordinates_for_matrices_of_other_files(tmp_path: Path) -> None:
     file = tmp_path / "shell.bdf"
     file.write_text("GRID,1,,1.,2.,3.\nGRID,7,5,1.,0.,0.\nCQUAD4,1,1,1,7,1,7\n"
