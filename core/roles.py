@@ -243,6 +243,7 @@ class Reader(Protocol):
     - ``model_files(path) -> Sequence[Path]``: further files that `read_model` opens.
     - ``read_nodes(path) -> Mapping[str, Sequence[float]]``: coordinates of nodes by name, for
       models whose own files have none.
+    - ``read_outline(path) -> Outline``: the title of a test, and lines that draw its structure.
     - ``write_model(model, path, original)``, ``write_pair(model, stiffness, mass, originals)``:
       write an updated model in the format of the original file or files, and keep of these what
       an update does not change.

@@ -51,6 +51,7 @@ from femubench.core.fem.sections import (
     solid_rectangle,
     wall_of,
 )
+from femubench.core.fem.sensors import Outline
 from femubench.core.fem.structure import Structure
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
@@ -76,6 +77,7 @@ __all__ = [
     "ModelError",
     "Modification",
     "Oscillator",
+    "Outline",
     "Parameter",
     "Place",
     "PointMass",

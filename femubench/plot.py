@@ -17,6 +17,7 @@ from femubench.core.plot.diagnosis import (
     strongest_places,
 )
 from femubench.core.plot.mac import mac
+from femubench.core.plot.matching import matching
 from femubench.core.plot.mode_shape import mode_shape
 from femubench.core.plot.receptance import receptance
 from femubench.core.plot.svg import svg
@@ -32,6 +33,7 @@ __all__ = [
     "error_against_cost",
     "evidence",
     "mac",
+    "matching",
     "mode_shape",
     "parameters",
     "receptance",

@@ -14,6 +14,7 @@ from femubench.core.plugin.loader import load_plugins
 from femubench.plugins.readers.universal import UniversalReader
 
 CASES = Path(__file__).parent / "cases"
+FORMATS = Path(__file__).parent / "formats"
 XYZ = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.5], [0.75, 0.0, 1.1]])
 NODES = [11, 12, 20]
 SHAPES = np.array([[1.0, -0.5, 0.25], [0.5, 0.25, -1.0]])  # of two modes, along x
@@ -173,17 +174,86 @@ def system(matrix: np.ndarray, kind: int = 0) -> Dataset:
     }
 
 
-def test_local_axes_are_refused_unless_global(tmp_path: Path) -> None:
-    same = np.vstack([np.eye(3), np.zeros(3)])
-    turned = same[[1, 0, 2, 3]]
-    nodes = nodes_2411(disp_cs=[5, 5, 5])
-    shapes = modes(*SHAPES)
-    reader = UniversalReader()
-    assert len(reader.read_modes(write(tmp_path / "a.uff", system(same), nodes, *shapes))) == 2
-    for i, others in enumerate(([], [system(turned)], [system(same, kind=1)])):
-        file = write(tmp_path / f"{i}.uff", *others, nodes, *shapes)
-        with pytest.raises(InputError, match="local coordinate system 5"):
-            reader.read_modes(file)
+TURNED = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0], [-0.8, 0.0, 0.6]])  # rows: local axes
+
+
+def test_local_displacements_become_directions(tmp_path: Path) -> None:
+    axes = system(np.vstack([TURNED, [5.0, 5.0, 5.0]]))
+    file = write(tmp_path / "a.uff", axes, nodes_2411(disp_cs=[5, 5, 0]), *modes(*SHAPES))
+    sensors = UniversalReader().read_modes(file).sensors
+    np.testing.assert_allclose(sensors.xyz, XYZ)  # 2411 has them in the axes of the part
+    np.testing.assert_allclose(sensors.axes[:2, :3], [[0.6, 0.0, 0.8]] * 2)
+    assert sensors.directions[2] == "x"
+
+
+def test_cylindrical_axes(tmp_path: Path) -> None:
+    own = np.vstack([np.eye(3), [1.0, 2.0, 0.0]])
+    nodes = nodes_15(
+        x=[2.0] * 3, y=[0.0, 90.0, 180.0], z=[0.5] * 3, def_cs=[5] * 3, disp_cs=[5] * 3
+    )
+    file = write(tmp_path / "a.uff", system(own, kind=1), nodes, *modes(*SHAPES))
+    sensors = UniversalReader().read_modes(file).sensors
+    np.testing.assert_allclose(sensors.xyz, [[3, 2, 0.5], [1, 4, 0.5], [-1, 2, 0.5]], atol=1e-12)
+    assert sensors.directions == ("x", "y", "-x")  # outwards
+
+
+def test_system_told_in_another(tmp_path: Path) -> None:
+    """Dataset 18 chains: a quarter turn about z, twice, is a half turn."""
+    file = write(tmp_path / "a.uff", nodes_15(def_cs=[8] * 3, disp_cs=[8] * 3), *modes(*SHAPES))
+    text = "".join(
+        f"{number:10d}{0:10d}{outer:10d}{1:10d}{1:10d}\nname\n"
+        "  1.00000E+00  0.00000E+00  0.00000E+00  1.00000E+00  1.00000E+00  0.00000E+00\n"
+        "  1.00000E+00  0.00000E+00  1.00000E+00\n"
+        for number, outer in [(7, 0), (8, 7)]
+    )
+    file.write_text(f"    -1\n    18\n{text}    -1\n" + file.read_text())
+    sensors = UniversalReader().read_modes(file).sensors
+    assert sensors.directions == ("-x",) * 3
+    np.testing.assert_allclose(sensors.xyz, [1.0, 1.0, 0.0] + XYZ * [-1, -1, 1], atol=1e-12)
+
+
+def test_axes_that_cannot_be(tmp_path: Path) -> None:
+    nodes, same = nodes_2411(disp_cs=[5, 5, 5]), np.vstack([np.eye(3), np.zeros(3)])
+    skew = same + np.eye(4)[:, [1, 2, 0]]
+    for i, (others, what) in enumerate(
+        [
+            ([], "node 11 uses the coordinate system 5"),
+            ([system(same, kind=2)], "system 5 is of type 2"),
+            ([system(skew)], "not at right angles"),
+        ]
+    ):
+        file = write(tmp_path / f"{i}.uff", *others, nodes, *modes(*SHAPES))
+        with pytest.raises(InputError, match=what):
+            UniversalReader().read_modes(file)
+
+
+def test_outline_of_a_test() -> None:
+    outline = UniversalReader().read_outline(FORMATS / "mesh_Oros-modal_uff15_uff2412.uff")
+    assert outline.lines.shape == (168, 2, 3)  # 72 quadrilaterals share their sides
+    length = np.linalg.norm(outline.lines[:, 0] - outline.lines[:, 1], axis=1)
+    assert length.max() < 40.0  # mm, no line across the ring
+
+
+def test_trace_lines_and_header(tmp_path: Path) -> None:
+    trace = {"type": 82, "trace_num": 1, "id": "edge", "color": 1}
+    trace["nodes"] = np.array([11, 12, 0, 12, 20, 99])
+    header = pyuff.prepare_151(model_name="wing", description="GVT of June", return_full_dict=True)
+    outline = UniversalReader().read_outline(
+        write(tmp_path / "a.uff", header, nodes_15(), trace, *modes(*SHAPES))
+    )
+    assert outline.title == "wing, GVT of June"
+    np.testing.assert_allclose(outline.lines, [XYZ[[0, 1]], XYZ[[1, 2]]])
+
+
+@pytest.mark.parametrize("name", ["heat_engine_housing", "uff55_translation"])
+def test_files_of_real_exporters(name: str) -> None:
+    read = UniversalReader().read_modes(FORMATS / f"{name}.uff")
+    if name == "uff55_translation":
+        assert read.frequencies.tolist() == [10.0, 12.0, 13.0]
+        np.testing.assert_allclose(np.abs(read.shapes[:3, 0]), 1.46518)
+    else:  # nodes and a temperature, no modes; in mm
+        assert len(read) == 0
+        np.testing.assert_allclose(read.sensors.xyz[0], [-0.1711755676, 0.1036403427, 0.1384829102])
 
 
 def test_what_cannot_be_is_refused(tmp_path: Path) -> None:

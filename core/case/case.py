@@ -82,6 +82,7 @@ class Case(Shown):
             other case is known to share.
         notes: what was understood otherwise than it stands in the files, one sentence each.
         matches: where each sensor that came with coordinates was taken to sit.
+        lines: that draw the structure of the test, in m along the axes of the model, (k, 2, 3).
     """
 
     name: str
@@ -103,6 +104,7 @@ class Case(Shown):
     structure: str = ""
     notes: tuple[str, ...] = ()
     matches: tuple[Match, ...] = ()
+    lines: FloatArray | None = None
 
     def rows(self) -> list[tuple[str, str]]:
         """Return where the case is from, its model, and what was measured on it."""

@@ -153,7 +153,7 @@ def _measured(sensor_file: Path) -> dict[str, str]:
     assert isinstance(spec.model, FrameSpec)
     better = _better(frame_of(spec.model))
     site = FrameSite(better)
-    sensors, _ = read_sensors(sensor_file, site, Alignment.of(None, None, None))
+    sensors = read_sensors(sensor_file, site, Alignment.of(None, None, None)).sensors
     change = spec.modification[0]
     heavier = better.with_attachments(
         attachments("masses", change.masses, site), attachments("springs", change.springs, site)

@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import permutations, product
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -48,12 +49,32 @@ class Alignment:
         known = None if unit is None else METRES[unit]
         return cls(known, turn, TOLERANCE if tolerance is None else tolerance)
 
+    def limit(self, site: Site) -> float:
+        """Return how far from a structure a sensor may be in m."""
+        return max(self.tolerance * size_of(site.points), ON_MEMBER)
+
     def direction(self, name: str) -> str:
         """Return a direction of the test as one of the model."""
         if np.array_equal(self.turn, np.eye(3)):
             return name
         axis = axis_of(name)
         return direction_of(np.concatenate([self.turn @ axis[:3], self.turn @ axis[3:]]))
+
+
+class Placed(NamedTuple):
+    """Sensors on a structure.
+
+    Arguments:
+        sensors: that fit it.
+        matches: where each was taken to sit.
+        told: what to say of units and places.
+        turn: from coordinates of the test to those of the model in m, (3, 3).
+    """
+
+    sensors: Sensors
+    matches: tuple[Match, ...]
+    told: tuple[str, ...]
+    turn: FloatArray
 
 
 def parse_frame(text: str) -> FloatArray:
@@ -82,19 +103,27 @@ def size_of(points: FloatArray) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
 
 
-def unit_of(xyz: FloatArray, site: Site, turn: FloatArray) -> LengthUnit:
+def unit_of(xyz: FloatArray, site: Site, alignment: Alignment) -> LengthUnit:
     """Return the unit in which coordinates fit the structure, by its size: m where that may be.
 
     Arguments:
         xyz: of the test, finite, (k, 3).
         site: the structure.
-        turn: the axes of the model in those of the test.
+        alignment: how the test lies beside it.
     """
-    ratio = size_of(xyz) / (size_of(site.points) or 1.0)
-    fitting = [name for name, unit in METRES.items() if _EXTENT[0] <= ratio * unit <= _EXTENT[1]]
+    fitting = _units_by_size(xyz, site)
     if "m" in fitting or not fitting:
         return "m"
-    return min(fitting, key=lambda name: float(np.median(_gaps(xyz @ turn.T * METRES[name], site))))
+    turned = xyz @ alignment.turn.T
+    gap = {unit: float(np.median(_gaps(turned * METRES[unit], site))) for unit in fitting}
+    best = min(fitting, key=gap.__getitem__)
+    # One wrong coordinate may make any unit fit by size.
+    return best if gap[best] <= alignment.limit(site) else "m"
+
+
+def _units_by_size(xyz: FloatArray, site: Site) -> list[LengthUnit]:
+    ratio = size_of(xyz) / (size_of(site.points) or 1.0)
+    return [u for u, metres in METRES.items() if _EXTENT[0] <= ratio * metres <= _EXTENT[1]]
 
 
 def _gaps(xyz: FloatArray, site: Site) -> FloatArray:
@@ -130,12 +159,12 @@ def check_near(match: Match, site: Site, alignment: Alignment, every: FloatArray
         match: of the sensor.
         site: the structure.
         alignment: how the test lies beside it.
-        every: all points of the test in m along the axes of the model, for advice, (k, 3).
+        every: all coordinates of the test as they were given, for advice, (k, 3).
 
     Raises:
         Misfit: naming the nearest place and the distance.
     """
-    limit = max(alignment.tolerance * size_of(site.points), ON_MEMBER)
+    limit = alignment.limit(site)
     if match.distance <= limit:
         return
     at, foot = (", ".join(f"{v:.6g}" for v in point) for point in (match.measured, match.xyz))
@@ -148,17 +177,17 @@ def check_near(match: Match, site: Site, alignment: Alignment, every: FloatArray
 
 
 def _advice(every: FloatArray, site: Site, limit: float) -> str:
-    """Return the frame of axes, or the unit, with which all points of a test would fit."""
-    ratio = size_of(every) / (size_of(site.points) or 1.0)
-    for name, unit in METRES.items():
-        fits = name != "m" and _EXTENT[0] <= unit * ratio <= _EXTENT[1]
-        if fits and _gaps(unit * every, site).max() <= limit:
-            return f'; with unit = "{name}" all fit'
-    for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
-        turn = _turn(order, signs)
-        if np.linalg.det(turn) > 0.0 and _gaps(every @ turn.T, site).max() <= limit:
-            words = (f"{'-' if s < 0 else ''}{'xyz'[k]}" for k, s in zip(order, signs, strict=True))
-            return f'; turned by frame = "{",".join(words)}" all fit'
+    """Return the unit and the frame of axes with which all points of a test would fit."""
+    for unit in _units_by_size(every, site):
+        for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+            turn = _turn(order, signs)
+            points = METRES[unit] * every @ turn.T
+            if np.linalg.det(turn) > 0.0 and _gaps(points, site).max() <= limit:
+                axes = zip(order, signs, strict=True)
+                frame = ",".join(f"{'-' if s < 0 else ''}{'xyz'[k]}" for k, s in axes)
+                keys = [f'unit = "{unit}"'] if unit != "m" else []
+                keys += [f'frame = "{frame}"'] if frame != "x,y,z" else []
+                return f"; with {' and '.join(keys)} all fit" if keys else ""
     return ""
 
 
@@ -191,7 +220,7 @@ def check_apart(found: Sequence[tuple[Match, str]]) -> None:
 
 def fitted_sensors(
     read: Sensors, file: Path, site: Site, alignment: Alignment, wanted: Collection[str] | None
-) -> tuple[Sensors, tuple[Match, ...], tuple[str, ...]]:
+) -> Placed:
     """Return the sensors of a file that a plugin has read, those that fit the structure.
 
     Files of three components a point list directions that a planar model does not have, and
@@ -205,26 +234,26 @@ def fitted_sensors(
         alignment: how the test lies beside it; the unit is detected where it has none.
         wanted: labels with a shape; None for all.
 
-    Returns:
-        The sensors, where each was taken to sit, and what to say of units and places.
-
     Raises:
         InputError: when a sensor lies off the structure, or none is left.
     """
-    rows = [
-        i
-        for i, label in enumerate(read.labels)
-        if np.isfinite(read.xyz[i]).all() and (wanted is None or label in wanted)
-    ]
+    scale, rows = (
+        1.0,
+        [
+            i
+            for i, label in enumerate(read.labels)
+            if np.isfinite(read.xyz[i]).all() and (wanted is None or label in wanted)
+        ],
+    )
     kept: list[tuple[Match, str]] = []
     told: tuple[str, ...] = ()
     if rows:
         xyz = read.xyz[rows]
-        unit = unit_of(xyz, site, alignment.turn)
+        unit = unit_of(xyz, site, alignment)
         scale = METRES[unit] if alignment.unit is None else alignment.unit
         matches = matches_of([read.labels[i] for i in rows], xyz, site, alignment, scale)
         ways = [alignment.direction(read.directions[i]) for i in rows]
-        kept = _fitting(list(zip(matches, ways, strict=True)), file, site, alignment)
+        kept = _fitting(list(zip(matches, ways, strict=True)), file, site, alignment, xyz)
         told = told_of([match for match, _ in kept], file.name)
         if alignment.unit is None and unit != "m":
             told = (_detected(file.name, unit, size_of(xyz) / size_of(site.points)), *told)
@@ -234,14 +263,19 @@ def fitted_sensors(
     found = tuple(match for match, _ in kept)
     places = np.array([match.xyz for match in found])
     labels = tuple(match.sensor for match in found)
-    return Sensors(labels, places, tuple(way for _, way in kept)), found, told
+    sensors = Sensors(labels, places, tuple(way for _, way in kept))
+    return Placed(sensors, found, told, scale * alignment.turn)
 
 
 def _fitting(
-    found: Sequence[tuple[Match, str]], file: Path, site: Site, alignment: Alignment
+    found: Sequence[tuple[Match, str]],
+    file: Path,
+    site: Site,
+    alignment: Alignment,
+    every: FloatArray,
 ) -> list[tuple[Match, str]]:
     """Return those matches whose direction the model has; raises InputError for one too far."""
-    every, kept = np.array([match.measured for match, _ in found]), []
+    kept: list[tuple[Match, str]] = []
     try:
         for match, direction in found:
             check_near(match, site, alignment, every)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from femubench.core.case.faults import Fault, at_key
 from femubench.core.case.files import CASE_FILE, LARGEST_CASE, CaseFiles
@@ -160,6 +161,8 @@ def _reader(file: Path, readers: Sequence[Reader]) -> Any:  # noqa: ANN401 - of 
 def _a_model(found: object, file: Path) -> Model:
     if not isinstance(found, Model):
         raise InputError(f"the reader gave {type(found).__name__}", file=file, expected="a Model")
+    for matrix in (found.mass, found.stiffness, *found.groups.values()):
+        sp.csc_array(matrix).check_format(full_check=True)
     return found
 
 

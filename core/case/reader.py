@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
@@ -26,7 +27,7 @@ from femubench.core.case.faults import (
 )
 from femubench.core.case.files import LARGEST_CASE, CaseFiles
 from femubench.core.case.frames import FrameSite, Site, attachments, frame_of
-from femubench.core.case.matching import Alignment, fitted_sensors, told_of
+from femubench.core.case.matching import Alignment, Placed, fitted_sensors
 from femubench.core.case.matrices import model_of_matrices, reader_of, reading_with
 from femubench.core.case.model_files import model_of_file
 from femubench.core.case.modes import (
@@ -48,6 +49,7 @@ from femubench.core.fem.sensors import Sensors
 from femubench.core.files import read_text
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Reader
+from femubench.core.typing import FloatArray
 
 _TABLES = (".csv", ".txt")
 _MESHED = "a frame that can be meshed"
@@ -139,6 +141,7 @@ class _Building:
     readings: dict[Path, Measurement] = field(default_factory=dict)
     notes: dict[str, None] = field(default_factory=dict)
     matches: tuple[Match, ...] = ()
+    lines: FloatArray | None = None
 
     def case(self, name: str | None) -> Case:
         """Return the case; raises Fault or InputError."""
@@ -169,7 +172,8 @@ class _Building:
             beam_share=self.spec.diagnosis.beam_share,
             structure=info.structure,
         )
-        return replace(case, notes=tuple(self.notes), matches=self.matches)
+        notes = tuple(self.notes)
+        return replace(case, notes=notes, matches=self.matches, lines=self.lines)
 
     def model(self) -> Model:
         spec = self.spec.model
@@ -248,7 +252,7 @@ class _Building:
         own = sensors
         if spec.sensors is not None:
             path, read = self.reading(("reference", "sensors"), spec.sensors)
-            own, _ = self.placed(path, read, site, spec.modes)
+            own = self.placed(path, read, site, spec.modes).sensors
         found = seen_at(self.modes(("reference", "modes"), spec.modes, own), sensors)
         key = "modes" if spec.used is None else "used"
         listed = [(("reference", key), number) for number in self.reference_used]
@@ -263,25 +267,26 @@ class _Building:
         path, read = self.reading(("measurement", key), name)
         if spec.sensors is None and (read is None or not len(read.sensors)):
             return NO_SENSORS, False
-        found, matches = self.placed(path, read, site, spec.modes)
-        self.matches = matches
-        return found, read is not None
+        found = self.placed(path, read, site, spec.modes)
+        self.matches = found.matches
+        reader: Any = reader_of(path, self.readers)
+        if hasattr(reader, "read_outline"):
+            with reading_with(reader, path):
+                self.lines = np.asarray(reader.read_outline(path).lines @ found.turn.T)
+        return found.sensors, read is not None
 
-    def placed(
-        self, path: Path, read: Measurement | None, site: Site, modes: str
-    ) -> tuple[Sensors, tuple[Match, ...]]:
+    def placed(self, path: Path, read: Measurement | None, site: Site, modes: str) -> Placed:
         """Return the sensors of a file and where each was taken to sit."""
         spec = self.spec.measurement
         with at_key("measurement", "frame"):
             alignment = Alignment.of(spec.unit, spec.frame, spec.tolerance)
         if read is None:
-            found, matches = read_sensors(path, site, alignment)
-            told = told_of(matches, path.name)
+            found = read_sensors(path, site, alignment)
         else:
             labels = self.labels(modes)
-            found, matches, told = fitted_sensors(read.sensors, path, site, alignment, labels)
-        self.notes |= dict.fromkeys(told)
-        return found, matches
+            found = fitted_sensors(read.sensors, path, site, alignment, labels)
+        self.notes |= dict.fromkeys(found.told)
+        return found
 
     def labels(self, modes: str) -> frozenset[str]:
         """Return the labels of what a file of modes may have a shape at."""

@@ -9,7 +9,14 @@ import numpy as np
 from femubench.core.case.case import Match
 from femubench.core.case.faults import Misfit, WrongDirection
 from femubench.core.case.frames import Site
-from femubench.core.case.matching import Alignment, check_apart, check_near, matches_of
+from femubench.core.case.matching import (
+    Alignment,
+    Placed,
+    check_apart,
+    check_near,
+    matches_of,
+    told_of,
+)
 from femubench.core.case.tables import RESERVED, Row, Table, parse_place, read_table
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Vector
@@ -19,8 +26,8 @@ from femubench.core.typing import FloatArray
 _MOST_SENSORS = 50_000
 
 
-def read_sensors(file: Path, site: Site, alignment: Alignment) -> tuple[Sensors, tuple[Match, ...]]:
-    """Return the sensors of a CSV file and where coordinates put them on the structure.
+def read_sensors(file: Path, site: Site, alignment: Alignment) -> Placed:
+    """Return the sensors of a CSV file on the structure.
 
     Arguments:
         file: label,x,y,z,direction or label,at,direction.
@@ -49,7 +56,12 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> tuple[Sensors,
     if by_place:
         pairs = zip(table.rows, directions, strict=True)
         points = [_point_at(row, way, site) for row, way in pairs]
-        return Sensors(tuple(labels), np.array(points, dtype=float), tuple(directions)), ()
+        return Placed(
+            Sensors(tuple(labels), np.array(points, dtype=float), tuple(directions)),
+            (),
+            (),
+            np.eye(3),
+        )
     matches = _placed(table, site, alignment)
     directions = [alignment.direction(way) for way in directions]
     for row, match, way in zip(table.rows, matches, directions, strict=True):
@@ -59,7 +71,9 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> tuple[Sensors,
     except Misfit as misfit:
         raise InputError(misfit.what, file=file, expected=misfit.expected) from None
     xyz = np.array([match.xyz for match in matches], dtype=float)
-    return Sensors(tuple(labels), xyz, tuple(directions)), matches
+    sensors = Sensors(tuple(labels), xyz, tuple(directions))
+    turn = (alignment.unit or 1.0) * alignment.turn
+    return Placed(sensors, matches, told_of(matches, file.name), turn)
 
 
 def _placed(table: Table, site: Site, alignment: Alignment) -> tuple[Match, ...]:
@@ -67,10 +81,9 @@ def _placed(table: Table, site: Site, alignment: Alignment) -> tuple[Match, ...]
     labels = [row.cells["label"] for row in table.rows]
     xyz = np.array([row.vector() for row in table.rows], dtype=float)
     matches = matches_of(labels, xyz, site, alignment, alignment.unit or 1.0)
-    every = np.array([match.measured for match in matches])
     for row, match in zip(table.rows, matches, strict=True):
         try:
-            check_near(match, site, alignment, every)
+            check_near(match, site, alignment, xyz)
         except Misfit as misfit:
             raise row.error("x", misfit.what, misfit.expected) from None
     return tuple(matches)

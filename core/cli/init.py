@@ -3,18 +3,107 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from femubench.core.cli import options
+from femubench.core.cli.registry import plugins_for, wrapped
+from femubench.core.errors import InputError, ModelError
+
+if TYPE_CHECKING:
+    from femubench.core.case.case import Case
+    from femubench.core.case.schema import LengthUnit
+
+_UNITS = click.Choice(("m", "cm", "mm", "in", "ft"))
 
 
 @click.command()
 @click.argument("folder", type=options.PATH)
-def init(folder: Path) -> None:
-    """Write a commented example case into FOLDER, which must be new or empty."""
-    from femubench.core.library.plugins import init_case
+@click.option(
+    "--model", type=options.PATH, metavar="FILE", help="The model, or its stiffness alone."
+)
+@click.option("--mass", type=options.PATH, metavar="FILE", help="Its mass, where that is apart.")
+@click.option(
+    "--dofs", type=options.PATH, metavar="FILE",
+    help="Labels or places of the rows, where the matrices have none.",
+)  # fmt: skip
+@click.option("--modes", type=options.PATH, metavar="FILE", help="The measured modes.")
+@click.option(
+    "--sensors", type=options.PATH, metavar="FILE",
+    help="Where the sensors are, if the file of modes does not say.",
+)  # fmt: skip
+@click.option("--unit", type=_UNITS, help="Of the sensors' places. Default: seen from their size.")
+@click.option("--model-unit", type=_UNITS, help="Of the model's lengths. Default: m.")
+@click.option(
+    "--frame", metavar="AXES",
+    help="The axes of the model in those of the test, e.g. x,z,-y. Default: x,y,z.",
+)  # fmt: skip
+@click.option(
+    "--tolerance", type=float, metavar="X",
+    help="How far a sensor may be from the structure, of its size. Default: 0.01.",
+)  # fmt: skip
+@click.pass_context
+def init(
+    ctx: click.Context,
+    folder: Path,
+    model: Path | None,
+    mass: Path | None,
+    dofs: Path | None,
+    modes: Path | None,
+    sensors: Path | None,
+    unit: LengthUnit | None,
+    model_unit: LengthUnit | None,
+    frame: str | None,
+    tolerance: float | None,
+) -> None:
+    """Write a case folder into FOLDER, which must be new or empty.
 
-    for path in init_case(folder):
+    With the files of a model and of a test, these are copied, the sensors matched with the model,
+    and a case is written that runs; without any, a commented example.
+    """
+    others = (mass, dofs, sensors, unit, model_unit, frame, tolerance)
+    if model is None and modes is None and all(other is None for other in others):
+        from femubench.core.library.plugins import init_case
+
+        for path in init_case(folder):
+            click.echo(f"wrote {path}")
+        click.echo(f"Now change it to your structure, and run: bench run {folder}")
+        return
+    if model is None or modes is None:
+        missing = "--model" if model is None else "--modes"
+        expected = "a file with the model and one with the modes"
+        raise InputError("is missing", key=missing, expected=expected)
+    from femubench.core.case.starting import Beginning
+    from femubench.core.library.new_case import begin_case
+
+    given = Beginning(model, modes, mass, dofs, sensors, model_unit, unit, frame, tolerance)
+    case = begin_case(folder, given, plugins_for(ctx))
+    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
         click.echo(f"wrote {path}")
-    click.echo(f"Now change it to your structure, and run: bench run {folder}")
+    _tell(case)
+    click.echo(f"Now look at {folder / 'case.toml'}, and run: bench run {folder}")
+
+
+def _tell(case: Case) -> None:
+    """Print how well model and test go together, and which modes are held out."""
+    from femubench.core.library.new_case import nominal_pairs
+
+    for note in case.notes:
+        click.echo(wrapped(f"Note: {note}", hanging=2))
+    if case.matches:
+        far = max(case.matches, key=lambda match: match.distance)
+        text = f"{len(case.matches)} sensors matched; furthest from its place is {far.sensor}, "
+        click.echo(wrapped(f"{text}{far.distance:.3g} m from {far.place}.", hanging=2))
+    try:
+        pairs = nominal_pairs(case)
+    except ModelError as error:
+        click.echo(wrapped(f"Note: the model cannot be solved: {error}", hanging=2))
+        return
+    click.echo(f"{'mode':>4} {'measured':>11} {'model':>11} {'MAC':>6}")
+    for pair in pairs:
+        hertz = "-" if pair.predicted_hz is None else f"{pair.predicted_hz:.5g} Hz"
+        likeness = "-" if pair.mac is None else f"{pair.mac:.3f}"
+        held = "  held out" if pair.number in case.held_out else ""
+        measured = f"{pair.measured_hz:.5g} Hz"
+        click.echo(f"{pair.number:>4} {measured:>11} {hertz:>11} {likeness:>6}{held}")

@@ -100,3 +100,20 @@ class Sensors:
         """Return the signed unit vectors in (x, y, z, rx, ry, rz), (n_sensors, 6)."""
         rows = [axis_of(direction) for direction in self.directions]
         return np.array(rows, dtype=float).reshape(-1, 6)
+
+
+@dataclass(frozen=True)
+class Outline:
+    """What a file of a test says of it besides modes.
+
+    Arguments:
+        title: in a few words; empty where there is none.
+        lines: that draw the structure, in the unit of the file, (k, 2, 3).
+
+    Examples:
+        >>> fem.Outline("wing", np.zeros((0, 2, 3))).title
+        'wing'
+    """
+
+    title: str
+    lines: FloatArray

@@ -9,25 +9,50 @@ from pathlib import Path
 from typing import Any
 
 from femubench.core.case.example import write_example
+from femubench.core.case.starting import Beginning
 from femubench.core.conformance import SECONDS
 from femubench.core.conformance.checking import Finding, findings, subjects
 from femubench.core.conformance.problems import of_case
+from femubench.core.errors import InputError
 from femubench.core.library.cases import CaseLike, listed, read_cases, usable_plugins
+from femubench.core.library.new_case import begin_case
 from femubench.core.library.new_package import write_package
 from femubench.core.plugin.validation import check_strategy
 
 
-def init_case(folder: str | PathLike[str]) -> tuple[Path, ...]:
-    """Write a commented example case into a new or empty folder and return its files.
+def init_case(
+    folder: str | PathLike[str],
+    model: str | PathLike[str] | None = None,
+    modes: str | PathLike[str] | None = None,
+    **told: Any,  # noqa: ANN401 - as `Beginning` has it
+) -> tuple[Path, ...]:
+    """Write a case folder from the files of a model and of a test, or an example; return its files.
+
+    Arguments:
+        folder: new or empty.
+        model, modes: files with the model and with the measured modes; without both a commented
+            example is written.
+        told: ``mass``, ``dofs`` and ``sensors``, further files; ``model_unit``, ``unit``,
+            ``frame`` and ``tolerance``, as the keys of a case.
 
     Raises:
-        InputError: when the folder holds anything, or cannot be written.
+        InputError: when the folder holds anything or cannot be written, or for what is wrong in
+            the files.
 
     Examples:
         >>> [path.name for path in femubench.init_case("my-structure")]
         ['case.toml', 'sensors.csv', 'modes.csv', 'modified.csv']
     """
-    return write_example(Path(folder))
+    if model is None and modes is None and not told:
+        return write_example(Path(folder))
+    if model is None or modes is None:
+        missing = "model" if model is None else "modes"
+        expected = "a file with the model and one with the modes"
+        raise InputError("is missing", key=missing, expected=expected)
+    paths = {key: Path(told[key]) for key in ("mass", "dofs", "sensors") if told.get(key)}
+    given = Beginning(Path(model), Path(modes), **{**told, **paths})
+    begin_case(Path(folder), given, usable_plugins())
+    return tuple(sorted(path for path in Path(folder).rglob("*") if path.is_file()))
 
 
 def new_plugin(

@@ -2,31 +2,26 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 import scipy.sparse as sp
 
-from femubench import InputError, Model
-from femubench.fem import SparseArray, matrix_model
+from femubench import InputError
+from femubench.plugins.readers.apart import apart, limit_memory
 from femubench.plugins.readers.reading import directions, needs, no_modes
 
-_PACKAGE = "ansys.mapdl.reader"
-_MEMORY = 3 * 2**29  # bytes of address space of the process, the libraries among them
-_PER_BYTE, _SECONDS = 32, 300
+if TYPE_CHECKING:
+    from femubench import Model
+    from femubench.fem import SparseArray
 
 
 class AnsysReader:
     """Reads stiffness and mass of a .full file without what is held; nodes of a .rst file.
 
-    The library trusts the numbers of a file: what it does with a broken one, up to a crash,
-    stays in a process of its own.
+    Coordinates come from the results of the job: ``dofs = "file.rst"``.
     """
 
     name: str = "Ansys"
@@ -38,19 +33,18 @@ class AnsysReader:
 
     def read_model(self, path: Path) -> Model:
         """Return mass and stiffness by node and direction; raises InputError."""
-        found = _apart("full_file", path, "a .full file with stiffness and mass")
+        from femubench.fem import matrix_model
+
+        needs("ansys", "ansys", path)
+        found = apart(full_file, path, "a .full file with stiffness and mass")
         numbers = found["node"].tolist()
         along = directions(found["dof"].tolist(), path)
-        n = len(numbers)
-        mass, stiffness = (
-            sp.csc_array(tuple(found[f"{name}.{part}"] for part in _PARTS), shape=(n, n))
-            for name in ("mass", "stiffness")
-        )
-        return matrix_model(mass, stiffness, numbers, along)
+        return matrix_model(found["mass"], found["stiffness"], numbers, along)
 
     def read_nodes(self, path: Path) -> Mapping[str, list[float]]:
         """Return the nodes of a .rst file; raises InputError."""
-        found = _apart("rst_file", path, "a .rst file with nodes")
+        needs("ansys", "ansys", path)
+        found = apart(rst_file, path, "a .rst file with nodes")
         return dict(zip(map(str, found["node"].tolist()), found["xyz"].tolist(), strict=True))
 
     def read_modes(self, path: Path) -> NoReturn:
@@ -64,56 +58,15 @@ class AnsysReader:
         raise InputError(what, file=path, expected=expected)
 
 
-_PARTS = ("data", "indices", "indptr")
-
-
-def _apart(what: str, path: Path, expected: str) -> dict[str, Any]:
-    """Return what a function of this module gives, called in a process of its own."""
-    needs("ansys", "ansys", path)
-    memory = _MEMORY + _PER_BYTE * path.stat().st_size
-    code = f"from {__name__} import in_child; in_child({what!r}, {str(path)!r}, {memory})"
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    with tempfile.TemporaryDirectory() as folder:
-        result = Path(folder) / "result.npz"
-        code = f"{code[:-1]}, {str(result)!r})"
-        try:
-            done = subprocess.run(
-                [sys.executable, "-c", code],
-                env={**environment, "OPENBLAS_NUM_THREADS": "1"},
-                capture_output=True,
-                check=False,
-                timeout=_SECONDS,
-            )
-        except subprocess.TimeoutExpired:
-            what = f"takes more than {_SECONDS} s"
-            raise InputError(what, file=path, expected=expected) from None
-        if done.returncode or not result.is_file():
-            told = done.stderr.decode("utf-8", "replace").strip().rpartition("\n")[2]
-            raise InputError(f"cannot be read: {told or 'broken'}", file=path, expected=expected)
-        with np.load(result) as archive:
-            return dict(archive)
-
-
-def in_child(what: str, path: str, memory: int, result: str) -> None:
-    """Call a function of this module with limits, and store what it returns."""
-    try:
-        import resource
-    except ImportError:  # there are no such limits on Windows
-        pass
-    else:
-        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    np.savez(result, **{"full_file": full_file, "rst_file": rst_file}[what](path))
-
-
-def full_file(path: str) -> dict[str, Any]:
+def full_file(path: Path) -> dict[str, Any]:
     """Return node, dof (from 1) and both matrices of the free rows of a .full file."""
     from ansys.mapdl.reader.common import read_table
     from ansys.mapdl.reader.full import FullFile
 
-    file = FullFile(path)
+    limit_memory(path)
+    file = FullFile(str(path))
     rows, stiffness, mass = file.load_km(as_sparse=True, sort=False)
-    with Path(path).open("rb") as stream:
+    with path.open("rb") as stream:
         read_table(stream, skip=True)
         read_table(stream, skip=True)
         listed = np.asarray(read_table(stream))
@@ -126,14 +79,14 @@ def full_file(path: str) -> dict[str, Any]:
     found: dict[str, Any] = {"node": rows[free, 0], "dof": listed[rows[free, 1]]}
     for name, matrix in (("stiffness", stiffness), ("mass", mass)):
         upper = sp.csc_array(matrix)[free][:, free]
-        whole = sp.csc_array(upper + sp.triu(upper, 1).T)
-        found |= {f"{name}.{part}": getattr(whole, part) for part in _PARTS}
+        found[name] = sp.csc_array(upper + sp.triu(upper, 1).T)
     return found
 
 
-def rst_file(path: str) -> dict[str, Any]:
+def rst_file(path: Path) -> dict[str, Any]:
     """Return number and place of every node of a .rst file."""
     from ansys.mapdl.reader import read_binary
 
-    mesh = read_binary(path).mesh
+    limit_memory(path)
+    mesh = read_binary(str(path)).mesh
     return {"node": np.asarray(mesh.nnum), "xyz": np.asarray(mesh.nodes)[:, :3]}

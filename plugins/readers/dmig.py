@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
+import numpy as np
 import scipy.sparse as sp
 
 from femubench import InputError, Model
@@ -31,19 +32,21 @@ class DmigReader:
     def read_matrix(self, path: Path) -> SparseArray:
         """Return the only matrix; raises InputError."""
         frames = _frames(path)
-        return sp.csc_array(frames[only_matrix(frames, path)].to_numpy())
+        return sp.csc_array(frames[only_matrix(_values(frames), path)].to_numpy())
 
     def read_model(self, path: Path) -> Model:
         """Return stiffness and mass on the grids that either has; raises InputError."""
         frames = _frames(path)
-        stiffness, mass = (frames[chosen(frames, known, path)] for known in (STIFFNESS, MASS))
+        stiffness, mass = (
+            frames[chosen(_values(frames), known, path)] for known in (STIFFNESS, MASS)
+        )
         return _model(stiffness, mass, path)
 
     def read_pair(self, stiffness: Path, mass: Path) -> Model:
         """Return a model whose stiffness and mass are in files of their own."""
         first, second = _frames(stiffness), _frames(mass)
-        own = first[main_matrix(first, STIFFNESS, stiffness)]
-        return _model(own, second[main_matrix(second, MASS, mass)], stiffness)
+        own = first[main_matrix(_values(first), STIFFNESS, stiffness)]
+        return _model(own, second[main_matrix(_values(second), MASS, mass)], stiffness)
 
     def read_modes(self, path: Path) -> NoReturn:
         """Refuse: DMIG cards hold no modes."""
@@ -52,7 +55,10 @@ class DmigReader:
     def write_model(self, model: Model, path: Path, original: Path) -> None:
         """Write an updated model, all other matrices as they were; raises InputError."""
         frames = _frames(original)
-        names = chosen(frames, STIFFNESS, original), chosen(frames, MASS, original)
+        names = (
+            chosen(_values(frames), STIFFNESS, original),
+            chosen(_values(frames), MASS, original),
+        )
         points = set(frames[names[0]].index) | set(frames[names[1]].index)
         new = dict(zip(names, _labelled(model, points, original), strict=True))
         _write({**frames, **new}, path)
@@ -63,7 +69,8 @@ class DmigReader:
         """Write an updated model in two files; raises InputError."""
         frames = [_frames(original) for original in originals]
         names = [
-            main_matrix(frames[i], known, originals[i]) for i, known in enumerate((STIFFNESS, MASS))
+            main_matrix(_values(frames[i]), known, originals[i])
+            for i, known in enumerate((STIFFNESS, MASS))
         ]
         points = set(frames[0][names[0]].index) | set(frames[1][names[1]].index)
         for i, frame in enumerate(_labelled(model, points, originals[0])):
@@ -81,6 +88,10 @@ def _frames(path: Path) -> dict[str, pd.DataFrame]:
     if not frames:
         raise InputError("no matrix", file=path, expected=_KIND)
     return frames
+
+
+def _values(frames: dict[str, pd.DataFrame]) -> dict[str, np.ndarray]:
+    return {name: frame.to_numpy() for name, frame in frames.items()}
 
 
 def _model(stiffness: pd.DataFrame, mass: pd.DataFrame, path: Path) -> Model:

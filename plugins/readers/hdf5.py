@@ -11,7 +11,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench import InputError
-from femubench.plugins.readers.reading import needs, opened
+from femubench.plugins.readers.apart import apart, limit_memory
+from femubench.plugins.readers.reading import needs
 from femubench.plugins.readers.variables import Variables, VariablesReader
 
 _KIND = "an HDF5 file with matrices by name"
@@ -42,11 +43,16 @@ def read_hdf5(path: Path) -> dict[str, Any]:
         InputError: when it is broken, or leads to data outside of it.
     """
     needs("h5py", "hdf5", path)
-    with opened(path, _KIND):
-        import h5py
+    return apart(found_in, path, _KIND)
 
-        with h5py.File(path, "r") as file:
-            return dict(_found(file, "", path))
+
+def found_in(path: Path) -> dict[str, Any]:
+    """Return what a file holds by name; a crash is for the caller to stand."""
+    import h5py
+
+    limit_memory(path)
+    with h5py.File(path, "r") as file:
+        return dict(_found(file, "", path))
 
 
 def _found(group: Any, above: str, path: Path) -> Iterator[tuple[str, Any]]:  # noqa: ANN401

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import scipy.io
 
+from femubench.plugins.readers.apart import apart, limit_memory
 from femubench.plugins.readers.hdf5 import read_hdf5, save_hdf5
-from femubench.plugins.readers.reading import opened
 from femubench.plugins.readers.variables import Variables, VariablesReader
 
 _KIND = "a MATLAB file"
@@ -27,8 +27,7 @@ class MatlabReader(VariablesReader):
         """Return the variables by name; raises InputError."""
         if is_hdf5(path):
             return read_hdf5(path)
-        with opened(path, _KIND):
-            return {name: _plain(value) for name, value in _loaded(path).items()}
+        return apart(found_in, path, _KIND)
 
     def save(self, path: Path, original: Path, new: Variables) -> None:
         """Write a file of the same version with some variables renewed."""
@@ -44,6 +43,12 @@ def is_hdf5(path: Path) -> bool:
     with path.open("rb") as stream:
         start = stream.read(_USER_BLOCK + len(_HDF5))
     return start.startswith(_HDF5) or start[_USER_BLOCK:] == _HDF5
+
+
+def found_in(path: Path) -> dict[str, Any]:
+    """Return the variables by name; a crash is for the caller to stand."""
+    limit_memory(path)
+    return {name: _plain(value) for name, value in _loaded(path).items()}
 
 
 def _loaded(path: Path) -> dict[str, Any]:

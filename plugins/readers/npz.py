@@ -29,7 +29,8 @@ class NpzReader(VariablesReader):
         with opened(path, _KIND):
             arrays = _arrays(path)
             if "format" in arrays:
-                return {path.stem: sp.csc_array(sp.load_npz(path))}
+                with path.open("rb") as stream:
+                    return {path.stem: sp.csc_array(sp.load_npz(stream))}
             found = {name: value for name, value in arrays.items() if "." not in name}
             for name in arrays:
                 base, dot, part = name.rpartition(".")
@@ -53,7 +54,8 @@ class NpzReader(VariablesReader):
 
 
 def _arrays(path: Path) -> dict[str, Any]:
-    with np.load(path, allow_pickle=False) as archive:
+    # NumPy leaves a file open that it cannot read.
+    with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
         return {name: archive[name] for name in archive.files}
 
 

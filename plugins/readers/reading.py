@@ -8,13 +8,15 @@ from contextlib import contextmanager, redirect_stdout
 from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 import scipy.sparse as sp
 
 from femubench import InputError
-from femubench.fem import SparseArray
+
+if TYPE_CHECKING:
+    from femubench.fem import SparseArray
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 

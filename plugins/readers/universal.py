@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -15,19 +16,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from femubench import InputError, Measurement, Sensors
+from femubench.fem import Outline
 from femubench.modal import real_modes
 
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _COORDINATES, _UNITS, _SYSTEMS, _SHAPES = (15, 2411), 164, (18, 2420), (55, 2414)
-_WANTED = (*_COORDINATES, _UNITS, *_SYSTEMS, *_SHAPES)
+_HEADER, _TRACES, _ELEMENTS = 151, 82, 2412
+_WANTED = (*_COORDINATES, _UNITS, *_SYSTEMS, *_SHAPES, _HEADER, _TRACES, _ELEMENTS)
 _NORMAL_MODE, _COMPLEX_MODES = 2, (3, 7)
 _MOTIONS = (0, 1, 8, 11, 12)  # unknown, general, displacement, velocity, acceleration
 _FREQUENCY_STD, _SHAPE_STD = 0.005, 0.015
 _LARGEST, _MOST_NUMBERS = 256, 20_000_000  # MiB of a file; modes times places
 _GLOBAL = (0, 1)  # numbers that writers use for the global axes without defining them
+_DRAWN = (_HEADER, _TRACES, _ELEMENTS)  # of no use to modes, and left out where they are broken
 
 Dataset = Mapping[str, Any]
-Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class _Node:
+    """Where a node is, in the unit of the file or in m, and along what it moves."""
+
+    xyz: NDArray[np.float64]
+    triad: NDArray[np.float64]  # a row a direction, (3, 3)
 
 
 @dataclass(frozen=True)
@@ -41,7 +52,7 @@ class _Mode:
 
 
 class UniversalReader:
-    """Reads datasets 15, 2411 (nodes), 55, 2414 (modes), 164 (units), 18, 2420 (axes)."""
+    """Reads nodes, modes, units and axes, and the lines that draw a structure."""
 
     name: str = "universal file"
     suffixes: tuple[str, ...] = (".uff", ".unv", ".uf")
@@ -57,7 +68,7 @@ class UniversalReader:
         is a sensor in x, y and z; nodes without coordinates get nan.
 
         Raises:
-            InputError: when the file is broken, holds neither nodes nor modes, or uses local axes.
+            InputError: when the file is broken, or holds neither nodes nor modes.
         """
         datasets, other = _datasets(path)
         nodes = _nodes(path, datasets)
@@ -69,6 +80,21 @@ class UniversalReader:
                 what += "; frequency responses (dataset 58) must be turned into modes first"
             raise InputError(what, file=path, expected=expected)
         return _measurement(path, nodes, modes)
+
+    def read_outline(self, path: Path) -> Outline:
+        """Return the title of a test, and the lines that draw its structure.
+
+        Raises:
+            InputError: when the file is broken.
+        """
+        datasets, _ = _datasets(path)
+        nodes = _nodes(path, datasets)
+        pairs = dict.fromkeys(tuple(sorted(pair)) for pair in _lines(datasets, nodes))
+        ends = [[nodes[number].xyz for number in pair] for pair in pairs]
+        about = next(iter(_of(datasets, _HEADER)), {})
+        words = (str(about.get(key, "")).strip() for key in ("model_name", "description"))
+        title = ", ".join(dict.fromkeys(word for word in words if word.upper() not in ("", "NONE")))
+        return Outline(title, np.array(ends, dtype=float).reshape(-1, 2, 3))
 
 
 def _datasets(path: Path) -> tuple[list[Dataset], set[int]]:
@@ -93,6 +119,8 @@ def _datasets(path: Path) -> tuple[list[Dataset], set[int]]:
             with redirect_stdout(StringIO()):
                 wanted.append(file.read_sets(i))
         except Exception as error:
+            if number in _DRAWN:
+                continue
             key = f"dataset {number} (block {i + 1})"
             raise InputError(f"cannot be read: {error}", file=path, key=key) from None
     return wanted, other
@@ -110,37 +138,89 @@ def _length_factor(path: Path, datasets: Sequence[Dataset]) -> float:
     return factors.pop()
 
 
-def _global_systems(datasets: Sequence[Dataset]) -> dict[int, bool]:
-    """Return from the number of a coordinate system to whether it is the global one."""
-    systems: dict[int, bool] = dict.fromkeys(_GLOBAL, True)
+@dataclass(frozen=True)
+class _System:
+    """Axes of a file: cartesian or cylindrical (radius, degrees, height)."""
+
+    origin: NDArray[np.float64]
+    axes: NDArray[np.float64]  # a row an axis, (3, 3)
+    cylindrical: bool = False
+
+    def point(self, xyz: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a point given in these axes in those that they are told in, (3,)."""
+        if self.cylindrical:
+            radius, angle = xyz[0], math.radians(xyz[1])
+            xyz = np.array([radius * math.cos(angle), radius * math.sin(angle), xyz[2]])
+        return np.asarray(self.origin + xyz @ self.axes)
+
+    def triad(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the directions of displacements at a point, a row each, (3, 3)."""
+        away = self.axes[:2] @ (at - self.origin)
+        radius = float(np.linalg.norm(away))
+        if not self.cylindrical or radius == 0.0:
+            return self.axes
+        c, s = away / radius
+        return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ self.axes
+
+    def within(self, outer: _System) -> _System:
+        """Return these axes in those in which the outer ones are told."""
+        return _System(outer.point(self.origin), self.axes @ outer.axes, self.cylindrical)
+
+
+_HERE = _System(np.zeros(3), np.eye(3))
+
+
+def _systems(path: Path, datasets: Sequence[Dataset]) -> dict[int, _System]:
+    """Return the coordinate systems by number, in global axes."""
+    systems = dict.fromkeys(_GLOBAL, _HERE)
     for dataset in _of(datasets, 2420):
         triples = zip(
             dataset["CS_sys_labels"], dataset["CS_types"], dataset["CS_matrices"], strict=True
         )
         for label, kind, matrix in triples:
-            identity = np.allclose(matrix, np.eye(4)[:, :3] * [[1], [1], [1], [0]])
-            systems[int(label)] = kind == 0 and bool(identity)
+            # A row of coordinates times the matrix, the origin below: rows are the axes.
+            rows, origin = np.array(matrix[:3], dtype=float), np.array(matrix[3], dtype=float)
+            systems[int(label)] = _system(path, 2420, int(label), int(kind), origin, rows)
     for dataset in _of(datasets, 18):
         for i, label in enumerate(dataset["cs_num"]):
-            along = dataset["x_point"][i] - dataset["ref_o"][i]
-            plane = dataset["xz_point"][i] - dataset["ref_o"][i]
-            same = bool(
-                dataset["cs_type"][i] == 0
-                and dataset["ref_cs_num"][i] == 0
-                and np.allclose(dataset["ref_o"][i], 0.0)
-                and along[0] > 0.0
-                and np.allclose(along[1:], 0.0)
-                and np.isclose(plane[1], 0.0)
-                and plane[2] > 0.0
-            )
-            systems[int(label)] = same
+            origin = np.array(dataset["ref_o"][i], dtype=float)
+            first = np.array(dataset["x_point"][i], dtype=float) - origin
+            plane = np.array(dataset["xz_point"][i], dtype=float) - origin
+            second = np.cross(plane, first)
+            rows = np.array([first, second, np.cross(first, second)])
+            own = _system(path, 18, int(label), int(dataset["cs_type"][i]), origin, rows)
+            outer = systems.get(int(dataset["ref_cs_num"][i]))
+            if outer is None or outer.cylindrical:
+                what = f"coordinate system {int(label)} is told in one that is not there"
+                raise InputError(what, file=path, key="dataset 18", expected="cartesian axes")
+            systems[int(label)] = own.within(outer)
     return systems
 
 
-def _nodes(path: Path, datasets: Sequence[Dataset]) -> dict[int, Point]:
-    """Return the coordinates of the nodes in m."""
-    factor, systems = _length_factor(path, datasets), _global_systems(datasets)
-    nodes: dict[int, Point] = {}
+def _system(
+    path: Path,
+    dataset: int,
+    label: int,
+    kind: int,
+    origin: NDArray[np.float64],
+    rows: NDArray[np.float64],
+) -> _System:
+    """Return a coordinate system of three axes of any length."""
+    key, length = f"dataset {dataset}", np.linalg.norm(rows, axis=1)
+    if kind not in (0, 1):
+        what = f"coordinate system {label} is of type {kind}"
+        raise InputError(what, file=path, key=key, expected="cartesian (0) or cylindrical (1)")
+    axes = rows / np.where(length > 0.0, length, 1.0)[:, None]
+    if not (np.isfinite(origin).all() and np.allclose(axes @ axes.T, np.eye(3), atol=1e-3)):
+        what = f"the axes of coordinate system {label} are not at right angles"
+        raise InputError(what, file=path, key=key, expected="three axes")
+    return _System(origin, axes, kind == 1)
+
+
+def _nodes(path: Path, datasets: Sequence[Dataset]) -> dict[int, _Node]:
+    """Return the nodes by number."""
+    factor, systems = _length_factor(path, datasets), _systems(path, datasets)
+    nodes: dict[int, _Node] = {}
     for dataset in _of(datasets, *_COORDINATES):
         key = f"dataset {dataset['type']}"
         names = ("node_nums", "def_cs", "disp_cs", "x", "y", "z")
@@ -148,13 +228,17 @@ def _nodes(path: Path, datasets: Sequence[Dataset]) -> dict[int, Point]:
         if len({len(column) for column in columns}) > 1 or not np.isfinite(columns).all():
             raise InputError("truncated or not finite", file=path, key=key, expected="nodes")
         for number, defined, displaced, *xyz in zip(*columns, strict=True):
-            for system in (int(defined), int(displaced)):
-                if not systems.get(system, False):
-                    what = f"node {int(number)} uses the local coordinate system {system}"
-                    expected = "nodes and shapes in global axes"
+            # Dataset 2411 has coordinates in the axes of the part, whatever is exported.
+            used = (int(defined) if dataset["type"] == 15 else 0, int(displaced))
+            for system in used:
+                if system not in systems:
+                    what = f"node {int(number)} uses the coordinate system {system}"
+                    expected = "one that dataset 18 or 2420 defines"
                     raise InputError(what, file=path, key=key, expected=expected)
-            x, y, z = (float(v) / factor for v in xyz)
-            if nodes.setdefault(int(number), (x, y, z)) != (x, y, z):
+            at = systems[used[0]].point(np.array(xyz))
+            node = _Node(at / factor, systems[used[1]].triad(at))
+            other = nodes.setdefault(int(number), node)
+            if not np.array_equal(other.xyz, node.xyz):
                 what = f"node {int(number)} lies at two places"
                 raise InputError(what, file=path, key=key, expected="one place")
     return nodes
@@ -256,7 +340,7 @@ def _from_eigenvalue(eigenvalue: complex) -> tuple[float, float]:
     return size / (2.0 * math.pi), -eigenvalue.real / size if size > 0.0 else math.nan
 
 
-def _measurement(path: Path, nodes: Mapping[int, Point], modes: Sequence[_Mode]) -> Measurement:
+def _measurement(path: Path, nodes: Mapping[int, _Node], modes: Sequence[_Mode]) -> Measurement:
     if modes:
         listed = dict.fromkeys(place for mode in modes for place in mode.shape)
         if len(listed) * len(modes) > _MOST_NUMBERS:
@@ -265,11 +349,12 @@ def _measurement(path: Path, nodes: Mapping[int, Point], modes: Sequence[_Mode])
         places = [p for p in listed if any(mode.shape.get(p, 0.0) != 0.0 for mode in modes)]
     else:
         places = [(node, direction) for node in nodes for direction in _DIRECTIONS[:3]]
-    nowhere = (math.nan, math.nan, math.nan)
-    sensors = Sensors(
-        labels=tuple(f"{node}:{direction}" for node, direction in places),
-        xyz=np.array([nodes.get(node, nowhere) for node, _ in places]).reshape(-1, 3),
-        directions=tuple(direction for _, direction in places),
+    nowhere = _Node(np.full(3, math.nan), np.eye(3))
+    at = [nodes.get(node, nowhere) for node, _ in places]
+    sensors = Sensors.along(
+        (f"{node}:{direction}" for node, direction in places),
+        np.array([node.xyz for node in at], dtype=float).reshape(-1, 3),
+        np.array([_axis(node, way) for node, (_, way) in zip(at, places, strict=True)]),
     )
     empty = complex(math.nan, 0.0)
     table = [[mode.shape.get(place, empty) for mode in modes] for place in places]
@@ -287,3 +372,21 @@ def _measurement(path: Path, nodes: Mapping[int, Point], modes: Sequence[_Mode])
         shapes=shapes,
         shape_std=np.broadcast_to(_SHAPE_STD * largest, shapes.shape).copy(),
     )
+
+
+def _axis(node: _Node, direction: str) -> NDArray[np.float64]:
+    """Return a direction of a node in (x, y, z, rx, ry, rz), (6,)."""
+    axis, row = np.zeros(6), _DIRECTIONS.index(direction)
+    axis[3 * (row // 3) : 3 * (row // 3) + 3] = node.triad[row % 3]
+    return axis
+
+
+def _lines(datasets: Sequence[Dataset], nodes: Mapping[int, _Node]) -> Iterator[tuple[int, int]]:
+    """Yield the pairs of nodes between which trace lines and the edges of elements run."""
+    for dataset in _of(datasets, _TRACES):
+        path = [int(number) for number in dataset["nodes"]]
+        yield from ((a, b) for a, b in pairwise(path) if a in nodes and b in nodes and a != b)
+    for dataset in _of(datasets, _ELEMENTS):
+        for element in (one for kind in dataset.values() if isinstance(kind, list) for one in kind):
+            ring = [int(number) for number in element["nodes_nums"] if int(number) in nodes]
+            yield from pairwise(ring if len(ring) < 3 else [*ring, ring[0]])

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
 
-from femubench import InputError, Measurement, Model
-from femubench.fem import ModelError, SparseArray, matrix_model
+from femubench import InputError
 from femubench.plugins.readers.reading import DIRECTIONS, directions, no_modes
+
+if TYPE_CHECKING:
+    from femubench import Measurement, Model
+    from femubench.fem import SparseArray
 
 Variables: TypeAlias = Mapping[str, Any]  # arrays, sparse matrices, arrays of words
 STIFFNESS = ("stiffness", "k", "kaa", "kgg", "kaax", "kjj", "kll", "k_whole", "k0")
@@ -87,6 +90,9 @@ def model_of(variables: Variables, path: Path) -> Model:
     Raises:
         InputError: where a matrix is missing, or labels do not fit.
     """
+    # Not on top: a process that reads a file apart does without models.
+    from femubench.fem import ModelError, matrix_model
+
     stiffness, mass = chosen(variables, STIFFNESS, path), chosen(variables, MASS, path)
     groups = group_variables(variables, stiffness)
     words = {name.lower(): value for name, value in variables.items()}

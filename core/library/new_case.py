@@ -1,0 +1,43 @@
+"""A case from the files that are at hand: ``bench init FOLDER --model FILE --modes FILE``."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+
+from femubench.core.case.case import Case
+from femubench.core.case.starting import Beginning, start_case
+from femubench.core.plugin.loader import Plugins
+from femubench.core.schema.results import PairedMode
+from femubench.core.score.scoring import predict_block
+
+
+def begin_case(folder: Path, given: Beginning, plugins: Plugins) -> Case:
+    """Write a case folder from files, with a picture of the match where matplotlib is there.
+
+    Arguments:
+        folder: new or empty.
+        given: the files, and what was told of them.
+        plugins: whose readers read them.
+
+    Raises:
+        InputError: when the folder holds anything, or for what is wrong in the files.
+    """
+    readers = tuple(plugins.readers.values())
+    return start_case(folder, given, readers, _draw if find_spec("matplotlib") else None)
+
+
+def _draw(case: Case, file: Path) -> None:
+    from femubench.core.plot.matching import matching
+    from femubench.core.plot.style import figure_of
+
+    figure_of(matching(case)).savefig(str(file), dpi=150)
+
+
+def nominal_pairs(case: Case) -> tuple[PairedMode, ...]:
+    """Return what the model predicts of all measured modes, paired by shape and frequency.
+
+    Raises:
+        ModelError: when the model has no modes.
+    """
+    return predict_block(case.model, case.measurement, None)

@@ -1,0 +1,132 @@
+"""Cut and flipped files of other programs: read, or refused in one line, in little memory."""
+
+from __future__ import annotations
+
+import resource
+import shutil
+import sys
+from collections import Counter
+from contextlib import nullcontext, redirect_stdout, suppress
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femubench import FemubenchError
+from femubench.core.case.model_files import ModelFiles, read_model
+from femubench.core.plugin.loader import load_plugins
+
+sys.path.insert(0, str(Path(__file__).parent / "fuzz"))
+sys.path.insert(0, str(Path(__file__).parent))
+from bytes_changed import broken
+from test_model_readers import FORMATS, JOB, WRITERS, Files, base, rounded
+from watch import watched
+
+FEW, MANY, MANY_APART = 12, 400, 40
+LARGEST = 2**30  # bytes, of memory
+MOST_CHARACTERS = 2500
+REAL = ("ascii_fabiola.op4", "matrix_factory.pch", "heat_engine_housing.uff",
+        "mesh_Oros-modal_uff15_uff2412.uff", "uff55_translation.uff")  # fmt: skip
+APART = ("hdf5", "matlab", "matlab_73", "ansys")  # read in a process of their own
+READERS = load_plugins().readers
+
+
+def calculix(folder: Path) -> Files:
+    for suffix in (".inp", ".sti", ".mas", ".dof"):
+        shutil.copy(JOB.with_suffix(suffix), folder)
+    return {"file": "job.inp"}
+
+
+def ansys(folder: Path) -> Files:
+    from importlib.util import find_spec
+
+    package = find_spec("ansys.mapdl.reader")
+    assert package is not None
+    assert package.origin is not None
+    for name in ("file.full", "file.rst"):
+        shutil.copy(Path(package.origin).parent / "examples" / name, folder)
+    return {"file": "file.full", "dofs": "file.rst"}
+
+
+def real(name: str, folder: Path) -> Files:
+    shutil.copy(FORMATS / name, folder)
+    return {"file": name}
+
+
+def files_of(kind: str, folder: Path) -> Files:
+    if kind in WRITERS:
+        return WRITERS[kind](rounded(base()), folder)
+    own = {"calculix": calculix, "ansys": ansys}
+    return own[kind](folder) if kind in own else real(kind, folder)
+
+
+def peak() -> int:
+    """Return the most memory that this process and its children have had, in bytes."""
+    own, others = (resource.getrusage(who).ru_maxrss
+                   for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))  # fmt: skip
+    return 1024 * max(own, others)
+
+
+def read(kind: str, folder: Path, files: Files) -> None:
+    named = {key: folder / name for key, name in files.items()}
+    if Path(kind).suffix in (".uff",):
+        READERS["universal file"].read_modes(named["file"])
+    else:
+        paths = ModelFiles(named["file"], named.get("mass"), named.get("dofs"))
+        read_model(paths, tuple(READERS.values()))
+
+
+def check(kind: str, folder: Path, count: int, seed: int) -> Counter[str]:
+    """Break one file of a model at a time."""
+    files = files_of(kind, folder)
+    names = sorted(path.name for path in folder.iterdir() if path.is_file())
+    # What is imported late is imported now; a real file may be no model.
+    with suppress(FemubenchError) if kind in REAL else nullcontext():
+        read(kind, folder, files)
+    outcomes: Counter[str] = Counter()
+    rng = np.random.default_rng(seed)
+    before = peak()
+    for _ in range(count):
+        file = folder / names[rng.integers(len(names))]
+        whole = file.read_bytes()
+        file.write_bytes(broken(whole, rng))
+        try:
+            outcomes[outcome_of(kind, folder, files)] += 1
+        finally:
+            file.write_bytes(whole)
+    assert peak() < max(before, LARGEST)
+    return outcomes
+
+
+def outcome_of(kind: str, folder: Path, files: Files) -> str:
+    printed = StringIO()
+    try:
+        # A process of its own is no fault of the reader that needs it.
+        watch = nullcontext() if kind in APART else watched(folder)
+        with redirect_stdout(printed), watch:
+            read(kind, folder, files)
+    except FemubenchError as error:
+        text = str(error)
+        assert text.isprintable()
+        assert len(text) < MOST_CHARACTERS
+        assert str(folder) in text
+        return "refused"
+    finally:
+        assert printed.getvalue() == ""
+    return "read"
+
+
+@pytest.mark.parametrize("kind", [*WRITERS, "calculix", *REAL])
+def test_a_few(kind: str, tmp_path: Path) -> None:
+    count = 2 if kind in APART else FEW
+    assert check(kind, tmp_path, count, 0).total() == count
+
+
+@pytest.mark.fuzz
+@pytest.mark.parametrize("kind", [*WRITERS, "calculix", "ansys", *REAL])
+def test_many(kind: str, tmp_path: Path) -> None:
+    count = MANY_APART if kind in APART else MANY
+    outcomes = check(kind, tmp_path, count, 1)
+    print(f"{kind}: {dict(outcomes)}")
+    assert 0 < outcomes["refused"]

@@ -1,0 +1,170 @@
+"""Sensors go to the nearest place of the structure: tolerance, unit, axes, directions."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femubench import InputError, Measurement, Sensors, read_case
+from femubench.core.case.case import Case
+from femubench.core.case.matching import parse_frame
+from femubench.core.case.writing import write_case
+from femubench.core.errors import FemubenchError
+from femubench.core.modal.eigen import modes_of
+
+CASES = Path(__file__).parent / "cases"
+PLACES = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.5], [0.75, 0.0, 1.1], [1.5, 0.0, 0.6]])
+TURN = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # "x,z,-y"
+
+
+class Reader:
+    """Gives one measurement, whatever the file says."""
+
+    name, suffixes = "made up", (".test",)
+
+    def __init__(self, xyz: np.ndarray, directions: tuple[str, ...] = ("x",) * 4) -> None:
+        self.sensors = Sensors(tuple("abcd"), np.asarray(xyz, dtype=float), directions)
+
+    def read_modes(self, path: Path) -> Measurement:
+        count = len(self.sensors)
+        two = np.arange(2.0 * count).reshape(count, 2) + 1.0
+        hertz = np.array([10.0, 20.0])
+        return Measurement(
+            self.sensors, (1, 2), hertz, 0.01 * hertz, np.full(2, np.nan), two, 0.1 * two
+        )
+
+    def read_matrix(self, path: Path) -> None:
+        raise InputError("none", file=path)
+
+
+def read(tmp_path: Path, reader: Reader, keys: str = "") -> Case:
+    folder = Path(shutil.copytree(CASES / "in-plane", tmp_path / "case", dirs_exist_ok=True))
+    text = (CASES / "in-plane" / "case.toml").read_text().split("[[modification]]")[0]
+    text = text.replace('sensors = "sensors.csv"', keys).replace("modes.csv", "m.test")
+    (folder / "case.toml").write_text(text.replace("held_out = [4]", ""))
+    (folder / "m.test").write_text("")
+    return read_case(folder, readers=(reader,))
+
+
+def test_sensors_beside_the_structure_are_moved_and_said(tmp_path: Path) -> None:
+    beside = PLACES + np.array([0.0, 0.004, 0.0])
+    case = read(tmp_path, Reader(beside))
+    np.testing.assert_allclose(case.measurement.sensors.xyz, PLACES, atol=1e-12)
+    assert [(m.sensor, m.place) for m in case.matches] == [
+        ("a", "B"), ("b", "left@0.5"), ("c", "girder@0.5"), ("d", "right@0.5"),
+    ]  # fmt: skip
+    assert case.matches[0].distance == pytest.approx(0.004)
+    assert "4 of the 4 sensors of m.test were moved" in case.notes[0]
+    assert case.model.observe(case.measurement.sensors).shape[0] == 4
+    # Written, the places are those of the structure, and nothing is left to say.
+    write_case(tmp_path / "written", case)
+    again = read_case(tmp_path / "written")
+    np.testing.assert_array_equal(again.measurement.sensors.xyz, case.measurement.sensors.xyz)
+    assert again.notes == ()
+
+
+def test_tolerance_is_a_share_of_the_structure(tmp_path: Path) -> None:
+    beside = PLACES + np.array([0.0, 0.03, 0.0])
+    with pytest.raises(
+        InputError, match=r"'a' at .* 0.03 m off the structure, nearest B .*0.0192 m"
+    ):
+        read(tmp_path, Reader(beside))
+    assert len(read(tmp_path, Reader(beside), "tolerance = 0.02").matches) == 4
+    with pytest.raises(InputError, match="off the structure"):
+        read(tmp_path, Reader(PLACES + np.array([0.0, 0.001, 0.0])), "tolerance = 0.0")
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("mm", 1e-3), ("cm", 1e-2), ("in", 0.0254)])
+def test_unit_is_detected_and_said(tmp_path: Path, unit: str, metres: float) -> None:
+    case = read(tmp_path, Reader(PLACES / metres))
+    np.testing.assert_allclose(case.measurement.sensors.xyz, PLACES, atol=1e-12)
+    assert f"coordinates were taken in {unit}" in case.notes[0]
+    stated = read(tmp_path, Reader(PLACES / metres), f'unit = "{unit}"')
+    assert stated.notes == ()
+
+
+def test_stated_unit_is_believed(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r'off the structure.*with unit = "mm" all fit'):
+        read(tmp_path, Reader(1e3 * PLACES), 'unit = "m"')
+
+
+def test_one_sensor_far_off_changes_no_unit(tmp_path: Path) -> None:
+    wrong = PLACES.copy()
+    wrong[3, 2] = 6.0  # typed for 0.6
+    with pytest.raises(InputError, match=r"sensor 'd' at .* nearest C "):
+        read(tmp_path, Reader(wrong))
+
+
+def test_frame_of_the_test_turns_places_and_directions(tmp_path: Path) -> None:
+    ways = ("x", "-y", "0.6 -0.8 0.0", "rz")  # of a test whose z is the model's y
+    with pytest.raises(InputError, match='with frame = "x,z,-y" all fit'):
+        read(tmp_path, Reader(PLACES @ TURN, ways))
+    case = read(tmp_path, Reader(PLACES @ TURN, ways), 'frame = "x,z,-y"')
+    np.testing.assert_allclose(case.measurement.sensors.xyz, PLACES, atol=1e-12)
+    # Its rotation about z is one about y, which the portal has.
+    assert case.measurement.sensors.directions == ("x", "z", "0.6 0.0 0.8", "ry")
+
+
+@pytest.mark.parametrize("text", ["x,y", "x,y,y", "x,y,-z", "x;y;z", "", "x,y,z,x"])
+def test_frames_that_are_none(tmp_path: Path, text: str) -> None:
+    with pytest.raises(InputError, match=r"measurement\.frame"):
+        read(tmp_path, Reader(PLACES), f'frame = "{text}"')
+
+
+def test_frames_are_rotations() -> None:
+    for text in ("x,z,-y", "-x,-y,z", "y,z,x"):
+        turn = parse_frame(text)
+        np.testing.assert_array_equal(turn @ turn.T, np.eye(3))
+        assert np.linalg.det(turn) == 1.0
+
+
+def test_two_sensors_at_one_place_and_direction(tmp_path: Path) -> None:
+    shared = PLACES.copy()
+    shared[1] = PLACES[0] + np.array([-0.01, 0.0, 0.0])
+    with pytest.raises(InputError, match="sensors 'a' and 'b' both lie nearest to B, direction x"):
+        read(tmp_path, Reader(shared))
+    case = read(tmp_path, Reader(shared, ("x", "z", "x", "x")))  # two directions
+    assert [match.place for match in case.matches][:2] == ["B", "B"]
+
+
+def test_oblique_sensor_reads_the_projection(tmp_path: Path) -> None:
+    """A reading along an oblique axis is the projection of the motion, in frames and matrices."""
+    case = read_case(CASES / "3d")
+    at = np.repeat(case.measurement.sensors.xyz[:1], 4, axis=0)
+    axis = np.array([2.0, -1.0, 2.0]) / 3.0
+    sensors = Sensors(tuple("abcd"), at, ("x", "y", "z", "2 -1 2"))
+    motion = modes_of(case.model).shapes[:, :4]
+    found = case.model.observe(sensors) @ motion
+    np.testing.assert_allclose(found[3], axis @ found[:3], atol=1e-12 * np.abs(found).max())
+
+
+def test_oblique_direction_in_a_table(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(CASES / "3d", tmp_path / "case"))
+    table = folder / "sensors.csv"
+    table.write_text(table.read_text().replace("0.5,x", "0.5,0.6 0 0.8"))
+    case = read_case(folder)
+    assert case.measurement.sensors.directions[0] == "0.6 0 0.8"
+    write_case(tmp_path / "again", case)
+    again = read_case(tmp_path / "again").measurement.sensors
+    np.testing.assert_array_equal(again.axes, case.measurement.sensors.axes)
+    for wrong in ("0 0 0", "1 2", "0.6 0 inf", "x y z"):
+        table.write_text(f"label,x,y,z,direction\nknee_x,0,0,0.5,{wrong}\n")
+        with pytest.raises(FemubenchError, match=r"sensors.csv:2: direction.*vector"):
+            read_case(folder)
+
+
+def test_coordinates_in_a_table_have_the_unit_of_the_case(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(CASES / "3d", tmp_path / "case"))
+    table = folder / "sensors.csv"
+    table.write_text(
+        "label,x,y,z,direction\nknee_x,0,0,500,x\narm_y,200,150,550,y\ntip_turn,400,300,600,-rz\n"
+    )
+    with pytest.raises(InputError, match=r'sensors\.csv:2: x.*with unit = "mm" all fit'):
+        read_case(folder)
+    text = (folder / "case.toml").read_text()
+    (folder / "case.toml").write_text(text.replace("[measurement]", '[measurement]\nunit = "mm"'))
+    found = read_case(folder).measurement.sensors
+    np.testing.assert_allclose(found.xyz, read_case(CASES / "3d").measurement.sensors.xyz)
