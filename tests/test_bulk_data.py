@@ -17,7 +17,7 @@ from femubench import InputError, Model, Sensors
 from femubench.core.case.units import from_si, in_si
 from femubench.core.cli.main import bench
 from femubench.core.typing import FloatArray
-from femubench.fem import Coupling, Eccentricity, LowRank, Parameter, Place, PointMass
+from femubench.fem import Coupling, Eccentricity, GroundSpring, LowRank, Parameter, Place, PointMass
 from femubench.plugins.readers.bulk_data import BulkDataReader
 from femubench.plugins.readers.bulk_data.cards import Card
 from femubench.plugins.readers.bulk_data.writing import real
@@ -513,12 +513,28 @@ def test_included_files_are_written_beside(tmp_path: Path) -> None:
     assert "7.7+10" in (path.parent / "bar.inc").read_text()
 
 
+@pytest.mark.parametrize("cards", [TWO, TWO.replace("\nENDDATA\nbehind the end\n", ""), KINDS])
+def test_masses_and_springs_that_an_update_adds_get_cards(tmp_path: Path, cards: str) -> None:
+    original, path = tmp_path / "model.bdf", tmp_path / "new.bdf"
+    original.write_bytes(cards.encode("latin-1"))
+    model = changed(READER.read_model(original), {("E", "E1"): 1.2})
+    joint = "2" if cards != KINDS else "1.1"
+    masses = (PointMass(Place(joint=joint), 0.3, (0.1, 0.0, -0.2)), PointMass(Place("3"), 0.1))
+    springs = (GroundSpring(Place(joint="3"), "y", 4e3), GroundSpring(Place(joint="3"), "-rz", 9.0))
+    wanted = model.attach(masses, springs)
+    READER.write_model(wanted, path, original)
+    assert near(READER.read_model(path), wanted)
+    before, after = original.read_text(), path.read_text()
+    assert (after.count("CONM2"), after.count("CELAS2")) == (before.count("CONM2") + 2, 2)
+    assert "behind the end" in after or cards != TWO
+
+
 def test_what_cards_of_properties_cannot_say_is_refused(tmp_path: Path) -> None:
     original = tmp_path / "model.bdf"
     original.write_bytes(TWO.encode("latin-1"))
     model = READER.read_model(original)
     frame = model.frame_structure.frame
-    laden = frame.with_attachments((PointMass(Place(joint="3"), 0.1),), ())
+    laden = frame.with_attachments((PointMass(Place(member="E2", s=0.4), 0.1),), ())
     basis = np.eye(model.size)[:, :1]
     for update in (
         replace(model, stiffness=1.1 * model.stiffness),

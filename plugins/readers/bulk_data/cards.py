@@ -138,12 +138,14 @@ class Deck:
         file: the main one.
         lines: of every file, with their ends, byte for byte.
         cards: in their order.
+        end: file and line, from 0, behind the last card: of ``ENDDATA`` where it is there.
         chosen: the set that case control chooses, for ``SPC`` and ``MPC``.
         controlled: whether there is a case control.
     """
 
     file: Path
     lines: dict[Path, list[bytes]] = field(default_factory=dict)
+    end: tuple[Path, int] | None = None
     cards: list[Card] = field(default_factory=list)
     chosen: dict[str, int] = field(default_factory=dict)
     controlled: bool = False
@@ -165,7 +167,6 @@ class _Reading:
     def __init__(self, file: Path) -> None:
         self.deck = Deck(file)
         self.left, self.lines_left = LARGEST * 2**20, _MOST_LINES
-        self.ended = False
         lines = self.load(file)
         start = self.control(lines)
         self.bulk(file, lines, start)
@@ -218,7 +219,7 @@ class _Reading:
         """Collect the cards of one file from a line on."""
         open_card: _Rows | None = None
         for i in range(start, len(lines)):
-            if self.ended:
+            if self.deck.end is not None:
                 break
             text = _text(lines[i])
             if not text.strip():
@@ -231,7 +232,7 @@ class _Reading:
             self.close(open_card)
             open_card = None
             if found is None:
-                self.ended = True
+                self.deck.end = file, i
                 return
             included = _inside(self.deck.file, file, found[1], i + 1)
             self.bulk(included, self.load(included), 0)

@@ -29,9 +29,10 @@ from femubench.plugins.readers.bulk_data.cards import Card, Deck
 from femubench.plugins.readers.bulk_data.properties import Bar, bar_of
 from femubench.plugins.readers.bulk_data.systems import KINDS, Systems
 
-_DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 PROPERTIES = ("PBAR", "PBARL", "PBEAM", "PROD")
 _BARS = ("CBAR", "CBEAM")
+ELEMENTS = (*_BARS, "CROD", "CELAS1", "CELAS2", "CONM2", "RBE2")
 _MOST_MEMBERS, _MOST_CARDS = 20_000, 1_000_000
 _ALONG = 1e-6  # how far a spring between two grids may point off the line between them
 _SAME = 1e-9
@@ -164,7 +165,7 @@ class Reading:
 
     def frame(self) -> Frame:
         """Return the frame, in the units of the file."""
-        elements = numbered(self.deck, "CBAR", "CBEAM", "CROD", "CELAS1", "CELAS2", "CONM2", "RBE2")
+        elements = numbered(self.deck, *ELEMENTS)
         actions: dict[str, Callable[[Card], None]] = {
             **dict.fromkeys(_BARS, self._bar),
             **dict.fromkeys(("CELAS1", "CELAS2"), self._spring),
@@ -237,7 +238,7 @@ class Reading:
         for block, shift in (("123", 0), ("456", 3)):
             chosen = [int(digit) - 1 - shift for digit in components if digit in block]
             if len(chosen) == 3:
-                found += _DIRECTIONS[shift : shift + 3]
+                found += DIRECTIONS[shift : shift + 3]
                 continue
             for row in chosen:
                 axis = np.abs(grid.axes[row])
@@ -245,7 +246,7 @@ class Reading:
                     expected = "123, 456, or a grid whose axes are along x, y and z"
                     what = f"component {row + 1 + shift} of grid {grid.name} is turned"
                     raise card.error(what, expected, key)
-                found.append(_DIRECTIONS[shift + int(axis.argmax())])
+                found.append(DIRECTIONS[shift + int(axis.argmax())])
         return found
 
     def _bar(self, card: Card) -> None:
@@ -325,7 +326,7 @@ class Reading:
         for number, key, joint in ((9, "PA", member.ends[0]), (10, "PB", member.ends[1])):
             components = card.components(number, key)
             if components:
-                released = {_DIRECTIONS[int(digit) - 1]: 0.0 for digit in components}
+                released = {DIRECTIONS[int(digit) - 1]: 0.0 for digit in components}
                 self.parts.add("joint_springs", JointSpring(joint, member.name, released), card)
         if card.name == "CBEAM" and any(card.real(i, "SA", 0.0) for i in (17, 18)):
             raise card.error("warping", "no SA and SB", "SA")
@@ -447,7 +448,7 @@ class Reading:
                 motions = self._motions(grid, own.components(7, "PS"), own, "PS")
                 held.setdefault(grid.name, set()).update(motions)
         for name, stopped in held.items():
-            fixed = tuple(d for d in _DIRECTIONS if d in stopped)
+            fixed = tuple(d for d in DIRECTIONS if d in stopped)
             if fixed:
                 self.parts.supports.append(Support(Place(joint=name), fixed))
 
@@ -503,7 +504,7 @@ class Reading:
             if name not in braced and name not in sprung:
                 card = self.grids[int(name)].card
                 raise card.error("nothing holds this grid", "a bar, a rod, a spring or an RBE2")
-            idle = tuple(d for d in _DIRECTIONS[3:] if d not in sprung.get(name, ()))
+            idle = tuple(d for d in DIRECTIONS[3:] if d not in sprung.get(name, ()))
             if idle:
                 self.parts.supports.append(Support(Place(joint=name), idle))
 

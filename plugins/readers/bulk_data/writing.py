@@ -14,15 +14,32 @@ from pathlib import Path
 import numpy as np
 
 from femubench import InputError, Model
-from femubench.fem import BeamProperties, SparseArray, Structure
+from femubench.fem import (
+    BeamProperties,
+    FloatArray,
+    Frame,
+    GroundSpring,
+    Place,
+    PointMass,
+    SparseArray,
+    Structure,
+)
 from femubench.plugins.readers.bulk_data.cards import Card, Deck, read_deck
 from femubench.plugins.readers.bulk_data.properties import SHAPES, Bar
-from femubench.plugins.readers.bulk_data.structure import PROPERTIES, Reading
+from femubench.plugins.readers.bulk_data.structure import (
+    DIRECTIONS,
+    ELEMENTS,
+    PROPERTIES,
+    Grid,
+    Reading,
+)
 
 _SAME = 1e-12  # far below any update, above the rounding of a change of units
 _KEPT = 1e-9  # to which the matrices must be those of bars with other properties
 _WIDTH = 16  # of a large field, the widest that Nastran knows
-_EXPECTED = "factors on properties of bars; .op4 and .mtx hold any matrices"
+_EXPECTED = (
+    "factors on properties, masses and springs to ground at grids; .op4 and .mtx hold any matrices"
+)
 # Properties of elements that follow from the numbers of cards.
 _SAID = ("EA", "EIy", "EIz", "GJ", "flex_y", "flex_z", "rhoA", "rhoJp", "rhoIy", "rhoIz")
 # Field of a PBAR or PBEAM -> the number; the first row, and K1 and K2.
@@ -48,33 +65,45 @@ def write_cards(model: Model, path: Path, original: Path) -> None:
     reading = Reading(deck)
     nominal = reading.model().frame_structure
     bars = {name: reading.bars[number] for name, number in reading.pid.items()}
-    changed = _changed(model, nominal, bars, path)
+    if model.structure is None or model.mass_change or model.stiffness_change:
+        raise _refusal(path)
+    masses, springs = _added(model.structure.frame, nominal.frame)
+    changed = _changed(
+        model, nominal.rebuilt(nominal.frame.with_attachments(masses, springs)), bars, path
+    )
     cards = _Cards(reading)
     cards.assign(changed)
+    cards.attach(masses, springs, path)
     _write(deck, cards.edits, path, original)
+
+
+def _refusal(path: Path) -> InputError:
+    what = "the update changed more than cards can say"
+    return InputError(what, file=path, expected=_EXPECTED)
+
+
+def _added(new: Frame, old: Frame) -> tuple[tuple[PointMass, ...], tuple[GroundSpring, ...]]:
+    """Return the masses and the springs to ground that a frame has besides those of the file."""
+    return new.masses[len(old.masses) :], new.springs[len(old.springs) :]
 
 
 def _changed(
     model: Model, nominal: Structure, bars: Mapping[str, Bar], path: Path
 ) -> dict[str, tuple[Numbers, Numbers]]:
     """Return the new numbers of property and material of every bar; raises InputError."""
-    refusal = InputError(
-        "the update changed more than properties of bars", file=path, expected=_EXPECTED
-    )
-    if model.structure is None or model.mass_change or model.stiffness_change:
-        raise refusal
-    new = model.structure.properties
-    if model.structure.labels != nominal.labels or model.size != len(nominal.kinematics.node):
-        raise refusal
+    structure = model.frame_structure
+    new = structure.properties
+    if structure.labels != nominal.labels or model.size != len(nominal.kinematics.node):
+        raise _refusal(path)
     wanted: Structure = replace(nominal, properties=new)
     mass, stiffness = wanted.matrices()
     if not (_alike(model.mass, mass) and _alike(model.stiffness, stiffness)):
-        raise refusal
+        raise _refusal(path)
     for f in fields(BeamProperties):
         before, after = getattr(nominal.properties, f.name), getattr(new, f.name)
         arisen = (before == 0.0) & (after != 0.0)
         if arisen.any() or (f.name not in _SAID and not np.allclose(before, after, _KEPT, 0.0)):
-            raise refusal
+            raise _refusal(path)
     found: dict[str, tuple[Numbers, Numbers]] = {}
     for i, (name, bar) in enumerate(bars.items()):
         ratio = _ratios(nominal.properties, new, i)
@@ -166,7 +195,11 @@ class _Cards:
         self.edits: _Changes = {}
         self.highest = {
             key: max(c.id(1, key) for c in reading.deck.cards if c.name in names)
-            for key, names in (("PID", PROPERTIES), ("MID", ("MAT1",)))
+            for key, names in (
+                ("PID", PROPERTIES),
+                ("MID", ("MAT1",)),
+                ("EID", (*ELEMENTS, "PLOTEL")),
+            )
         }
 
     def assign(self, changed: Mapping[str, tuple[Numbers, Numbers]]) -> None:
@@ -177,7 +210,7 @@ class _Cards:
         number_of = self._materials(wanted)
         for property_number, groups in wanted.items():
             bar = self.reading.bars[property_number]
-            material = bar.card.text(2)
+            material = _material_of(bar)
             listed = [(of, number_of[material, m], names) for (of, m), names in groups.items()]
             # What did not change keeps its card, else what comes first does.
             listed.sort(key=lambda item: (item[0] != (), item[1] != material))
@@ -192,6 +225,41 @@ class _Cards:
                     self._point(self.reading.card_of[name], number)
             self._put(bar.card, new)
 
+    def attach(
+        self, masses: Sequence[PointMass], springs: Sequence[GroundSpring], path: Path
+    ) -> None:
+        """Add cards of masses and of springs to ground behind all others; raises InputError."""
+        deck, new = self.reading.deck, list[bytes]()
+        last = deck.cards[-1]
+        for mass in masses:
+            grid, arm = self._grid(mass.at, path)
+            offset = np.array(mass.offset) + arm
+            texts = [self._next("EID", last), grid.name, "", real(mass.mass / self.reading.weight)]
+            new += self._card(last, "CONM2", [*texts, *map(real, offset)])
+        for spring in springs:
+            grid, arm = self._grid(spring.at, path)
+            i = DIRECTIONS.index(spring.direction.lstrip("+-"))
+            along = np.abs(grid.axes[:, i % 3])
+            if arm.any() or along.max() < 1.0 - _KEPT:
+                raise _refusal(path)
+            component = str(int(along.argmax()) + 1 + i // 3 * 3)
+            texts = [self._next("EID", last), real(spring.stiffness), grid.name, component]
+            new += self._card(last, "CELAS2", texts)
+        if new:
+            lines = deck.lines[deck.file]
+            file, line = deck.end or (deck.file, len(lines))
+            if line == len(lines) and not lines[-1].endswith((b"\n", b"\r")):
+                new[:0] = [b"\n"]
+            self.edits.setdefault(file, {}).setdefault(line, (line - 1, []))[1][:0] = new
+
+    def _grid(self, place: Place, path: Path) -> tuple[Grid, FloatArray]:
+        """Return the grid of a joint, and where the joint is from there."""
+        joint = self.reading.parts.joints.get(place.joint or "")
+        if joint is None:
+            raise _refusal(path)
+        grid = self.reading.grids[int(joint.name.partition(".")[0])]
+        return grid, np.array(joint.xyz) - grid.xyz
+
     def _materials(
         self, wanted: Mapping[int, Mapping[tuple[Numbers, Numbers], object]]
     ) -> dict[tuple[str, Numbers], str]:
@@ -201,7 +269,7 @@ class _Cards:
             rods: dict[tuple[Numbers, Numbers], object] = {((), ()): None}  # stay as they are
             groups = rods if bar.card.name == "PROD" else wanted.get(number, {})
             for _, numbers in groups:
-                variants.setdefault(bar.card.text(2), {})[numbers] = bar
+                variants.setdefault(_material_of(bar), {})[numbers] = bar
         found: dict[tuple[str, Numbers], str] = {}
         for material, own in variants.items():
             new: list[bytes] = []
@@ -254,6 +322,10 @@ class _Cards:
             body = body.expandtabs(8)
             body = f"{body[: 8 + width]}{number:<{width}}{body[8 + 2 * width :]}"
         self._put(card, [(body + mark + comment).encode("latin-1"), *rest])
+
+
+def _material_of(bar: Bar) -> str:
+    return str(bar.material.id(1, "MID"))
 
 
 def _property(
@@ -339,8 +411,12 @@ def _write(deck: Deck, edits: _Changes, path: Path, original: Path) -> None:
         changes = edits.get(file, {})
         content: list[bytes] = []
         i = 0
-        while i < len(lines):
-            last, new = changes.get(i, (i, [lines[i]]))
+        while i < len(lines) or i in changes:
+            last, new = changes.get(i) or (i, [lines[i]])
+            if last < i:  # in front of a line that stays
+                content += new + lines[i : i + 1]
+                i += 1
+                continue
             comments = [line for line in lines[i : last + 1] if line.lstrip()[:1] == b"$"]
             content += new if all(c in new for c in comments) else [*comments, *new]
             i = last + 1
