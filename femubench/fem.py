@@ -1,7 +1,9 @@
 """Finite elements: frames and their parts, sections, beam matrices, what a model is made of."""
 
 from femubench.core.case.case import Modification
+from femubench.core.case.matrix_files import write_matrices
 from femubench.core.case.nodes import MatrixGeometry, matrix_model
+from femubench.core.case.opensees import from_opensees
 from femubench.core.errors import ModelError
 from femubench.core.fem.beam import (
     BeamProperties,
@@ -20,6 +22,7 @@ from femubench.core.fem.frame import (
     GroundSpring,
     Joint,
     JointSpring,
+    Link,
     Material,
     Member,
     MemberSet,
@@ -65,6 +68,7 @@ __all__ = [
     "IntArray",
     "Joint",
     "JointSpring",
+    "Link",
     "LowRank",
     "Material",
     "MatrixGeometry",
@@ -87,6 +91,7 @@ __all__ = [
     "constant_kappa",
     "coupling_matrices",
     "eccentric_mass_parts",
+    "from_opensees",
     "gravity_stiffness",
     "mass_matrices",
     "matrix_model",
@@ -99,4 +104,5 @@ __all__ = [
     "solid_rectangle",
     "stiffness_matrices",
     "wall_of",
+    "write_matrices",
 ]

@@ -48,6 +48,15 @@ def test_elements_and_matrices_are_converted_alike(unit: LengthUnit) -> None:
     np.testing.assert_allclose(elements.dofs.xyz, matrices.dofs.xyz, rtol=1e-12)
 
 
+def test_what_an_update_changed_in_the_matrices_stays() -> None:
+    model = laden_frame()
+    updated = replace(model, stiffness=1.1 * model.stiffness, mass=0.9 * model.mass)
+    back = in_si(from_si(updated, "mm"), "mm")
+    for role in ("mass", "stiffness"):
+        one, other = getattr(back, role), getattr(updated, role)
+        assert abs(one - other).max() < 1e-12 * abs(other).max()
+
+
 def test_millimetres_are_those_of_tonnes_and_megapascals() -> None:
     model = laden_frame()
     frame = from_si(model, "mm").frame_structure.frame

@@ -26,9 +26,8 @@ Peer = Callable[[dict[str, Any]], list[float]]
 FrameBuilder = Callable[..., Frame]
 
 
-@pytest.fixture(scope="module")
-def peer(tmp_path_factory: pytest.TempPathFactory) -> Peer:
-    """Return a call to OpenSees in a process of its own."""
+def opensees_environment() -> dict[str, str]:
+    """Return the environment in which OpenSees runs in a process of its own, or skip the test."""
     package = importlib.util.find_spec("openseespylinux")
     if importlib.util.find_spec("openseespy") is None or package is None or not package.origin:
         pytest.skip("openseespy is not installed on this machine")
@@ -41,6 +40,13 @@ def peer(tmp_path_factory: pytest.TempPathFactory) -> Peer:
     )  # fmt: skip
     if probe.returncode:
         pytest.skip(f"openseespy cannot be imported: {probe.stderr.strip().splitlines()[-1]}")
+    return environment
+
+
+@pytest.fixture(scope="module")
+def peer(tmp_path_factory: pytest.TempPathFactory) -> Peer:
+    """Return a call to OpenSees in a process of its own."""
+    environment = opensees_environment()
     script = Path(__file__).with_name("opensees_peer.py")
     output = tmp_path_factory.mktemp("peer") / "frequencies.json"
 

@@ -76,6 +76,7 @@ def check_frame(model: FrameSpec) -> None:
     """Check names, geometry and connections; raises Fault with a path below `model`."""
     check_unique((("joints", i, "name"), joint.name) for i, joint in enumerate(model.joints))
     check_unique((("members", i, "name"), member.name) for i, member in enumerate(model.members))
+    _check_links(model)
     _check_joints(model)
     _check_members(model)
     _check_connected(model)
@@ -93,6 +94,33 @@ def check_frame(model: FrameSpec) -> None:
     _check_eccentricities(model)
     _check_couplings(model)
     _check_braces(model)
+
+
+def _check_links(model: FrameSpec) -> None:
+    joints = {joint.name for joint in model.joints}
+    for i, link in enumerate(model.links):
+        _check_known("joint", link.leads, joints, ("links", i, "leads"))
+        path: KeyPath = ("links", i, "follows")
+        check_unique(((*path, j), name) for j, name in enumerate(link.follows))
+        for j, name in enumerate(link.follows):
+            _check_known("joint", name, joints, (*path, j))
+            if name == link.leads:
+                raise Fault((*path, j), f"joint {name!r} follows itself", "another joint")
+        _check_directions(link.motions, model.plane, ("links", i, "motions"))
+
+
+def _bodies(model: FrameSpec, *, members: bool) -> dict[str, set[str]]:
+    """Return the joints that hang together with every joint, by links and perhaps by members."""
+    group = {joint.name: {joint.name} for joint in model.joints}
+    pairs = [(link.leads, name) for link in model.links for name in link.follows]
+    for pair in (*pairs, *(member.ends for member in model.members if members)):
+        first, second = (group[name] for name in pair)
+        if first is not second:
+            small, large = sorted((first, second), key=len)
+            large |= small
+            for name in small:
+                group[name] = large
+    return group
 
 
 def _check_sets(model: FrameSpec, members: Collection[str]) -> None:
@@ -141,11 +169,12 @@ def _check_joints(model: FrameSpec) -> None:
             what = f"joint {model.joints[i].name!r} lies off the plane, {normal} = {column[i]:g}"
             raise Fault(("joints", i, "xyz"), what, f"{normal} = {column[0]:g} as at the first")
     cells: dict[tuple[int, ...], str] = {}
+    linked = _bodies(model, members=False)
     for i, joint in enumerate(model.joints):
         cell = tuple(int(v) for v in np.round(xyz[i] / ON_MEMBER))
-        if cell in cells:
+        if cell in cells and joint.name not in linked[cells[cell]]:
             what = f"joint {joint.name!r} lies at the same point as {cells[cell]!r}"
-            raise Fault(("joints", i, "xyz"), what, "a point of its own")
+            raise Fault(("joints", i, "xyz"), what, "a point of its own, or a link")
         cells[cell] = joint.name
 
 
@@ -182,19 +211,12 @@ def _check_up(model: FrameSpec, i: int, along: FloatArray) -> None:
 
 
 def _check_connected(model: FrameSpec) -> None:
-    group = {joint.name: {joint.name} for joint in model.joints}
-    for member in model.members:
-        first, second = (group[end] for end in member.ends)
-        if first is not second:
-            small, large = sorted((first, second), key=len)
-            large |= small
-            for name in small:
-                group[name] = large
+    group = _bodies(model, members=True)
     whole = group[model.joints[0].name]
     for i, joint in enumerate(model.joints):
         if joint.name not in whole:
             what = f"joint {joint.name!r} is not connected to {model.joints[0].name!r}"
-            raise Fault(("joints", i), what, "members that connect all joints")
+            raise Fault(("joints", i), what, "members or links that connect all joints")
 
 
 def _check_ends(

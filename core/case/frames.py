@@ -23,6 +23,7 @@ from femubench.core.fem.frame import (
     GroundSpring,
     Joint,
     JointSpring,
+    Link,
     Material,
     Member,
     MemberSet,
@@ -181,6 +182,7 @@ _PARTS: dict[str, type] = {
     "joints": Joint,
     "joint_springs": JointSpring,
     "rigid_ends": RigidEnd,
+    "links": Link,
     "factors": Factor,
     "preloads": Preload,
     "eccentricities": Eccentricity,
@@ -205,7 +207,7 @@ def frame_of(model: FrameSpec) -> Frame:
             made = section_of(spec, model.plane, model.beam)
             sections[name] = replace(made, name=name)
     materials = {n: Material(m.E, m.nu, m.rho, n) for n, m in model.materials.items()}
-    own = ("plane", "beam", "rotary_inertia", "bending_mass", "gravity")
+    own = ("plane", "beam", "rotary_inertia", "bending_mass", "gravity", "free")
     parts: dict[str, Any] = {key: getattr(model, key) for key in own}
     for key, kind in _PARTS.items():
         parts[key] = tuple(_made(kind, spec) for spec in getattr(model, key))

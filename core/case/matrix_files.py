@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from io import BytesIO
+from os import PathLike
+from pathlib import Path
 
 import numpy as np
 import scipy.io
@@ -14,12 +16,14 @@ from femubench.core.case.faults import Fault
 from femubench.core.case.frame_keys import Keys
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.table_text import csv_bytes, number
+from femubench.core.errors import InputError
 from femubench.core.fem.frame import Place
 from femubench.core.fem.kinematics import node_at
 from femubench.core.fem.mesh import SAME_STATION
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.fem.structure import Structure
+from femubench.core.files import make_folder, write_atomically
 from femubench.core.typing import IntArray, SparseArray
 
 Files = dict[str, bytes]
@@ -180,3 +184,36 @@ def matrix_keys(
         files[file] = matrix_market(part)
         tables.append({"name": name, "stiffness": file})
     return (keys | {"groups": tables} if tables else keys), files
+
+
+def write_matrices(model: Model, folder: str | PathLike[str]) -> tuple[Path, ...]:
+    """Write a model as the files of a case: `mass.mtx`, `stiffness.mtx`, `dofs.csv`, groups.
+
+    ``bench init`` makes a case of them and of what was measured.
+
+    Arguments:
+        model: any model; of a frame the nodes between joints get names of their own.
+        folder: made where it is not there; files of these names are written anew.
+
+    Raises:
+        InputError: when nothing can be written there, or a degree of freedom has no direction
+            that a table could name.
+
+    Examples:
+        >>> [path.name for path in fem.write_matrices(model, "matrices")]
+        ['mass.mtx', 'stiffness.mtx', 'dofs.csv']
+    """
+    place = Path(folder)
+    if has_skew_dofs(model):
+        raise InputError("the model has degrees of freedom of skew members", file=place)
+    geometry = model.geometry
+    if not isinstance(geometry, MatrixGeometry):
+        geometry = frame_geometry(model)
+    try:
+        files = matrix_keys(*matrices_of(model), geometry, model.groups)[1]
+    except Fault as fault:
+        raise InputError(fault.what, file=place, expected=fault.expected) from None
+    make_folder(place)
+    for name, content in files.items():
+        write_atomically(place / name, content)
+    return tuple(place / name for name in files)

@@ -15,7 +15,7 @@ from femubench.core.case.faults import Misfit, WrongDirection
 from femubench.core.case.tables import read_table
 from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import GroundSpring, Place, PointMass, Vector
-from femubench.core.fem.kinematics import rigid_arm
+from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.model import Dofs, Model
 from femubench.core.fem.sensors import DIRECTIONS, Sensors, moved_names

@@ -57,6 +57,7 @@ _MESHED = "a frame that can be meshed"
 _EXPECTED = {
     "joint_springs": "a shorter one",
     "rigid_ends": "a shorter one",
+    "links": "joints that follow one other joint each",
     "gravity": "a frame in plane or in space that stands or hangs",
     "preloads": "a member of a ring with all constants of its section",
 }

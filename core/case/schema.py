@@ -263,6 +263,16 @@ class RigidEndSpec(Table):
     mass_length: Number = Field(0.0, description="a length in m")
 
 
+class LinkSpec(Table):
+    """`[[model.links]]`."""
+
+    leads: Name = Field(description="the name of a joint")
+    follows: Many[Name] = Field(
+        min_length=1, max_length=20_000, description="a list of names of joints"
+    )
+    motions: Many[Direction] = Field((), max_length=6, description="a list of directions")
+
+
 class SetSpec(Table):
     """`[[model.sets]]`: members that belong together."""
 
@@ -281,6 +291,7 @@ class FrameSpec(Table):
         "shear-consistent", description="'cubic' or 'shear-consistent'"
     )
     gravity: NotNegative = Field(0.0, description="a multiple of the own weight, a number >= 0")
+    free: bool = Field(False, strict=True, description="true or false")
     materials: dict[Name, MaterialSpec] = Field(description="tables [model.materials.NAME]")
     sections: dict[Name, SectionSpec] = Field(description="tables [model.sections.NAME]")
     joints: Annotated[Many[JointSpec], Field(min_length=2, max_length=20_000)] = Field(
@@ -294,6 +305,7 @@ class FrameSpec(Table):
     supports: Many[SupportSpec] = _tables("model.supports", max_length=_MOST)
     joint_springs: Many[JointSpringSpec] = _tables("model.joint_springs")
     rigid_ends: Many[RigidEndSpec] = _tables("model.rigid_ends")
+    links: Many[LinkSpec] = _tables("model.links", max_length=_MOST)
     factors: Many[FactorSpec] = _tables("model.factors")
     preloads: Many[PreloadSpec] = _tables("model.preloads")
     eccentricities: Many[EccentricitySpec] = _tables("model.eccentricities")

@@ -49,9 +49,6 @@ def from_si(model: Model, unit: LengthUnit) -> Model:
 def _converted(model: Model, length: float, force: float) -> Model:
     if length == force == 1.0:
         return model
-    if model.structure is not None:
-        return Model.of(_frame(described_frame(model.structure), length, force))
-    assert isinstance(model.geometry, MatrixGeometry)
     rotation = np.array([name.startswith("r") for name in model.dofs.direction])
     scale = sp.diags_array(np.sqrt(force * length) * np.where(rotation, 1.0, 1.0 / length))
 
@@ -59,6 +56,12 @@ def _converted(model: Model, length: float, force: float) -> Model:
         return sp.csc_array(scale @ matrix @ scale)
 
     mass, stiffness = matrices_of(model)
+    if model.structure is not None:
+        new = Model.of(_frame(described_frame(model.structure), length, force))
+        own = model.structure.matrices()  # an update may have changed the matrices themselves
+        more_mass, more_stiffness = turned(mass - own[0]), turned(stiffness - own[1])
+        return replace(new, mass=new.mass + more_mass, stiffness=new.stiffness + more_stiffness)
+    assert isinstance(model.geometry, MatrixGeometry)
     dofs = replace(model.dofs, xyz=length * model.dofs.xyz)
     return Model(
         mass=turned(mass),

@@ -33,7 +33,7 @@ from femubench.core.effect.places import member_length
 from femubench.core.fem.beam import mass_matrices, stiffness_matrices
 from femubench.core.fem.frame import Frame, JointSpring
 from femubench.core.fem.joints import available_length, half_depth
-from femubench.core.fem.kinematics import rigid_arm
+from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.fem.structure import Structure

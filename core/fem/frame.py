@@ -142,6 +142,21 @@ class RigidEnd:
 
 
 @dataclass(frozen=True)
+class Link:
+    """A rigid connection: motions of some joints follow from those of another, as of one body.
+
+    Arguments:
+        leads: the joint whose motions are free.
+        follows: the joints that go along with it, each behind a rigid massless arm.
+        motions: which of their motions follow; empty for all. A rigid floor is ``x, y, rz``.
+    """
+
+    leads: str
+    follows: tuple[str, ...]
+    motions: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Factor:
     """A multiple of what sections and materials give, at some places of the frame.
 
@@ -240,6 +255,7 @@ class Frame:
         bending_mass: ``shear-consistent`` takes the functions of the Timoshenko element (Friedman
             & Kosmatka 1993), Hermite's without shear; ``cubic`` takes these in every theory.
         gravity: multiple of the own weight, down along z, that acts on its stiffness.
+        free: whether the structure is known to hang free, so that nothing may hold it.
         sets: named by the user.
         families: the members of every section and of every material, by the names that these have
             in the case; empty for a frame that was not read.
@@ -254,9 +270,11 @@ class Frame:
     supports: tuple[Support, ...] = ()
     joint_springs: tuple[JointSpring, ...] = ()
     rigid_ends: tuple[RigidEnd, ...] = ()
+    links: tuple[Link, ...] = ()
     rotary_inertia: bool | float | None = None
     bending_mass: BendingMass = "shear-consistent"
     gravity: float = 0.0
+    free: bool = False
     factors: tuple[Factor, ...] = ()
     preloads: tuple[Preload, ...] = ()
     eccentricities: tuple[Eccentricity, ...] = ()

@@ -11,9 +11,12 @@ import scipy.sparse as sp
 from femubench.core.errors import ModelError
 from femubench.core.fem.beam import BeamProperties, shape_functions
 from femubench.core.fem.frame import ACTIVE, Frame, Place
+from femubench.core.fem.links import Linkage, held_leaders, linkage, rigid_arm
 from femubench.core.fem.mesh import ON_MEMBER, SAME_STATION, Connection, Mesh, member_axes
 from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
+
+_NO_ARM = 1e-9  # m
 
 
 @dataclass(frozen=True)
@@ -33,14 +36,6 @@ class Kinematics:
     direction: tuple[str, ...]
     axes: FloatArray
     active: BoolArray
-
-
-def rigid_arm(offset: FloatArray) -> FloatArray:
-    """Return the (6, 6) motion of a point at `offset` (global, m) of a moving rigid body."""
-    x, y, z = offset
-    motion = np.eye(6)
-    motion[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
-    return motion
 
 
 def rigid_motions(xyz: FloatArray, axes: FloatArray) -> FloatArray:
@@ -142,17 +137,43 @@ def build_kinematics(
     for oscillator, item in zip(mesh.oscillators, frame.oscillators, strict=False):
         free[oscillator, DIRECTIONS.index(item.direction.lstrip("+-"))] = True
     hanging = {connection.node: connection for connection in mesh.connections}
+    held = np.zeros(free.shape, dtype=bool)
     for support in frame.supports:
         node = _support_node(frame, mesh, support.at)
         if node is None or node in hanging:
             what = f"the support at {support.at} lies on the arm of a joint spring"
             raise ModelError(what, support)
-        free[node, [DIRECTIONS.index(name) for name in support.fixed]] = False
+        held[node, [DIRECTIONS.index(name) for name in support.fixed]] = True
+    free &= ~held
+    tie = _tie(frame, free, held, active) if frame.links else None
     own: list[tuple[int, FloatArray, tuple[str, ...]]] = []  # node, (6, k) basis, labels
     for node in hanging:
         free[node] = False
         own.append((node, *_own_motion(hanging[node], active)))
-    return _assemble_transform(mesh, free, own, hanging, active)
+    return _assemble_transform(mesh, free, own, hanging, active, tie)
+
+
+def _tie(frame: Frame, free: BoolArray, held: BoolArray, active: BoolArray) -> Linkage:
+    """Return the rigid links of a frame; what they lead or hold is free no more.
+
+    A joint at which no member ends moves only as far as a link makes use of it.
+    """
+    names, count = list(frame.joint_index), len(frame.joints)
+    tie = linkage(frame.links, names, frame.corners, active, held[:count])
+    joints = free[:count]
+    joints[tie.led] = False
+    linked = {name for link in frame.links for name in (link.leads, *link.follows)}
+    bare = [i for i, name in enumerate(names) if name in linked and not frame.ends_at(name)]
+    used = np.asarray((np.abs(tie.spread) > _NO_ARM).sum(axis=0)).reshape(-1, 6) > 1
+    joints[bare] &= used[bare]
+    stopped = held_leaders(tie, joints, held[:count])
+    if stopped is None:
+        followers = {name for link in frame.links for name in link.follows}
+        support = next(item for item in frame.supports if item.at.joint in followers)
+        what = f"what the support at {support.at} holds is a mixture of motions of what leads it"
+        raise ModelError(what, support)
+    joints[stopped] = False
+    return tie
 
 
 def _support_node(frame: Frame, mesh: Mesh, place: Place) -> int | None:
@@ -192,6 +213,7 @@ def _assemble_transform(
     own: list[tuple[int, FloatArray, tuple[str, ...]]],
     hanging: dict[int, Connection],
     active: BoolArray,
+    tie: Linkage | None,
 ) -> Kinematics:
     size = 6 * len(mesh.xyz)
     flat = np.flatnonzero(free.ravel())
@@ -208,6 +230,9 @@ def _assemble_transform(
         position += basis.shape[1]
     triplet = (np.concatenate(data), (np.concatenate(rows), np.concatenate(cols)))
     transform = sp.csr_array(triplet, shape=(size, count))
+    if tie is not None:  # joints are the first nodes
+        joints = 6 * len(tie.led)
+        transform = sp.csr_array(sp.vstack([tie.spread @ transform[:joints], transform[joints:]]))
     # A hanging node may hang on the tip of an arm that is itself free, never on a hanging node.
     for n, basis, _ in own:
         shared = np.eye(6) - basis @ basis.T

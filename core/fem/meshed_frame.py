@@ -14,7 +14,8 @@ from femubench.core.errors import ModelError
 from femubench.core.fem.assembly import AssemblyPlan, plan_assembly
 from femubench.core.fem.beam import BeamProperties
 from femubench.core.fem.frame import Frame, GroundSpring, PointMass
-from femubench.core.fem.kinematics import Kinematics, point_rows, rigid_arm, spring_rows
+from femubench.core.fem.kinematics import Kinematics, point_rows, spring_rows
+from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.mesh import Mesh
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.sensors import DIRECTIONS

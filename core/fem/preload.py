@@ -36,7 +36,8 @@ from femubench.core.fem.beam import (
 )
 from femubench.core.fem.elastic_stiffness import elastic_stiffness
 from femubench.core.fem.frame import ACTIVE, Frame, Support
-from femubench.core.fem.kinematics import build_kinematics, point_rows, rigid_arm, rigid_motions
+from femubench.core.fem.kinematics import build_kinematics, point_rows, rigid_motions
+from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.meshed_frame import MeshedFrame
 from femubench.core.fem.nominal import meshed
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray

@@ -15,6 +15,7 @@ def femubench_readers() -> dict[str, str]:
         "MATLAB": f"{__name__}.matlab:MatlabReader",
         "Nastran OP4": f"{__name__}.op4:Op4Reader",
         "Nastran DMIG": f"{__name__}.dmig:DmigReader",
+        "Nastran bulk data": f"{__name__}.bulk_data:BulkDataReader",
         "CalculiX": f"{__name__}.calculix:CalculixReader",
         "Abaqus": f"{__name__}.abaqus:AbaqusReader",
         "Ansys": f"{__name__}.ansys:AnsysReader",

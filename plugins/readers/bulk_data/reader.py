@@ -1,0 +1,56 @@
+"""The reader of bulk data: a frame from cards, and cards from an updated frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NoReturn
+
+from femubench import InputError, Model
+from femubench.plugins.readers.bulk_data.cards import read_deck
+from femubench.plugins.readers.bulk_data.structure import Reading, grids_of
+from femubench.plugins.readers.bulk_data.writing import write_cards
+
+
+class BulkDataReader:
+    """Reads and writes frames of CBAR and CBEAM in Nastran bulk data."""
+
+    name: str = "Nastran bulk data"
+    suffixes: tuple[str, ...] = (".bdf", ".dat", ".nas")
+
+    def read_matrix(self, path: Path) -> NoReturn:
+        """Refuse: bulk data hold elements."""
+        raise InputError("bulk data hold no matrix", file=path, expected=".op4, .pch or .mtx")
+
+    def read_modes(self, path: Path) -> NoReturn:
+        """Refuse: bulk data hold no results."""
+        raise InputError("bulk data hold no modes", file=path, expected=".csv or .unv")
+
+    def read_model(self, path: Path) -> Model:
+        """Return the model of the frame that a file describes, in the units of the file.
+
+        Raises:
+            InputError: at the line of the first card that is wrong or is not read.
+        """
+        return Reading(read_deck(path)).model()
+
+    def read_nodes(self, path: Path) -> dict[str, tuple[float, float, float]]:
+        """Return where the grids are, whatever the elements are; raises InputError."""
+        grids = grids_of(read_deck(path)).values()
+        return {g.name: (float(g.xyz[0]), float(g.xyz[1]), float(g.xyz[2])) for g in grids}
+
+    def model_files(self, path: Path) -> tuple[Path, ...]:
+        """Return the files that a file includes; raises InputError."""
+        return tuple(file for file in read_deck(path).lines if file != path)
+
+    def write_model(self, model: Model, path: Path, original: Path) -> None:
+        """Write an updated frame: other property and material cards, all else byte for byte.
+
+        Arguments:
+            model: of the frame in `original`, its properties multiplied, in the units of that.
+            path: the new file.
+            original: the file that the model comes from.
+
+        Raises:
+            InputError: for what cards of properties cannot say.
+        """
+        write_cards(model, path, original)

@@ -1,0 +1,601 @@
+"""The frame that bulk data describe: grids are joints, CBAR and CBEAM members, RBE2 rigid links."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from femubench import InputError, Model
+from femubench.fem import (
+    Brace,
+    Factor,
+    FloatArray,
+    Frame,
+    GroundSpring,
+    Joint,
+    JointSpring,
+    Link,
+    Member,
+    MemberSet,
+    ModelError,
+    Place,
+    PointMass,
+    Support,
+)
+from femubench.plugins.readers.bulk_data.cards import Card, Deck
+from femubench.plugins.readers.bulk_data.properties import Bar, bar_of
+from femubench.plugins.readers.bulk_data.systems import KINDS, Systems
+
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+PROPERTIES = ("PBAR", "PBARL", "PBEAM", "PROD")
+_BARS = ("CBAR", "CBEAM")
+ELEMENTS = (*_BARS, "CROD", "CELAS1", "CELAS2", "CONM2", "RBE2")
+_MOST_MEMBERS, _MOST_CARDS = 20_000, 1_000_000
+_ALONG = 1e-6  # how far a spring between two grids may point off the line between them
+_SAME = 1e-9
+
+# What changes neither mass nor stiffness: loads, output, damping, how to solve.
+_WORDS = """
+    ASET ASET1 CDAMP1 CDAMP2 CDAMP3 CDAMP4 CVISC DAREA DLOAD DPHASE ECHOOFF ECHOON EIGB EIGC
+    EIGR EIGRL FORCE FORCE1 FORCE2 FREQ FREQ1 FREQ2 FREQ3 FREQ4 GRAV LOAD MODTRAK MOMENT MOMENT1
+    MOMENT2 OMIT OMIT1 PARAM PDAMP PLOAD1 PLOTEL PVISC RFORCE RLOAD1 RLOAD2 SET1 SET3 SUPORT
+    SUPORT1 TABDMP1 TABLED1 TABLED2 TABLED3 TABLED4 TEMP TEMPD TLOAD1 TLOAD2 TSTEP USET USET1
+"""
+IGNORED = frozenset(_WORDS.split())
+_READ = frozenset(
+    (
+        *(*PROPERTIES, *_BARS, *KINDS, "GRID", "GRDSET", "BAROR", "CROD", "MAT1", "CONM2"),
+        *("CELAS1", "CELAS2", "PELAS", "RBE2", "SPC", "SPC1", "SPCADD"),
+    )
+)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A grid: its place in basic coordinates, and the axes of its displacements as rows."""
+
+    card: Card
+    xyz: FloatArray
+    axes: FloatArray
+
+    @property
+    def name(self) -> str:
+        """Return its number as a text."""
+        return str(int(self.card.text(1)))
+
+
+def numbered(deck: Deck, *names: str) -> dict[int, Card]:
+    """Return cards of some kinds by their number, in the order of the file.
+
+    Raises:
+        InputError: when a number is there twice, for different cards.
+    """
+    found: dict[int, Card] = {}
+    for card in deck.cards:
+        if card.name not in names:
+            continue
+        other = found.setdefault(card.id(1, "the number"), card)
+        if other is not card and (other.name, other.fields) != (card.name, card.fields):
+            raise card.error(f"{other} is there already", "a number of its own")
+    if len(found) > _MOST_CARDS:
+        what, expected = f"{len(found)} cards", f"at most {_MOST_CARDS}"
+        raise InputError(what, file=deck.file, key=names[0], expected=expected)
+    return found
+
+
+def grids_of(deck: Deck) -> dict[int, Grid]:
+    """Return the grids by their numbers; raises InputError."""
+    systems = Systems(numbered(deck, *KINDS))
+    usual = next((card for card in deck.cards if card.name == "GRDSET"), None)
+    first = 0 if usual is None else usual.id(2, "CP", 0)
+    shown = 0 if usual is None else usual.id(6, "CD", 0)
+    found = {}
+    for number, card in numbered(deck, "GRID").items():
+        place = systems.find(card.id(2, "CP", first), card, "CP")
+        xyz = place.point(np.array(card.vector(3, "X")))
+        if card.text(6) == "-1":
+            raise card.error("a point of a fluid", "a grid of a structure", "CD")
+        motion = systems.find(card.id(6, "CD", shown), card, "CD")
+        found[number] = Grid(card, xyz, motion.axes_at(xyz))
+    return found
+
+
+@dataclass
+class Parts:
+    """What of a frame has been found so far.
+
+    Arguments:
+        offsets: joints at the ends of bars beside their grids, by grid and offset.
+        arms: how many such joints a grid has.
+        of: the card of a part of the frame, by the part's id in memory.
+    """
+
+    members: list[Member] = field(default_factory=list)
+    masses: list[PointMass] = field(default_factory=list)
+    springs: list[GroundSpring] = field(default_factory=list)
+    supports: list[Support] = field(default_factory=list)
+    joint_springs: list[JointSpring] = field(default_factory=list)
+    links: list[Link] = field(default_factory=list)
+    braces: list[Brace] = field(default_factory=list)
+    joints: dict[str, Joint] = field(default_factory=dict)
+    offsets: dict[tuple[float, ...], str] = field(default_factory=dict)
+    arms: dict[str, int] = field(default_factory=dict)
+    of: dict[int, Card] = field(default_factory=dict)
+
+    def add(self, key: str, part: Any, card: Card) -> None:  # noqa: ANN401 - a part of a frame
+        """Add a part that a card describes."""
+        getattr(self, key).append(part)
+        self.of[id(part)] = card
+
+
+class Reading:
+    """Bulk data as a frame.
+
+    Arguments:
+        deck: all cards.
+
+    Raises:
+        InputError: for a card that is not read and may carry stiffness or mass, and all that is
+            wrong in those that are.
+    """
+
+    def __init__(self, deck: Deck) -> None:
+        self.deck = deck
+        self.named: dict[str, list[Card]] = {}
+        for card in deck.cards:
+            if card.name not in _READ | IGNORED:
+                expected = "a frame of CBAR, CBEAM, CROD, CONM2, CELAS2, RBE2, SPC; see the docs"
+                raise card.error("this card is not read", expected)
+            self.named.setdefault(card.name, []).append(card)
+        self.weight = self._weight()
+        self.systems = Systems(numbered(deck, *KINDS))
+        self.grids = grids_of(deck)
+        self.sorted = sorted(self.grids)
+        self.listed = 0  # grids in lists so far
+        self.stiffnesses = self._pelas()
+        materials = numbered(deck, "MAT1")
+        properties = numbered(deck, *PROPERTIES).items()
+        self.bars = {number: bar_of(card, materials) for number, card in properties}
+        self.parts = Parts()
+        self.pid: dict[str, int] = {}  # of every member
+        self.card_of: dict[str, Card] = {}
+
+    def frame(self) -> Frame:
+        """Return the frame, in the units of the file."""
+        elements = numbered(self.deck, *ELEMENTS)
+        actions: dict[str, Callable[[Card], None]] = {
+            **dict.fromkeys(_BARS, self._bar),
+            **dict.fromkeys(("CELAS1", "CELAS2"), self._spring),
+            **{"CROD": self._rod, "CONM2": self._mass, "RBE2": self._link},
+        }
+        for card in elements.values():
+            actions[card.name](card)
+        if not self.parts.members:
+            expected = "a frame of CBAR or CBEAM"
+            raise InputError("there is no bar", file=self.deck.file, expected=expected)
+        self._supports()
+        self._check_held()
+        return self._assembled()
+
+    def model(self) -> Model:
+        """Return the model of the frame; raises InputError at the card of what is wrong in it."""
+        frame = self.frame()
+        try:
+            with np.errstate(all="ignore"):
+                model = Model.of(frame)
+        except ModelError as error:
+            card = self.parts.of.get(id(error.item))
+            if card is None:
+                raise InputError(str(error), file=self.deck.file) from None
+            raise card.error(str(error)) from None
+        if not all(np.isfinite(m.data).all() for m in (model.mass, model.stiffness)):
+            what, expected = "the matrices are not finite", "constants of a real structure"
+            raise InputError(what, file=self.deck.file, expected=expected)
+        if model.size == 0:
+            raise InputError("nothing can move", file=self.deck.file, expected="a free direction")
+        return model
+
+    def _cards(self, *names: str) -> Iterator[Card]:
+        for name in names:
+            yield from self.named.get(name, ())
+
+    def _weight(self) -> float:
+        """Return what all masses are multiplied by (PARAM,WTMASS)."""
+        weight = 1.0
+        for i, card in enumerate(c for c in self._cards("PARAM") if c.text(1) == "WTMASS"):
+            value = card.real(2, "WTMASS")
+            if not value > 0.0 or (i and value != weight):
+                raise card.error(f"{value:g}", "one number > 0", "WTMASS")
+            weight = value
+        return weight
+
+    def grid(self, card: Card, number: int, key: str) -> Grid:
+        """Return the grid that a field names, and make a joint of it; raises InputError."""
+        return self._known(card, card.id(number, key), key)
+
+    def _known(self, card: Card, number: int, key: str) -> Grid:
+        grid = self.grids.get(number)
+        if grid is None:
+            raise card.error(f"there is no GRID {number}", "the number of a GRID", key)
+        self._joint(grid.name, grid.xyz)
+        return grid
+
+    def _joint(self, name: str, xyz: FloatArray) -> str:
+        x, y, z = (float(v) for v in xyz)
+        self.parts.joints.setdefault(name, Joint(name, (x, y, z)))
+        return name
+
+    def _motions(self, grid: Grid, components: str, card: Card, key: str) -> list[str]:
+        """Return the global directions that components at a grid are.
+
+        Raises:
+            InputError: where they are single directions of axes that are turned.
+        """
+        found: list[str] = []
+        for block, shift in (("123", 0), ("456", 3)):
+            chosen = [int(digit) - 1 - shift for digit in components if digit in block]
+            if len(chosen) == 3:
+                found += DIRECTIONS[shift : shift + 3]
+                continue
+            for row in chosen:
+                axis = np.abs(grid.axes[row])
+                if axis.max() < 1.0 - _SAME:
+                    expected = "123, 456, or a grid whose axes are along x, y and z"
+                    what = f"component {row + 1 + shift} of grid {grid.name} is turned"
+                    raise card.error(what, expected, key)
+                found.append(DIRECTIONS[shift + int(axis.argmax())])
+        return found
+
+    def _bar(self, card: Card) -> None:
+        usual = next(self._cards("BAROR"), None) if card.name == "CBAR" else None
+        own = card.id(1, "EID")
+        number = card.id(2, "PID", own if usual is None else usual.id(2, "PID", own))
+        self._property(card, number, ("PBAR", "PBARL") if card.name == "CBAR" else ("PBEAM",))
+        ends = [self.grid(card, 3 + i, key) for i, key in enumerate(("GA", "GB"))]
+        flags = card.text(8) or (usual.text(8) if usual else "") or "GGG"
+        if flags not in ("GGG", "BGG", "GGO", "GOG", "GOO", "BGO", "BOG", "BOO"):
+            raise card.error(f"{flags[:20]!r}", "GGG, or B and O in it", "OFFT")
+        offsets = [np.array(card.vector(11 + 3 * i, f"W{end}")) for i, end in enumerate("AB")]
+        if "O" in flags[1:] and any(o.any() for o in offsets):
+            raise card.error(
+                "offsets along the axes of the bar", "along those of its grids", "OFFT"
+            )
+        names = tuple(
+            self._end(grid, w @ grid.axes, card) for grid, w in zip(ends, offsets, strict=True)
+        )
+        start, stop = (np.array(self.parts.joints[name].xyz) for name in names)
+        if names[0] == names[1] or not np.linalg.norm(stop - start) > 0.0:
+            raise card.error("the bar has no length", "two grids apart", "GB")
+        x = (stop - start) / np.linalg.norm(stop - start)
+        v = self._orientation(card, usual, ends[0], flags[0])
+        up = np.cross(x, v)
+        if not np.linalg.norm(up) > 1e-6 * np.linalg.norm(v):
+            raise card.error("the orientation vector lies along the bar", "one across it", "X1")
+        bar = self.bars[number]
+        up = up / np.linalg.norm(up)
+        name = f"E{card.id(1, 'EID')}"
+        member = Member(
+            name,
+            (names[0], names[1]),
+            1,
+            bar.frame_section(),
+            bar.frame_material(weight=self.weight),
+            (float(up[0]), float(up[1]), float(up[2])),
+        )
+        self.parts.add("members", member, card)
+        self.pid[name], self.card_of[name] = number, card
+        self._pins(card, member)
+
+    def _property(self, card: Card, number: int, kinds: tuple[str, ...]) -> Bar:
+        bar = self.bars.get(number)
+        if bar is None or bar.card.name not in kinds:
+            wanted = " or ".join(kinds)
+            raise card.error(f"there is no {wanted} {number}", f"the number of a {wanted}", "PID")
+        return bar
+
+    def _end(self, grid: Grid, offset: FloatArray, card: Card) -> str:
+        """Return the joint of an end of a bar: its grid, or a joint that is linked to it."""
+        if not offset.any():
+            return grid.name
+        key = (float(grid.name), *(float(v) for v in offset))
+        if key not in self.parts.offsets:
+            count = self.parts.arms[grid.name] = self.parts.arms.get(grid.name, 0) + 1
+            name = self._joint(f"{grid.name}.{count}", grid.xyz + offset)
+            self.parts.offsets[key] = name
+            self.parts.add("links", Link(grid.name, (name,)), card)
+        return self.parts.offsets[key]
+
+    def _orientation(self, card: Card, usual: Card | None, first: Grid, system: str) -> FloatArray:
+        """Return a vector in the plane 1 of a bar, in basic axes."""
+        source = card if usual is None or any(card.text(i) for i in (5, 6, 7)) else usual
+        if source.is_integer(5) and not source.text(6) and not source.text(7):
+            number = source.id(5, "G0")
+            if number not in self.grids:
+                raise card.error(f"there is no GRID {number}", "the number of a GRID", "G0")
+            return np.asarray(self.grids[number].xyz - first.xyz)
+        vector = np.array(source.vector(5, "X"))
+        if not vector.any():
+            raise card.error("no orientation vector", "X1, X2, X3 or G0", "X1")
+        return np.asarray(vector if system == "B" else vector @ first.axes)
+
+    def _pins(self, card: Card, member: Member) -> None:
+        """Let the ends of a bar go where pin flags say so."""
+        for number, key, joint in ((9, "PA", member.ends[0]), (10, "PB", member.ends[1])):
+            components = card.components(number, key)
+            if components:
+                released = {DIRECTIONS[int(digit) - 1]: 0.0 for digit in components}
+                self.parts.add("joint_springs", JointSpring(joint, member.name, released), card)
+        if card.name == "CBEAM" and any(card.real(i, "SA", 0.0) for i in (17, 18)):
+            raise card.error("warping", "no SA and SB", "SA")
+
+    def _rod(self, card: Card) -> None:
+        """Add a rod: a spring along its line, and half of its mass at either end."""
+        bar = self._property(card, card.id(2, "PID", card.id(1, "EID")), ("PROD",))
+        ends = [self.grid(card, 3 + i, f"G{i + 1}") for i in range(2)]
+        length = float(np.linalg.norm(ends[1].xyz - ends[0].xyz))
+        if not length > 0.0:
+            raise card.error("the rod has no length", "two grids apart", "G2")
+        if bar.of.J * bar.G > 0.0:
+            expected = "no J, or a CBAR"
+            raise bar.card.error("a rod that resists twist is not read", expected, "J")
+        brace = Brace((ends[0].name, ends[1].name), bar.E * bar.of.A / length)
+        self.parts.add("braces", brace, card)
+        half = 0.5 * self.weight * (bar.rho * bar.of.A + bar.of.nsm) * length
+        for grid in ends if half > 0.0 else ():
+            self.parts.add("masses", PointMass(Place(joint=grid.name), half), card)
+
+    def _spring(self, card: Card) -> None:
+        direct = card.name == "CELAS2"
+        stiffness = card.real(2, "K") if direct else self._of_pelas(card)
+        if stiffness < 0.0:
+            raise card.error(f"{stiffness:g}", "a stiffness >= 0", "K")
+        ends = []
+        for i in (3, 5):
+            if card.integer(i, "G", 0):
+                grid = self.grid(card, i, f"G{i // 2}")
+                component = card.components(i + 1, f"C{i // 2}")
+                motions = self._motions(grid, component, card, f"C{i // 2}")
+                if len(component) != 1:
+                    raise card.error(f"component {component!r}", "one of 1 to 6", f"C{i // 2}")
+                ends.append((grid, motions[0]))
+        if stiffness == 0.0:
+            return
+        if not ends:
+            raise card.error("no grid", "one grid or two", "G1")
+        if len(ends) == 1:
+            spring = GroundSpring(Place(joint=ends[0][0].name), ends[0][1], stiffness)
+            self.parts.add("springs", spring, card)
+            return
+        (first, one), (second, other) = ends
+        along = second.xyz - first.xyz
+        off = np.delete(np.abs(along), "xyz".index(one)) if one in "xyz" else np.ones(1)
+        if one != other or not off.max() <= _ALONG * np.abs(along).max():
+            expected = "to ground, or along the line between the two grids"
+            raise card.error("a spring between two grids across their line", expected)
+        self.parts.add("braces", Brace((first.name, second.name), stiffness), card)
+
+    def _pelas(self) -> dict[int, float]:
+        pairs = [(card, i) for card in self._cards("PELAS") for i in (1, 5) if card.text(i)]
+        return {card.id(i, "PID"): card.real(i + 1, "K") for card, i in pairs}
+
+    def _of_pelas(self, card: Card) -> float:
+        wanted = card.id(2, "PID", card.id(1, "EID"))
+        if wanted not in self.stiffnesses:
+            what = f"there is no PELAS {wanted}"
+            raise card.error(what, "the number of a PELAS", "PID")
+        return self.stiffnesses[wanted]
+
+    def _list(self, card: Card, first: int, key: str) -> list[int]:
+        """Return the grids of a list; raises InputError for more than any structure needs."""
+        found = card.numbers(first, key, self.sorted)
+        self.listed += len(found)
+        if self.listed > _MOST_CARDS:
+            raise card.error("the lists name too many grids", f"at most {_MOST_CARDS}", key)
+        return found
+
+    def _mass(self, card: Card) -> None:
+        grid = self.grid(card, 2, "G")
+        mass = self.weight * card.real(4, "M")
+        if mass < 0.0:
+            raise card.error(f"{mass:g}", "a mass >= 0", "M")
+        offset = np.array(card.vector(5, "X"))
+        axes = np.eye(3)
+        if card.text(3) == "-1":
+            offset = offset - grid.xyz
+        else:
+            system = self.systems.find(card.id(3, "CID", 0), card, "CID")
+            axes = system.axes_at(grid.xyz)
+            offset = offset @ axes
+        keys = ("I11", "I21", "I22", "I31", "I32", "I33")
+        values = [self.weight * card.real(9 + i, key, 0.0) for i, key in enumerate(keys)]
+        for m, shift in lumps(mass, values, axes, card):
+            x, y, z = (float(v) for v in offset + shift)
+            self.parts.add("masses", PointMass(Place(joint=grid.name), m, (x, y, z)), card)
+
+    def _link(self, card: Card) -> None:
+        """Add the rigid links of an RBE2; grids that follow in the same motions share one."""
+        leader = self.grid(card, 2, "GN")
+        components = card.components(3, "CM")
+        last = len(card.fields)
+        if last > 4 and not card.is_integer(last) and card.text(last) != "THRU":
+            last -= 1  # the coefficient of thermal expansion
+        listed = Card(card.name, card.fields[:last], card.file, card.first, card.last)
+        follows: dict[tuple[str, ...], list[str]] = {}
+        for number in self._list(listed, 4, "GM"):
+            grid = self._known(card, number, "GM")
+            motions = tuple(self._motions(grid, components, card, "CM"))
+            follows.setdefault(motions, []).append(grid.name)
+        if not components or not follows:
+            raise card.error("nothing follows", "components in CM and grids in GM", "CM")
+        for motions, names in follows.items():
+            link = Link(leader.name, tuple(names), () if len(motions) == 6 else motions)
+            self.parts.add("links", link, card)
+
+    def _supports(self) -> None:
+        """Hold what the constraints hold that case control chooses, or all where there is none."""
+        held: dict[str, set[str]] = {}
+        for grid, components, card in self._constraints():
+            if grid.name in self.parts.joints:
+                motions = self._motions(grid, components, card, "C")
+                held.setdefault(grid.name, set()).update(motions)
+        usual = next(self._cards("GRDSET"), None)
+        for grid in self.grids.values():
+            own = grid.card if grid.card.text(7) or usual is None else usual
+            if grid.name in self.parts.joints and own.text(7):
+                motions = self._motions(grid, own.components(7, "PS"), own, "PS")
+                held.setdefault(grid.name, set()).update(motions)
+        for name, stopped in held.items():
+            fixed = tuple(d for d in DIRECTIONS if d in stopped)
+            if fixed:
+                self.parts.supports.append(Support(Place(joint=name), fixed))
+
+    def _constraints(self) -> Iterator[tuple[Grid, str, Card]]:
+        cards = list(self._cards("SPC", "SPC1"))
+        sets = {card.id(1, "SID") for card in cards}
+        if "MPC" in self.deck.chosen:
+            what = "a set of MPC is chosen"
+            raise InputError(what, file=self.deck.file, expected="RBE2 instead")
+        if self.deck.controlled:
+            chosen = {self.deck.chosen["SPC"]} if "SPC" in self.deck.chosen else set()
+            for card in self._cards("SPCADD"):
+                if card.id(1, "SID") in chosen:
+                    chosen |= {card.id(i, "S") for i in range(2, len(card.fields) + 1)}
+            if chosen and not chosen & sets:
+                what = f"there is no SPC or SPC1 of set {min(chosen)}"
+                raise InputError(what, file=self.deck.file, expected="the set of case control")
+        elif len(sets) > 1:
+            what = f"{len(sets)} sets, and no case control that chooses one"
+            raise cards[-1].error(what, "one set, or SPC = n before BEGIN BULK", "SID")
+        else:
+            chosen = sets
+        for card in cards:
+            if card.id(1, "SID") in chosen:
+                yield from self._held_by(card)
+
+    def _held_by(self, card: Card) -> Iterator[tuple[Grid, str, Card]]:
+        if card.name == "SPC1":
+            components = card.components(2, "C")
+            numbers = self._list(card, 3, "G")
+            pairs = [(number, components) for number in numbers]
+        else:
+            rows = [i for i in (2, 5) if card.text(i)]
+            if any(card.real(i + 2, "D", 0.0) for i in rows):
+                raise card.error("a displacement that is not 0", "a grid that is held", "D")
+            pairs = [(card.id(i, "G"), card.components(i + 1, "C")) for i in rows]
+        for number, components in pairs:
+            if number not in self.grids:
+                raise card.error(f"there is no GRID {number}", "the number of a GRID", "G")
+            yield self.grids[number], components, card
+
+    def _check_held(self) -> None:
+        """Check that every joint is part of the structure; hold rotations that nothing resists."""
+        ends = {name for member in self.parts.members for name in member.ends}
+        linked = {name for link in self.parts.links for name in (link.leads, *link.follows)}
+        braced = {name for brace in self.parts.braces for name in brace.ends}
+        sprung: dict[str | None, set[str]] = {}
+        for spring in self.parts.springs:
+            sprung.setdefault(spring.at.joint, set()).add(spring.direction)
+        for name in self.parts.joints:
+            if name in ends or name in linked:
+                continue
+            if name not in braced and name not in sprung:
+                card = self.grids[int(name)].card
+                raise card.error("nothing holds this grid", "a bar, a rod, a spring or an RBE2")
+            idle = tuple(d for d in DIRECTIONS[3:] if d not in sprung.get(name, ()))
+            if idle:
+                self.parts.supports.append(Support(Place(joint=name), idle))
+
+    def _assembled(self) -> Frame:
+        parts = self.parts
+        if len(parts.members) > _MOST_MEMBERS or len(parts.joints) > _MOST_MEMBERS:
+            what, expected = f"{len(parts.members)} bars", f"at most {_MOST_MEMBERS}"
+            raise InputError(what, file=self.deck.file, expected=expected)
+        bars = {m.name: self.bars[self.pid[m.name]] for m in parts.members}
+        return Frame(
+            plane="3d",
+            beam="timoshenko" if any(b.has_shear for b in bars.values()) else "euler-bernoulli",
+            joints=tuple(sorted(parts.joints.values(), key=lambda j: self._order(j.name))),
+            members=tuple(parts.members),
+            masses=tuple(parts.masses),
+            springs=tuple(parts.springs),
+            supports=tuple(parts.supports),
+            joint_springs=tuple(parts.joint_springs),
+            links=tuple(parts.links),
+            braces=tuple(parts.braces),
+            factors=tuple(_factors(bars)),
+            families=_families(parts.members),
+        )
+
+    def _order(self, name: str) -> tuple[int, int]:
+        grid, _, number = name.partition(".")
+        return int(grid), int(number or 0)
+
+
+def _families(members: list[Member]) -> tuple[MemberSet, ...]:
+    """Return the members of every property and of every material."""
+    found: dict[str, list[str]] = {}
+    for kind in ("section", "material"):
+        for member in members:
+            found.setdefault(f"{kind}:{getattr(member, kind).name}", []).append(member.name)
+    return tuple(MemberSet(word, tuple(names)) for word, names in found.items())
+
+
+def _factors(bars: dict[str, Bar]) -> Iterator[Factor]:
+    """Return what makes members differ from material times section.
+
+    Mass without stiffness (NSM) adds to the translations alone; a bar without shear coefficients
+    bends as Euler's and Bernoulli's beam, also beside others.
+    """
+    timoshenko = any(bar.has_shear for bar in bars.values())
+    groups: dict[tuple[str, float], list[str]] = {}
+    for name, bar in bars.items():
+        if bar.of.nsm:
+            if not bar.rho > 0.0:
+                expected = "a MAT1 with RHO > 0 beside NSM"
+                raise bar.card.error("mass of a bar without density", expected, "NSM")
+            groups.setdefault(("rhoA", 1.0 + bar.of.nsm / (bar.rho * bar.of.A)), []).append(name)
+        if timoshenko and not bar.has_shear:
+            for quantity in ("shear", "rotary"):
+                groups.setdefault((quantity, 0.0), []).append(name)
+        elif timoshenko and not (bar.of.K1 > 0.0 and bar.of.K2 > 0.0):
+            expected = "both K1 and K2, or neither"
+            raise bar.card.error("shear in one plane alone", expected, "K1")
+    for (quantity, factor), names in groups.items():
+        yield Factor(quantity, tuple(names), factor)
+
+
+def lumps(
+    mass: float, moments: list[float], axes: FloatArray, card: Card
+) -> Iterator[tuple[float, FloatArray]]:
+    """Return point masses, each with its place from the centre, that have the moments of a body.
+
+    Pairs of a sixth of the mass lie on the principal axes, the rest in the centre.
+
+    Arguments:
+        mass: of the body.
+        moments: I11, I21, I22, I31, I32, I33 about its centre; products with their own sign.
+        axes: to which these belong, as rows, (3, 3).
+        card: for errors.
+
+    Raises:
+        InputError: where no body has such moments.
+    """
+    I11, I21, I22, I31, I32, I33 = moments
+    inertia = np.array([[I11, -I21, -I31], [-I21, I22, -I32], [-I31, -I32, I33]])
+    second, principal = np.linalg.eigh(0.5 * np.trace(inertia) * np.eye(3) - inertia)
+    largest = np.abs(second).max()
+    if largest > 0.0 and (second.min() < -_SAME * largest or not mass > 0.0):
+        expected = "a mass > 0 and moments of which none is larger than the sum of the others"
+        raise card.error("moments of inertia that no body has", expected, "I11")
+    rest = mass
+    for value, direction in zip(second, principal.T, strict=True):
+        if value > _SAME * largest:
+            arm = np.sqrt(3.0 * value / mass) * (direction @ axes)
+            rest -= mass / 3.0
+            yield mass / 6.0, arm
+            yield mass / 6.0, -arm
+    if rest > _SAME * mass:
+        yield rest, np.zeros(3)
