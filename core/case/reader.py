@@ -51,6 +51,7 @@ _EXPECTED = {
     "joint_springs": "a shorter one",
     "rigid_ends": "a shorter one",
     "links": "joints that follow one other joint each",
+    "supports": "a support of the joint that leads",
     "gravity": "a frame in plane or in space that stands or hangs",
     "preloads": "a member of a ring with all constants of its section",
 }
