@@ -234,6 +234,19 @@ class Scenario:
 class Reader(Protocol):
     """Reads a file format that the case format does not know by itself.
 
+    A reader may offer more than is asked here; what it reads is in the units of the file:
+
+    - ``read_model(path) -> Model``: mass, stiffness and labelled dofs, made by
+      `fem.matrix_model`, or `Model.of(frame)` where the file holds elements.
+    - ``read_pair(stiffness, mass) -> Model``: likewise, from two files, for a format that keeps
+      labels in each; without it `read_matrix` reads them.
+    - ``model_files(path) -> Sequence[Path]``: further files that `read_model` opens.
+    - ``read_nodes(path) -> Mapping[str, Sequence[float]]``: coordinates of nodes by name, for
+      models whose own files have none.
+    - ``write_model(model, path, original)``: writes an updated model in the format of
+      `original`, and keeps of it what an update does not change.
+    - ``write_matrix(matrix, path, original)``: likewise one matrix of a pair.
+
     Attributes:
         name: for messages, e.g. ``"universal file"``.
         suffixes: lower-case file suffixes with the dot.

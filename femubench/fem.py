@@ -1,6 +1,7 @@
 """Finite elements: frames and their parts, sections, beam matrices, what a model is made of."""
 
 from femubench.core.case.case import Modification
+from femubench.core.case.nodes import MatrixGeometry, matrix_model
 from femubench.core.errors import ModelError
 from femubench.core.fem.beam import (
     BeamProperties,
@@ -65,6 +66,7 @@ __all__ = [
     "JointSpring",
     "LowRank",
     "Material",
+    "MatrixGeometry",
     "Member",
     "MemberSet",
     "ModelError",
@@ -85,6 +87,7 @@ __all__ = [
     "eccentric_mass_parts",
     "gravity_stiffness",
     "mass_matrices",
+    "matrix_model",
     "member_axes",
     "preload_stiffness",
     "preload_stiffnesses",

@@ -102,7 +102,7 @@ def first_fault(error: ValidationError, schema: type[BaseModel]) -> Fault:
         return Fault(path, f"unknown key{hint}", f"one of {', '.join(owner.model_fields)}")
     if kind.startswith("union_tag"):
         what = "missing key" if kind == "union_tag_not_found" else f"unknown kind {_tag(value)}"
-        return Fault(("model", "kind"), what, "'frame' or 'matrices'")
+        return Fault(("model", "kind"), what, "'frame', 'matrices' or 'file'")
     if kind == "misfit":
         context: Mapping[str, Any] = found.get("ctx", {})
         return Fault(path, context["what"], context["expected"])

@@ -92,15 +92,43 @@ def read_matrix(file: Path, size: int, readers: Sequence[Reader]) -> SparseArray
     Raises:
         InputError: when it is not real, square, of that size, finite and symmetric.
     """
-    if file.name.lower().endswith(_MATRIX_MARKET):
-        matrix = _matrix_market(file, size)
-    else:
-        reader = reader_of(file, readers)
-        if reader is None:
-            known = [*_MATRIX_MARKET[:2], *(s for r in readers for s in r.suffixes)]
-            raise InputError("unknown kind of file", file=file, expected=", ".join(known))
-        with reading_with(reader, file):
-            matrix = sp.csc_array(reader.read_matrix(file))
+    return checked(matrix_of(file, readers, size), file, size)
+
+
+def matrix_of(file: Path, readers: Sequence[Reader], size: int | None = None) -> SparseArray:
+    """Return what a file holds as a matrix, with nothing checked but its size.
+
+    Arguments:
+        file: Matrix Market, or whatever one of the readers knows by its suffix.
+        readers: reader plugins.
+        size: the number of rows that a header must claim; None for any.
+    """
+    if is_matrix_market(file):
+        return _matrix_market(file, size)
+    reader = reader_of(file, readers)
+    if reader is None:
+        known = [*_MATRIX_MARKET[:2], *(s for r in readers for s in r.suffixes)]
+        raise InputError("unknown kind of file", file=file, expected=", ".join(known))
+    with reading_with(reader, file):
+        return sp.csc_array(reader.read_matrix(file))
+
+
+def is_matrix_market(file: Path) -> bool:
+    """Tell whether a file is one of Matrix Market; Abaqus calls its matrices ``.mtx`` too."""
+    name = file.name.lower()
+    if not name.endswith(_MATRIX_MARKET[0]):
+        return name.endswith(_MATRIX_MARKET)
+    with open_regular(file, LARGEST_FILE) as stream:
+        start = stream.read(64)
+    return start.startswith(b"%%") or not start.lstrip()[:1].isdigit()
+
+
+def checked(matrix: SparseArray, file: Path, size: int) -> SparseArray:
+    """Return what a file gave as a symmetric matrix.
+
+    Raises:
+        InputError: when it is not real, square, of that size, finite and symmetric.
+    """
     if matrix.shape != (size, size):
         what = f"the matrix has {matrix.shape[0]} rows and {matrix.shape[1]} columns"
         raise InputError(what, file=file, expected=f"{size} of both as in the dofs file")
@@ -150,16 +178,17 @@ def reading_with(reader: Reader, file: Path) -> Iterator[None]:
         raise InputError(what, file=file, expected=f"a file that {reader.name!r} reads") from error
 
 
-def _matrix_market(file: Path, size: int) -> SparseArray:
+def _matrix_market(file: Path, size: int | None) -> SparseArray:
     expected = "a Matrix Market file, coordinate or array, real, symmetric or general"
     try:
         with MatrixText(file) as text:
             rows, columns, entries, form, field, symmetry = scipy.io.mminfo(text)
         if field not in ("real", "integer") or symmetry not in ("general", "symmetric"):
             raise InputError(f"a matrix that is {field} {symmetry}", file=file, expected=expected)
-        if (rows, columns) != (size, size) or (form == "array" and size > _MOST_DENSE):
+        if (rows, columns) != (size or rows,) * 2 or (form == "array" and rows > _MOST_DENSE):
             what = f"the matrix has {rows} rows and {columns} columns"
-            raise InputError(what, file=file, expected=f"{size} of both as in the dofs file")
+            wanted = f"{size} of both as in the dofs file" if size else "a square matrix"
+            raise InputError(what, file=file, expected=wanted)
         # The header is believed when memory is taken for the entries.
         if form == "coordinate" and not 0 <= entries <= _MOST_ENTRIES:
             what = f"the matrix has {entries} entries"
@@ -170,7 +199,7 @@ def _matrix_market(file: Path, size: int) -> SparseArray:
         raise InputError(f"cannot be read: {error}", file=file, expected=expected) from None
 
 
-def matrix_model(spec: MatricesSpec, files: CaseFiles, readers: Sequence[Reader]) -> Model:
+def model_of_matrices(spec: MatricesSpec, files: CaseFiles, readers: Sequence[Reader]) -> Model:
     """Return the model of a case of kind ``matrices``.
 
     Raises:
@@ -184,12 +213,29 @@ def matrix_model(spec: MatricesSpec, files: CaseFiles, readers: Sequence[Reader]
     geometry = read_dofs(paths["dofs"])
     size = len(geometry.dofs)
     mass, stiffness = (read_matrix(paths[key], size, readers) for key in ("mass", "stiffness"))
-    check_unique((("groups", i, "name"), group.name) for i, group in enumerate(spec.groups))
-    groups: dict[str, SparseArray] = {}
-    for i, group in enumerate(spec.groups):
-        with at_key("groups", i):
-            groups[group.name] = _group(group, geometry, stiffness, files, readers)
+    groups = read_groups(spec.groups, geometry, stiffness, files, readers)
     return Model(mass, stiffness, geometry.dofs, geometry, groups=groups)
+
+
+def read_groups(
+    specs: Sequence[GroupSpec],
+    geometry: MatrixGeometry,
+    stiffness: SparseArray,
+    files: CaseFiles,
+    readers: Sequence[Reader],
+) -> dict[str, SparseArray]:
+    """Return the groups of a model by name, as `[[model.groups]]` gives them.
+
+    Raises:
+        Fault: with a path below `model`.
+        InputError: for what is wrong in one of the files.
+    """
+    check_unique((("groups", i, "name"), spec.name) for i, spec in enumerate(specs))
+    groups: dict[str, SparseArray] = {}
+    for i, spec in enumerate(specs):
+        with at_key("groups", i):
+            groups[spec.name] = _group(spec, geometry, stiffness, files, readers)
+    return groups
 
 
 def _group(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +16,7 @@ from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import GroundSpring, Place, PointMass, Vector
 from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.mesh import ON_MEMBER
-from femubench.core.fem.model import Dofs
+from femubench.core.fem.model import Dofs, Model
 from femubench.core.fem.sensors import DIRECTIONS, Sensors
 from femubench.core.typing import FloatArray, SparseArray
 
@@ -161,6 +161,56 @@ class MatrixGeometry:
         return sp.csr_array((values, (i_rows, columns)), shape=(3, len(self.dofs)))
 
 
+def matrix_model(
+    mass: SparseArray,
+    stiffness: SparseArray,
+    nodes: Sequence[object] | None = None,
+    directions: Sequence[str] | None = None,
+    xyz: FloatArray | None = None,
+    groups: Mapping[str, SparseArray] | None = None,
+) -> Model:
+    """Return a model of a pair of matrices with labelled rows.
+
+    Arguments:
+        mass, stiffness: symmetric, sparse or dense, (n, n) each.
+        nodes: the name of every row's node, (n,); None, with `directions`, where rows have no
+            labels, which a table must then give.
+        directions: one of x y z rx ry rz a row, (n,).
+        xyz: position of every row's node, (n, 3); None or nan where it is not known.
+        groups: named parts of the stiffness, (n, n) each.
+
+    Raises:
+        ModelError: when sizes differ, or a degree of freedom is there twice.
+
+    Examples:
+        >>> chain = fem.matrix_model(np.eye(2), 5.0 * np.eye(2), ["a", "b"], ["x", "x"])
+        >>> chain.geometry.rows["b", "x"]
+        1
+    """
+    n = mass.shape[0]
+    if nodes is None or directions is None:
+        nodes, directions = range(1, n + 1), ("",) * n
+    labels = [str(node) for node in nodes]
+    names = {label: i for i, label in enumerate(dict.fromkeys(labels))}
+    places = np.full((n, 3), np.nan) if xyz is None else np.asarray(xyz, dtype=float)
+    own = {} if groups is None else groups
+    shapes = {part.shape for part in (mass, stiffness, *own.values())}
+    if shapes != {(n, n)} or {len(labels), len(directions), len(places)} != {n}:
+        raise ModelError(f"matrices and labels differ in size from the {n} rows of the mass")
+    if len(set(zip(labels, directions, strict=True))) < n:
+        raise ModelError("a degree of freedom is there twice")
+    numbers = np.array([names[label] for label in labels], dtype=np.int64)
+    dofs = Dofs(numbers, tuple(directions), places)
+    parts = {name: sp.csc_array(part, dtype=float) for name, part in own.items()}
+    return Model(
+        mass=sp.csc_array(mass, dtype=float),
+        stiffness=sp.csc_array(stiffness, dtype=float),
+        dofs=dofs,
+        geometry=MatrixGeometry(tuple(names), dofs),
+        groups=parts,
+    )
+
+
 def read_dofs(file: Path) -> MatrixGeometry:
     """Return the dofs of a CSV file row,node,direction,x,y,z; rows count from 0 or from 1.
 
@@ -198,3 +248,20 @@ def read_dofs(file: Path) -> MatrixGeometry:
         xyz=np.array([places[node] for node, _ in order], dtype=float),
     )
     return MatrixGeometry(tuple(names), dofs, first)
+
+
+def read_nodes(file: Path) -> dict[str, Vector]:
+    """Return the places of nodes of a CSV file node,x,y,z.
+
+    Raises:
+        InputError: for a node listed twice, a number that is none.
+    """
+    table = read_table(file)
+    table.check_columns(("node", "x", "y", "z"))
+    places: dict[str, Vector] = {}
+    for row in table.rows:
+        node = row.text("node")
+        if node in places:
+            raise row.error("node", f"node {node!r} is listed twice", "every node once")
+        places[node] = row.vector()
+    return places

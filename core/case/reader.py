@@ -25,7 +25,8 @@ from femubench.core.case.faults import (
 )
 from femubench.core.case.files import LARGEST_CASE, CaseFiles
 from femubench.core.case.frames import FrameSite, Site, attachments, frame_of
-from femubench.core.case.matrices import matrix_model, reader_of, reading_with
+from femubench.core.case.matrices import model_of_matrices, reader_of, reading_with
+from femubench.core.case.model_files import model_of_file
 from femubench.core.case.modes import (
     NO_SENSORS,
     fitted_modes,
@@ -35,7 +36,7 @@ from femubench.core.case.modes import (
     seen_at,
 )
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.case.schema import CaseSpec, FrameSpec, ModificationSpec, parse_spec
+from femubench.core.case.schema import CaseSpec, FileSpec, FrameSpec, ModificationSpec, parse_spec
 from femubench.core.case.tables import read_sensors
 from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import Frame
@@ -168,8 +169,10 @@ class _Building:
     def model(self) -> Model:
         spec = self.spec.model
         with at_key("model"), np.errstate(all="ignore"):
+            if isinstance(spec, FileSpec):
+                return model_of_file(spec, self.files, self.readers)
             if not isinstance(spec, FrameSpec):
-                return matrix_model(spec, self.files, self.readers)
+                return model_of_matrices(spec, self.files, self.readers)
             frame = frame_of(spec)
             try:
                 model = Model.of(frame)

@@ -15,6 +15,7 @@ from femubench.core.case.case import BEAM_SHARE, TOLERANCE
 from femubench.core.fem.frame import BeamTheory, BendingMass, Place, Plane
 
 T = TypeVar("T")
+LengthUnit = Literal["m", "cm", "mm", "in", "ft"]
 LARGEST, SMALLEST = 1e30, 1e-30
 # What a terminal obeys or what turns the direction of writing: no name and no title has it.
 _CONTROL = r"\x00-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069"
@@ -282,7 +283,7 @@ class SetSpec(Table):
 class FrameSpec(Table):
     """`[model]` with ``kind = "frame"``."""
 
-    kind: Literal["frame"] = Field(description="'frame' or 'matrices'")
+    kind: Literal["frame"] = Field(description="'frame', 'matrices' or 'file'")
     plane: Plane = Field(description="'in-plane', 'out-of-plane' or '3d'")
     beam: BeamTheory = Field("euler-bernoulli", description="'euler-bernoulli' or 'timoshenko'")
     rotary_inertia: Share | None = Field(None, description=_SHARE)
@@ -327,10 +328,25 @@ class GroupSpec(Table):
 class MatricesSpec(Table):
     """`[model]` with ``kind = "matrices"``."""
 
-    kind: Literal["matrices"] = Field(description="'frame' or 'matrices'")
+    kind: Literal["matrices"] = Field(description="'frame', 'matrices' or 'file'")
     mass: FileName = Field(description="a matrix file in the case folder")
     stiffness: FileName = Field(description="a matrix file in the case folder")
     dofs: FileName = Field(description="a CSV file: row,node,direction,x,y,z")
+    groups: Many[GroupSpec] = Field(
+        (), max_length=1000, description="tables [[model.groups]], 1000 at most"
+    )
+
+
+class FileSpec(Table):
+    """`[model]` with ``kind = "file"``."""
+
+    kind: Literal["file"] = Field(description="'frame', 'matrices' or 'file'")
+    file: FileName = Field(description="a file with a model, or with its stiffness, in quotes")
+    mass: FileName | None = Field(None, description="a matrix file in the case folder")
+    dofs: FileName | None = Field(
+        None, description="a CSV file row,node,direction,x,y,z or node,x,y,z, or a file with nodes"
+    )
+    unit: LengthUnit = Field("m", description=f"one of {', '.join(get_args(LengthUnit))}")
     groups: Many[GroupSpec] = Field(
         (), max_length=1000, description="tables [[model.groups]], 1000 at most"
     )
@@ -400,7 +416,7 @@ class CaseSpec(Table):
     """The whole of `case.toml`."""
 
     case: CaseInfo = Field(description="the table [case]")
-    model: Annotated[FrameSpec | MatricesSpec, Field(discriminator="kind")] = Field(
+    model: Annotated[FrameSpec | MatricesSpec | FileSpec, Field(discriminator="kind")] = Field(
         description="the table [model]"
     )
     measurement: MeasurementSpec = Field(description="the table [measurement]")

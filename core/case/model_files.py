@@ -1,0 +1,202 @@
+"""Models that come in the files of other programs: read by plugins, labelled, converted to SI."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from femubench.core.case.faults import at_key
+from femubench.core.case.files import CaseFiles
+from femubench.core.case.matrices import (
+    checked,
+    is_matrix_market,
+    matrix_of,
+    read_groups,
+    reader_of,
+    reading_with,
+)
+from femubench.core.case.nodes import (
+    MatrixGeometry,
+    matrix_model,
+    read_dofs,
+    read_nodes,
+)
+from femubench.core.case.schema import FileSpec, LengthUnit
+from femubench.core.case.tables import read_table
+from femubench.core.case.units import in_si
+from femubench.core.errors import InputError
+from femubench.core.fem.model import Model
+from femubench.core.roles import Reader
+
+_TABLES = (".csv", ".txt")
+_LABELS = "dofs: a table row,node,direction,x,y,z"
+_PLACES = "dofs: a table node,x,y,z, or a file with nodes"
+
+
+@dataclass(frozen=True)
+class ModelFiles:
+    """The files that give a model.
+
+    Arguments:
+        model: a whole model, or its stiffness alone.
+        mass: the mass where `model` has the stiffness alone.
+        dofs: labels or coordinates that the other files lack: a table
+            row,node,direction,x,y,z or node,x,y,z, or a file from which a reader reads nodes.
+    """
+
+    model: Path
+    mass: Path | None = None
+    dofs: Path | None = None
+
+
+def read_model(paths: ModelFiles, readers: Sequence[Reader], unit: LengthUnit = "m") -> Model:
+    """Return the model that files hold, in SI, with a label and a place for every row.
+
+    Arguments:
+        paths: the files.
+        readers: reader plugins, of which the suffix of a file chooses one.
+        unit: of the lengths in all of the files; see `units.in_si` for masses and forces.
+
+    Raises:
+        InputError: for a kind of file that no reader reads a model from, and all that is wrong
+            in the files.
+    """
+    return in_si(read_as_it_is(paths, readers), unit)
+
+
+def read_as_it_is(paths: ModelFiles, readers: Sequence[Reader]) -> Model:
+    """Return the model that files hold, in their units.
+
+    Raises:
+        InputError: as in `read_model`.
+    """
+    model = _read(paths, readers)
+    if not isinstance(model.geometry, MatrixGeometry):
+        return model
+    mass = checked(model.mass, paths.mass or paths.model, model.size)
+    stiffness = checked(model.stiffness, paths.model, model.size)
+    return _labelled(replace(model, mass=mass, stiffness=stiffness), paths, readers)
+
+
+def further_files(path: Path, readers: Sequence[Reader]) -> tuple[Path, ...]:
+    """Return the files that are opened besides a model's own, e.g. those that it includes.
+
+    Raises:
+        InputError: for a file that no reader reads.
+    """
+    reader = _reader(path, readers)
+    if not hasattr(reader, "model_files"):
+        return ()
+    with reading_with(reader, path):
+        return tuple(Path(further) for further in reader.model_files(path))
+
+
+def model_of_file(spec: FileSpec, files: CaseFiles, readers: Sequence[Reader]) -> Model:
+    """Return the model of a case of kind ``file``.
+
+    Raises:
+        Fault: with a path below `model`.
+        InputError: for what is wrong in one of the files.
+    """
+    found: dict[str, Path] = {}
+    for key in ("file", "mass", "dofs"):
+        if (name := getattr(spec, key)) is None:
+            continue
+        with at_key(key):
+            found[key] = files.path(name)
+            for further in further_files(found[key], readers):
+                files.path(os.path.relpath(further, files.folder))
+    paths = ModelFiles(found["file"], found.get("mass"), found.get("dofs"))
+    model = read_as_it_is(paths, readers)
+    if spec.groups and isinstance(model.geometry, MatrixGeometry):
+        groups = read_groups(spec.groups, model.geometry, model.stiffness, files, readers)
+        model = replace(model, groups={**model.groups, **groups})
+    return in_si(model, spec.unit)
+
+
+def _read(paths: ModelFiles, readers: Sequence[Reader]) -> Model:
+    """Return what the readers read, in the units of the files, maybe without labels or places."""
+    reader = _reader(paths.model, readers)
+    if paths.mass is not None:
+        own = _reader(paths.mass, readers)
+        if own is reader and hasattr(reader, "read_pair"):
+            with reading_with(reader, paths.model):
+                return _a_model(reader.read_pair(paths.model, paths.mass), paths.model)
+        stiffness = matrix_of(paths.model, readers)
+        mass = matrix_of(paths.mass, readers)
+        if stiffness.shape != mass.shape:
+            what = f"the matrix has {mass.shape[0]} rows"
+            expected = f"{stiffness.shape[0]} as in {paths.model.name}"
+            raise InputError(what, file=paths.mass, expected=expected)
+        return matrix_model(mass, stiffness)
+    if not hasattr(reader, "read_model"):
+        known = [s for r in readers if hasattr(r, "read_model") for s in r.suffixes]
+        expected = f"{', '.join(known)}; or one with the stiffness, beside one with the mass"
+        raise InputError(
+            "no model is read from this kind of file", file=paths.model, expected=expected
+        )
+    with reading_with(reader, paths.model):
+        return _a_model(reader.read_model(paths.model), paths.model)
+
+
+def _reader(file: Path, readers: Sequence[Reader]) -> Any:  # noqa: ANN401 - of optional members
+    """Return the reader of a file, None for one of Matrix Market and for an unknown kind."""
+    return None if is_matrix_market(file) else reader_of(file, readers)
+
+
+def _a_model(found: object, file: Path) -> Model:
+    if not isinstance(found, Model):
+        raise InputError(f"the reader gave {type(found).__name__}", file=file, expected="a Model")
+    return found
+
+
+def _labelled(model: Model, paths: ModelFiles, readers: Sequence[Reader]) -> Model:
+    """Return the model with the labels and places that a file besides gives."""
+    geometry = model.geometry
+    assert isinstance(geometry, MatrixGeometry)
+    if paths.dofs is not None:
+        if paths.dofs.suffix.lower() not in _TABLES:
+            geometry = _placed(geometry, _nodes_of(paths.dofs, readers), paths.dofs)
+        elif "row" not in read_table(paths.dofs).columns:
+            geometry = _placed(geometry, read_nodes(paths.dofs), paths.dofs)
+        else:
+            geometry = read_dofs(paths.dofs)
+            if len(geometry.dofs) != model.size:
+                what, expected = f"{len(geometry.dofs)} rows", f"{model.size} as in the matrices"
+                raise InputError(what, file=paths.dofs, expected=expected)
+    if "" in geometry.dofs.direction:
+        raise InputError("the rows have no labels", file=paths.model, expected=_LABELS)
+    lost = np.flatnonzero(~np.isfinite(geometry.dofs.xyz).all(axis=1))
+    if len(lost):
+        what = f"node {geometry.names[geometry.dofs.node[lost[0]]]!r} has no coordinates"
+        raise InputError(what, file=paths.dofs or paths.model, expected=_PLACES)
+    return replace(model, dofs=geometry.dofs, geometry=geometry)
+
+
+def _nodes_of(file: Path, readers: Sequence[Reader]) -> dict[str, Sequence[float]]:
+    reader = _reader(file, readers)
+    if not hasattr(reader, "read_nodes"):
+        known = [s for r in readers if hasattr(r, "read_nodes") for s in r.suffixes]
+        expected = ", ".join([*_TABLES, *known])
+        raise InputError("no nodes are read from this kind of file", file=file, expected=expected)
+    with reading_with(reader, file):
+        return dict(reader.read_nodes(file))
+
+
+def _placed(
+    geometry: MatrixGeometry, places: Mapping[str, Sequence[float]], file: Path
+) -> MatrixGeometry:
+    """Return a geometry with coordinates by the names of nodes; nan where there are none."""
+    xyz = geometry.dofs.xyz.copy()
+    for i, node in enumerate(geometry.dofs.node):
+        if geometry.names[node] in places:
+            xyz[i] = places[geometry.names[node]]
+    if not np.isfinite(xyz).any():
+        what = f"no node is called as in the matrices, e.g. {geometry.names[0]!r}"
+        raise InputError(what, file=file, expected="coordinates of the same nodes")
+    return replace(geometry, dofs=replace(geometry.dofs, xyz=xyz))
