@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from femubench.core.case.case import Case, Modification
-from femubench.core.case.checks import check_unique
+from femubench.core.case.checks import FREE_YET_HELD, NOT_HELD, check_unique
 from femubench.core.case.faults import (
     Fault,
     KeyPath,
@@ -170,9 +170,9 @@ class _Building:
         spec = self.spec.model
         with at_key("model"), np.errstate(all="ignore"):
             if isinstance(spec, FileSpec):
-                return model_of_file(spec, self.files, self.readers)
+                return known_free(model_of_file(spec, self.files, self.readers), spec.free)
             if not isinstance(spec, FrameSpec):
-                return model_of_matrices(spec, self.files, self.readers)
+                return known_free(model_of_matrices(spec, self.files, self.readers), spec.free)
             frame = frame_of(spec)
             try:
                 model = Model.of(frame)
@@ -293,6 +293,21 @@ class _Building:
                 raise Fault((), str(error), "a change that the model can take") from None
         measurement = self.modes(("modification", i, "modes"), spec.modes, sensors)
         return Modification(spec.name, masses, springs, measurement)
+
+
+def known_free(model: Model, free: bool) -> Model:
+    """Return a model of which it is known whether it hangs free.
+
+    Raises:
+        Fault: when its supports say otherwise.
+    """
+    if not free or model.structure is None:
+        return replace(model, free=free)
+    frame = replace(model.structure.frame, free=True)
+    if frame.supports:
+        raise Fault(("free",), FREE_YET_HELD, NOT_HELD)
+    structure = model.structure.rebuilt(frame)
+    return replace(model, free=True, structure=structure, geometry=structure)
 
 
 def check_labels(
