@@ -10,7 +10,7 @@ from femubench.core.look.modes import Seen
 from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.schema.diagnosis import LookWarning
 
-_SOFT = 1.0 / 3.0  # of the first elastic frequency: a suspension changes it by some per cent
+_SOFT = 0.5  # of the first elastic frequency: the softer half still changes it by some per cent
 
 
 def look_at_freedom(seen: Seen) -> list[LookWarning]:
