@@ -5,13 +5,24 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from femubench.core.effect.attachments import total_mass
-from femubench.core.fem.frame import Frame, Material, Place, Support
+from femubench.core.fem.frame import (
+    Frame,
+    GroundSpring,
+    Joint,
+    Link,
+    Material,
+    Member,
+    Place,
+    Support,
+)
+from femubench.core.fem.joints import whole_members
 from femubench.core.fem.model import Model
 from femubench.core.fem.sections import (
     Section,
@@ -220,6 +231,58 @@ def test_stubby_members_are_named(hframe: FrameBuilder) -> None:
     model = Model.of(with_section(hframe(mesh=(6, 3, 5), accelerometers=False), section))
     (warning,) = texts(look(model, measured(model, 3)), "times their height")
     assert warning.where == "lower1, lower2"
+
+
+def wing(cuts: int, width: float, height: float, *, link: bool = False) -> Frame:
+    """Return a spar in many pieces, free, with a fuselage that it may stand off by a link."""
+    names = [f"w{k}" for k in range(cuts + 1)]
+    joints = [Joint(n, (0.0, 2.0 * k / cuts - 1.0, 0.1 * link)) for k, n in enumerate(names)]
+    middle = names[cuts // 2]
+    joints += [Joint("nose", (1.0, 0.0, 0.0)), Joint("tail", (-1.0, 0.0, 0.0))]
+    spar, rod = solid_rectangle(width, height), solid_rectangle(0.04, 0.04)
+    metal = Material(72e9, 0.3, 2700.0)
+    members = [
+        Member(f"m{k}", (a, b), 1, spar, metal, (0.0, 0.0, 1.0))
+        for k, (a, b) in enumerate(pairwise(names))
+    ]
+    body = "body" if link else middle
+    joints += [Joint("body", (0.0, 0.0, 0.0))] if link else []
+    members += [Member(f"{end}-rod", (body, end), 4, rod, metal) for end in ("nose", "tail")]
+    links = (Link("body", (middle,)),) if link else ()
+    return Frame("3d", "timoshenko", tuple(joints), tuple(members), links=links)
+
+
+@pytest.mark.parametrize("link", [False, True])
+def test_a_thin_wing_in_many_pieces_is_slender(link: bool) -> None:
+    model = Model.of(wing(38, 0.1, 0.01, link=link))
+    assert len(whole_members(model.frame_structure.frame)) == 4
+    assert not texts(look(model, measured(model, 3)), "times their height")
+
+
+def test_the_height_is_that_of_the_direction_of_bending() -> None:
+    flat, upright = (Model.of(wing(2, *sizes)) for sizes in ((0.16, 0.02), (0.02, 0.16)))
+    assert not texts(look(flat, measured(flat, 3)), "times their height")
+    (warning,) = texts(look(upright, measured(upright, 7)), "times their height")
+    assert "2 of 4 members" in warning.what
+    assert warning.where == "m0, m1"
+
+
+def test_pieces_of_a_short_member_are_named_together() -> None:
+    model = Model.of(wing(8, 0.02, 0.16))
+    (warning,) = texts(look(model, measured(model, 12)), "times their height")
+    assert warning.what.startswith("2 of 4 members")
+    assert warning.where == ", ".join(f"m{k}" for k in range(8))
+
+
+def test_what_holds_a_structure_that_hangs_free_is_said() -> None:
+    frame = replace(wing(4, 0.1, 0.01), free=True)
+    for stiffness, held in ((20.0, False), (5e4, True)):
+        springs = tuple(GroundSpring(Place(joint="w2"), d, stiffness) for d in "xyz")
+        source = Model.of(replace(frame, springs=springs))
+        for model in (source, replace(source, structure=None)):
+            found = texts(look(model, measured(source, 8)), "hang free")
+            assert bool(found) == held
+    assert not texts(look(Model.of(frame), measured(Model.of(frame), 3)), "hang free")
 
 
 @pytest.mark.parametrize(

@@ -27,8 +27,8 @@ def code(path: Path) -> list[str]:
     return ["\n".join(x for x in cell.splitlines() if x[:1] != "%") for cell in cells]
 
 
-def test_there_are_six() -> None:
-    assert [path.name[0] for path in NOTEBOOKS] == list("123456")
+def test_there_are_seven() -> None:
+    assert [path.name[0] for path in NOTEBOOKS] == list("1234567")
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

@@ -121,7 +121,7 @@ def stress(structure: Structure, force: Any, moment: Any) -> StressState:
     count = len(structure.mesh.ends)
     none = np.zeros((0, 3))
     rows = [np.broadcast_to(v, (count, 3)) for v in (force, moment)]
-    return StressState(rows[0], rows[1], none, none, np.zeros(0))
+    return StressState(rows[0], rows[1], none, none, none, np.zeros(0))
 
 
 def buckling(structure: Structure, state: StressState) -> float:

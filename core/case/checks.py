@@ -13,6 +13,8 @@ from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.nominal import MAY_VANISH
 from femubench.core.typing import FloatArray
 
+FREE_YET_HELD = "the structure hangs free, yet supports hold it"
+NOT_HELD = "free = false, or no supports"
 _MOST_ELEMENTS = 100_000
 # A planar frame moves its masses in its own directions, so that an offset along it does nothing.
 _NORMAL: dict[Plane, str] = {"in-plane": "y", "out-of-plane": "z"}
@@ -76,6 +78,8 @@ def check_frame(model: FrameSpec) -> None:
     """Check names, geometry and connections; raises Fault with a path below `model`."""
     check_unique((("joints", i, "name"), joint.name) for i, joint in enumerate(model.joints))
     check_unique((("members", i, "name"), member.name) for i, member in enumerate(model.members))
+    if model.free and model.supports:
+        raise Fault(("free",), FREE_YET_HELD, NOT_HELD)
     _check_links(model)
     _check_joints(model)
     _check_members(model)

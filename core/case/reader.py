@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from femubench.core.case.case import Case, Match, Modification
-from femubench.core.case.checks import check_unique
+from femubench.core.case.checks import FREE_YET_HELD, NOT_HELD, check_unique
 from femubench.core.case.deviations import with_floor
 from femubench.core.case.faults import (
     Fault,
@@ -58,6 +58,7 @@ _EXPECTED = {
     "joint_springs": "a shorter one",
     "rigid_ends": "a shorter one",
     "links": "joints that follow one other joint each",
+    "supports": "a support of the joint that leads",
     "gravity": "a frame in plane or in space that stands or hangs",
     "preloads": "a member of a ring with all constants of its section",
 }
@@ -180,9 +181,9 @@ class _Building:
         spec = self.spec.model
         with at_key("model"), np.errstate(all="ignore"):
             if isinstance(spec, FileSpec):
-                return model_of_file(spec, self.files, self.readers)
+                return known_free(model_of_file(spec, self.files, self.readers), spec.free)
             if not isinstance(spec, FrameSpec):
-                return model_of_matrices(spec, self.files, self.readers)
+                return known_free(model_of_matrices(spec, self.files, self.readers), spec.free)
             frame = frame_of(spec)
             try:
                 model = Model.of(frame)
@@ -356,6 +357,21 @@ class _Building:
                 raise Fault((), str(error), "a change that the model can take") from None
         measurement = self.modes(("modification", i, "modes"), spec.modes, sensors)
         return Modification(spec.name, masses, springs, measurement)
+
+
+def known_free(model: Model, free: bool) -> Model:
+    """Return a model of which it is known whether it hangs free.
+
+    Raises:
+        Fault: when its supports say otherwise.
+    """
+    if not free or model.structure is None:
+        return replace(model, free=free)
+    frame = replace(model.structure.frame, free=True)
+    if frame.supports:
+        raise Fault(("free",), FREE_YET_HELD, NOT_HELD)
+    structure = model.structure.rebuilt(frame)
+    return replace(model, free=True, structure=structure, geometry=structure)
 
 
 def check_labels(

@@ -332,6 +332,7 @@ class MatricesSpec(Table):
     mass: FileName = Field(description="a matrix file in the case folder")
     stiffness: FileName = Field(description="a matrix file in the case folder")
     dofs: FileName = Field(description="a CSV file: row,node,direction,x,y,z")
+    free: bool = Field(False, strict=True, description="true or false")
     groups: Many[GroupSpec] = Field(
         (), max_length=1000, description="tables [[model.groups]], 1000 at most"
     )
@@ -347,6 +348,7 @@ class FileSpec(Table):
         None, description="a CSV file row,node,direction,x,y,z or node,x,y,z, or a file with nodes"
     )
     unit: LengthUnit = Field("m", description=f"one of {', '.join(get_args(LengthUnit))}")
+    free: bool = Field(False, strict=True, description="true or false")
     groups: Many[GroupSpec] = Field(
         (), max_length=1000, description="tables [[model.groups]], 1000 at most"
     )

@@ -221,6 +221,8 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
         Fault: for what no case folder can say.
     """
     keys, files, modifications = _model_part(case, known)
+    if case.model.free:
+        keys = {"kind": keys["kind"], "free": True, **keys}
     share = common_share(_measurements(case), known.shape_std)
     measurement: Keys = {"modes": "modes.csv", "shape_std": share}
     if len(case.measurement.sensors):

@@ -14,12 +14,17 @@ from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 
 def check_attachments(frame: Frame) -> None:
-    """Check braces and oscillators.
+    """Check braces, oscillators and the motions of links.
 
     Raises:
-        ModelError: for a brace out of plane or without two joints, or an oscillator without mass
-            or frequency or in a direction that is no translation of the plane.
+        ModelError: for a motion of a link that the plane does not have, a brace out of plane or
+            without two joints, or an oscillator without mass or frequency or in a direction that
+            is no translation of the plane.
     """
+    for link in frame.links:
+        if not set(link.motions) <= set(ACTIVE[frame.plane]):
+            what = f"a link has the motions {', '.join(ACTIVE[frame.plane])} in this plane"
+            raise ModelError(what, link)
     for brace in frame.braces:
         if frame.plane == "out-of-plane":
             raise ModelError("a brace does nothing out of plane", brace)

@@ -72,6 +72,31 @@ def _roles(frame: Frame, joint: str) -> dict[str, str]:
     return {member.name: "end" for member in members}
 
 
+def whole_members(frame: Frame) -> tuple[tuple[str, ...], ...]:
+    """Return the members between real joints, each as the pieces that it is described by.
+
+    A joint is none where two collinear members of one section and material meet, and nothing
+    but masses is attached.
+    """
+    real = {name for link in frame.links for name in (link.leads, *link.follows)}
+    real |= {item.at.joint for item in frame.supports if item.at.joint is not None}
+    real |= {spring.joint for spring in frame.joint_springs}
+    real |= {name for brace in frame.braces for name in brace.ends}
+    whole = {member.name: [member.name] for member in frame.members}
+    for joint in frame.joints:
+        pair = _members_at(frame, joint.name)
+        if len(pair) != 2 or joint.name in real:
+            continue
+        one, other = pair
+        alike = one.section == other.section and one.material == other.material
+        straight = _outward(frame, one, joint.name) @ _outward(frame, other, joint.name)
+        if alike and straight < _COLLINEAR and whole[one.name] is not whole[other.name]:
+            whole[one.name] += whole[other.name]
+            for name in whole[other.name]:
+                whole[name] = whole[one.name]
+    return tuple(tuple(pieces) for name, pieces in whole.items() if pieces[0] == name)
+
+
 def joint_groups(frame: Frame, *, merged: bool = False) -> tuple[JointGroup, ...]:
     """Return the member ends at joints, by joint type and role.
 

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from femubench.core.errors import ModelError
 from femubench.core.fem.beam import BeamProperties, shape_functions
 from femubench.core.fem.frame import ACTIVE, Frame, Place
-from femubench.core.fem.links import Linkage, held_leaders, linkage, rigid_arm
+from femubench.core.fem.links import Linkage, linkage, rigid_arm
 from femubench.core.fem.mesh import ON_MEMBER, SAME_STATION, Connection, Mesh, member_axes
 from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
@@ -29,6 +29,9 @@ class Kinematics:
         direction: its direction, (n,).
         axes: its unit motion in (x, y, z, rx, ry, rz), (n, 6).
         active: which of x, y, z, rx, ry, rz may move at all, (6,).
+        unused: displacements of joints at which no member ends and of which no link makes use,
+            (k,).
+        bodies: joints that follow in all their motions, and what leads them, (l, 2).
     """
 
     transform: SparseArray
@@ -36,6 +39,8 @@ class Kinematics:
     direction: tuple[str, ...]
     axes: FloatArray
     active: BoolArray
+    unused: IntArray
+    bodies: IntArray
 
 
 def rigid_motions(xyz: FloatArray, axes: FloatArray) -> FloatArray:
@@ -145,35 +150,34 @@ def build_kinematics(
             raise ModelError(what, support)
         held[node, [DIRECTIONS.index(name) for name in support.fixed]] = True
     free &= ~held
-    tie = _tie(frame, free, held, active) if frame.links else None
+    tie, unused = _tie(frame, free, held, active) if frame.links else (None, np.zeros(0, int))
     own: list[tuple[int, FloatArray, tuple[str, ...]]] = []  # node, (6, k) basis, labels
     for node in hanging:
         free[node] = False
         own.append((node, *_own_motion(hanging[node], active)))
-    return _assemble_transform(mesh, free, own, hanging, active, tie)
+    return _assemble_transform(mesh, free, own, hanging, active, tie, unused)
 
 
-def _tie(frame: Frame, free: BoolArray, held: BoolArray, active: BoolArray) -> Linkage:
-    """Return the rigid links of a frame; what they lead or hold is free no more.
-
-    A joint at which no member ends moves only as far as a link makes use of it.
-    """
+def _tie(
+    frame: Frame, free: BoolArray, held: BoolArray, active: BoolArray
+) -> tuple[Linkage, IntArray]:
+    """Return the rigid links of a frame, and what is unused; what follows is free no more."""
     names, count = list(frame.joint_index), len(frame.joints)
-    tie = linkage(frame.links, names, frame.corners, active, held[:count])
+    tie = linkage(frame.links, names, frame.corners, active)
+    both = np.argwhere(held[:count] & tie.led)
+    if len(both):
+        name = names[both[0, 0]]
+        support = next(s for s in frame.supports if s.at.joint == name)
+        raise ModelError(f"a support holds joint {name!r}, which follows another", support)
     joints = free[:count]
     joints[tie.led] = False
     linked = {name for link in frame.links for name in (link.leads, *link.follows)}
     bare = [i for i, name in enumerate(names) if name in linked and not frame.ends_at(name)]
     used = np.asarray((np.abs(tie.spread) > _NO_ARM).sum(axis=0)).reshape(-1, 6) > 1
-    joints[bare] &= used[bare]
-    stopped = held_leaders(tie, joints, held[:count])
-    if stopped is None:
-        followers = {name for link in frame.links for name in link.follows}
-        support = next(item for item in frame.supports if item.at.joint in followers)
-        what = f"what the support at {support.at} holds is a mixture of motions of what leads it"
-        raise ModelError(what, support)
-    joints[stopped] = False
-    return tie
+    idle = np.zeros(joints.shape, dtype=bool)
+    idle[bare] = joints[bare] & ~used[bare]
+    joints[idle] = False
+    return tie, np.flatnonzero(idle)
 
 
 def _support_node(frame: Frame, mesh: Mesh, place: Place) -> int | None:
@@ -214,6 +218,7 @@ def _assemble_transform(
     hanging: dict[int, Connection],
     active: BoolArray,
     tie: Linkage | None,
+    unused: IntArray,
 ) -> Kinematics:
     size = 6 * len(mesh.xyz)
     flat = np.flatnonzero(free.ravel())
@@ -253,4 +258,6 @@ def _assemble_transform(
         direction=tuple(direction[i] for i in order),
         axes=axes[order],
         active=active,
+        unused=unused,
+        bodies=np.zeros((0, 2), dtype=np.int64) if tie is None else tie.bodies,
     )

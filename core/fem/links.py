@@ -30,34 +30,30 @@ class Linkage:
     Arguments:
         spread: sparse, (6 n, 6 n); rows of what leads itself are those of the unit matrix.
         led: whether a displacement follows from others, (n, 6).
+        bodies: joints that follow in all their motions, and what leads them in the end, (l, 2).
     """
 
     spread: SparseArray
     led: BoolArray
+    bodies: IntArray
 
 
 def linkage(
-    links: Sequence[Link],
-    names: Sequence[str],
-    xyz: FloatArray,
-    active: BoolArray,
-    held: BoolArray,
+    links: Sequence[Link], names: Sequence[str], xyz: FloatArray, active: BoolArray
 ) -> Linkage:
     """Return what rigid links tie together.
 
-    A joint that follows in all its motions is one body with its leader, and so are those that
-    follow it in turn. Where another joint of such a body than its leader is held, that one leads.
+    What follows a joint takes part in all six of its motions, so that a rigid body stays one.
 
     Arguments:
         links: the rigid links.
         names: the joints, or nodes, in the order of the displacements.
         xyz: where they are in m, (n, 3).
         active: which of x, y, z, rx, ry, rz may move at all, (6,).
-        held: which displacements supports hold, (n, 6).
 
     Raises:
-        ModelError: for a joint or a motion that is not there, a joint that follows two others in
-            one motion, or links that go round in a circle.
+        ModelError: for a joint that is not there, one that follows two others in one motion, or
+            links that go round in a circle.
     """
     index = {name: i for i, name in enumerate(names)}
     leader = np.full((len(names), 6), -1)
@@ -67,56 +63,40 @@ def linkage(
             if name not in index:
                 raise ModelError(f"there is no joint {name!r}", link)
         for name in link.follows:
-            other = leader[index[name], motions].max()
+            other = int(leader[index[name], motions].max(initial=-1))
             if other >= 0:
                 what = f"joint {name!r} follows {names[other]!r} and {link.leads!r}"
                 raise ModelError(what, link)
             leader[index[name], motions] = index[link.leads]
-    order = _order(leader, names, links)
-    leader = _led_by_the_held(leader, order, active, held)
-    return Linkage(_spread(leader, xyz, active), leader >= 0)
+    _check_rings(leader, names, links)
+    bodies = np.array([(i, _root(leader, i, active)) for i in range(len(names))])
+    bodies = bodies[bodies[:, 0] != bodies[:, 1]]
+    return Linkage(_spread(leader, xyz, active), leader >= 0, bodies)
+
+
+def _root(leader: IntArray, joint: int, active: BoolArray) -> int:
+    """Return the joint at the end of the chain of those that lead in all motions."""
+    own = np.unique(leader[joint, active])
+    return _root(leader, int(own[0]), active) if len(own) == 1 and own[0] >= 0 else joint
 
 
 def _motions(link: Link, active: BoolArray) -> IntArray:
-    wrong = [d for d in link.motions if d not in DIRECTIONS or not active[DIRECTIONS.index(d)]]
-    if wrong:
-        raise ModelError(f"a link has no motion {wrong[0]!r} in this plane", link)
-    wanted = [d in link.motions for d in DIRECTIONS] if link.motions else active
-    return np.flatnonzero(wanted)
+    wanted = np.isin(DIRECTIONS, link.motions) if link.motions else active
+    return np.flatnonzero(wanted & active)
 
 
-def _order(leader: IntArray, names: Sequence[str], links: Sequence[Link]) -> list[int]:
-    """Return the joints that have to do with links, what leads before what follows."""
+def _check_rings(leader: IntArray, names: Sequence[str], links: Sequence[Link]) -> None:
+    """Raise where a joint follows, by way of others, itself."""
     graph = {
         int(i): {int(j) for j in leader[i] if j >= 0} for i in np.flatnonzero((leader >= 0).any(1))
     }
     try:
-        return list(TopologicalSorter(graph).static_order())
+        TopologicalSorter(graph).prepare()
     except CycleError as error:
         ring = [names[i] for i in error.args[1]]
         item = next(link for link in links if link.leads in ring)
         what = f"the links go round in a circle: {', '.join(ring)}"
         raise ModelError(what, item) from None
-
-
-def _led_by_the_held(
-    leader: IntArray, order: Sequence[int], active: BoolArray, held: BoolArray
-) -> IntArray:
-    """Return the leaders such that in every body the joint leads that supports hold most."""
-    root: dict[int, int] = {}
-    for i in order:
-        own = np.unique(leader[i, active])
-        whole = len(own) == 1 and own[0] >= 0
-        root[i] = root[int(own[0])] if whole else i
-    found = leader.copy()
-    for first in set(root.values()):
-        body = np.array([i for i in root if root[i] == first], dtype=np.int64)
-        most = max(body, key=lambda i: (int(held[i].sum()), bool(i == first)))
-        # One that follows others in some motions stays what it is.
-        chosen = first if (leader[first] >= 0).any() else most
-        found[np.ix_(body, np.flatnonzero(active))] = chosen
-        found[chosen] = leader[first]
-    return found
 
 
 def _spread(leader: IntArray, xyz: FloatArray, active: BoolArray) -> SparseArray:
@@ -137,24 +117,3 @@ def _spread(leader: IntArray, xyz: FloatArray, active: BoolArray) -> SparseArray
         spread = spread + step
     spread.eliminate_zeros()
     return spread
-
-
-def held_leaders(tie: Linkage, free: BoolArray, held: BoolArray) -> BoolArray | None:
-    """Return which free displacements cannot move, since something that follows them is held.
-
-    None where what is held does not hold single motions of the leader, but a mixture of them.
-
-    Arguments:
-        tie: the rigid links.
-        free: which displacements are free, (n, 6).
-        held: which displacements supports hold, (n, 6).
-    """
-    stopped = np.zeros(free.shape, dtype=bool)
-    rows = tie.spread[np.flatnonzero((held & tie.led).ravel())][:, np.flatnonzero(free.ravel())]
-    tied = np.unique(rows.indices)
-    if len(tied):
-        block = rows[:, tied].toarray()
-        if np.linalg.matrix_rank(block) < len(tied):
-            return None
-        stopped.ravel()[np.flatnonzero(free.ravel())[tied]] = True
-    return stopped

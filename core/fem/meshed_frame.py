@@ -206,7 +206,7 @@ class MeshedFrame:
         own = motion(xyz[self.kinematics.node], self.kinematics.axes)
         free = np.tile(self.active_local[:6], (len(xyz), 1))
         free[self.mesh.oscillators] = False  # they have dofs of their own and hold nothing
-        active = np.flatnonzero(free)
+        active = np.setdiff1d(np.flatnonzero(free), self.kinematics.unused)
         all_nodes = motion(xyz[active // 6], np.eye(6)[active % 6])
         rows = [self._ground_row(spring) for spring in self.frame.springs if spring.stiffness]
         pulled = [np.asarray(row @ own) for row in rows]

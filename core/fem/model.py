@@ -94,6 +94,7 @@ class Model(Shown):
         structure: the meshed frame that gave the matrices; None for matrices from files.
         mass_change, stiffness_change: low-rank terms on top of the sparse matrices.
         groups: named parts of the stiffness of a model from files, sparse (n, n) each.
+        free: whether the structure is known to hang free, so that nothing may hold it.
     """
 
     mass: SparseArray
@@ -104,6 +105,7 @@ class Model(Shown):
     mass_change: LowRank | None = None
     stiffness_change: LowRank | None = None
     groups: Mapping[str, SparseArray] = field(default_factory=dict)
+    free: bool = False
 
     @classmethod
     def of(cls, source: Frame | Structure) -> Model:
@@ -117,7 +119,7 @@ class Model(Shown):
         kinematics = structure.kinematics
         xyz = structure.mesh.xyz[kinematics.node]
         dofs = Dofs(kinematics.node, kinematics.direction, xyz, kinematics.axes)
-        return cls(mass, stiffness, dofs, structure, structure)
+        return cls(mass, stiffness, dofs, structure, structure, free=structure.frame.free)
 
     def rows(self) -> list[tuple[str, str]]:
         """Return what it is a model of, its mass and what of it is not in the matrices."""

@@ -25,7 +25,7 @@ from scipy.sparse.linalg import splu
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.assembly import plan_assembly
-from femubench.core.fem.attachments import brace_lines, brace_motion, brace_rows
+from femubench.core.fem.attachments import brace_ends, brace_lines, brace_motion, brace_rows
 from femubench.core.fem.beam import (
     GAUSS,
     cubic_rates,
@@ -36,12 +36,13 @@ from femubench.core.fem.beam import (
 )
 from femubench.core.fem.elastic_stiffness import elastic_stiffness
 from femubench.core.fem.frame import ACTIVE, Frame, Support
-from femubench.core.fem.kinematics import build_kinematics, point_rows, rigid_motions
+from femubench.core.fem.kinematics import build_kinematics, node_at, point_rows, rigid_motions
 from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.meshed_frame import MeshedFrame
 from femubench.core.fem.nominal import meshed
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
+_TRANSLATIONS = ("x", "y", "z")
 _IN_PLANE = ("x", "y", "rz")  # of a frame that moves out of plane
 _HELD = 1e-9
 # Without redundancy rounding leaves some 1e-13 of EA times the misfit strain.
@@ -62,6 +63,7 @@ class StressState:
         force: normal and shear forces (N, Vy, Vz) of the elements in N, (n, 3).
         moment: (T, My, Mz) at their second nodes in N m, (n, 3).
         spring_force, spring_moment: on the member side of the joint springs, global, (c, 3).
+        link_force: on what follows in a rigid link, from all that is not the link, global, (l, 3).
         brace_force: in the braces in N, tension positive, (b,).
     """
 
@@ -69,6 +71,7 @@ class StressState:
     moment: FloatArray
     spring_force: FloatArray
     spring_moment: FloatArray
+    link_force: FloatArray
     brace_force: FloatArray
 
     @property
@@ -150,7 +153,14 @@ class Statics:
         axis, length = [1.0, 0.0, 0.0], structure.properties.length[:, None]
         force, moment = (0.5 * (ends[:, k + 6 : k + 9] - ends[:, k : k + 3]) for k in (0, 3))
         moment = moment - 0.5 * length * np.cross(axis, force)
-        return replace(self._state(ends, motion), force=force, moment=moment)
+        state = self._state(ends, motion)
+        lumps = np.zeros((len(mesh.xyz), 3))
+        for at, mass, _ in hung:
+            node = node_at(frame, mesh, at)
+            if node is not None:
+                lumps[node, 2] -= mass * GRAVITY
+        link = state.link_force + lumps[structure.kinematics.bodies[:, 0]]
+        return replace(state, force=force, moment=moment, link_force=link)
 
     def resisting(self) -> BoolArray:
         """Tell which members cannot be fitted without stress, (n_members,).
@@ -200,7 +210,30 @@ class Statics:
         outer = -np.einsum("cij,cki->ckj", mesh.axes[element], local)
         stiffness = np.array([brace.stiffness for brace in frame.braces])
         stretch = brace_rows(self.structure) @ motion if frame.braces else np.zeros(0)
-        return StressState(ends[:, 6:9], ends[:, 9:], outer[:, 0], outer[:, 1], stiffness * stretch)
+        spring, tension = (outer[:, 0], outer[:, 1]), stiffness * stretch
+        link = self._at_followers(ends, motion, spring[0], tension)
+        return StressState(ends[:, 6:9], ends[:, 9:], *spring, link, tension)
+
+    def _at_followers(
+        self, ends: FloatArray, motion: FloatArray, spring: FloatArray, tension: FloatArray
+    ) -> FloatArray:
+        """Return what pulls at joints that follow as one body with others, global, (l, 3)."""
+        structure, mesh, frame = self.structure, self.structure.mesh, self.structure.frame
+        followers = structure.kinematics.bodies[:, 0]
+        total = np.zeros((len(mesh.xyz), 3))
+        forces = -np.einsum("eij,eki->ekj", mesh.axes, ends.reshape(-1, 2, 2, 3)[:, :, 0])
+        np.add.at(total, mesh.ends.ravel(), forces.reshape(-1, 3))
+        np.add.at(total, [c.base for c in mesh.connections], spring)
+        pull = tension[:, None] * brace_lines(frame)[0] if frame.braces else np.zeros((0, 3))
+        for side, sign in ((0, 1.0), (1, -1.0)):
+            np.add.at(total, brace_ends(frame)[:, side], sign * pull)
+        for item in frame.springs if len(followers) else ():
+            node, direction = node_at(frame, mesh, item.at), item.direction.lstrip("+-")
+            if node is not None and direction in _TRANSLATIONS:
+                column = _TRANSLATIONS.index(direction)
+                row = structure.kinematics.transform[[6 * node + column]]
+                total[node, column] -= item.stiffness * float((row @ motion)[0])
+        return total[followers]
 
 
 def statics_of(structure: MeshedFrame) -> Statics:
@@ -340,8 +373,9 @@ def _stiffnesses(structure: MeshedFrame, states: Sequence[StressState]) -> tuple
         blocks = several[i % together]
         total = structure.plan.assemble(blocks.reshape(count, 12, 12))
         for given, part in (
-            (structure.mesh.connections, _connections),
-            (structure.frame.braces, _braces),
+            (len(structure.mesh.connections), _connections),
+            (len(structure.kinematics.bodies), _links),
+            (len(structure.frame.braces), _braces),
         ):
             if given:
                 rows, forms = part(structure, state)
@@ -442,20 +476,38 @@ def _density(
 
 
 def _connections(structure: MeshedFrame, state: StressState) -> tuple[SparseArray, FloatArray]:
-    """Return motions of base and hanging node of the joint springs, and their forms.
+    """Return motions of base and hanging node of the joint springs, and their forms."""
+    connections = structure.mesh.connections
+    pairs = np.array([(c.base, c.node) for c in connections], dtype=np.int64).reshape(-1, 2)
+    arm = np.array([c.arm for c in connections]).reshape(-1, 3)
+    return _behind_arms(structure, pairs, arm, state.spring_force, state.spring_moment)
+
+
+def _links(structure: MeshedFrame, state: StressState) -> tuple[SparseArray, FloatArray]:
+    """Return motions of both ends of the arms of rigid links, and their forms."""
+    pairs, xyz = structure.kinematics.bodies[:, ::-1], structure.mesh.xyz
+    arm = xyz[pairs[:, 1]] - xyz[pairs[:, 0]]
+    # A moment does no work on two ends that turn alike.
+    return _behind_arms(structure, pairs, arm, state.link_force, np.zeros(arm.shape))
+
+
+def _behind_arms(
+    structure: MeshedFrame,
+    pairs: IntArray,
+    arm: FloatArray,
+    force: FloatArray,
+    moment: FloatArray,
+) -> tuple[SparseArray, FloatArray]:
+    """Return motions of the bases and tips of rigid arms, and their forms.
 
     A spring behind a rigid arm is the same as a beam of one point: u' dx is the relative
     displacement, r' dx the relative rotation, e1 dx the arm.
     """
-    connections = structure.mesh.connections
-    pairs = np.array([(c.base, c.node) for c in connections], dtype=np.int64).reshape(-1, 2)
-    arm = np.array([c.arm for c in connections]).reshape(-1, 3)
     rows = (6 * pairs[:, :, None] + np.arange(6)).ravel()
-    force, moment = _skew(state.spring_force), _skew(state.spring_moment)
     blocks = np.zeros((len(pairs), 12, 12))
-    blocks[:, 3:6, 3:6] = _turned(state.spring_force, arm)
-    blocks[:, 6:9, 3:6], blocks[:, 0:3, 3:6] = -2.0 * force, 2.0 * force
-    blocks[:, 9:12, 3:6] = -moment
+    blocks[:, 3:6, 3:6] = _turned(force, arm)
+    blocks[:, 6:9, 3:6], blocks[:, 0:3, 3:6] = -2.0 * _skew(force), 2.0 * _skew(force)
+    blocks[:, 9:12, 3:6] = -_skew(moment)
     return structure.kinematics.transform[rows], _symmetric(blocks)
 
 

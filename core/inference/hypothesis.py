@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 
 import numpy as np
+import scipy.linalg as la
 
 from femubench.core.effect.change import Change
 from femubench.core.effect.tabulated_change import tabulated_change
 from femubench.core.fem.model import Model
-from femubench.core.modal.eigen import once_for
+from femubench.core.modal.eigen import enough_modes, modes_of, once_for, zero_tolerance
+from femubench.core.modal.generalised_mass import mass_normalised
+from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.roles import Effect, EffectParameter
 from femubench.core.typing import FloatArray
 
@@ -141,7 +144,10 @@ def _points(parameter: EffectParameter, sizes: Sequence[float]) -> list[float]:
 
 
 def hypotheses_of(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ...]:
-    """Return every effect at every place where it may sit in a model."""
+    """Return every effect at every place where it may sit in a model.
+
+    Of a structure that is known to hang free, nothing that holds it to ground is a candidate.
+    """
     known = tuple(effects)
     # Kept with the effects, so that no other one has their addresses meanwhile.
     key = "hypotheses", *map(id, known)
@@ -173,8 +179,33 @@ def _hypotheses(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ..
     found = []
     for effect in effects:
         places = tuple(dict.fromkeys(effect.places(model)))
-        found += [hypothesis_at(model, effect, place, len(places)) for place in places]
+        own = [hypothesis_at(model, effect, place, len(places)) for place in places]
+        if model.free:
+            own = [one for one in own if not _holds(model, one)]
+            own = [replace(one, places=len(own)) for one in own]
+        found += own
     return tuple(found)
+
+
+def _holds(model: Model, hypothesis: Hypothesis) -> bool:
+    """Tell whether an effect makes it cost energy to move a model as a rigid body."""
+    rigid, least = once_for(model, "rigid motions", lambda: _rigid_motions(model))
+    extra, count = hypothesis.change.extra, rigid.shape[1]
+    vectors = np.asarray(la.block_diag(rigid, np.eye(extra))) if extra else rigid
+    energy = np.zeros((count + extra, count + extra))
+    for term, factor in zip(hypothesis.change.terms, hypothesis.typical_factors, strict=True):
+        if term.matrix == "stiffness":
+            energy += factor * term.operator.project(vectors)
+    # Dofs of its own go along as they like.
+    body, across = energy[:count, :count], energy[:count, count:]
+    body = body - across @ np.linalg.pinv(energy[count:, count:]) @ across.T
+    return bool(np.abs(body).max(initial=0.0) > least)
+
+
+def _rigid_motions(model: Model) -> tuple[FloatArray, float]:
+    """Return the motions of a model as a rigid body, mass-normalised, and an energy like none."""
+    modes = modes_of(model, enough_modes(model, 1))
+    return mass_normalised(model, rigid_body_vectors(model.dofs)), zero_tolerance(modes)
 
 
 def hypothesis_at(model: Model, effect: Effect, place: str, places: int) -> Hypothesis:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from femubench.core.fem.model import Model
 from femubench.core.inference.mesh_error import mesh_bias
+from femubench.core.look.freedom import look_at_freedom
 from femubench.core.look.mesh import look_at_mesh
 from femubench.core.look.modes import Seen
 from femubench.core.look.readings import look_at_band, look_at_deviations, look_at_sensors
@@ -43,7 +44,7 @@ def look(
     if model.structure is not None:
         for part in (look_at_slenderness, look_at_mesh, look_at_materials):
             found += part(seen)
-    found += look_at_deviations(seen) + look_at_sensors(seen)
+    found += look_at_freedom(seen) + look_at_deviations(seen) + look_at_sensors(seen)
     if band is not None:
         found += look_at_band(seen, band)
     return tuple(found)

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from femubench.core.fem.beam import stiffness_matrices
 from femubench.core.fem.frame import Frame, Material, Member
+from femubench.core.fem.joints import whole_members
 from femubench.core.fem.sections import Section
 from femubench.core.look.modes import Seen
 from femubench.core.schema.diagnosis import LookWarning
+from femubench.core.typing import FloatArray
 
 _STUBBY = 8.0  # length over height
+_BENDS = 0.05  # of the energy of some mode, in the bending of one member along one axis
+_ACROSS = ([2, 4, 8, 10], [1, 5, 7, 11])  # local dofs of bending along z and along y
 # E / rho in m2/s2: metals 2.3e7 to 2.8e7, magnesium to beryllium alloys 2e7 to 2e8, plastics 2e6.
 _STIFF_PER_MASS = (1e6, 4e8)
 _POISSON = (0.0, 0.5)
@@ -17,31 +22,58 @@ _SHEAR_COEFFICIENT = (0.2, 1.0)
 
 
 def look_at_slenderness(seen: Seen) -> list[LookWarning]:
-    """Return one warning about all members that are short for their height."""
+    """Return one warning about all members that are short for their height.
+
+    Members are whole ones, from one real joint to the next, and their height is their size in
+    the direction in which the modes bend them.
+    """
     frame = seen.model.frame_structure.frame
     corners = frame.corners[frame.member_ends]
     length = np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)
-    height = np.array([_height(frame, m.section) for m in frame.members])
-    ratio = length / np.where(height > 0.0, height, 1e-300)
-    short = np.flatnonzero(ratio < _STUBBY)
-    if len(short) == 0:
+    share = _bending(seen)
+    short, least = [], np.inf
+    whole = whole_members(frame)
+    for pieces in whole:
+        rows = [frame.member_index[name] for name in pieces]
+        bends = share[rows].sum(axis=0).max(axis=1) > _BENDS
+        height = _sizes(frame.members[rows[0]].section)[bends].max(initial=0.0)
+        if length[rows].sum() < _STUBBY * height:
+            least = min(least, length[rows].sum() / height)
+            short.append(pieces)
+    if not short:
         return []
-    names = [frame.members[k].name for k in short]
     what = (
-        f"{len(short)} of {len(frame.members)} members are shorter than {_STUBBY:g} times their "
-        f"height, down to {ratio[short].min():.2g}: beams describe them roughly, and what happens "
+        f"{len(short)} of {len(whole)} members are shorter than {_STUBBY:g} times their "
+        f"height, down to {least:.2g}: beams describe them roughly, and what happens "
         "in their joints counts."
     )
+    names = [name for pieces in short for name in pieces]
     where = "all" if len(names) == len(frame.members) else ", ".join(names)
     return [LookWarning(what, where, "")]
 
 
-def _height(frame: Frame, section: Section) -> float:
-    """Return the size of a section in its plane of bending, sqrt(12 I / A) without a shape."""
-    by_numbers = float(np.sqrt(12.0 * max(section.Iy, section.Iz) / section.A))
+def _bending(seen: Seen) -> FloatArray:
+    """Return the share of every mode's energy in the bending of members, (n_members, 2, count).
+
+    Along local z first, then along local y.
+    """
+    structure = seen.model.frame_structure
+    modes = seen.modes.take(np.arange(seen.count))
+    local = (structure.gather @ modes.shapes).reshape(-1, 12, len(modes))
+    stiffness, member = stiffness_matrices(structure.properties), structure.mesh.member
+    share = np.zeros((len(structure.frame.members), 2, len(modes)))
+    for k, slots in enumerate(_ACROSS):
+        own = local[:, slots]
+        energy = np.einsum("eim,eim->em", own, stiffness[:, slots][:, :, slots] @ own)
+        np.add.at(share[:, k], member, energy / modes.eigenvalues)
+    return share
+
+
+def _sizes(section: Section) -> FloatArray:
+    """Return the sizes of a section along local z and y, sqrt(12 I / A) without a shape, (2,)."""
     if section.height is None or section.width is None:
-        return by_numbers
-    return max(section.height, section.width) if frame.plane == "3d" else section.height
+        return np.sqrt(12.0 * np.array([section.Iy, section.Iz]) / section.A)
+    return np.array([section.height, section.width])
 
 
 def look_at_materials(seen: Seen) -> list[LookWarning]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 from typing import ClassVar
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from femubench import Model
 from femubench.effect import (
@@ -23,10 +25,11 @@ from femubench.effect import (
     pair_of,
     proportional,
 )
-from femubench.fem import Brace, Frame
+from femubench.fem import ACTIVE, Brace, Frame
 
 _SHARE = 0.01  # of the mean EA / L of the members
 _MOST = 300
+_STRAIGHT = np.cos(np.radians(5.0))
 
 
 class BraceSpring(FrameEffect):
@@ -37,12 +40,24 @@ class BraceSpring(FrameEffect):
     sizes: ClassVar[Sequence[Size]] = (Size(0.01, 1.0, Site.modal_stiffness, log=True),)
 
     def places(self, model: Model) -> Sequence[str]:
-        """Return the pairs of joints without a member between them, the nearest 300 at most."""
+        """Return the pairs of joints without a member between them, the nearest 300 at most.
+
+        Joints that rigid links make one body are one joint, and of those that stand off members
+        by links, a straight run of members joins all that it passes: a brace beside it would be
+        a stiffener of these members.
+        """
         if model.structure is None or model.structure.frame.plane == "out-of-plane":
             return ()
         frame = model.structure.frame
-        joined = {frozenset(member.ends) for member in frame.members}
-        pairs = [p for p in combinations(frame.joint_index, 2) if frozenset(p) not in joined]
+        body = _bodies(frame)
+        joined = {frozenset(body[name] for name in member.ends) for member in frame.members}
+        joined |= {frozenset([number]) for number in body.values()}
+        joined |= _in_line(frame, body) if frame.links else set()
+        pairs = [
+            (first, last)
+            for first, last in combinations(frame.joint_index, 2)
+            if frozenset([body[first], body[last]]) not in joined
+        ]
         return [f"{first}-{last}" for first, last in _nearest(frame, pairs)]
 
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
@@ -64,6 +79,31 @@ class BraceSpring(FrameEffect):
         """Return the stiffness matrix of 1 N/m."""
         row = elongation_row(model, pair_of(model.frame_structure.frame, place))
         return proportional(Term("stiffness", RowOperator(row, np.eye(1))))
+
+
+def _bodies(frame: Frame) -> dict[str, int]:
+    """Return from every joint to the number of the rigid body that links make it part of."""
+    body = dict(frame.joint_index)
+    for link in frame.links:
+        if len(link.motions) in (0, len(ACTIVE[frame.plane])):
+            taken = {body[name] for name in (link.leads, *link.follows)}
+            body = {name: min(taken) if own in taken else own for name, own in body.items()}
+    return body
+
+
+def _in_line(frame: Frame, body: Mapping[str, int]) -> set[frozenset[int]]:
+    """Return the pairs of bodies that a straight run of members joins."""
+    ends = [frozenset(body[name] for name in member.ends) for member in frame.members]
+    along = np.diff(frame.corners[frame.member_ends], axis=1)[:, 0]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    parallel = np.abs(along @ along.T) > _STRAIGHT
+    meet = np.array([[bool(one & other) for other in ends] for one in ends])
+    run = connected_components(csr_array(parallel & meet), directed=False)[1]
+    found = set()
+    for number in np.unique(run):
+        passed = frozenset().union(*(ends[i] for i in np.flatnonzero(run == number)))
+        found |= {frozenset(pair) for pair in combinations(passed, 2)}
+    return found
 
 
 def _nearest(frame: Frame, pairs: list[tuple[str, str]]) -> list[tuple[str, str]]:

@@ -1,0 +1,106 @@
+"""A structure that is known to hang free: what may not hold it, in a case and in a diagnosis."""
+
+from __future__ import annotations
+
+import shutil
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from femubench import InputError, Model, cases, read_case
+from femubench.core.case.writing import write_case
+from femubench.core.effect.attachments import point_motion
+from femubench.core.effect.change import Change, RowOperator, Term, proportional
+from femubench.core.fem.frame import Place
+from femubench.core.inference.hypothesis import hypotheses_of
+from femubench.diagnosis import registered_effects
+from femubench.effect import EffectParameter
+
+CASES = Path(__file__).parent / "cases"
+
+
+class Tether:
+    """A stranger's effect: a torsional spring to ground, or one between two joints."""
+
+    name: ClassVar[str] = "tether"
+
+    def places(self, model: Model) -> Sequence[str]:
+        return ("A", "A-F")
+
+    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+        return (EffectParameter("stiffness", "N m/rad", 10.0),)
+
+    def change(self, model: Model, place: str) -> Change:
+        points = [point_motion(model, Place(joint=name))[[3]] for name in place.split("-")]
+        row = points[0] if len(points) == 1 else points[0] - points[1]
+        return proportional(Term("stiffness", RowOperator(row, np.eye(1))))
+
+
+def names(model: Model, *more: Any) -> Counter[str]:
+    return Counter(h.name for h in hypotheses_of(model, (*registered_effects(), *more)))
+
+
+def test_nothing_to_ground_is_a_candidate_and_all_else_is(ladder: Any) -> None:
+    plain = names(Model.of(ladder(elements=2)))
+    free = names(Model.of(replace(ladder(elements=2), free=True)))
+    assert plain["grounding-spring"] > 0
+    assert plain["attached-oscillator"] > 0
+    del plain["grounding-spring"]
+    assert free == plain
+
+
+def test_what_a_stranger_ties_to_ground_is_found_by_its_energy(ladder: Any) -> None:
+    model = Model.of(replace(ladder(elements=2), free=True))
+    own = [h for h in hypotheses_of(model, (Tether(),)) if h.name == "tether"]
+    assert [(h.place, h.places) for h in own] == [("A-F", 1)]
+    assert names(replace(model, free=False), Tether())["tether"] == 2
+
+
+def as_matrices(tmp_path: Path) -> Path:
+    """Return a case of matrices of a free frame: one whose update has changed them."""
+    wanted = replace(cases["frame"], modifications=())
+    model = wanted.model
+    write_case(tmp_path / "matrices", wanted, replace(model, stiffness=1.1 * model.stiffness))
+    return tmp_path / "matrices"
+
+
+def test_matrices_that_hang_free_have_none_either(tmp_path: Path) -> None:
+    model = read_case(as_matrices(tmp_path)).model
+    assert model.structure is None
+    assert names(model)["grounding-spring"] > 0
+    assert names(replace(model, free=True))["grounding-spring"] == 0
+
+
+def freed(folder: Path, kind: str) -> str:
+    text = (folder / "case.toml").read_text()
+    text = text.replace(f'kind = "{kind}"\n', f'kind = "{kind}"\nfree = true\n')
+    (folder / "case.toml").write_text(text)
+    return text
+
+
+def test_supports_contradict_it(tmp_path: Path) -> None:
+    shutil.copytree(CASES / "in-plane", tmp_path / "case")
+    text = freed(tmp_path / "case", "frame")
+    with pytest.raises(InputError, match="supports hold it") as caught:
+        read_case(tmp_path / "case")
+    line = 1 + text[: text.index("free = true")].count("\n")
+    assert (caught.value.key, caught.value.line) == ("model.free", line)
+
+
+@pytest.mark.parametrize("kind", ["frame", "matrices"])
+def test_the_key_is_kept(kind: str, tmp_path: Path) -> None:
+    folder = tmp_path / "frame" if kind == "frame" else as_matrices(tmp_path)
+    if kind == "frame":
+        case = read_case(CASES / "out-of-plane")
+        frame = replace(case.model.frame_structure.frame, supports=())
+        write_case(folder, replace(case, modifications=()), Model.of(frame))
+    freed(folder, kind)
+    found = read_case(folder)
+    assert found.model.free
+    write_case(tmp_path / "again", found)
+    assert read_case(tmp_path / "again").model.free
