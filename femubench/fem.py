@@ -29,6 +29,7 @@ from femubench.core.fem.frame import (
     RigidEnd,
     Support,
 )
+from femubench.core.fem.group_factors import group_matrix, group_places
 from femubench.core.fem.mesh import member_axes
 from femubench.core.fem.model import LowRank
 from femubench.core.fem.parameters import Parameter
@@ -84,6 +85,8 @@ __all__ = [
     "coupling_matrices",
     "eccentric_mass_parts",
     "gravity_stiffness",
+    "group_matrix",
+    "group_places",
     "mass_matrices",
     "member_axes",
     "preload_stiffness",

@@ -26,6 +26,7 @@ _EXPECTED = (
     f"the folder with {MODEL} and {TEST} of github.com/ywang-structures/"
     "Structural-Model-Updating, Examples/SteelPedestrianBridge"
 )
+_EXACT = 1e-9  # of a shape: no reading is known better
 _INCH, _KIP = 0.0254, 4448.2216152605  # m, N
 _CASE = """\
 [case]
@@ -128,7 +129,7 @@ def _matrices(model: _Variables) -> dict[str, str | FloatArray]:
 
 
 def _measured(model: _Variables, test: _Variables) -> dict[str, str | FloatArray]:
-    """Return sensors and modes; a deviation of zero, at what a shape is scaled by, is left out."""
+    """Return sensors and modes; where a shape is one by definition its deviation is left out."""
     dofs = model.array("measDOFs").ravel().astype(int).tolist()
     moving = np.flatnonzero(model.array("M0").any(axis=0)) + 1
     if strangers := [dof for dof in dofs if dof not in moving]:
@@ -145,6 +146,6 @@ def _measured(model: _Variables, test: _Variables) -> dict[str, str | FloatArray
     modes = [",".join(["mode,frequency,frequency_std", *(f"S{d},S{d}_std" for d in dofs)])]
     for m, (frequency, std) in enumerate(zip(frequencies, frequency_std, strict=True)):
         pairs = zip(shapes[:, m], shape_std[:, m], strict=True)
-        cells = (f"{value:.17g},{f'{std:.17g}' if std > 0.0 else ''}" for value, std in pairs)
+        cells = (f"{value:.17g},{f'{std:.17g}' if std > _EXACT else ''}" for value, std in pairs)
         modes.append(f"{m + 1},{frequency:.17g},{std:.17g},{','.join(cells)}")
     return {"sensors.csv": "\n".join(sensors), "modes.csv": "\n".join(modes)}

@@ -186,29 +186,42 @@ def matrix_model(spec: MatricesSpec, files: CaseFiles, readers: Sequence[Reader]
     mass, stiffness = (read_matrix(paths[key], size, readers) for key in ("mass", "stiffness"))
     check_unique((("groups", i, "name"), group.name) for i, group in enumerate(spec.groups))
     groups: dict[str, SparseArray] = {}
+    mass_groups: dict[str, SparseArray] = {}
     for i, group in enumerate(spec.groups):
         with at_key("groups", i):
-            groups[group.name] = _group(group, geometry, stiffness, files, readers)
-    return Model(mass, stiffness, geometry.dofs, geometry, groups=groups)
+            _check_group(group)
+            if group.dofs is not None:
+                groups[group.name] = _between(group.dofs, geometry, stiffness)
+            for key, found in (("stiffness", groups), ("mass", mass_groups)):
+                if (file := getattr(group, key)) is not None:
+                    with at_key(key):
+                        path = files.path(file)
+                    found[group.name] = read_matrix(path, size, readers)
+    priors = {group.name: group.prior for group in spec.groups if group.prior is not None}
+    return Model(
+        mass,
+        stiffness,
+        geometry.dofs,
+        geometry,
+        groups=groups,
+        mass_groups=mass_groups,
+        group_priors=priors,
+    )
 
 
-def _group(
-    spec: GroupSpec,
-    geometry: MatrixGeometry,
-    stiffness: SparseArray,
-    files: CaseFiles,
-    readers: Sequence[Reader],
+def _check_group(spec: GroupSpec) -> None:
+    if spec.dofs is not None and (spec.stiffness is not None or spec.mass is not None):
+        raise Fault(("dofs",), "a group of dofs with files", "either files or dofs")
+    if spec.stiffness is None and spec.mass is None and spec.dofs is None:
+        raise Fault((), "a group without a part", "stiffness, mass or dofs")
+
+
+def _between(
+    dofs: Sequence[int | str], geometry: MatrixGeometry, stiffness: SparseArray
 ) -> SparseArray:
-    """Return the part of the stiffness that a group names."""
-    if (spec.stiffness is None) == (spec.dofs is None):
-        raise Fault((), "a group with both or neither", "either stiffness or dofs")
-    size = len(geometry.dofs)
-    if spec.stiffness is not None:
-        with at_key("stiffness"):
-            path = files.path(spec.stiffness)
-        return read_matrix(path, size, readers)
-    inside = np.zeros(size)
-    for i, entry in enumerate(spec.dofs or ()):
+    """Return the stiffness between some dofs."""
+    inside = np.zeros(len(geometry.dofs))
+    for i, entry in enumerate(dofs):
         with at_key("dofs", i):
             inside[_rows(entry, geometry)] = 1.0
     pick = sp.diags_array(inside)

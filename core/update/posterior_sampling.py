@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from femubench.core.errors import ModelError, StrategyFailure
+from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.neighbour_modes import followed_frequencies
@@ -130,7 +131,7 @@ class Target:
 
 
 def sample_posterior(
-    structure: Structure,
+    source: Model | Structure,
     unknowns: Sequence[Unknown],
     measurement: Measurement,
     rng: np.random.Generator,
@@ -146,7 +147,7 @@ def sample_posterior(
     after three rounds widens the likelihood.
 
     Arguments:
-        structure: the nominal frame.
+        source: the nominal model, matrices with groups or a frame, or the latter's structure.
         unknowns: positive parameters, each with a prior.
         measurement: the used modes, each with a standard deviation.
         rng: decides on every draw.
@@ -172,7 +173,7 @@ def sample_posterior(
         >>> len(found.uncertainty.samples)
         40
     """
-    target, covariance = most_probable(structure, unknowns, measurement, discrepancy, options)
+    target, covariance = most_probable(source, unknowns, measurement, discrepancy, options)
     sampler, off = _fitted(target, np.asarray(np.linalg.cholesky(covariance)), rng)
     chain, found = _settled(sampler)
     drawn = chain[rng.choice(len(chain), _SAMPLES, replace=False), :-1]
@@ -202,7 +203,7 @@ def _fitted(target: Target, root: FloatArray, rng: np.random.Generator) -> tuple
 
 
 def most_probable(
-    structure: Structure,
+    source: Model | Structure,
     unknowns: Sequence[Unknown],
     measurement: Measurement,
     discrepancy: Discrepancy,
@@ -211,7 +212,7 @@ def most_probable(
     """Return the posterior about its mode at the median discrepancy, and the covariance of q there.
 
     Arguments:
-        structure, unknowns, measurement, discrepancy, options: as for `sample_posterior`.
+        source, unknowns, measurement, discrepancy, options: as for `sample_posterior`.
 
     Raises:
         NotApplicable: when a frequency has no standard deviation.
@@ -219,8 +220,9 @@ def most_probable(
     """
     std = np.hypot(measurement.frequency_std, discrepancy.median * measurement.frequencies)
     whole = replace(measurement, frequency_std=std)
+    model = Model.of(source) if isinstance(source, Structure) else source
     iteration = Iteration(
-        structure, unknowns, Data(whole, options.residual, True, options.shapes, True), options
+        model, unknowns, Data(whole, options.residual, True, options.shapes, True), options
     )
     point = iteration.run()
     covariance = iteration.covariance(point)

@@ -32,7 +32,8 @@ class Eigensensitivity(FactorStrategy):
 
     Arguments:
         parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
-            `materials`, `sets` of the case, or `groups` of matrices.
+            `materials`, `sets` of the case, or `groups` of matrices; `own` for the members of a
+            frame and the groups of matrices.
         shape_weight: of a MAC of 0 beside a frequency that is 100 % off; 0 for frequencies alone.
 
     The authors' are the sensitivities (Fox & Kapoor), the damped least squares of Natke and

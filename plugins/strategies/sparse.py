@@ -27,7 +27,8 @@ class Sparse(FactorStrategy):
 
     Arguments:
         parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
-            `materials`, `sets` of the case, or `groups` of matrices.
+            `materials`, `sets` of the case, or `groups` of matrices; `own` for the members of a
+            frame and the groups of matrices.
 
     The authors' are the l1 penalty on the changes and the frequencies' sensitivities; the
     criterion for its weight (Tibshirani's cross-validation), logarithms, and a new
