@@ -15,7 +15,7 @@ from femubench.core.fem.model import Model
 from femubench.core.fem.model_parameters import with_values
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.structure import Structure
-from femubench.core.modal.group_prior import group_prior_std, support_groups
+from femubench.core.modal.group_prior import STRUCTURE_STD, group_prior_std, support_groups
 from femubench.core.typing import FloatArray, SparseArray
 from femubench.core.update.unknowns import Unknown
 
@@ -208,12 +208,14 @@ class StiffnessParts:
         names: of the factors.
         matrices: the parts K_j, sparse (n, n) each.
         parameters: the factors themselves.
+        spread: prior standard deviation of each ln theta, relative to that of a structure, (p,).
     """
 
     model: Model
     names: tuple[str, ...]
     matrices: tuple[SparseArray, ...]
     parameters: tuple[Parameter, ...]
+    spread: FloatArray
 
     def __len__(self) -> int:
         return len(self.names)
@@ -235,6 +237,7 @@ class StiffnessParts:
             tuple(self.names[j] for j in chosen),
             tuple(self.matrices[j] for j in chosen),
             tuple(self.parameters[j] for j in chosen),
+            self.spread[list(chosen)],
         )
 
     def energies(self, left: FloatArray, right: FloatArray) -> FloatArray:
@@ -264,8 +267,10 @@ def stiffness_parts(model: Model, word: str) -> StiffnessParts:
     names = tuple(p.name for p in parameters)
     structure = model.structure
     if structure is None:
-        return StiffnessParts(model, names, tuple(model.groups.values()), parameters)
+        std = [group_prior_std(model, name) for name in model.groups]
+        spread = np.array(std) / STRUCTURE_STD
+        return StiffnessParts(model, names, tuple(model.groups.values()), parameters, spread)
     nominal = structure.matrices()[1]
     # All rigidities of an element grow with E alike, so the stiffness is linear in the factor.
     parts = [structure.with_values([p], [2.0]).matrices()[1] - nominal for p in parameters]
-    return StiffnessParts(model, names, tuple(parts), parameters)
+    return StiffnessParts(model, names, tuple(parts), parameters, np.ones(len(names)))
