@@ -29,7 +29,12 @@ from femubench.core.fem.frame import (
     RigidEnd,
     Support,
 )
-from femubench.core.fem.group_factors import group_matrix, group_places
+from femubench.core.fem.group_factors import (
+    GROUP,
+    group_matrix,
+    group_places,
+    with_group_factors,
+)
 from femubench.core.fem.mesh import member_axes
 from femubench.core.fem.model import LowRank
 from femubench.core.fem.parameters import Parameter
@@ -60,6 +65,7 @@ __all__ = [
     "Factor",
     "FloatArray",
     "Frame",
+    "GROUP",
     "GroundSpring",
     "IntArray",
     "Joint",
@@ -97,4 +103,5 @@ __all__ = [
     "solid_rectangle",
     "stiffness_matrices",
     "wall_of",
+    "with_group_factors",
 ]

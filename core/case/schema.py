@@ -145,6 +145,7 @@ class BraceSpec(Table):
 
     ends: tuple[Name, Name] = Field(description="the names of two joints")
     stiffness: NotNegative = Field(description="a number >= 0 in N/m")
+    direction: Literal["", "x", "y", "z"] = Field("", description="x, y or z")
 
 
 class OscillatorSpec(Table):

@@ -63,6 +63,12 @@ def with_group_factors(
 
     Raises:
         ModelError: when there is no such group, or for a parameter that matrices do not have.
+
+    Examples:
+        >>> factor = fem.Parameter("stiffness all", "E", ("all",))
+        >>> twice = fem.with_group_factors(model, [factor], [2.0])
+        >>> float(abs(twice.stiffness - 2.0 * model.stiffness).max())
+        0.0
     """
     for parameter, value in zip(parameters, values, strict=True):
         model = _scaled(model, _matrix(parameter), parameter.places, float(value))

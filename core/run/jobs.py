@@ -107,8 +107,8 @@ def missing_capability(needs: frozenset[str], model: Model, measurement: Measure
         return "needs measured mode shapes, and a used mode has none"
     if model.structure is None:
         # Who takes groups needs joints of frames alone.
-        frame = ("elements", "geometry", *(() if "parts" in needs else ("joints",)))
-        lacking = [need for need in frame if need in needs]
+        kinds = ("elements", "geometry", *(() if "parts" in needs else ("joints",)))
+        lacking = [need for need in kinds if need in needs]
         if lacking:
             return f"needs {lacking[0]}: a model of kind 'frame' has them, a pair of matrices none"
         if "parts" in needs and not model.groups:

@@ -305,9 +305,7 @@ def _normal_result(target: Target, covariance: FloatArray, off: float) -> Update
             "surrogate_error": off,
             "paired_modes": float(len(target.measurement)),
         },
-        uncertainty=Uncertainty.drawn(
-            iteration.model_at, point.q, covariance, discrepancy_std=own
-        ),
+        uncertainty=Uncertainty.drawn(iteration.model_at, point.q, covariance, discrepancy_std=own),
     )
 
 
