@@ -54,11 +54,12 @@ from femubench.core.fem.sections import (
     wall_of,
 )
 from femubench.core.fem.structure import Structure
-from femubench.core.typing import FloatArray, IntArray, SparseArray
+from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 __all__ = [
     "ACTIVE",
     "BeamProperties",
+    "BoolArray",
     "Brace",
     "Coupling",
     "Eccentricity",

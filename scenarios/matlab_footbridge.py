@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 import scipy.io
+import scipy.linalg as la
 import scipy.sparse as sp
 
 from femubench import InputError
-from femubench.fem import FloatArray
+from femubench.fem import BoolArray, FloatArray
 
 VARIABLE = "FEMUBENCH_FOOTBRIDGE"
 MODEL, TEST = "SteelPedestrianBridgeExp.mat", "ExpModeInfo_FEM.mat"
@@ -27,6 +28,7 @@ _EXPECTED = (
     "Structural-Model-Updating, Examples/SteelPedestrianBridge"
 )
 _EXACT = 1e-9  # of a shape: no reading is known better
+_FORCELESS = 1e-9
 _INCH, _KIP = 0.0254, 4448.2216152605  # m, N
 _CASE = """\
 [case]
@@ -45,6 +47,9 @@ sensors = "sensors.csv"
 modes = "modes.csv"
 used = {used}
 held_out = {held_out}
+
+[diagnosis]
+model_error = 1.0
 """
 
 
@@ -107,9 +112,9 @@ class _Variables:
 def _matrices(model: _Variables) -> dict[str, str | FloatArray]:
     """Return mass, stiffness, its groups, and the dofs.
 
-    The files have kips, inches and seconds. Rows without mass are rotations; which of the others
-    go where is not in the files, nor is any position, so every row is a node of its own on a
-    line. Nothing but drawings depends on that: the supports are springs, no motion is free.
+    The files have kips, inches and seconds. Rows without mass are rotations. Positions are not in
+    the files, so every row is a node of its own on a line; nothing but drawings depends on that,
+    since the supports are springs and no motion is free.
     """
     size = len(model.array("K_whole"))
     mass = model.array("M0", size, size)
@@ -119,13 +124,39 @@ def _matrices(model: _Variables) -> dict[str, str | FloatArray]:
     square = np.outer(scale, scale)
     names = {"stiffness.mtx": "K_whole", **{f"{name}.mtx": name for name in GROUPS}}
     parts = {file: square * model.array(name, size, size) for file, name in names.items()}
-    rows = [f"{i},{i},{'rx' if turn else 'z'},{i},0,0" for i, turn in enumerate(turns, start=1)]
+    directions = _directions(model, turns)
+    rows = [f"{i},{i},{name},{i},0,0" for i, name in enumerate(directions, start=1)]
     groups = "".join(
         f'\n[[model.groups]]\nname = "{name}"\nstiffness = "{name}.mtx"\n' for name in GROUPS
     )
     text = _CASE.format(groups=groups, used=list(USED), held_out=list(HELD_OUT))
     dofs = "\n".join(["row,node,direction,x,y,z", *rows])
     return {"mass.mtx": square * mass, **parts, "dofs.csv": dofs, "case.toml": text}
+
+
+def _directions(model: _Variables, turns: BoolArray) -> list[str]:
+    """Return where every row goes: the files do not say it, the stiffness does.
+
+    Without its springs the bridge is free to shift across, up and down: motions without force in
+    which no row turns. What shifts with a spring across goes along y, what shifts with an upright
+    one along z, what does not shift, being held lengthwise, along x.
+    """
+    size = len(turns)
+    springs = {name: model.array(name, size, size) for name in GROUPS[-4:]}
+    free = model.array("K_whole", size, size) - sum(springs.values())
+    scale = 1.0 / np.sqrt(free.diagonal())
+    values, vectors = la.eigh(scale[:, None] * free * scale)
+    motions = scale[:, None] * vectors[:, np.abs(values) < _FORCELESS]
+    _, turned, mix = la.svd(motions[turns])
+    turned = np.append(turned, np.zeros(len(mix) - len(turned)))
+    shifts = motions @ mix[turned < _EXACT * turned.max(initial=1e-300)].T
+    shifts /= np.abs(shifts).max(initial=1e-300)
+    along = {name[2]: shifts[spring.diagonal().argmax()] for name, spring in springs.items()}
+    found = []
+    for turn, shift in zip(turns, shifts, strict=True):
+        near = [name for name, way in along.items() if np.abs(shift - way).max(initial=0.0) < 1e-4]
+        found.append("rx" if turn else near[-1] if near else "x")
+    return found
 
 
 def _measured(model: _Variables, test: _Variables) -> dict[str, str | FloatArray]:
@@ -142,7 +173,8 @@ def _measured(model: _Variables, test: _Variables) -> dict[str, str | FloatArray
     frequencies = np.sqrt(values.ravel()) / (2.0 * np.pi)
     # lambda = (2 pi f)^2, to first order.
     frequency_std = value_std.ravel() / (8.0 * np.pi**2 * frequencies)
-    sensors = ["label,at,direction", *(f"S{dof},{dof},z" for dof in dofs)]
+    directions = _directions(model, np.asarray(~model.array("M0").any(axis=0)))
+    sensors = ["label,at,direction", *(f"S{dof},{dof},{directions[dof - 1]}" for dof in dofs)]
     modes = [",".join(["mode,frequency,frequency_std", *(f"S{d},S{d}_std" for d in dofs)])]
     for m, (frequency, std) in enumerate(zip(frequencies, frequency_std, strict=True)):
         pairs = zip(shapes[:, m], shape_std[:, m], strict=True)
