@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 import scipy.io
-import scipy.linalg as la
 import scipy.sparse as sp
 
 from femubench import InputError
 from femubench.fem import BoolArray, FloatArray
+from femubench.scenarios.nodes_from_stiffness import Row, labelled_rows
 
 VARIABLE = "FEMUBENCH_FOOTBRIDGE"
 MODEL, TEST = "SteelPedestrianBridgeExp.mat", "ExpModeInfo_FEM.mat"
@@ -28,7 +28,6 @@ _EXPECTED = (
     "Structural-Model-Updating, Examples/SteelPedestrianBridge"
 )
 _EXACT = 1e-9  # of a shape: no reading is known better
-_FORCELESS = 1e-9
 _INCH, _KIP = 0.0254, 4448.2216152605  # m, N
 _CASE = """\
 [case]
@@ -112,9 +111,7 @@ class _Variables:
 def _matrices(model: _Variables) -> dict[str, str | FloatArray]:
     """Return mass, stiffness, its groups, and the dofs.
 
-    The files have kips, inches and seconds. Rows without mass are rotations. Positions are not in
-    the files, so every row is a node of its own on a line; nothing but drawings depends on that,
-    since the supports are springs and no motion is free.
+    The files have kips, inches and seconds. Rows without mass are rotations.
     """
     size = len(model.array("K_whole"))
     mass = model.array("M0", size, size)
@@ -124,8 +121,10 @@ def _matrices(model: _Variables) -> dict[str, str | FloatArray]:
     square = np.outer(scale, scale)
     names = {"stiffness.mtx": "K_whole", **{f"{name}.mtx": name for name in GROUPS}}
     parts = {file: square * model.array(name, size, size) for file, name in names.items()}
-    directions = _directions(model, turns)
-    rows = [f"{i},{i},{name},{i},0,0" for i, name in enumerate(directions, start=1)]
+    rows = [
+        f"{i},{row.node + 1},{row.direction},{','.join(f'{_INCH * v:.6g}' for v in row.xyz)}"
+        for i, row in enumerate(_rows(model, turns), start=1)
+    ]
     groups = "".join(
         f'\n[[model.groups]]\nname = "{name}"\nstiffness = "{name}.mtx"\n' for name in GROUPS
     )
@@ -134,29 +133,19 @@ def _matrices(model: _Variables) -> dict[str, str | FloatArray]:
     return {"mass.mtx": square * mass, **parts, "dofs.csv": dofs, "case.toml": text}
 
 
-def _directions(model: _Variables, turns: BoolArray) -> list[str]:
-    """Return where every row goes: the files do not say it, the stiffness does.
+def _rows(model: _Variables, turns: BoolArray) -> list[Row]:
+    """Return what the rows are, which the files do not say and the stiffness does, in inches.
 
-    Without its springs the bridge is free to shift across, up and down: motions without force in
-    which no row turns. What shifts with a spring across goes along y, what shifts with an upright
-    one along z, what does not shift, being held lengthwise, along x.
+    Where it does not either, every row is a node of its own on a line.
     """
     size = len(turns)
     springs = {name: model.array(name, size, size) for name in GROUPS[-4:]}
     free = model.array("K_whole", size, size) - sum(springs.values())
-    scale = 1.0 / np.sqrt(free.diagonal())
-    values, vectors = la.eigh(scale[:, None] * free * scale)
-    motions = scale[:, None] * vectors[:, np.abs(values) < _FORCELESS]
-    _, turned, mix = la.svd(motions[turns])
-    turned = np.append(turned, np.zeros(len(mix) - len(turned)))
-    shifts = motions @ mix[turned < _EXACT * turned.max(initial=1e-300)].T
-    shifts /= np.abs(shifts).max(initial=1e-300)
-    along = {name[2]: shifts[spring.diagonal().argmax()] for name, spring in springs.items()}
-    found = []
-    for turn, shift in zip(turns, shifts, strict=True):
-        near = [name for name, way in along.items() if np.abs(shift - way).max(initial=0.0) < 1e-4]
-        found.append("rx" if turn else near[-1] if near else "x")
-    return found
+    y1, z1, y2, z2 = (np.flatnonzero(part.diagonal()).tolist() for part in springs.values())
+    found = labelled_rows(free, turns, [*y1, *y2], [*z1, *z2])
+    if found is not None:
+        return found
+    return [Row(i, "rx" if turn else "z", (i / _INCH, 0.0, 0.0)) for i, turn in enumerate(turns)]
 
 
 def _measured(model: _Variables, test: _Variables) -> dict[str, str | FloatArray]:
@@ -173,8 +162,9 @@ def _measured(model: _Variables, test: _Variables) -> dict[str, str | FloatArray
     frequencies = np.sqrt(values.ravel()) / (2.0 * np.pi)
     # lambda = (2 pi f)^2, to first order.
     frequency_std = value_std.ravel() / (8.0 * np.pi**2 * frequencies)
-    directions = _directions(model, np.asarray(~model.array("M0").any(axis=0)))
-    sensors = ["label,at,direction", *(f"S{dof},{dof},{directions[dof - 1]}" for dof in dofs)]
+    rows = _rows(model, np.asarray(~model.array("M0").any(axis=0)))
+    labels = [f"S{dof},{rows[dof - 1].node + 1},{rows[dof - 1].direction}" for dof in dofs]
+    sensors = ["label,at,direction", *labels]
     modes = [",".join(["mode,frequency,frequency_std", *(f"S{d},S{d}_std" for d in dofs)])]
     for m, (frequency, std) in enumerate(zip(frequencies, frequency_std, strict=True)):
         pairs = zip(shapes[:, m], shape_std[:, m], strict=True)

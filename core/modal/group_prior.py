@@ -12,15 +12,17 @@ from femubench.core.typing import FloatArray, SparseArray
 STRUCTURE_STD = 0.1  # of ln(factor)
 SUPPORT_FACTOR = 5.0  # as likely as not
 QUARTILE = 0.6744897501960817  # of the standard normal distribution
-_FORCE = 1e-8  # of the forces that cancel each other in a rigid-body motion
+_FREE = 1e-8  # of the energy that the entries would have without cancelling each other
+_HELD = 0.1  # of it; a part of the structure with some dofs removed has less
 
 
 def support_groups(model: Model) -> frozenset[str]:
     """Return the groups of the stiffness that hold the structure to ground.
 
     A group is a support where its matrix couples no two dofs, or where a rigid-body motion costs
-    it force. The latter is asked only where positions and directions of the dofs are right, that
-    is, where some group that couples dofs is free of force in all rigid-body motions.
+    it a tenth of the energy that its entries would have without cancelling each other. The latter
+    is asked only where positions and directions of the dofs are known to be right: where some group
+    that couples dofs has no energy in any rigid-body motion.
 
     Examples:
         >>> modal.support_groups(model)
@@ -33,8 +35,10 @@ def _support_groups(model: Model) -> frozenset[str]:
     apart = {name for name, part in model.groups.items() if not _couples(part)}
     rigid = rigid_body_vectors(model.dofs)
     rest = {name: part for name, part in model.groups.items() if name not in apart}
-    held = {name for name, part in rest.items() if _force(part, rigid) > _FORCE}
-    return frozenset(apart | held if len(held) < len(rest) else apart)
+    energy = {name: _energy(part, rigid) for name, part in rest.items()}
+    known = any(share < _FREE for share in energy.values())
+    held = {name for name, share in energy.items() if known and share > _HELD}
+    return frozenset(apart | held)
 
 
 def _couples(part: SparseArray) -> bool:
@@ -42,11 +46,11 @@ def _couples(part: SparseArray) -> bool:
     return bool(np.any(entries.data[entries.row != entries.col] != 0.0))
 
 
-def _force(part: SparseArray, rigid: FloatArray) -> float:
-    """Return the largest force of a rigid-body motion, relative to those that make it up."""
-    whole = (abs(part) @ np.abs(rigid)).max(axis=0, initial=0.0)
-    force = np.abs(part @ rigid).max(axis=0, initial=0.0)
-    return float((force / np.where(whole > 0.0, whole, 1.0)).max(initial=0.0))
+def _energy(part: SparseArray, rigid: FloatArray) -> float:
+    """Return the largest energy of a rigid-body motion, relative to that of its entries."""
+    whole = np.einsum("nr,nr->r", np.abs(rigid), abs(part) @ np.abs(rigid))
+    energy = np.abs(np.einsum("nr,nr->r", rigid, part @ rigid))
+    return float((energy / np.where(whole > 0.0, whole, 1.0)).max(initial=0.0))
 
 
 def group_prior_std(model: Model, name: str) -> float:
