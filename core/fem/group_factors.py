@@ -58,7 +58,7 @@ def with_group_factors(
 
     Arguments:
         model: whose groups are as large as they are now.
-        parameters: of quantity ``E`` (stiffness) or ``density`` (mass), at ``all`` or groups.
+        parameters: on E (the stiffness) or density (the mass), at ``all`` or groups.
         values: factors, (p,).
 
     Raises:

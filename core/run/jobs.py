@@ -110,7 +110,7 @@ def missing_capability(needs: frozenset[str], model: Model, measurement: Measure
         kinds = ("elements", "geometry", *(() if "parts" in needs else ("joints",)))
         lacking = [need for need in kinds if need in needs]
         if lacking:
-            return f"needs {lacking[0]}: a model of kind 'frame' has them, a pair of matrices none"
+            return f"needs {lacking[0]}, and the model is a pair of matrices: kind 'frame' has them"
         if "parts" in needs and not model.groups:
             return "needs parts of the stiffness to scale: declare [[model.groups]] in the case"
         return None
