@@ -37,6 +37,12 @@ from femubench.core.effect.flexible_ends import (
 )
 from femubench.core.effect.flexible_supports import flexible_supports_change, softened_supports
 from femubench.core.effect.frame_effect import EffectParameter, FrameEffect
+from femubench.core.effect.interfaces import (
+    facing_nodes,
+    interface_directions,
+    interface_places,
+    node_pairs,
+)
 from femubench.core.effect.places import (
     APART,
     FREE,
@@ -106,10 +112,13 @@ __all__ = [
     "end_room",
     "end_stiffness",
     "ends_of",
+    "facing_nodes",
     "flexible_ends_change",
     "flexible_supports_change",
     "free_arm_change",
     "free_translations",
+    "interface_directions",
+    "interface_places",
     "joint_types",
     "joints_of",
     "joints_with_members",
@@ -118,6 +127,7 @@ __all__ = [
     "member_length",
     "members_at",
     "members_of",
+    "node_pairs",
     "once_for",
     "pair_of",
     "point_in",

@@ -33,6 +33,12 @@ from femubench.core.fem.frame import (
     RigidEnd,
     Support,
 )
+from femubench.core.fem.group_factors import (
+    GROUP,
+    group_matrix,
+    group_places,
+    with_group_factors,
+)
 from femubench.core.fem.mesh import member_axes
 from femubench.core.fem.model import LowRank
 from femubench.core.fem.parameters import Parameter
@@ -53,17 +59,19 @@ from femubench.core.fem.sections import (
 )
 from femubench.core.fem.sensors import Outline
 from femubench.core.fem.structure import Structure
-from femubench.core.typing import FloatArray, IntArray, SparseArray
+from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 __all__ = [
     "ACTIVE",
     "BeamProperties",
+    "BoolArray",
     "Brace",
     "Coupling",
     "Eccentricity",
     "Factor",
     "FloatArray",
     "Frame",
+    "GROUP",
     "GroundSpring",
     "IntArray",
     "Joint",
@@ -93,6 +101,8 @@ __all__ = [
     "eccentric_mass_parts",
     "from_opensees",
     "gravity_stiffness",
+    "group_matrix",
+    "group_places",
     "mass_matrices",
     "matrix_model",
     "member_axes",
@@ -105,4 +115,5 @@ __all__ = [
     "stiffness_matrices",
     "wall_of",
     "write_matrices",
+    "with_group_factors",
 ]

@@ -6,6 +6,7 @@ from femubench.core.modal.correlation import auto_mac, mac, modal_scale_factor
 from femubench.core.modal.expansion import expand_by_dynamics, expand_by_rotation, expand_by_serep
 from femubench.core.modal.frf import receptance
 from femubench.core.modal.generalised_mass import mass_normalised
+from femubench.core.modal.group_prior import group_prior_std, support_groups
 from femubench.core.modal.pairing import Pairing, pair_measured, pair_modes
 from femubench.core.modal.rigid import rigid_body_vectors, rigid_modes_of
 from femubench.core.modal.sensitivity import (
@@ -22,6 +23,7 @@ __all__ = [
     "expand_by_rotation",
     "expand_by_serep",
     "frequency_sensitivities",
+    "group_prior_std",
     "mac",
     "mass_normalised",
     "modal_scale_factor",
@@ -33,4 +35,5 @@ __all__ = [
     "rigid_modes_of",
     "shape_sensitivities",
     "shrunk_correlation",
+    "support_groups",
 ]

@@ -15,7 +15,8 @@ import scipy.io
 import scipy.sparse as sp
 
 from femubench import InputError
-from femubench.fem import FloatArray
+from femubench.fem import BoolArray, FloatArray
+from femubench.scenarios.nodes_from_stiffness import Row, labelled_rows
 
 VARIABLE = "FEMUBENCH_FOOTBRIDGE"
 MODEL, TEST = "SteelPedestrianBridgeExp.mat", "ExpModeInfo_FEM.mat"
@@ -26,6 +27,7 @@ _EXPECTED = (
     f"the folder with {MODEL} and {TEST} of github.com/ywang-structures/"
     "Structural-Model-Updating, Examples/SteelPedestrianBridge"
 )
+_EXACT = 1e-9  # of a shape: no reading is known better
 _INCH, _KIP = 0.0254, 4448.2216152605  # m, N
 _CASE = """\
 [case]
@@ -44,6 +46,9 @@ sensors = "sensors.csv"
 modes = "modes.csv"
 used = {used}
 held_out = {held_out}
+
+[diagnosis]
+model_error = 1.0
 """
 
 
@@ -106,9 +111,7 @@ class _Variables:
 def _matrices(model: _Variables) -> dict[str, str | FloatArray]:
     """Return mass, stiffness, its groups, and the dofs.
 
-    The files have kips, inches and seconds. Rows without mass are rotations; which of the others
-    go where is not in the files, nor is any position, so every row is a node of its own on a
-    line. Nothing but drawings depends on that: the supports are springs, no motion is free.
+    The files have kips, inches and seconds. Rows without mass are rotations.
     """
     size = len(model.array("K_whole"))
     mass = model.array("M0", size, size)
@@ -118,7 +121,10 @@ def _matrices(model: _Variables) -> dict[str, str | FloatArray]:
     square = np.outer(scale, scale)
     names = {"stiffness.mtx": "K_whole", **{f"{name}.mtx": name for name in GROUPS}}
     parts = {file: square * model.array(name, size, size) for file, name in names.items()}
-    rows = [f"{i},{i},{'rx' if turn else 'z'},{i},0,0" for i, turn in enumerate(turns, start=1)]
+    rows = [
+        f"{i},{row.node + 1},{row.direction},{','.join(f'{_INCH * v:.6g}' for v in row.xyz)}"
+        for i, row in enumerate(_rows(model, turns), start=1)
+    ]
     groups = "".join(
         f'\n[[model.groups]]\nname = "{name}"\nstiffness = "{name}.mtx"\n' for name in GROUPS
     )
@@ -127,8 +133,23 @@ def _matrices(model: _Variables) -> dict[str, str | FloatArray]:
     return {"mass.mtx": square * mass, **parts, "dofs.csv": dofs, "case.toml": text}
 
 
+def _rows(model: _Variables, turns: BoolArray) -> list[Row]:
+    """Return what the rows are, which the files do not say and the stiffness does, in inches.
+
+    Where it does not either, every row is a node of its own on a line.
+    """
+    size = len(turns)
+    springs = {name: model.array(name, size, size) for name in GROUPS[-4:]}
+    free = model.array("K_whole", size, size) - sum(springs.values())
+    y1, z1, y2, z2 = (np.flatnonzero(part.diagonal()).tolist() for part in springs.values())
+    found = labelled_rows(free, turns, [*y1, *y2], [*z1, *z2])
+    if found is not None:
+        return found
+    return [Row(i, "rx" if turn else "z", (i / _INCH, 0.0, 0.0)) for i, turn in enumerate(turns)]
+
+
 def _measured(model: _Variables, test: _Variables) -> dict[str, str | FloatArray]:
-    """Return sensors and modes; a deviation of zero, at what a shape is scaled by, is left out."""
+    """Return sensors and modes; where a shape is one by definition its deviation is left out."""
     dofs = model.array("measDOFs").ravel().astype(int).tolist()
     moving = np.flatnonzero(model.array("M0").any(axis=0)) + 1
     if strangers := [dof for dof in dofs if dof not in moving]:
@@ -141,10 +162,12 @@ def _measured(model: _Variables, test: _Variables) -> dict[str, str | FloatArray
     frequencies = np.sqrt(values.ravel()) / (2.0 * np.pi)
     # lambda = (2 pi f)^2, to first order.
     frequency_std = value_std.ravel() / (8.0 * np.pi**2 * frequencies)
-    sensors = ["label,at,direction", *(f"S{dof},{dof},z" for dof in dofs)]
+    rows = _rows(model, np.asarray(~model.array("M0").any(axis=0)))
+    labels = [f"S{dof},{rows[dof - 1].node + 1},{rows[dof - 1].direction}" for dof in dofs]
+    sensors = ["label,at,direction", *labels]
     modes = [",".join(["mode,frequency,frequency_std", *(f"S{d},S{d}_std" for d in dofs)])]
     for m, (frequency, std) in enumerate(zip(frequencies, frequency_std, strict=True)):
         pairs = zip(shapes[:, m], shape_std[:, m], strict=True)
-        cells = (f"{value:.17g},{f'{std:.17g}' if std > 0.0 else ''}" for value, std in pairs)
+        cells = (f"{value:.17g},{f'{std:.17g}' if std > _EXACT else ''}" for value, std in pairs)
         modes.append(f"{m + 1},{frequency:.17g},{std:.17g},{','.join(cells)}")
     return {"sensors.csv": "\n".join(sensors), "modes.csv": "\n".join(modes)}

@@ -168,6 +168,8 @@ class TestReading:
         ("case", "text", "key"),
         [
             ("out-of-plane", '[[model.braces]]\nends = ["A", "C"]\nstiffness = 1.0', "braces[0]"),
+            ("in-plane", '[[model.braces]]\nends = ["A", "C"]\nstiffness = 1.0\ndirection = "y"',
+             "braces[0].direction"),
             ("out-of-plane", '[[model.eccentricities]]\nmember = "long"\nz = 0.1',
              "eccentricities[0].z"),
             ("in-plane", '[[model.eccentricities]]\nmember = "left"\ny = 0.1',

@@ -209,7 +209,7 @@ HEAD = "%%MatrixMarket matrix coordinate {} general\n{} {} {}\n"
         ("case.toml", MATRICES.replace("mass.mtx", "dofs.csv"), "dofs.csv", "kind of file"),
         ("case.toml", MATRICES + CHANGE, ":12: modification[0]", "no rotation ry"),
         ("case.toml", MATRICES + CHANGE.replace('"a"', '"q"'), "masses[0].at", "no node 'q'"),
-        ("case.toml", MATRICES + '[[model.groups]]\nname = "g"', ":12: model.groups[0]", "neither"),
+        ("case.toml", MATRICES + '[[model.groups]]\nname = "g"', ":12: model.groups[0]", "without"),
         (
             "case.toml",
             MATRICES + '[[model.groups]]\nname = "g"\ndofs = ["a", 3]',

@@ -208,7 +208,7 @@ def full_frames(ladder: Case, portal: Case, bracket: Case) -> Iterator[tuple[str
         replace(
             base,
             rotary_inertia=True,
-            braces=(Brace(("A", "C"), 1e5),),
+            braces=(Brace(("A", "C"), 1e5), Brace(("A", "B"), 2e4, "z")),
             eccentricities=(Eccentricity("left", z=-0.004),),
             gravity=0.5,
             oscillators=(Oscillator(Place(joint="B"), "x", 0.05, 30.0),),

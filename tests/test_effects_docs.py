@@ -39,11 +39,18 @@ def rows_of(heading: str) -> dict[str, list[str]]:
 
 @pytest.fixture(scope="module")
 def models(ladder: FrameBuilder, hframe: FrameBuilder, portal: FrameBuilder) -> list[Model]:
-    """Return a frame of each plane, none with shear deformation, and one that carries a weight."""
+    """Return a frame of each plane, none with shear deformation, and one that carries a weight.
+
+    The last has a joint twice, at the end of either member.
+    """
     frames = [ladder(), hframe(mesh=(4, 2, 4)), portal(3, "euler-bernoulli")]
     clamp = Support(Place(joint="L1"), ("x", "z", "ry"))
     weight = PointMass(Place(joint="U2"), 1000.0)
     frames.append(replace(frames[1], supports=(clamp,), masses=(weight,)))
+    whole, first = frames[0], frames[0].members[0]
+    twice = replace(whole.joint(first.ends[0]), name="other side")
+    parted = (replace(first, ends=(twice.name, first.ends[1])), *whole.members[1:])
+    frames.append(replace(whole, joints=(*whole.joints, twice), members=parted))
     return [Model.of(frame) for frame in frames]
 
 
@@ -58,7 +65,7 @@ def changed_keys(frame: Frame, other: Frame) -> set[str]:
 
 
 def test_every_effect_is_in_both_tables() -> None:
-    assert len(EFFECTS) == 25
+    assert len(EFFECTS) == 27
     assert list(rows_of(THERE)) == list(rows_of(WRITES))
     assert set(rows_of(THERE)) == set(EFFECTS)
 
@@ -67,7 +74,7 @@ def test_every_effect_is_in_both_tables() -> None:
 def test_units_priors_and_keys_are_those_of_the_effect(name: str, models: list[Model]) -> None:
     effect = EFFECTS[name]
     _, where, unit, prior = rows_of(THERE)[name]
-    scalings = set(re.findall(r"linear|exponential|compliance", prior))
+    scalings = set(re.findall(r"linear|exponential|compliance|factor", prior))
     written: set[str] = set()
     for model in models:
         frame = model.frame_structure.frame

@@ -353,7 +353,7 @@ def matrix_model(model: Model) -> Model:
 
 def test_matrices_without_a_frame(models: dict[str, Model]) -> None:
     model = matrix_model(models["ladder"])
-    assert MemberStiffness().places(model) == ("left", "rest")
+    assert MemberStiffness().places(model) == ("group:left", "group:rest")
     elsewhere: list[FrameEffect] = [TorsionConstant(), ShearDeformation(), RotaryInertia()]
     elsewhere += [MemberMass(), JointRotation(), JointOffset(), LocalStiffnessLoss()]
     for effect in elsewhere:
@@ -361,7 +361,11 @@ def test_matrices_without_a_frame(models: dict[str, Model]) -> None:
     with pytest.raises(NotApplicable, match="joint-rotation needs a frame"):
         JointRotation().extend(model, "A", [1.0])
     unit = np.eye(model.size)
-    for one, place in ((YoungsModulus(), "all"), (MemberStiffness(), "left"), (Density(), "all")):
+    for one, place in (
+        (YoungsModulus(), "all"),
+        (MemberStiffness(), "group:left"),
+        (Density(), "all"),
+    ):
         change, extended = one.change(model, place), one.extend(model, place, [0.25])
         factors = change.coefficients(np.array([[0.25]]))[0]
         sums = {"mass": model.mass_times(unit), "stiffness": model.stiffness_times(unit)}
@@ -373,8 +377,8 @@ def test_matrices_without_a_frame(models: dict[str, Model]) -> None:
     stiffer = YoungsModulus().extend(model, "all", [0.21])
     old, new = (solve_modes(m, 9).natural_frequencies[4:] for m in (model, stiffer))
     np.testing.assert_allclose(new, 1.1 * old, rtol=1e-9)
-    with pytest.raises(ModelError, match="no place 'right'"):
-        MemberStiffness().extend(model, "right", [0.1])
+    with pytest.raises(ModelError, match="no group 'group:right'"):
+        MemberStiffness().extend(model, "group:right", [0.1])
 
 
 def test_loss_takes_split_elements_whole(ladder: FrameBuilder) -> None:

@@ -356,6 +356,8 @@ class TestBraces:
             Structure.build(beam("3d", 2, braces=(Brace(ends, 1.0),)))
         with pytest.raises(ModelError, match="out of plane"):
             Structure.build(beam("out-of-plane", 2, braces=(Brace(("A", "B"), 1.0),)))
+        with pytest.raises(ModelError, match="along 'x'"):
+            Structure.build(beam("out-of-plane", 2, braces=(Brace(("A", "B"), 1.0, "x"),)))
 
 
 PINS = tuple(Support(Place(joint=j), ("x", "z")) for j in "AB")

@@ -85,7 +85,8 @@ def test_the_needs_of_a_strategy_are_checked_first() -> None:
     plain = toys.matrices_only(CASE.model)
     outcome = execute(job(toys.Needy(), model=plain))
     assert outcome.status == "not-applicable"
-    assert outcome.reason == "needs geometry, and the model is a pair of matrices"
+    expected = "needs geometry, and the model is a pair of matrices: kind 'frame' has them"
+    assert outcome.reason == expected
     assert execute(job(toys.Needy())).status == "ok"
 
 

@@ -252,7 +252,8 @@ def test_a_pair_of_matrices_has_nodes_and_groups(ladder: FrameBuilder) -> None:
         ladder(polar=False, accelerometer=False, elements=8), np.random.default_rng(3)
     )
     rows = locate(model, measured(soft, None, f_std=1e-4, std=1e-3))
-    assert ranking(rows, "energy-error", tuple(groups))[0] == place.partition("/")[0]
+    places = tuple(f"group:{name}" for name in groups)
+    assert ranking(rows, "energy-error", places)[0] == f"group:{place.partition('/')[0]}"
     assert len(structure.properties) == n
 
 

@@ -48,9 +48,9 @@ def test_the_posterior_is_that_of_exact_solutions() -> None:
     """Weighed draws of a wider distribution, every one solved, give the same mean and spread."""
     measurement, discrepancy = CASE.used_measurement(), Discrepancy(0.02, 0.01)
     strategy = BayesianSampling(discrepancy_median=0.02, discrepancy_spread=0.01)
-    unknowns = strategy.unknowns(CASE.model.frame_structure, weighed=False)
+    unknowns = strategy.unknowns(CASE.model, weighed=False)
     target, covariance = posterior_sampling.most_probable(
-        CASE.model.frame_structure, unknowns, measurement, discrepancy, strategy.options
+        CASE.model, unknowns, measurement, discrepancy, strategy.options
     )
     rng = np.random.default_rng(0)
     z = 1.8 * rng.standard_normal((700, len(unknowns)))

@@ -362,9 +362,9 @@ def test_a_partner_that_is_lost_for_an_iteration_is_followed(hframe_case: Any) -
     model, data = hframe_case
     shapes = data.shapes.copy()
     shapes[:, 2] = np.random.default_rng(3).normal(size=len(shapes))
-    before = predict(Data(data), model.frame_structure)
-    alone = predict(Data(replace(data, shapes=shapes)), model.frame_structure)
-    followed = predict(Data(replace(data, shapes=shapes)), model.frame_structure, before)
+    before = predict(Data(data), model)
+    alone = predict(Data(replace(data, shapes=shapes)), model)
+    followed = predict(Data(replace(data, shapes=shapes)), model, before)
     assert alone.partner[2] == -1
     assert np.isnan(alone.residual[2])
     np.testing.assert_array_equal(followed.partner, before.partner)
@@ -649,10 +649,10 @@ def test_the_jacobian_of_scaled_shapes(ladder: Any) -> None:
     data = Data(measured(model, 3).with_noise(np.random.default_rng(2)), "frequency", True, True)
     labels = tuple(label for label in structure.labels if label)
     parameters = [Parameter("GJ", "GJ", labels), Parameter("EI", "EI", labels[:3])]
-    slope = predict(data, structure).jacobian(parameters)
+    slope = predict(data, Model.of(structure)).jacobian(parameters)
     for p, parameter in enumerate(parameters):
         up, down = (
-            predict(data, structure.with_values([parameter], [1.0 + h])).residual
+            predict(data, Model.of(structure.with_values([parameter], [1.0 + h]))).residual
             for h in (1e-5, -1e-5)
         )
         difference = -(up - down) / 2e-5

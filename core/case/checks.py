@@ -65,9 +65,13 @@ def _check_couplings(model: FrameSpec) -> None:
 def _check_braces(model: FrameSpec) -> None:
     joints = {joint.name for joint in model.joints}
     for i, item in enumerate(model.braces):
-        if model.plane == "out-of-plane":
+        if model.plane == "out-of-plane" and not item.direction:
             what = "a brace does nothing in plane 'out-of-plane'"
-            raise Fault(("braces", i), what, "plane 'in-plane' or '3d'")
+            raise Fault(("braces", i), what, "plane 'in-plane' or '3d', or a direction")
+        moving = [name for name in ACTIVE[model.plane] if len(name) == 1]
+        if item.direction and item.direction not in moving:
+            what = f"nothing moves along {item.direction} in plane {model.plane!r}"
+            raise Fault(("braces", i, "direction"), what, ", ".join(moving))
         for j, end in enumerate(item.ends):
             _check_known("joint", end, joints, ("braces", i, "ends", j))
         if item.ends[0] == item.ends[1]:

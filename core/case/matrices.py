@@ -7,6 +7,7 @@ import gzip
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from io import BufferedIOBase
 from pathlib import Path
 from typing import IO, Any
@@ -218,48 +219,49 @@ def model_of_matrices(spec: MatricesSpec, files: CaseFiles, readers: Sequence[Re
     geometry = read_dofs(paths["dofs"])
     size = len(geometry.dofs)
     mass, stiffness = (read_matrix(paths[key], size, readers) for key in ("mass", "stiffness"))
-    groups = read_groups(spec.groups, geometry, stiffness, files, readers)
-    return Model(mass, stiffness, geometry.dofs, geometry, groups=groups)
+    return with_groups(Model(mass, stiffness, geometry.dofs, geometry), spec.groups, files, readers)
 
 
-def read_groups(
-    specs: Sequence[GroupSpec],
-    geometry: MatrixGeometry,
-    stiffness: SparseArray,
-    files: CaseFiles,
-    readers: Sequence[Reader],
-) -> dict[str, SparseArray]:
-    """Return the groups of a model by name, as `[[model.groups]]` gives them.
+def with_groups(
+    model: Model, specs: Sequence[GroupSpec], files: CaseFiles, readers: Sequence[Reader]
+) -> Model:
+    """Return a model from files with the groups of `[[model.groups]]` beside its own.
 
     Raises:
         Fault: with a path below `model`.
         InputError: for what is wrong in one of the files.
     """
+    geometry = model.geometry
+    assert isinstance(geometry, MatrixGeometry)
     check_unique((("groups", i, "name"), spec.name) for i, spec in enumerate(specs))
-    groups: dict[str, SparseArray] = {}
+    groups, mass_groups = dict(model.groups), dict(model.mass_groups)
     for i, spec in enumerate(specs):
         with at_key("groups", i):
-            groups[spec.name] = _group(spec, geometry, stiffness, files, readers)
-    return groups
+            _check_group(spec)
+            if spec.dofs is not None:
+                groups[spec.name] = _between(spec.dofs, geometry, model.stiffness)
+            for key, found in (("stiffness", groups), ("mass", mass_groups)):
+                if (file := getattr(spec, key)) is not None:
+                    with at_key(key):
+                        path = files.path(file)
+                    found[spec.name] = read_matrix(path, model.size, readers)
+    priors = {spec.name: spec.prior for spec in specs if spec.prior is not None}
+    return replace(model, groups=groups, mass_groups=mass_groups, group_priors=priors)
 
 
-def _group(
-    spec: GroupSpec,
-    geometry: MatrixGeometry,
-    stiffness: SparseArray,
-    files: CaseFiles,
-    readers: Sequence[Reader],
+def _check_group(spec: GroupSpec) -> None:
+    if spec.dofs is not None and (spec.stiffness is not None or spec.mass is not None):
+        raise Fault(("dofs",), "a group of dofs with files", "either files or dofs")
+    if spec.stiffness is None and spec.mass is None and spec.dofs is None:
+        raise Fault((), "a group without a part", "stiffness, mass or dofs")
+
+
+def _between(
+    dofs: Sequence[int | str], geometry: MatrixGeometry, stiffness: SparseArray
 ) -> SparseArray:
-    """Return the part of the stiffness that a group names."""
-    if (spec.stiffness is None) == (spec.dofs is None):
-        raise Fault((), "a group with both or neither", "either stiffness or dofs")
-    size = len(geometry.dofs)
-    if spec.stiffness is not None:
-        with at_key("stiffness"):
-            path = files.path(spec.stiffness)
-        return read_matrix(path, size, readers)
-    inside = np.zeros(size)
-    for i, entry in enumerate(spec.dofs or ()):
+    """Return the stiffness between some dofs."""
+    inside = np.zeros(len(geometry.dofs))
+    for i, entry in enumerate(dofs):
         with at_key("dofs", i):
             inside[_rows(entry, geometry)] = 1.0
     pick = sp.diags_array(inside)

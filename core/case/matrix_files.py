@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from io import BytesIO
 from os import PathLike
@@ -167,22 +167,31 @@ def matrix_keys(
     mass: SparseArray,
     stiffness: SparseArray,
     geometry: MatrixGeometry,
-    groups: Mapping[str, SparseArray],
+    model: Model,
 ) -> tuple[Keys, Files]:
     """Return the table `[model]` of a pair of matrices, and the files that it names.
 
     Arguments:
         mass, stiffness: sparse, (n, n).
         geometry: what their rows are.
-        groups: named parts of the stiffness, sparse (n, n) each.
+        model: whose groups are written.
     """
     files = _three(mass, stiffness, geometry)
     keys: Keys = {"kind": "matrices", **{file.partition(".")[0]: file for file in files}}
     tables = []
-    for i, (name, part) in enumerate(groups.items(), start=1):
-        file = f"group-{i}.mtx"
-        files[file] = matrix_market(part)
-        tables.append({"name": name, "stiffness": file})
+    names = dict.fromkeys((*model.groups, *model.mass_groups))
+    for i, name in enumerate(names, start=1):
+        table: Keys = {"name": name}
+        for key, suffix, parts in (
+            ("stiffness", "", model.groups),
+            ("mass", "-mass", model.mass_groups),
+        ):
+            if name in parts:
+                table[key] = f"group-{i}{suffix}.mtx"
+                files[table[key]] = matrix_market(parts[name])
+        if name in model.group_priors:
+            table["prior"] = float(model.group_priors[name])
+        tables.append(table)
     return (keys | {"groups": tables} if tables else keys), files
 
 

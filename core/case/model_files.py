@@ -20,9 +20,9 @@ from femubench.core.case.matrices import (
     checked,
     is_matrix_market,
     matrix_of,
-    read_groups,
     reader_of,
     reading_with,
+    with_groups,
 )
 from femubench.core.case.matrix_files import matrices_of, matrix_market
 from femubench.core.case.nodes import (
@@ -87,8 +87,11 @@ def read_as_it_is(paths: ModelFiles, readers: Sequence[Reader]) -> Model:
         return model
     mass = checked(model.mass, paths.mass or paths.model, model.size)
     stiffness = checked(model.stiffness, paths.model, model.size)
-    groups = {name: checked(part, paths.model, model.size) for name, part in model.groups.items()}
-    found = replace(model, mass=mass, stiffness=stiffness, groups=groups)
+    groups, mass_groups = (
+        {name: checked(part, paths.model, model.size) for name, part in parts.items()}
+        for parts in (model.groups, model.mass_groups)
+    )
+    found = replace(model, mass=mass, stiffness=stiffness, groups=groups, mass_groups=mass_groups)
     return _labelled(found, paths, readers)
 
 
@@ -123,8 +126,7 @@ def model_of_file(spec: FileSpec, files: CaseFiles, readers: Sequence[Reader]) -
     paths = ModelFiles(found["file"], found.get("mass"), found.get("dofs"))
     model = read_as_it_is(paths, readers)
     if spec.groups and isinstance(model.geometry, MatrixGeometry):
-        groups = read_groups(spec.groups, model.geometry, model.stiffness, files, readers)
-        model = replace(model, groups={**model.groups, **groups})
+        model = with_groups(model, spec.groups, files, readers)
     return in_si(model, spec.unit)
 
 

@@ -146,6 +146,7 @@ class BraceSpec(Table):
 
     ends: tuple[Name, Name] = Field(description="the names of two joints")
     stiffness: NotNegative = Field(description="a number >= 0 in N/m")
+    direction: Literal["", "x", "y", "z"] = Field("", description="x, y or z")
 
 
 class OscillatorSpec(Table):
@@ -316,12 +317,16 @@ class FrameSpec(Table):
 
 
 class GroupSpec(Table):
-    """`[[model.groups]]`: a named part of the stiffness."""
+    """`[[model.groups]]`: a named part of the stiffness, of the mass, or of both."""
 
     name: Name = Field(description=NAME)
     stiffness: FileName | None = Field(None, description="a matrix file in the case folder")
+    mass: FileName | None = Field(None, description="a matrix file in the case folder")
     dofs: Annotated[Many[DofName], Field(min_length=1)] | None = Field(
         None, description='a list of row numbers, "node" or "node:direction"'
+    )
+    prior: Annotated[float, Field(strict=True, gt=1, le=1e6, allow_inf_nan=False)] | None = Field(
+        None, description="a number > 1: a factor of so much up or down is as likely as not"
     )
 
 

@@ -63,12 +63,16 @@ def _converted(model: Model, length: float, force: float) -> Model:
         return replace(new, mass=new.mass + more_mass, stiffness=new.stiffness + more_stiffness)
     assert isinstance(model.geometry, MatrixGeometry)
     dofs = replace(model.dofs, xyz=length * model.dofs.xyz)
-    return Model(
+    return replace(
+        model,
         mass=turned(mass),
         stiffness=turned(stiffness),
+        mass_change=None,
+        stiffness_change=None,
         dofs=dofs,
         geometry=replace(model.geometry, dofs=dofs),
         groups={name: turned(part) for name, part in model.groups.items()},
+        mass_groups={name: turned(part) for name, part in model.mass_groups.items()},
     )
 
 

@@ -300,7 +300,7 @@ def _model_part(case: Case, known: Known) -> tuple[Keys, Files, tuple[Modificati
         return keys, frame_files(_model_of(frame)), case.modifications
     matrices = matrices_of(model)
     if isinstance(model.geometry, MatrixGeometry):
-        return *matrix_keys(*matrices, model.geometry, model.groups), case.modifications
+        return *matrix_keys(*matrices, model.geometry, model), case.modifications
     if model.structure is None:
         what = "a model without elements and without nodes by name cannot be written"
         raise Fault(("model",), what, "a frame, or matrices from files")
@@ -308,7 +308,7 @@ def _model_part(case: Case, known: Known) -> tuple[Keys, Files, tuple[Modificati
         what = "the model has changed matrices and flexible connections of skew members"
         raise Fault(("model",), what, "degrees of freedom along x, y or z")
     moved = tuple(_at_nodes(item, model) for item in case.modifications)
-    return *matrix_keys(*matrices, frame_geometry(model), model.groups), moved
+    return *matrix_keys(*matrices, frame_geometry(model), model), moved
 
 
 def _model_of(frame: Frame) -> Model:

@@ -12,7 +12,7 @@ from femubench.core.conformance import kit
 from femubench.core.conformance.fingerprints import fingerprint, first_difference
 from femubench.core.conformance.kit import Bench, Verdict, check, failed, passed
 from femubench.core.conformance.place_words import known_place
-from femubench.core.conformance.problems import PLAIN, problem
+from femubench.core.conformance.problems import GROUPED, PLAIN, problem
 from femubench.core.conformance.results import (
     Given,
     finite as finite_entries,
@@ -32,7 +32,7 @@ from femubench.core.update.strategy import UpdateResult
 
 _PROBLEMS = (
     PLAIN, "grounded frame in plane", "grounded frame in space", "free frame out of plane",
-    "matrices alone",
+    "matrices alone", GROUPED,
 )  # fmt: skip
 _SAME = 1e-6  # relative, of frequencies: stiff springs stand for rigid joints
 _STEP = 1e-4  # of the scale

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.effect.interfaces import node_pairs
 from femubench.core.effect.places import (
     bare_place,
     elements_of,
@@ -13,6 +14,7 @@ from femubench.core.effect.places import (
     supports_of,
 )
 from femubench.core.errors import ModelError
+from femubench.core.fem.group_factors import group_places
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 
@@ -21,11 +23,19 @@ def known_place(model: Model, place: str) -> bool:
     """Tell whether a place, without its direction or role, is in a model."""
     bare = split_direction(bare_place(place).removesuffix(":branch"))[0]
     if model.structure is not None:
-        return _in_frame(model.structure, bare) or _in_frame(model.structure, place)
-    known = set(model.groups) | {"all"}
+        words = (bare, place)
+        return any(_in_frame(model.structure, w) for w in words) or _is_interface(model, bare)
+    known = {"all", *group_places(model, "stiffness"), *group_places(model, "mass")}
     if isinstance(model.geometry, MatrixGeometry):
         known |= set(model.geometry.names)
-    return place in known or bare in known
+    return place in known or bare in known or _is_interface(model, bare)
+
+
+def _is_interface(model: Model, place: str) -> bool:
+    try:
+        return bool(node_pairs(model, place))
+    except ModelError:
+        return False
 
 
 def _in_frame(structure: Structure, place: str) -> bool:

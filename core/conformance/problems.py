@@ -24,6 +24,7 @@ from femubench.core.fem.frame import (
     Support,
 )
 from femubench.core.fem.model import Model
+from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.sections import rectangular_tube
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import solve_modes
@@ -168,6 +169,17 @@ def _as_matrices(problem: Problem) -> Problem:
     return replace(problem, model=Model(model.mass, model.stiffness, dofs, geometry))
 
 
+def _as_groups(problem: Problem) -> Problem:
+    """Return a problem with matrices of which one member and the others are groups."""
+    structure, nominal = problem.model.frame_structure, problem.model.stiffness
+    own = Parameter("E", "E", tuple(m for m in structure.label_index if m.startswith("AB/")))
+    one = structure.with_values([own], [2.0]).matrices()[1] - nominal
+    grouped = _as_matrices(problem)
+    groups = {"one": one, "others": nominal - one}
+    mass = {"half": 0.5 * grouped.model.mass}
+    return replace(grouped, model=replace(grouped.model, groups=groups, mass_groups=mass))
+
+
 def _without(problem: Problem, *cells: tuple[int | slice, int | slice]) -> Problem:
     """Return a problem in which some cells of the shapes are missing, by sensors and modes."""
     shapes, std = problem.measurement.shapes.copy(), problem.measurement.shape_std.copy()
@@ -198,6 +210,7 @@ def problem(name: str) -> Problem:
 
 
 PLAIN = "grounded frame out of plane"
+GROUPED = "matrices with groups"
 CROSSED = "frame whose modes change order"
 _FREE = "free frame out of plane"
 _ALL = slice(None)
@@ -216,6 +229,7 @@ _FRAMES: Mapping[str, Mapping[str, Any]] = {
 # The problem that is changed, and how.
 _CHANGED: Mapping[str, tuple[str, Callable[[Problem], Problem]]] = {
     "matrices alone": (PLAIN, _as_matrices),
+    GROUPED: (PLAIN, _as_groups),
     # One sensor never worked, and others missed a mode.
     "some shape cells missing": (PLAIN, lambda p: _without(p, (1, _ALL), (0, 2), (3, 0))),
     "one mode without a shape": (PLAIN, lambda p: _without(p, (_ALL, 1))),

@@ -12,7 +12,7 @@ from typing import Any
 from femubench.core.conformance import kit
 from femubench.core.conformance.fingerprints import first_difference
 from femubench.core.conformance.kit import Bench, Verdict, check, failed, passed
-from femubench.core.conformance.problems import CROSSED, PLAIN, PROBLEMS
+from femubench.core.conformance.problems import CROSSED, GROUPED, PLAIN, PROBLEMS
 from femubench.core.conformance.results import PROMISES
 from femubench.core.conformance.trial import Observation, Want, promises_of
 from femubench.core.plugin.variants import Variant
@@ -76,7 +76,7 @@ def _wanted(_: Bench, names: Sequence[str]) -> Sequence[Want]:
 
 def _with_results(bench: Bench) -> Sequence[Want]:
     """Return the trials whose results every check of results looks at."""
-    further = (CROSSED, "matrices alone", "one used mode", *bench.cases)
+    further = (CROSSED, "matrices alone", GROUPED, "one used mode", *bench.cases)
     return _runs((PLAIN, *_PLANES, *_FREE, *_MASSLESS, *_NOISE, *_MISSING, *further))
 
 
@@ -255,7 +255,8 @@ def _withheld(bench: Bench) -> list[tuple[str, Want]]:
     """Return what it does not declare, and a problem that does not have it."""
     needs = frozenset(declared(bench.subject, "needs"))
     frame = needs & {"elements", "geometry", "joints"}
-    lacking = {"shapes": "no shapes at all", "elements": "matrices alone", "joints": "one member"}
+    bare = GROUPED if "parts" in needs else "matrices alone"
+    lacking = {"shapes": "no shapes at all", "elements": bare, "joints": "one member"}
     return [
         (capability, Want(lacking[capability]))
         for capability in CAPABILITIES

@@ -16,6 +16,8 @@ from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
 from femubench.core.roles import Effect, Scaling, Wording
 
+_NOTHING = -1.0 + 1e-12  # a factor is positive
+
 
 @dataclass(frozen=True)
 class EffectParameter:
@@ -27,6 +29,7 @@ class EffectParameter:
     - ``linear``: value = neutral + scale x
     - ``exponential``: value = neutral + scale (exp |x| - 1) sign x, for sizes over decades
     - ``compliance``: value = scale / (exp x - 1), for springs that are rigid at x = 0
+    - ``factor``: value = neutral + exp (scale x) - 1, for the change of a log-normal factor
 
     Arguments:
         name: for tables.
@@ -61,6 +64,8 @@ class EffectParameter:
             return self.neutral + self.scale * x
         if self.scaling == "compliance":
             return self.scale / np.expm1(np.maximum(x, 1e-9))
+        if self.scaling == "factor":
+            return self.neutral + np.expm1(self.scale * x)
         return self.neutral + self.scale * np.expm1(np.abs(x)) * np.sign(x)
 
     def coordinate(self, value: float) -> float:
@@ -69,6 +74,8 @@ class EffectParameter:
             if value <= 0.0:
                 return np.inf
             return float(np.log1p(self.scale / value)) if np.isfinite(value) else 0.0
+        if self.scaling == "factor":
+            return float(np.log1p(max(value - self.neutral, _NOTHING)) / self.scale)
         share = (value - self.neutral) / self.scale
         if self.scaling == "linear":
             return float(share)

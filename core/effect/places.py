@@ -17,6 +17,7 @@ import numpy as np
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import ACTIVE, Frame, Member, Place
+from femubench.core.fem.group_factors import GROUP
 from femubench.core.fem.joints import joint_groups
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import DIRECTIONS
@@ -352,7 +353,7 @@ def split_direction(place: str) -> tuple[str, str | None]:
     """
     head, _, tail = place.rpartition(":")
     # "type:x" is the joint type x.
-    kinds = (_TYPE, _SUPPORT, _SET, _SECTION, _MATERIAL)
+    kinds = (_TYPE, _SUPPORT, _SET, _SECTION, _MATERIAL, GROUP)
     if head and f"{head}:" not in kinds and tail.lstrip("+-") in DIRECTIONS:
         return head, tail
     return place, None

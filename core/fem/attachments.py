@@ -26,8 +26,12 @@ def check_attachments(frame: Frame) -> None:
             what = f"a link has the motions {', '.join(ACTIVE[frame.plane])} in this plane"
             raise ModelError(what, link)
     for brace in frame.braces:
-        if frame.plane == "out-of-plane":
+        if frame.plane == "out-of-plane" and not brace.direction:
             raise ModelError("a brace does nothing out of plane", brace)
+        if brace.direction and brace.direction not in set(ACTIVE[frame.plane]) & set(
+            DIRECTIONS[:3]
+        ):
+            raise ModelError(f"nothing moves along {brace.direction!r} in this plane", brace)
         if brace.ends[0] == brace.ends[1] or not set(brace.ends) <= set(frame.joint_index):
             raise ModelError(f"a brace needs two joints, not {' and '.join(brace.ends)}", brace)
     allowed = [name for name in ACTIVE[frame.plane] if len(name) == 1]
@@ -49,11 +53,18 @@ def brace_ends(frame: Frame) -> IntArray:
 
 
 def brace_lines(frame: Frame) -> tuple[FloatArray, FloatArray]:
-    """Return unit vectors (n_braces, 3) and lengths in m (n_braces,) of the braces."""
+    """Return unit vectors (n_braces, 3) and lengths in m (n_braces,) of the braces.
+
+    One in a global direction does not turn with its ends: its length is infinite.
+    """
     ends = brace_ends(frame)
     along = frame.corners[ends[:, 1]] - frame.corners[ends[:, 0]]
     length = np.linalg.norm(along, axis=1)
-    return along / length[:, None], length
+    for i, brace in enumerate(frame.braces):
+        if brace.direction:
+            along[i], length[i] = np.eye(3)[DIRECTIONS.index(brace.direction)], 1.0
+    fixed = np.array([bool(brace.direction) for brace in frame.braces], dtype=bool)
+    return along / length[:, None], np.where(fixed, np.inf, length)
 
 
 def brace_motion(structure: MeshedFrame) -> SparseArray:

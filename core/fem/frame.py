@@ -210,10 +210,15 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Brace:
-    """A massless axial spring between two joints, N/m."""
+    """A massless spring between two joints, N/m: along their line, or in one global direction.
+
+    Arguments:
+        direction: x, y or z; empty for the line between the joints.
+    """
 
     ends: tuple[str, str]
     stiffness: float
+    direction: str = ""
 
 
 @dataclass(frozen=True)

@@ -93,8 +93,10 @@ class Model(Shown):
         geometry: where sensors and attachments act.
         structure: the meshed frame that gave the matrices; None for matrices from files.
         mass_change, stiffness_change: low-rank terms on top of the sparse matrices.
-        groups: named parts of the stiffness of a model from files, sparse (n, n) each.
         free: whether the structure is known to hang free, so that nothing may hold it.
+        groups, mass_groups: named parts of stiffness and mass of a model from files, sparse (n, n)
+            each.
+        group_priors: by name of a group, a factor of so much up or down is as likely as not.
     """
 
     mass: SparseArray
@@ -106,6 +108,8 @@ class Model(Shown):
     stiffness_change: LowRank | None = None
     groups: Mapping[str, SparseArray] = field(default_factory=dict)
     free: bool = False
+    mass_groups: Mapping[str, SparseArray] = field(default_factory=dict)
+    group_priors: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, source: Frame | Structure) -> Model:
@@ -133,7 +137,8 @@ class Model(Shown):
             matrix, change = getattr(self, name), getattr(self, f"{name}_change")
             rank = "" if change is None else f", and a change of rank {change.core.shape[0]}"
             found.append((name, f"{matrix.nnz} entries, largest {abs(matrix).max():.4g}{rank}"))
-        return found + ([("groups", ", ".join(self.groups))] if self.groups else [])
+        groups = (("groups", self.groups), ("mass groups", self.mass_groups))
+        return found + [(word, ", ".join(known)) for word, known in groups if known]
 
     @property
     def size(self) -> int:

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.errors import ModelError
 from femubench.core.fem.beam import stiffness_matrices
+from femubench.core.fem.group_factors import group_places
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.look.shape_expansion import Comparison, Expansion, expand
@@ -147,7 +148,7 @@ def node_residual(comparison: Comparison, expansion: Expansion) -> list[Values]:
 def group_energy(comparison: Comparison, expansion: Expansion) -> list[Values]:
     """Return the error in constitutive relation of the groups of a model from files."""
     shapes, gaps = _weighted(expansion)
-    names = tuple(comparison.model.groups)
+    names = group_places(comparison.model, "stiffness")
     parts = comparison.model.groups.values()
     error = np.array([np.einsum("nm,nm->", gaps, k @ gaps) for k in parts])
     energy = np.array([np.einsum("nm,nm->", shapes, k @ shapes) for k in parts])

@@ -1,4 +1,4 @@
-"""Derivatives of eigenvalues and mode shapes with respect to model parameters."""
+"""MatrixSlopes of eigenvalues and mode shapes with respect to model parameters."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.derivatives import Derivatives, derivatives
 from femubench.core.fem.model import Model
+from femubench.core.fem.model_parameters import MatrixSlopes, matrix_slopes
 from femubench.core.fem.parameters import Parameter
 from femubench.core.modal.eigen import Modes
 from femubench.core.typing import FloatArray, IntArray
@@ -19,12 +19,12 @@ _REPEATED = 1e-8
 
 
 def eigenvalue_sensitivities(
-    model: Model, modes: Modes, parameters: Sequence[Parameter], change: Derivatives | None = None
+    model: Model, modes: Modes, parameters: Sequence[Parameter], change: MatrixSlopes | None = None
 ) -> FloatArray:
     """Return d lambda_j / d p in rad^2/s^2 a unit of the parameter, (m, n_parameters).
 
     Arguments:
-        model: a frame model.
+        model: a frame, or matrices with groups.
         modes: some of its modes, mass-normalised.
         parameters: factors are taken about 1, everything else about its present value.
         change: the derivatives of the matrices, where they are at hand.
@@ -36,7 +36,7 @@ def eigenvalue_sensitivities(
         >>> np.allclose(slopes[:, 0], modes.eigenvalues[[3, 4]])
         True
     """
-    change = derivatives(model.frame_structure, parameters) if change is None else change
+    change = matrix_slopes(model, parameters) if change is None else change
     stiffness, mass = change.quadratic(modes.shapes, modes.shapes)
     return np.asarray(stiffness - modes.eigenvalues[:, None] * mass)
 
@@ -46,7 +46,7 @@ def shape_sensitivities(
     modes: Modes,
     index: int,
     parameters: Sequence[Parameter],
-    change: Derivatives | None = None,
+    change: MatrixSlopes | None = None,
 ) -> FloatArray:
     """Return d phi / d p of one mode, (n, n_parameters).
 
@@ -56,7 +56,7 @@ def shape_sensitivities(
     left out.
 
     Arguments:
-        model: a frame model.
+        model: a frame, or matrices with groups.
         modes: its modes, mass-normalised; modes that share the eigenvalue must be among them.
         index: which of them.
         parameters: as in `eigenvalue_sensitivities`.
@@ -71,7 +71,7 @@ def shape_sensitivities(
         >>> modal.shape_sensitivities(model, modes, 3, [stiffness]).shape
         (81, 1)
     """
-    change = derivatives(model.frame_structure, parameters) if change is None else change
+    change = matrix_slopes(model, parameters) if change is None else change
     if len(modes) == model.size:
         return _modal_sum(modes, index, change)
     return _nelson(model, modes, index, change)
@@ -84,7 +84,7 @@ def _same_eigenvalue(modes: Modes, index: int) -> IntArray:
     return np.flatnonzero(gap <= _REPEATED * scale)
 
 
-def _modal_sum(modes: Modes, index: int, change: Derivatives) -> FloatArray:
+def _modal_sum(modes: Modes, index: int, change: MatrixSlopes) -> FloatArray:
     shapes, eigenvalue = modes.shapes, modes.eigenvalues[index]
     shape = shapes[:, index]
     force = change.products(shape, float(eigenvalue))
@@ -95,13 +95,13 @@ def _modal_sum(modes: Modes, index: int, change: Derivatives) -> FloatArray:
     return np.asarray(shapes @ share)
 
 
-def _mass_part(shape: FloatArray, change: Derivatives) -> FloatArray:
+def _mass_part(shape: FloatArray, change: MatrixSlopes) -> FloatArray:
     """Return phi' dM/dp phi, (n_parameters,)."""
     _, mass = change.quadratic(shape[:, None], shape[:, None])
     return np.asarray(mass[0])
 
 
-def _nelson(model: Model, modes: Modes, index: int, change: Derivatives) -> FloatArray:
+def _nelson(model: Model, modes: Modes, index: int, change: MatrixSlopes) -> FloatArray:
     if model.stiffness_change is not None or model.mass_change is not None:
         raise ModelError("shape sensitivities of a model with low-rank changes need all its modes")
     shape, eigenvalue = modes.shapes[:, index], float(modes.eigenvalues[index])

@@ -106,8 +106,14 @@ def missing_capability(needs: frozenset[str], model: Model, measurement: Measure
     if "shapes" in needs and not measurement.has_shapes:
         return "needs measured mode shapes, and a used mode has none"
     if model.structure is None:
-        lacking = [need for need in ("elements", "geometry", "joints") if need in needs]
-        return f"needs {lacking[0]}, and the model is a pair of matrices" if lacking else None
+        # Who takes groups needs joints of frames alone.
+        kinds = ("elements", "geometry", *(() if "parts" in needs else ("joints",)))
+        lacking = [need for need in kinds if need in needs]
+        if lacking:
+            return f"needs {lacking[0]}, and the model is a pair of matrices: kind 'frame' has them"
+        if "parts" in needs and not model.groups:
+            return "needs parts of the stiffness to scale: declare [[model.groups]] in the case"
+        return None
     frame = model.structure.frame
     if "joints" in needs and all(len(frame.ends_at(joint.name)) < 2 for joint in frame.joints):
         return "needs joints, and no two members of the frame meet"

@@ -1,19 +1,23 @@
-"""Families of element stiffness matrices in which an updated element is looked for."""
+"""Families of stiffness matrices in which updated elements or groups are looked for."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+import scipy.sparse as sp
 
 from femubench.core.errors import ModelError, NotApplicable
 from femubench.core.fem.beam import BeamProperties, stiffness_matrices
 from femubench.core.fem.frame import Plane
+from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
-from femubench.core.typing import BoolArray, FloatArray, IntArray
+from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
+from femubench.core.update.parameter_sets import StiffnessParts, stiffness_parts
 
 Symmetry = Literal["none", "half-turn", "mirror", "full"]
 _MIRROR_AXIS = 0  # the mid-plane is normal to the element
@@ -128,29 +132,23 @@ _TRANSLATION_XY, _SLOPE_XY = [1, 7], [5, 11]
 _TWIST, _AXIAL = [3, 9], [0, 6]
 
 
-@dataclass(frozen=True)
-class ElementFamily:
-    """Element stiffness matrices k_e = k_e0 + sum_a x[column_ea] pattern_ea.
+@dataclass(frozen=True, kw_only=True)
+class Family(ABC):
+    """Stiffness matrices K_0 + sum_a x[column_ea] pattern_ea of parts e of a model.
 
     The unknowns x are relative changes (p - p0)/ref, zero for the nominal model.
 
     Arguments:
-        structure: the meshed frame.
-        elements: the elements that may change, (n_e,).
-        patterns: change of a local stiffness matrix for a unit change, (n_e, n_a, 12, 12).
         columns: the unknown that scales each pattern, -1 for none, (n_e, n_a).
         names: one a unknown.
         before, units: nominal values of the parameters and their unit, one an unknown; an unknown
             x stands for the value before + x scale.
         scale: unit change of every parameter, (n_unknowns,).
-        cores: part of each pattern in the element's relative core, whose nominal value is the unit
-            matrix, (n_e, n_a, q, q); None for a family without such a promise. The element is
+        cores: part of each pattern in the part's relative core, whose nominal value is the unit
+            matrix, (n_e, n_a, q, q); None for a family without such a promise. The part is
             positive semidefinite where its core is.
     """
 
-    structure: Structure
-    elements: IntArray
-    patterns: FloatArray
     columns: IntArray
     names: tuple[str, ...]
     before: FloatArray
@@ -170,8 +168,47 @@ class ElementFamily:
         return np.asarray((values - self.before) / self.scale)
 
     def spread(self, x: FloatArray) -> FloatArray:
-        """Return the unknowns of every element and pattern, zero where there is none."""
+        """Return the unknowns of every part and pattern, zero where there is none."""
         return np.asarray(np.append(x, 0.0)[self.columns])
+
+    def relative_cores(self, x: FloatArray) -> FloatArray:
+        """Return the relative core of every part, the unit matrix nominally, (n_e, q, q)."""
+        assert self.cores is not None
+        change = np.einsum("ea,eaij->eij", self.spread(x), self.cores)
+        return np.asarray(np.eye(self.cores.shape[-1]) + change)
+
+    @property
+    @abstractmethod
+    def length(self) -> float:
+        """Return the length in m by which moments are made forces."""
+
+    @abstractmethod
+    def forces(self, shapes: FloatArray) -> list[SparseArray]:
+        """Return, for each shape, what a unit of every unknown adds, sparse (n, n_unknowns)."""
+
+    @abstractmethod
+    def changed(self, model: Model, x: FloatArray) -> Model:
+        """Return the model with the change of stiffness that belongs to x."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElementFamily(Family):
+    """Families of element matrices k_e = k_e0 + sum_a x[column_ea] pattern_ea.
+
+    Arguments:
+        structure: the meshed frame.
+        elements: the elements that may change, (n_e,).
+        patterns: change of a local stiffness matrix for a unit change, (n_e, n_a, 12, 12).
+    """
+
+    structure: Structure
+    elements: IntArray
+    patterns: FloatArray
+
+    @property
+    def length(self) -> float:
+        """Return the mean length of the elements in m."""
+        return float(self.structure.properties.length[self.elements].mean())
 
     def change(self, x: FloatArray) -> FloatArray:
         """Return the change of all local stiffness matrices, (n_elements, 12, 12)."""
@@ -179,11 +216,83 @@ class ElementFamily:
         change[self.elements] = np.einsum("ea,eaij->eij", self.spread(x), self.patterns)
         return change
 
-    def relative_cores(self, x: FloatArray) -> FloatArray:
-        """Return the relative core of every element, the unit matrix nominally, (n_e, q, q)."""
-        assert self.cores is not None
-        change = np.einsum("ea,eaij->eij", self.spread(x), self.cores)
-        return np.asarray(np.eye(self.cores.shape[-1]) + change)
+    def changed(self, model: Model, x: FloatArray) -> Model:
+        """Return the model with other element matrices."""
+        change = self.structure.plan.assemble(self.change(x))
+        return replace(model, stiffness=model.stiffness + change)
+
+    def forces(self, shapes: FloatArray) -> list[SparseArray]:
+        """Return, for each shape, what a unit of every unknown adds, sparse (n, n_unknowns)."""
+        gather = self.structure.gather
+        local = (gather @ shapes).reshape(-1, 12, shapes.shape[1])[self.elements]
+        forces = self.patterns @ local[:, None]  # e, a, 12, m
+        used = self.columns >= 0
+        rows = 12 * self.elements[:, None, None] + np.arange(12)
+        rows = np.broadcast_to(rows, forces.shape[:3])[used].ravel()
+        columns = np.repeat(self.columns[used], 12)
+        shape = (gather.shape[0], len(self))
+        across = gather.T.tocsr()
+        return [
+            across @ sp.csr_array((forces[used][:, :, j].ravel(), (rows, columns)), shape=shape)
+            for j in range(shapes.shape[1])
+        ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class GroupFamily(Family):
+    """Factors on the groups of a model from matrices.
+
+    Arguments:
+        parts: the groups and their factors.
+    """
+
+    parts: StiffnessParts
+
+    @property
+    def length(self) -> float:
+        """Return the length at which rotations are as stiff as translations, 1 without either."""
+        model = self.parts.model
+        turning = np.array([direction.startswith("r") for direction in model.dofs.direction])
+        size = model.stiffness.diagonal()
+        sizes = [size[chosen & (size > 0.0)] for chosen in (turning, ~turning)]
+        if not all(map(len, sizes)):
+            return 1.0
+        turn, move = (float(np.log(size).mean()) for size in sizes)
+        return float(np.exp(0.5 * (turn - move)))
+
+    def changed(self, model: Model, x: FloatArray) -> Model:
+        """Return the model with factors 1 + x on its groups."""
+        return self.parts.at(1.0 + x)
+
+    def forces(self, shapes: FloatArray) -> list[SparseArray]:
+        """Return, for each shape, what a unit of every unknown adds, sparse (n, n_unknowns)."""
+        products = np.array([part @ shapes for part in self.parts.matrices])  # p, n, m
+        return [sp.csr_array(products[:, :, j].T) for j in range(shapes.shape[1])]
+
+
+def group_family(model: Model) -> GroupFamily:
+    """Return one factor on every group of the stiffness of a model from matrices.
+
+    Raises:
+        NotApplicable: when it has no groups.
+
+    Examples:
+        >>> from dataclasses import replace
+        >>> deck = replace(model, structure=None, groups={"deck": model.stiffness})
+        >>> update.group_family(deck).names
+        ('stiffness group:deck',)
+    """
+    parts = stiffness_parts(model, "groups")
+    one = np.ones(len(parts))
+    return GroupFamily(
+        columns=np.arange(len(parts))[:, None],
+        names=parts.names,
+        before=one,
+        scale=one,
+        units=("",) * len(parts),
+        cores=np.ones((len(parts), 1, 1, 1)),
+        parts=parts,
+    )
 
 
 def tied(family: ElementFamily, parts: Mapping[str, tuple[str, ...]]) -> ElementFamily:
@@ -285,11 +394,16 @@ def physical_family(structure: Structure) -> ElementFamily:
     count = patterns.shape[1]
     units = np.eye(count)[:, :, None] * np.eye(count)[:, None, :]
     return ElementFamily(
-        structure, elements, patterns, columns,
-        tuple(f"{key} {labels[e]}" for key, e in listed),
-        before, before, tuple("N" if key == "EA" else "N m2" for key, _ in listed),
-        np.broadcast_to(units, (len(elements), *units.shape)),
-    )  # fmt: skip
+        structure=structure,
+        elements=elements,
+        patterns=patterns,
+        columns=columns,
+        names=tuple(f"{key} {labels[e]}" for key, e in listed),
+        before=before,
+        scale=before,
+        units=tuple("N" if key == "EA" else "N m2" for key, _ in listed),
+        cores=np.broadcast_to(units, (len(elements), *units.shape)),
+    )
 
 
 def nobari_family(structure: Structure) -> ElementFamily:
@@ -317,7 +431,14 @@ def nobari_family(structure: Structure) -> ElementFamily:
     one = np.ones(len(listed))
     names = tuple(f"{key.strip()} {labels[e]}" for key, e in listed)
     return ElementFamily(
-        structure, elements, patterns, columns, names, one, one, ("",) * len(listed)
+        structure=structure,
+        elements=elements,
+        patterns=patterns,
+        columns=columns,
+        names=names,
+        before=one,
+        scale=one,
+        units=("",) * len(listed),
     )
 
 
@@ -418,6 +539,13 @@ def generic_family(
     before = np.array([1.0 if i == j else 0.0 for i, j, _ in unknowns])
     names = tuple(name for _, name in unknowns.values())
     return ElementFamily(
-        structure, elements, patterns, columns, names,
-        before, np.ones(len(names)), ("",) * len(names), cores,
-    )  # fmt: skip
+        structure=structure,
+        elements=elements,
+        patterns=patterns,
+        columns=columns,
+        names=names,
+        before=before,
+        scale=np.ones(len(names)),
+        units=("",) * len(names),
+        cores=cores,
+    )

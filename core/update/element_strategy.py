@@ -8,11 +8,11 @@ from typing import ClassVar, get_args
 
 import numpy as np
 
-from femubench.core.errors import InputError
+from femubench.core.errors import InputError, NotApplicable
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.measurement import Measurement
-from femubench.core.update.element_families import ElementFamily, tied
+from femubench.core.update.element_families import ElementFamily, Family, tied
 from femubench.core.update.equation_error import update_by_equation_error
 from femubench.core.update.parameter_sets import OWN, checked_set, element_sets
 from femubench.core.update.quasi import Expansion, Frequencies
@@ -59,6 +59,20 @@ class ElementStrategy(Strategy):
     def family(self, structure: Structure) -> ElementFamily:
         """Return where the updated element matrices are looked for."""
 
+    def family_of(self, model: Model) -> Family:
+        """Return the family of a model, unknowns of one part tied where told.
+
+        Raises:
+            NotApplicable: when the model has no such parts.
+        """
+        if self.parameters == "groups":
+            raise NotApplicable("groups of matrices have no elements: parameters=sets of a frame")
+        structure = model.frame_structure
+        family = self.family(structure)
+        if self.parameters == OWN:
+            return family
+        return tied(family, element_sets(structure, self.parameters))
+
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator
     ) -> UpdateResult:
@@ -70,10 +84,7 @@ class ElementStrategy(Strategy):
                 where element cores are, rigid-body modes where they shall be kept.
             NotApplicable: when there are too many unknowns, or no rigid-body modes to keep.
         """
-        structure = model.frame_structure
-        family = self.family(structure)
-        if self.parameters != OWN:
-            family = tied(family, element_sets(structure, self.parameters))
+        family = self.family_of(model)
         return update_by_equation_error(
             model,
             measurement,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
@@ -15,7 +15,7 @@ from femubench.core.modal.eigen import DENSE_LIMIT, dense_matrices
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.typing import FloatArray, SparseArray
-from femubench.core.update.element_families import ElementFamily
+from femubench.core.update.element_families import Family
 from femubench.core.update.quasi import ITERATIONS, Expansion, Frequencies, QuasiModes, WantedModes
 from femubench.core.update.strategy import ParameterEstimate, UpdateResult
 
@@ -26,12 +26,12 @@ _MOST_STEPS = 400
 _RIDGE = 1e-14  # decides motions of x that no equation sees
 
 
-def smallest_core_eigenvalue(family: ElementFamily, x: FloatArray) -> float:
+def smallest_core_eigenvalue(family: Family, x: FloatArray) -> float:
     """Return the smallest eigenvalue of all relative element cores; 1 for the nominal model."""
     return float(np.linalg.eigvalsh(family.relative_cores(x)).min())
 
 
-def nearest_positive(family: ElementFamily, normal: FloatArray, best: FloatArray) -> FloatArray:
+def nearest_positive(family: Family, normal: FloatArray, best: FloatArray) -> FloatArray:
     """Return the least-squares solution among cores with eigenvalues of at least `FLOOR`.
 
     The problem is convex; a logarithmic barrier with Newton steps from the nominal model solves
@@ -70,7 +70,7 @@ def nearest_positive(family: ElementFamily, normal: FloatArray, best: FloatArray
 
 
 def _newton(
-    family: ElementFamily, hessian: FloatArray, best: FloatArray, x: FloatArray, barrier: float
+    family: Family, hessian: FloatArray, best: FloatArray, x: FloatArray, barrier: float
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return gradient, Newton step and Newton decrement squared."""
     assert family.cores is not None
@@ -94,7 +94,7 @@ def _newton(
 
 
 def _line_search(
-    family: ElementFamily, hessian: FloatArray, best: FloatArray, x: FloatArray,
+    family: Family, hessian: FloatArray, best: FloatArray, x: FloatArray,
     slope: FloatArray, step: FloatArray, barrier: float,
 ) -> FloatArray:  # fmt: skip
     """Return the next point, inside the cone and lower by Armijo's rule; x itself if none is."""
@@ -147,36 +147,14 @@ class Solution:
     free: int
 
 
-def row_scale(model: Model, family: ElementFamily) -> FloatArray:
-    """Return 1 for forces and 1/L for moments, L being the mean element length, (n,)."""
-    length = float(family.structure.properties.length[family.elements].mean())
+def row_scale(model: Model, family: Family) -> FloatArray:
+    """Return 1 for forces and 1/L for moments, L being the length of the family, (n,)."""
     turning = np.array([direction.startswith("r") for direction in model.dofs.direction])
-    return np.where(turning, 1.0 / length, 1.0)
-
-
-def force_columns(family: ElementFamily, shapes: FloatArray) -> list[SparseArray]:
-    """Return, for each shape, the forces that a unit of every unknown adds, sparse (n, n_unknowns).
-
-    Arguments:
-        shapes: on the free dofs, (n, m).
-    """
-    gather = family.structure.gather
-    local = (gather @ shapes).reshape(-1, 12, shapes.shape[1])[family.elements]
-    forces = family.patterns @ local[:, None]  # e, a, 12, m
-    used = family.columns >= 0
-    rows = 12 * family.elements[:, None, None] + np.arange(12)
-    rows = np.broadcast_to(rows, forces.shape[:3])[used].ravel()
-    columns = np.repeat(family.columns[used], 12)
-    shape = (gather.shape[0], len(family))
-    across = gather.T.tocsr()
-    return [
-        across @ sp.csr_array((forces[used][:, :, j].ravel(), (rows, columns)), shape=shape)
-        for j in range(shapes.shape[1])
-    ]
+    return np.where(turning, 1.0 / family.length, 1.0)
 
 
 def equations(
-    model: Model, family: ElementFamily, quasi: QuasiModes, *, orthogonality: bool
+    model: Model, family: Family, quasi: QuasiModes, *, orthogonality: bool
 ) -> tuple[SparseArray, FloatArray, float]:
     """Return A, b of A x = b and the norm of the inertia forces.
 
@@ -186,7 +164,7 @@ def equations(
     Source: Ahmadian, Gladwell & Ismail (1997), section 4.
     """
     scale = row_scale(model, family)
-    columns = force_columns(family, quasi.shapes)
+    columns = family.forces(quasi.shapes)
     inertia = model.mass_times(quasi.shapes) * quasi.eigenvalues
     elastic = model.stiffness_times(quasi.shapes)
     size = float(np.linalg.norm(scale[:, None] * inertia))
@@ -216,7 +194,7 @@ def _triangular(matrix: SparseArray, right: FloatArray) -> FloatArray:
 
 
 def solve_least_change(
-    matrix: SparseArray, right: FloatArray, family: ElementFamily, basis: FloatArray | None
+    matrix: SparseArray, right: FloatArray, family: Family, basis: FloatArray | None
 ) -> Solution:
     """Return the smallest x that solves A x = b in the sense of least squares.
 
@@ -243,30 +221,24 @@ def solve_least_change(
     )
 
 
-def rigid_basis(model: Model, family: ElementFamily, rigid: FloatArray) -> FloatArray:
+def rigid_basis(model: Model, family: Family, rigid: FloatArray) -> FloatArray:
     """Return an orthonormal basis of the changes that leave rigid-body modes free, (n, k).
 
     Arguments:
         rigid: rigid-body modes of the model, (n, r).
     """
     scale = sp.diags_array(row_scale(model, family))
-    rows = sp.csr_array(sp.vstack([scale @ block for block in force_columns(family, rigid)]))
+    rows = sp.csr_array(sp.vstack([scale @ block for block in family.forces(rigid)]))
     reduced = _triangular(rows, np.zeros(rows.shape[0]))[:, :-1]
     _, singular, right = la.svd(reduced)
     rank = int(np.sum(singular > _CUTOFF * singular[0]))
     return np.asarray(right[rank:].T)
 
 
-def updated(model: Model, family: ElementFamily, x: FloatArray) -> Model:
-    """Return the model with element matrices changed by x."""
-    change = family.structure.plan.assemble(family.change(x))
-    return replace(model, stiffness=model.stiffness + change)
-
-
 def update_by_equation_error(
     model: Model,
     measurement: Measurement,
-    family: ElementFamily,
+    family: Family,
     *,
     orthogonality: bool = True,
     keep_rigid: bool = False,
@@ -276,10 +248,10 @@ def update_by_equation_error(
     """Return the model after five iterations of expansion and solution.
 
     Arguments:
-        model: the nominal frame model.
+        model: the nominal model.
         measurement: the used modes.
-        family: where the updated element matrices are looked for; with cores they stay positive
-            semidefinite.
+        family: where updated element or group matrices are looked for; with cores they stay
+            positive semidefinite.
         orthogonality: whether the orthogonality of the modes adds equations.
         keep_rigid: whether the rigid-body modes of the model are hard constraints.
         expansion: `rotation`, equations (16)-(17) with the current model; `force`, equation (15)
@@ -300,7 +272,7 @@ def update_by_equation_error(
     """
     if len(family) > MOST_UNKNOWNS:
         raise NotApplicable(
-            f"the elements have {len(family)} unknowns, at most {MOST_UNKNOWNS} are solved for"
+            f"there are {len(family)} unknowns, at most {MOST_UNKNOWNS} are solved for"
         )
     rigid = rigid_modes_of(model)
     if keep_rigid and rigid.shape[1] == 0:
@@ -324,7 +296,7 @@ def update_by_equation_error(
 def _iterate(
     model: Model,
     modes: WantedModes,
-    family: ElementFamily,
+    family: Family,
     basis: FloatArray | None,
     orthogonality: bool,
 ) -> tuple[Model, Solution, tuple[Mapping[str, float], ...]]:
@@ -336,18 +308,18 @@ def _iterate(
         solution = solve_least_change(a, b, family, basis)
         change = np.linalg.norm(solution.x - x) / max(float(np.linalg.norm(solution.x)), 1e-300)
         x = solution.x
-        current = updated(model, family, x)
+        current = family.changed(model, x)
         history.append({"residual": solution.residual / size, "change": float(change)})
     return current, solution, tuple(history)
 
 
-def _estimates(family: ElementFamily, x: FloatArray) -> tuple[ParameterEstimate, ...]:
+def _estimates(family: Family, x: FloatArray) -> tuple[ParameterEstimate, ...]:
     listed = zip(family.names, family.before, family.values(x), family.units, strict=True)
     return tuple(ParameterEstimate(n, float(b), float(a), u) for n, b, a, u in listed)
 
 
 def _self_check(
-    model: Model, family: ElementFamily, x: FloatArray, rigid: FloatArray, *, promised: bool
+    model: Model, family: Family, x: FloatArray, rigid: FloatArray, *, promised: bool
 ) -> Mapping[str, float]:
     """Return the measured figures; raise where a family that promises them does not hold them."""
     checks = {}

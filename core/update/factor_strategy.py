@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from femubench.core.update.parameter_sets import checked_set
+from femubench.core.update.parameter_sets import OWN, checked_set
 from femubench.core.update.strategy import Strategy
 
 
@@ -13,20 +13,18 @@ from femubench.core.update.strategy import Strategy
 class FactorStrategy(Strategy):
     """Base class of updates of stiffness factors: override `update`, set `name` and `citation`.
 
-    Factors stay positive, so the stiffness keeps its sign and its rigid-body modes. Element
-    matrices are needed, except where the factors are those of groups of matrices.
+    Factors stay positive, so the stiffness keeps its sign and its rigid-body modes.
 
     Arguments:
         parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
-            `materials`, `sets` of the case, or `groups` of matrices.
+            `materials`, `sets` of the case, or `groups` of matrices; `own` for the members of a
+            frame and the groups of matrices.
     """
 
-    needs: ClassVar[frozenset[str]] = frozenset({"elements"})
+    needs: ClassVar[frozenset[str]] = frozenset({"parts"})
     promises: ClassVar[frozenset[str]] = frozenset({"rigid-body-modes", "no-negative-eigenvalue"})
 
-    parameters: str = "members"
+    parameters: str = OWN
 
     def __post_init__(self) -> None:
-        checked_set(self.parameters)
-        if self.parameters == "groups":
-            object.__setattr__(self, "needs", self.needs - {"elements"})
+        checked_set(self.parameters, own=True)

@@ -33,7 +33,8 @@ _LONGEST = 0.5  # step of ln theta
 _HALVINGS = 6
 _EVALUATIONS, _TOLERANCE = 30, 1e-6
 _INSIDE = 0.999  # a start at a bound could not leave it
-_LARGEST_LOG = np.log(5.0)  # a factor beyond 1/5 .. 5 is no error of a stiffness
+_LARGEST_LOG = np.log(5.0)  # a factor beyond 1/5 .. 5 is no error of a stiffness,
+_WIDER = 3.0  # but of a support, whose bounds are so many times as wide in ln theta at most
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,7 @@ class ModalSpace:
         readings: of the shapes at the sensors, (n_sensors, r).
         shape_weight: of a shape error of 1 (MAC of 0) beside a frequency error of 1 (100 %); 0 to
             leave shapes out.
+        spread: of every ln theta beforehand, relative to each other, (p,).
     """
 
     measurement: Measurement
@@ -77,6 +79,7 @@ class ModalSpace:
     parts: FloatArray
     readings: FloatArray
     shape_weight: float
+    spread: FloatArray
 
     def eigenpairs(self, log: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return eigenvalues (r,) and vectors (r, r) at ln theta, (p,)."""
@@ -142,18 +145,20 @@ class ModalSpace:
             log: ln theta, (p,).
             fit: the fit there.
             wanted: where a linear problem has its optimum, (p,).
-            squares, sizes: what the sums of squares and of absolute values of ln theta weigh in
-                the penalty, beside the sum of squares of the residual.
+            squares, sizes: what the sums of squares and of absolute values of ln theta / spread
+                weigh in the penalty, beside the sum of squares of the residual.
         """
 
         def penalty(x: FloatArray) -> float:
-            return squares * float(x @ x) + sizes * float(np.abs(x).sum())
+            z = x / self.spread
+            return squares * float(z @ z) + sizes * float(np.abs(z).sum())
 
+        limit = _LARGEST_LOG * np.clip(self.spread, 1.0, _WIDER)
         step = wanted - log
         step *= min(1.0, _LONGEST / max(float(np.abs(step).max()), _LONGEST))
         before = fit.cost + penalty(log)
         for halving in range(_HALVINGS):
-            trial = np.clip(log + step / 2**halving, -_LARGEST_LOG, _LARGEST_LOG)
+            trial = np.clip(log + step / 2**halving, -limit, limit)
             found = self.fit(trial)
             if found.cost + penalty(trial) <= before:
                 return trial, found
@@ -222,7 +227,7 @@ def modal_space(
     change = np.expm1(log)
     inner = parts.energies(basis, basis)
     nominal = basis.T @ model.stiffness_times(basis) - np.tensordot(change, inner, axes=1)
-    space = ModalSpace(measurement, nominal, inner, observer @ basis, shape_weight)
+    space = ModalSpace(measurement, nominal, inner, observer @ basis, shape_weight, parts.spread)
     if space.fit(log, slopes=False).paired == 0:
         raise StrategyFailure("no mode of the model looks like any measured mode")
     return space

@@ -9,10 +9,13 @@ from typing import Literal, get_args
 import numpy as np
 
 from femubench.core.errors import InputError, NotApplicable
+from femubench.core.fem.group_factors import GROUP, Matrix, group_places
 from femubench.core.fem.joints import all_elements
 from femubench.core.fem.model import Model
+from femubench.core.fem.model_parameters import with_values
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.structure import Structure
+from femubench.core.modal.group_prior import STRUCTURE_STD, group_prior_std, support_groups
 from femubench.core.typing import FloatArray, SparseArray
 from femubench.core.update.unknowns import Unknown
 
@@ -22,8 +25,9 @@ _MISSING = {
     "sections": "a frame whose members have sections of the case",
     "materials": "a frame whose members have materials of the case",
     "sets": "`[[model.sets]]` in the case",
-    "groups": "a model from matrices with `[[model.groups]]`",
+    "groups": "a model from matrices for which the case declares `[[model.groups]]`",
 }
+_WIDEST = 3.0  # prior deviations to either side of a group's factor
 
 
 def checked_set(word: str, *, own: bool = False) -> None:
@@ -92,27 +96,107 @@ def _need(word: str) -> str:
 
 
 def stiffness_factors(
-    structure: Structure, word: str, *, prior_std: float | None = None
+    source: Model | Structure, word: str, *, prior_std: float | None = None
 ) -> list[Unknown]:
-    """Return one unknown a part of a frame: a factor on EA, EI, GJ and GA together.
+    """Return one unknown a part: of a frame a factor on EA, EI, GJ and GA together, or of a group.
 
     Arguments:
-        structure: the meshed frame.
+        source: the nominal model, or the structure of a frame.
         word: a `ParameterSet`.
-        prior_std: of its logarithm; None for no prior.
+        prior_std: of its logarithm; None for no prior. Groups have their own.
 
     Raises:
-        NotApplicable: when the frame has no such parts.
+        NotApplicable: when the model has no such parts.
 
     Examples:
         >>> update.stiffness_factors(structure, "sections")[0].parameter.name
         'E section:tube'
     """
-    parts = element_sets(structure, word)
+    structure = source.structure if isinstance(source, Model) else source
+    if isinstance(source, Model) and (structure is None or word == "groups"):
+        return _group_stiffness(source, word, own_prior=prior_std is not None)
+    if structure is None or word == "groups":
+        raise _without(word)
     return [
         Unknown(Parameter(f"E {name}", "E", elements), prior_std=prior_std)
-        for name, elements in parts.items()
+        for name, elements in element_sets(structure, word).items()
     ]
+
+
+def _without(word: str) -> NotApplicable:
+    return NotApplicable(f"the model has no {word} to scale: parameters={word} needs {_need(word)}")
+
+
+def _group_stiffness(model: Model, word: str, *, own_prior: bool) -> list[Unknown]:
+    if word != "groups" or not model.groups:
+        raise _without(word)
+    return group_factors(model, "stiffness", own_prior=own_prior)
+
+
+def group_factors(model: Model, matrix: Matrix, *, own_prior: bool) -> list[Unknown]:
+    """Return one unknown a group of the stiffness or of the mass.
+
+    Arguments:
+        model: from matrices.
+        matrix: ``stiffness`` or ``mass``.
+        own_prior: whether each has the log-normal prior of its group; else none.
+
+    Examples:
+        >>> update.group_factors(model, "mass", own_prior=True)
+        []
+    """
+    quantity = "E" if matrix == "stiffness" else "density"
+    found = []
+    for place in group_places(model, matrix):
+        parameter = Parameter(f"{matrix} {place}", quantity, (place,))
+        name = place.removeprefix(GROUP)
+        if own_prior:
+            std = group_prior_std(model, name)
+            limit = max(20.0, float(np.exp(_WIDEST * std)))
+            found.append(Unknown(parameter, lower=1.0 / limit, upper=limit, prior_std=std))
+        else:
+            limit = 100.0 if matrix == "stiffness" and name in support_groups(model) else 20.0
+            found.append(Unknown(parameter, lower=1.0 / limit, upper=limit))
+    return found
+
+
+def groups_within_count(model: Model, count: int) -> list[Unknown]:
+    """Return factors on the groups of the stiffness, at most so many: what is alike shares one.
+
+    Every group has its own; or every support has, and the structure shares one; or the supports
+    share another one; or there is one for all.
+
+    Arguments:
+        model: from matrices with groups.
+        count: how many factors there may be.
+
+    Raises:
+        NotApplicable: when the model has no groups.
+
+    Examples:
+        >>> from dataclasses import replace
+        >>> deck = replace(model, structure=None, groups={"deck": model.stiffness})
+        >>> [unknown.parameter.name for unknown in update.groups_within_count(deck, 3)]
+        ['stiffness group:deck']
+    """
+    every = stiffness_factors(model, "groups")
+    held = {f"{GROUP}{name}" for name in support_groups(model)}
+    supports = [u for u in every if u.parameter.places[0] in held]
+    rest = [u for u in every if u.parameter.places[0] not in held]
+    levels = (
+        every,
+        [*_shared("supports", supports, apart=True), *_shared("structure", rest)],
+        [*_shared("supports", supports), *_shared("structure", rest)],
+    )
+    return next((level for level in levels if len(level) <= count), _shared("all groups", every))
+
+
+def _shared(name: str, unknowns: list[Unknown], *, apart: bool = False) -> list[Unknown]:
+    """Return one unknown for all of several, or each of them."""
+    if apart or len(unknowns) < 2:
+        return unknowns
+    places = tuple(place for unknown in unknowns for place in unknown.parameter.places)
+    return [replace(unknowns[0], parameter=Parameter(f"stiffness {name}", "E", places))]
 
 
 @dataclass(frozen=True)
@@ -123,13 +207,15 @@ class StiffnessParts:
         model: the nominal one, at factors of 1.
         names: of the factors.
         matrices: the parts K_j, sparse (n, n) each.
-        parameters: the same in the frame; empty where the parts are groups of matrices.
+        parameters: the factors themselves.
+        spread: prior standard deviation of each ln theta, relative to that of a structure, (p,).
     """
 
     model: Model
     names: tuple[str, ...]
     matrices: tuple[SparseArray, ...]
-    parameters: tuple[Parameter, ...] = ()
+    parameters: tuple[Parameter, ...]
+    spread: FloatArray
 
     def __len__(self) -> int:
         return len(self.names)
@@ -142,13 +228,7 @@ class StiffnessParts:
             >>> parts.at(np.full(7, 2.0)).size
             81
         """
-        if self.parameters:
-            structure = self.model.frame_structure
-            return Model.of(structure.with_values(self.parameters, factors))
-        stiffness = self.model.stiffness
-        for factor, part in zip(factors, self.matrices, strict=True):
-            stiffness = stiffness + (factor - 1.0) * part
-        return replace(self.model, stiffness=stiffness)
+        return with_values(self.model, self.parameters, factors)
 
     def of(self, chosen: Sequence[int]) -> StiffnessParts:
         """Return the same model with some of the factors only."""
@@ -156,7 +236,8 @@ class StiffnessParts:
             self.model,
             tuple(self.names[j] for j in chosen),
             tuple(self.matrices[j] for j in chosen),
-            tuple(self.parameters[j] for j in chosen) if self.parameters else (),
+            tuple(self.parameters[j] for j in chosen),
+            self.spread[list(chosen)],
         )
 
     def energies(self, left: FloatArray, right: FloatArray) -> FloatArray:
@@ -169,7 +250,7 @@ def stiffness_parts(model: Model, word: str) -> StiffnessParts:
 
     Arguments:
         model: a frame, or matrices with groups.
-        word: a `ParameterSet`.
+        word: a `ParameterSet`, or ``own``: the members of a frame, the groups of matrices.
 
     Raises:
         InputError: for another word.
@@ -179,16 +260,17 @@ def stiffness_parts(model: Model, word: str) -> StiffnessParts:
         >>> update.stiffness_parts(model, "members").names[0]
         'E rung-right'
     """
-    checked_set(word)
-    if word == "groups" or model.structure is None:
-        if word != "groups" or not model.groups:
-            raise NotApplicable(
-                f"the model has no {word} to scale: parameters={word} needs {_need(word)}"
-            )
-        return StiffnessParts(model, tuple(model.groups), tuple(model.groups.values()))
+    checked_set(word, own=True)
+    if word == OWN:
+        word = "members" if model.structure is not None else "groups"
+    parameters = tuple(unknown.parameter for unknown in stiffness_factors(model, word))
+    names = tuple(p.name for p in parameters)
     structure = model.structure
-    parameters = [unknown.parameter for unknown in stiffness_factors(structure, word)]
+    if structure is None:
+        std = [group_prior_std(model, name) for name in model.groups]
+        spread = np.array(std) / STRUCTURE_STD
+        return StiffnessParts(model, names, tuple(model.groups.values()), parameters, spread)
     nominal = structure.matrices()[1]
     # All rigidities of an element grow with E alike, so the stiffness is linear in the factor.
     parts = [structure.with_values([p], [2.0]).matrices()[1] - nominal for p in parameters]
-    return StiffnessParts(model, tuple(p.name for p in parameters), tuple(parts), tuple(parameters))
+    return StiffnessParts(model, names, tuple(parts), parameters, np.ones(len(names)))

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from femubench.core.errors import ModelError, StrategyFailure
+from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.neighbour_modes import followed_frequencies
@@ -34,6 +35,7 @@ _POINTS = 1.5  # solutions for every coefficient of the polynomials
 _WIDER = 1.5  # than the normal approximation, from where the first of them are taken
 _ROUNDS = 3
 _OFF = 0.25  # of a datum's standard deviation: rms error of the polynomials that is let pass
+_USELESS = 2.0  # of it: with such polynomials a chain knows less than the normal approximation
 _SAMPLES = 40
 _WALKERS, _FEWEST_WALKERS = 4, 96  # for each unknown, and in all: few take no less time
 _BLOCK, _LONGEST = 500, 8000  # steps
@@ -148,7 +150,7 @@ class Target:
 
 
 def sample_posterior(
-    structure: Structure,
+    source: Model | Structure,
     unknowns: Sequence[Unknown],
     measurement: Measurement,
     rng: np.random.Generator,
@@ -161,10 +163,12 @@ def sample_posterior(
     Logarithms of frequencies are taken as quadratic in those of the parameters, fitted to solutions
     near the most probable ones, and anew with more of them until the rms error over the posterior
     is at most a quarter of each datum's standard deviation, discrepancy included; what is left
-    after three rounds widens the likelihood.
+    after three rounds widens the likelihood. Where polynomials miss a datum by twice its standard
+    deviation, as over the wide priors of supports, no chain is run: the answer is the normal
+    approximation about the most probable parameters, at the median of the discrepancy.
 
     Arguments:
-        structure: the nominal frame.
+        source: the nominal model, matrices with groups or a frame, or the latter's structure.
         unknowns: positive parameters, each with a prior.
         measurement: the used modes, each with a standard deviation.
         rng: decides on every draw.
@@ -190,8 +194,10 @@ def sample_posterior(
         >>> len(found.uncertainty.samples)
         40
     """
-    target, covariance = most_probable(structure, unknowns, measurement, discrepancy, options)
+    target, covariance = most_probable(source, unknowns, measurement, discrepancy, options)
     sampler, off = _fitted(target, np.asarray(np.linalg.cholesky(covariance)), rng)
+    if sampler is None:
+        return _normal_result(target, covariance, off)
     chain, found = _settled(sampler)
     drawn = chain[rng.choice(len(chain), _SAMPLES, replace=False), :-1]
     return _result(target, chain, drawn, {**found, "surrogate_error": off})
@@ -199,6 +205,8 @@ def sample_posterior(
 
 def _fitted(target: Target, root: FloatArray, rng: np.random.Generator) -> tuple[Any, float]:
     """Return a sampler after its first steps, and the largest error of the polynomials there.
+
+    No sampler where the polynomials are useless.
 
     Arguments:
         root: of the covariance about the most probable parameters, (p, p).
@@ -208,6 +216,8 @@ def _fitted(target: Target, root: FloatArray, rng: np.random.Generator) -> tuple
     points, values = target.predicted(start)
     for _ in range(_ROUNDS):
         fit = QuadraticFit.of(points, values)
+        if (fit.error > _USELESS * target.std(np.zeros(1))).any():
+            return None, float(fit.error.max())
         sampler = _started(target, fit, root, rng)
         drawn = sampler.get_chain(discard=_BLOCK // 2, flat=True)
         drawn = drawn[rng.choice(len(drawn), count, replace=False)]
@@ -220,7 +230,7 @@ def _fitted(target: Target, root: FloatArray, rng: np.random.Generator) -> tuple
 
 
 def most_probable(
-    structure: Structure,
+    source: Model | Structure,
     unknowns: Sequence[Unknown],
     measurement: Measurement,
     discrepancy: Discrepancy,
@@ -229,15 +239,16 @@ def most_probable(
     """Return the posterior about its mode at the median discrepancy, and the covariance of q there.
 
     Arguments:
-        structure, unknowns, measurement, discrepancy, options: as for `sample_posterior`.
+        source, unknowns, measurement, discrepancy, options: as for `sample_posterior`.
 
     Raises:
         NotApplicable: when a frequency has no standard deviation.
         StrategyFailure: when no measured mode has a partner.
     """
     whole = measurement.widened(discrepancy.median * measurement.frequencies)
+    model = Model.of(source) if isinstance(source, Structure) else source
     iteration = Iteration(
-        structure, unknowns, Data(whole, options.residual, True, options.shapes, True), options
+        model, unknowns, Data(whole, options.residual, True, options.shapes, True), options
     )
     point = iteration.run()
     covariance = iteration.covariance(point)
@@ -289,6 +300,30 @@ def _settled(sampler: Any) -> tuple[FloatArray, dict[str, float]]:  # noqa: ANN4
         "autocorrelation_time": time,
         "effective_samples": len(chain) / time,
     }
+
+
+def _normal_result(target: Target, covariance: FloatArray, off: float) -> UpdateResult:
+    """Return the most probable model and the normal approximation about it.
+
+    Arguments:
+        covariance: of scaled parameters there, (p, p).
+        off: largest error of the polynomials that were tried.
+    """
+    iteration, point = target.iteration, target.point
+    own = target.discrepancy.median
+    covariance = 0.5 * (covariance + covariance.T)
+    return UpdateResult(
+        model=point.prediction.model,
+        parameter_count=len(point.q),
+        parameters=iteration.estimates(point, covariance),
+        diagnostics={
+            "discrepancy_std": own,
+            "steps": 0.0,
+            "surrogate_error": off,
+            "paired_modes": float(len(target.measurement)),
+        },
+        uncertainty=Uncertainty.drawn(iteration.model_at, point.q, covariance, discrepancy_std=own),
+    )
 
 
 def _result(

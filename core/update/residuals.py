@@ -1,4 +1,4 @@
-"""Measured minus predicted modal data of a frame model, with sensitivities in scaled parameters."""
+"""Measured minus predicted modal data of a model, with sensitivities in scaled parameters."""
 
 from __future__ import annotations
 
@@ -10,10 +10,14 @@ from typing import Literal
 import numpy as np
 
 from femubench.core.errors import NotApplicable
-from femubench.core.fem.derivatives import Derivatives, derivatives
 from femubench.core.fem.model import Model
+from femubench.core.fem.model_parameters import (
+    MatrixSlopes,
+    mass_slopes,
+    matrix_slopes,
+    updated_mass,
+)
 from femubench.core.fem.parameters import Parameter
-from femubench.core.fem.structure import Structure
 from femubench.core.modal.correlated_errors import undone
 from femubench.core.modal.correlation import modal_scale_factor, seen_modes
 from femubench.core.modal.eigen import Modes, enough_modes, solve_modes
@@ -111,15 +115,13 @@ class Prediction:
 
     Arguments:
         data: what it is compared with.
-        structure: the frame with its present parameter values.
-        model: its matrices.
+        model: with its present parameter values.
         modes: its modes.
         partner: which of them belongs to every measured mode; -1 where none does, (m,).
         observer: sensor readings from dofs, sparse (n_sensors, n).
     """
 
     data: Data
-    structure: Structure
     model: Model
     modes: Modes
     partner: IntArray
@@ -137,7 +139,7 @@ class Prediction:
             parts.append(np.where(lost, np.nan, misfit).T.ravel())
         if data.weigh and data.measurement.total_mass is not None:
             mass, std = data.measurement.total_mass
-            parts.append(np.array([(mass - self.structure.total_mass) / std]))
+            parts.append(np.array([(mass - updated_mass(self.model)) / std]))
         return np.concatenate(parts)
 
     @cached_property
@@ -156,7 +158,7 @@ class Prediction:
     def jacobian(self, parameters: Sequence[Parameter]) -> FloatArray:
         """Return d (weighted prediction) / d parameter, 0 without partner, (n_rows, p)."""
         data = self.data
-        change = derivatives(self.structure, parameters)
+        change = matrix_slopes(self.model, parameters)
         paired = self.modes.take(self.partner)
         slope = eigenvalue_sensitivities(self.model, paired, parameters, change)
         scale = data.weight * data.slope(paired.eigenvalues) * (self.partner >= 0)
@@ -165,11 +167,11 @@ class Prediction:
         if data.shapes:
             parts.append(self._shape_rows(parameters, change))
         if data.weigh and data.measurement.total_mass is not None:
-            grow = [_mass_slope(self.structure, parameter) for parameter in parameters]
-            parts.append(np.array([grow]) / data.measurement.total_mass[1])
+            grow = mass_slopes(self.model, parameters)
+            parts.append(grow[None, :] / data.measurement.total_mass[1])
         return np.vstack(parts)
 
-    def _shape_rows(self, parameters: Sequence[Parameter], change: Derivatives) -> FloatArray:
+    def _shape_rows(self, parameters: Sequence[Parameter], change: MatrixSlopes) -> FloatArray:
         """Return the sensitivities of s phi with the modal scale factor's own, (n_s m, p)."""
         data = self.data
         observe = self.observer
@@ -187,46 +189,37 @@ class Prediction:
         return rows.reshape(-1, len(parameters))
 
 
-def _mass_slope(structure: Structure, parameter: Parameter) -> float:
-    """Return d total mass / d factor about the present value in kg."""
-    if parameter.quantity not in ("rhoA", "density"):
-        return 0.0
-    p = structure.properties
-    mass = p.rhoA * (p.length - p.rigid_mass_1 - p.rigid_mass_2)
-    elements = [structure.label_index[place] for place in dict.fromkeys(parameter.places)]
-    return float(mass[np.concatenate(elements)].sum())
-
-
-def predict(data: Data, structure: Structure, previous: Prediction | None = None) -> Prediction:
-    """Return the prediction of a frame, its modes paired with the measured ones.
+def predict(data: Data, model: Model, previous: Prediction | None = None) -> Prediction:
+    """Return the prediction of a model, its modes paired with the measured ones.
 
     Pairs are formed by shape and frequency; a measured mode that finds no partner that way keeps
     the mode that continues its previous partner.
 
     Arguments:
         data: what is measured.
-        structure: the frame with its present values.
+        model: with its present values.
         previous: the prediction at the iteration before, on the same dofs.
 
     Raises:
         ModelError: when the eigenvalue problem has no solution.
     """
-    model = Model.of(structure)
     count = enough_modes(model, len(data.measurement))
     modes = solve_modes(model, count)
-    if previous is None or _observed_anew(structure):
+    if previous is None or _observed_anew(model):
         observer = model.observe(data.measurement.sensors)
     else:
         observer = previous.observer
     partner = pair_measured(data.measurement, modes, observer @ modes.shapes).index
     if previous is not None:
         partner = _followed(partner, model, modes, previous)
-    return Prediction(data, structure, model, modes, partner, observer)
+    return Prediction(data, model, modes, partner, observer)
 
 
-def _observed_anew(structure: Structure) -> bool:
+def _observed_anew(model: Model) -> bool:
     """Tell whether the interpolation between nodes depends on parameters."""
-    p = structure.properties
+    if model.structure is None:
+        return False
+    p = model.structure.properties
     return any(array.any() for array in (p.rigid_1, p.rigid_2, p.shear_shape))
 
 

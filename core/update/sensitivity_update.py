@@ -9,6 +9,7 @@ import numpy as np
 
 from femubench.core.errors import Diverged, ModelError, NotApplicable, StrategyFailure
 from femubench.core.fem.model import Model
+from femubench.core.fem.model_parameters import with_values
 from femubench.core.fem.structure import Structure
 from femubench.core.gauss_newton import bounded_step
 from femubench.core.modal.measurement import Measurement
@@ -41,9 +42,9 @@ class Iteration:
     """State of one update."""
 
     def __init__(
-        self, structure: Structure, unknowns: Sequence[Unknown], data: Data, options: UpdateOptions
+        self, model: Model, unknowns: Sequence[Unknown], data: Data, options: UpdateOptions
     ) -> None:
-        self.structure, self.unknowns, self.data, self.options = structure, unknowns, data, options
+        self.model, self.unknowns, self.data, self.options = model, unknowns, data, options
         self.scaling = Scaling(unknowns)
         self.parameters = [u.parameter for u in unknowns]
         self.history: list[Mapping[str, float]] = []
@@ -53,13 +54,13 @@ class Iteration:
     def model_at(self, q: FloatArray) -> Model:
         """Return the model at scaled parameters, (p,), taken within their limits."""
         values = self.scaling.values(np.clip(q, self.scaling.lower, self.scaling.upper))
-        return Model.of(self.structure.with_values(self.parameters, values))
+        return with_values(self.model, self.parameters, values)
 
     def at(self, q: FloatArray, previous: Prediction | None = None) -> Point:
         """Return the prediction at scaled parameters, its pairs continued from a previous one."""
         values = self.scaling.values(q)
-        structure = self.structure.with_values(self.parameters, values)
-        return Point(q, predict(self.data, structure, previous))
+        model = with_values(self.model, self.parameters, values)
+        return Point(q, predict(self.data, model, previous))
 
     def system(self, point: Point) -> tuple[FloatArray, FloatArray]:
         """Return scaled sensitivities s and residual of the data that have a partner."""
@@ -207,18 +208,19 @@ class Iteration:
 
 
 def sensitivity_update(
-    structure: Structure,
+    source: Model | Structure,
     unknowns: Sequence[Unknown],
     measurement: Measurement,
     options: UpdateOptions | None = None,
 ) -> UpdateResult:
-    """Return a frame model whose parameters fit the measured modes.
+    """Return a model whose parameters fit the measured modes.
 
     Every iteration pairs by shape and makes one eigenvalue solution; a step after which the cost
     is larger is halved, at one solution each.
 
     Arguments:
-        structure: the nominal frame; factors multiply its present properties.
+        source: the nominal model, matrices with groups or a frame, or the latter's structure;
+            factors multiply its present properties.
         unknowns: the parameters, with ranges and priors.
         measurement: the used modes.
         options: residual, weighting, damping, ends.
@@ -240,7 +242,8 @@ def sensitivity_update(
     options = UpdateOptions() if options is None else options
     statistical = options.weighting == "statistical"
     data = Data(measurement, options.residual, statistical, options.shapes, statistical)
-    iteration = Iteration(structure, unknowns, data, options)
+    model = Model.of(source) if isinstance(source, Structure) else source
+    iteration = Iteration(model, unknowns, data, options)
     point = iteration.run()
     covariance = iteration.covariance(point)
     return UpdateResult(

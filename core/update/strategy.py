@@ -85,8 +85,9 @@ class Strategy(ABC):
         name: the word after ``bench run -s``.
         citation: author, year, title, equation.
         needs: capabilities that model or measurement must have: ``shapes`` measured mode shapes,
+            ``parts`` members of a frame or groups of matrices, whose stiffness has factors,
             ``elements`` element matrices, ``geometry`` members that can be rebuilt with other
-            parameters, ``joints`` places where members meet.
+            parameters, ``joints`` places where members of a frame meet.
         promises: what every result keeps (of ``used-modes``, ``used-modes-or-stated``,
             ``rigid-body-modes``, ``no-negative-eigenvalue``); `bench plugins check` measures it.
         settings: other values of its options that are as good a reading of its source, in the words

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femubench.core.fem.joints import JointGroup, all_elements, elements_at
+from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.structure import Structure
 from femubench.core.typing import FloatArray
@@ -108,19 +109,23 @@ def stiffness_quantity(structure: Structure) -> str:
     return "EI" if structure.frame.plane == "in-plane" else "E"
 
 
-def global_stiffness(structure: Structure, *, prior_std: float | None = None) -> Unknown:
-    """Return one factor on the stiffness of all members.
+def global_stiffness(source: Model | Structure, *, prior_std: float | None = None) -> Unknown:
+    """Return one factor on the stiffness of all members, of matrices on the whole stiffness.
 
     Arguments:
-        structure: the frame.
+        source: the nominal model, or the structure of a frame.
         prior_std: of its logarithm; None for no prior.
 
     Examples:
         >>> update.global_stiffness(structure).parameter.name
         'E all members'
     """
-    quantity = stiffness_quantity(structure)
-    parameter = Parameter(f"{quantity} all members", quantity, all_elements(structure))
+    structure = source.structure if isinstance(source, Model) else source
+    if structure is None:
+        parameter = Parameter("stiffness all", "E", ("all",))
+    else:
+        quantity = stiffness_quantity(structure)
+        parameter = Parameter(f"{quantity} all members", quantity, all_elements(structure))
     return Unknown(parameter, fatal=prior_std is None, prior_std=prior_std)
 
 

@@ -22,7 +22,9 @@ from femubench.effect import (
 )
 from femubench.fem import Frame, PointMass
 
-_SHARE = 0.005  # of the structure's mass
+# Of the structure's mass: as much as there is to a joint, within these bounds. A fifth
+# of a structure at one of a few points is beyond belief, a twentieth at one of a thousand.
+_MOST, _LEAST = 0.03, 0.005
 
 
 class AddedMass(FrameEffect):
@@ -38,8 +40,10 @@ class AddedMass(FrameEffect):
 
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return the mass."""
-        scale = _SHARE * model.total_mass
-        return (EffectParameter("mass", "kg", scale, scaling="exponential", one_sided=True),)
+        structure = model.structure
+        points = point_places(model) if structure is None else structure.frame.joints
+        scale = model.total_mass * min(max(1.0 / max(len(points), 1), _LEAST), _MOST)
+        return (EffectParameter("mass", "kg", scale, one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the mass."""

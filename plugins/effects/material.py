@@ -28,14 +28,18 @@ from femubench.effect import (
     set_places,
 )
 from femubench.fem import (
+    GROUP,
     FloatArray,
     Frame,
     Member,
-    ModelError,
-    SparseArray,
+    Parameter,
+    group_matrix,
+    group_places,
     mass_matrices,
     stiffness_matrices,
+    with_group_factors,
 )
+from femubench.modal import group_prior_std, support_groups
 
 _SURE = 3.0  # standard deviations of the weighed mass
 
@@ -55,10 +59,14 @@ class MaterialEffect(FrameEffect):
         return ("all", *(() if structure is None else set_places(structure.frame, ("material",))))
 
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
-        """Return the relative change."""
-        return (
-            EffectParameter(f"change of {self.constant}", "", 0.1, lower=-0.9, wording="change"),
-        )
+        """Return the relative change; of a group with a prior of its own, that of a factor."""
+        name = f"change of {self.constant}"
+        group = place.removeprefix(GROUP)
+        own = group in model.group_priors or group in support_groups(model)
+        if model.structure is None and place.startswith(GROUP) and own:
+            std = group_prior_std(model, group)
+            return (EffectParameter(name, "", std, scaling="factor", wording="change"),)
+        return (EffectParameter(name, "", 0.1, lower=-0.9, wording="change"),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with another material in the members."""
@@ -77,24 +85,8 @@ class MaterialEffect(FrameEffect):
         """Return the model with the change; matrices without a frame are scaled as they are."""
         if model.structure is not None:
             return super().extend(model, place, values)
-        part, share = values[0] * self._matrix(model, place), 1.0 + values[0]
-        if self.constant == "rho":
-            low_rank = model.mass_change
-            if low_rank is not None:
-                low_rank = replace(low_rank, core=share * low_rank.core)
-            return replace(model, mass=model.mass + part, mass_change=low_rank)
-        low_rank = model.stiffness_change
-        if low_rank is not None and place == "all":
-            low_rank = replace(low_rank, core=share * low_rank.core)
-        return replace(model, stiffness=model.stiffness + part, stiffness_change=low_rank)
-
-    def _matrix(self, model: Model, place: str) -> SparseArray:
-        """Return the part of a model's matrices that grows with the constant."""
-        if place == "all":
-            return model.stiffness if self.constant == "E" else model.mass
-        if self.constant == "rho" or place not in model.groups:
-            raise ModelError(f"there is no place {place!r}")
-        return model.groups[place]
+        quantity = "E" if self.constant == "E" else "density"
+        return with_group_factors(model, [Parameter(place, quantity, (place,))], [1.0 + values[0]])
 
     def change(self, model: Model, place: str) -> Change:
         """Return the matrices of the elements, exactly proportional to the change."""
@@ -105,7 +97,7 @@ class MaterialEffect(FrameEffect):
             matrices = stiffness_matrices if self.constant == "E" else mass_matrices
             whole = once_for(model, f"element {kind}", partial(matrices, structure.properties))
             return proportional(Term(kind, ElementOperator(structure, rows, whole[rows])))
-        parts = [self._matrix(model, place)]
+        parts = [group_matrix(model, kind, place)]
         low_rank = model.stiffness_change if self.constant == "E" else model.mass_change
         if low_rank is not None and place == "all":
             parts.append(low_rank)
@@ -170,9 +162,10 @@ class MemberStiffness(MaterialEffect):
 
     def places(self, model: Model) -> Sequence[str]:
         """Return members and families, or the groups; a single one is `youngs-modulus`."""
-        structure = model.structure
-        parts = tuple(model.groups) if structure is None else _parts(structure.frame)
-        return parts if len(parts) > 1 or structure is None else ()
+        if model.structure is None:
+            return group_places(model, "stiffness")
+        parts = _parts(model.structure.frame)
+        return parts if len(parts) > 1 else ()
 
 
 class MemberMass(MaterialEffect):
@@ -189,6 +182,19 @@ class MemberMass(MaterialEffect):
             return ()
         members = _parts(model.structure.frame)
         return members if len(members) > 1 else ()
+
+
+class GroupMass(MaterialEffect):
+    """Scale the mass of one group of a model from matrices."""
+
+    name: ClassVar[str] = "group-mass"
+    summary: ClassVar[str] = "a group has another mass"
+    sizes: ClassVar[Sequence[Size]] = (Size(0.05, 0.30, signed=True),)
+    constant: ClassVar[Literal["E", "rho"]] = "rho"
+
+    def places(self, model: Model) -> Sequence[str]:
+        """Return the groups of the mass."""
+        return group_places(model, "mass")
 
 
 def _parts(frame: Frame) -> tuple[str, ...]:

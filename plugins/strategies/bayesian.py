@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from femubench import Measurement, Model, Strategy, UpdateResult
-from femubench.fem import Parameter, Structure
+from femubench.fem import Parameter
 from femubench.update import (
     OWN,
     Unknown,
@@ -16,6 +16,7 @@ from femubench.update import (
     all_elements,
     checked_set,
     global_stiffness,
+    group_factors,
     joint_groups,
     joint_stiffness,
     sensitivity_update,
@@ -35,6 +36,9 @@ class Bayesian(Strategy):
     log-normal priors about the nominal value, so there may be more of them than data. The result
     is the maximum of the posterior density, its covariance the inverse of s'Ws + P.
 
+    Of matrices every group of stiffness or mass has a factor with the prior of its own; where
+    there are no groups, the whole stiffness has one.
+
     Arguments:
         stiffness_std: prior standard deviation of ln(E or EI).
         torsion_std: of ln(GJ).
@@ -43,7 +47,7 @@ class Bayesian(Strategy):
         options: of the iteration; `shapes` takes the shapes at the sensors as data too.
         parameters: `own` for the parameters above; else one factor on E of each of the `elements`,
             `members`, `sections`, `materials` or `sets` of the case, with the prior of the
-            stiffness, in place of stiffness, torsion and joints.
+            stiffness, in place of stiffness, torsion and joints; or on the `groups` of matrices.
 
     Source: Horton et al. (1999), equation (4) with W_ee and W_theta the inverse covariances;
     Friswell & Mottershead (1995), Finite Element Model Updating in Structural Dynamics, ch. 8.
@@ -54,7 +58,6 @@ class Bayesian(Strategy):
         "Friswell & Mottershead (1995), Finite Element Model Updating in Structural Dynamics, "
         "chapter 8; Horton et al. (1999), equation (4) with the covariances of data and parameters"
     )
-    needs: ClassVar[frozenset[str]] = frozenset({"geometry"})
     settings: ClassVar[tuple[str, ...]] = (
         "stiffness_std=0.05",
         "joint_std=0.25",
@@ -76,24 +79,28 @@ class Bayesian(Strategy):
         self, model: Model, measurement: Measurement, rng: np.random.Generator
     ) -> UpdateResult:
         """Return the most probable model, parameters with standard deviations."""
-        structure = model.frame_structure
-        unknowns = self.unknowns(structure, weighed=measurement.total_mass is not None)
-        return sensitivity_update(structure, unknowns, measurement, self.options)
+        unknowns = self.unknowns(model, weighed=measurement.total_mass is not None)
+        return sensitivity_update(model, unknowns, measurement, self.options)
 
-    def unknowns(self, structure: Structure, *, weighed: bool) -> list[Unknown]:
+    def unknowns(self, model: Model, *, weighed: bool) -> list[Unknown]:
         """Return the parameters with their priors.
 
         Arguments:
-            structure: the nominal frame.
+            model: the nominal one.
             weighed: whether the total mass was measured.
         """
-        everywhere = all_elements(structure)
-        density = Parameter("density all members", "density", everywhere)
-        mass = [Unknown(density, prior_std=self.density_std)] if weighed else []
-        if self.parameters != OWN:
-            factors = stiffness_factors(structure, self.parameters, prior_std=self.stiffness_std)
-            return factors + mass
-        unknowns = [global_stiffness(structure, prior_std=self.stiffness_std)]
+        structure = model.structure
+        everywhere = ("all",) if structure is None else all_elements(structure)
+        mass = group_factors(model, "mass", own_prior=True)
+        if weighed and not mass:
+            density = Parameter("density all members", "density", everywhere)
+            mass = [Unknown(density, prior_std=self.density_std)]
+        word = "groups" if self.parameters == OWN and model.groups else self.parameters
+        if word != OWN:
+            return stiffness_factors(model, word, prior_std=self.stiffness_std) + mass
+        unknowns = [global_stiffness(model, prior_std=self.stiffness_std)]
+        if structure is None:
+            return unknowns + mass
         if structure.frame.plane != "in-plane":
             torsion = Parameter("GJ all members", "GJ", everywhere)
             unknowns.append(Unknown(torsion, prior_std=self.torsion_std))

@@ -22,7 +22,8 @@ class CmaEs(FactorStrategy):
 
     Arguments:
         parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
-            `materials`, `sets` of the case, or `groups` of matrices.
+            `materials`, `sets` of the case, or `groups` of matrices; `own` for the members of a
+            frame and the groups of matrices.
         evaluations: at most.
         largest: bound of a factor; the least is its inverse.
         spread: standard deviation of the first generation in ln(factor).

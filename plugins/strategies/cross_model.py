@@ -34,7 +34,8 @@ class CrossModel(FactorStrategy):
 
     Arguments:
         parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
-            `materials`, `sets` of the case, or `groups` of matrices.
+            `materials`, `sets` of the case, or `groups` of matrices; `own` for the members of a
+            frame and the groups of matrices.
         modes: model modes taken for every measured one, the lowest.
         expansion: of measured shapes to all dofs: `rotation` of the model's own, or `force`, the
             least force residual with the readings met, which is exact for complete shapes.
@@ -49,7 +50,7 @@ class CrossModel(FactorStrategy):
         "Hu, Li & Wang (2007), Cross-model cross-mode method for model updating, Mechanical "
         "Systems and Signal Processing 21, 1690-1703"
     )
-    needs: ClassVar[frozenset[str]] = frozenset({"shapes", "elements"})
+    needs: ClassVar[frozenset[str]] = frozenset({"shapes", "parts"})
 
     modes: int = 3
     expansion: str = "rotation"

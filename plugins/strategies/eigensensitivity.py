@@ -28,11 +28,13 @@ class Eigensensitivity(FactorStrategy):
     Every iteration linearises relative frequencies and unit shapes in the logarithms x of the
     factors and takes the x that makes |S x - b|^2 + mu^2 |x|^2 least; mu is the weight at the
     corner of the L-curve of that linear problem. The squares of a unit shape's misfit sum to
-    1 - MAC.
+    1 - MAC. Of groups of matrices each x_j is divided by the spread of its prior, so that supports
+    may change more than the structure.
 
     Arguments:
         parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
-            `materials`, `sets` of the case, or `groups` of matrices.
+            `materials`, `sets` of the case, or `groups` of matrices; `own` for the members of a
+            frame and the groups of matrices.
         shape_weight: of a MAC of 0 beside a frequency that is 100 % off; 0 for frequencies alone.
 
     The authors' are the sensitivities (Fox & Kapoor), the damped least squares of Natke and
@@ -69,8 +71,9 @@ class Eigensensitivity(FactorStrategy):
             right = fit.slope @ log - fit.residual
             if not right.any() or not fit.slope.any():
                 break
-            weight = l_curve_corner(fit.slope, right)
-            wanted = tikhonov(fit.slope, right, weight)
+            slope = fit.slope * space.spread
+            weight = l_curve_corner(slope, right)
+            wanted = space.spread * tikhonov(slope, right, weight)
             before = log
             log, fit = space.advance(log, fit, wanted, squares=weight**2)
             moved = float(np.abs(log - before).max())

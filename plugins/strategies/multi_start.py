@@ -28,7 +28,8 @@ class MultiStart(FactorStrategy):
 
     Arguments:
         parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
-            `materials`, `sets` of the case, or `groups` of matrices.
+            `materials`, `sets` of the case, or `groups` of matrices; `own` for the members of a
+            frame and the groups of matrices.
         starts: number of starts from a Latin hypercube, beside the nominal model.
         largest: bound of a factor; the least is its inverse.
         shape_weight: of a MAC of 0 beside a frequency that is 100 % off; 0 for frequencies alone.

@@ -5,13 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+from femubench import Model
 from femubench.fem import Structure
-from femubench.update import ElementFamily, ElementStrategy, physical_family
+from femubench.update import (
+    OWN,
+    ElementFamily,
+    ElementStrategy,
+    Family,
+    group_family,
+    physical_family,
+)
 
 
 @dataclass(frozen=True)
 class Physical(ElementStrategy):
     """Scale EI and GJ (out of plane), EI and EA (in plane) or all four of every element.
+
+    Of matrices every group has a factor.
 
     The factors stay above one hundredth, so the stiffness stays positive semidefinite.
     """
@@ -21,9 +31,16 @@ class Physical(ElementStrategy):
         "Ahmadian, Gladwell & Ismail (1997), Parameter selection strategies in finite element "
         "model updating, section 4.2, table 3"
     )
+    needs: ClassVar[frozenset[str]] = frozenset({"shapes", "parts"})
     yardstick: ClassVar[bool] = True
     promises: ClassVar[frozenset[str]] = frozenset({"no-negative-eigenvalue"})
 
     def family(self, structure: Structure) -> ElementFamily:
         """Return factors on the rigidities of every element."""
         return physical_family(structure)
+
+    def family_of(self, model: Model) -> Family:
+        """Return factors on the groups of matrices, else on the rigidities."""
+        if self.parameters == "groups" or (model.structure is None and self.parameters == OWN):
+            return group_family(model)
+        return super().family_of(model)

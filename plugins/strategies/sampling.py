@@ -55,10 +55,9 @@ class BayesianSampling(Bayesian):
             raise InputError(
                 "the likelihood is of frequencies alone", key="shapes", expected="false"
             )
-        structure = model.frame_structure
-        unknowns = self.unknowns(structure, weighed=measurement.total_mass is not None)
+        unknowns = self.unknowns(model, weighed=measurement.total_mass is not None)
         return sample_posterior(
-            structure,
+            model,
             unknowns,
             measurement,
             rng,

@@ -23,11 +23,13 @@ class Sparse(FactorStrategy):
 
     Every iteration linearises relative frequencies in the logarithms x of the factors and takes
     the x that makes |S x - b|^2 / 2 + mu sum |x_j| least. mu is the weight at which the linear
-    problem without one of the frequencies foretells that one best, each left out in turn.
+    problem without one of the frequencies foretells that one best, each left out in turn. Of groups
+    of matrices each x_j is divided by the spread of its prior.
 
     Arguments:
         parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
-            `materials`, `sets` of the case, or `groups` of matrices.
+            `materials`, `sets` of the case, or `groups` of matrices; `own` for the members of a
+            frame and the groups of matrices.
 
     The authors' are the l1 penalty on the changes and the frequencies' sensitivities; the
     criterion for its weight (Tibshirani's cross-validation), logarithms, and a new
@@ -58,8 +60,9 @@ class Sparse(FactorStrategy):
             right = fit.slope @ log - fit.residual
             if not (fit.slope.T @ right).any():
                 break
-            weight = cross_validated_weight(fit.slope, right)
-            wanted, before = lasso(fit.slope, right, weight), log
+            slope = fit.slope * space.spread
+            weight = cross_validated_weight(slope, right)
+            wanted, before = space.spread * lasso(slope, right, weight), log
             log, fit = space.advance(log, fit, wanted, sizes=2.0 * weight)
             moved = float(np.abs(log - before).max())
             history.append({"cost": fit.cost, "step": moved, "weight": weight})

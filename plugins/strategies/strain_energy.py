@@ -35,7 +35,8 @@ class StrainEnergy(FactorStrategy):
 
     Arguments:
         parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
-            `materials`, `sets` of the case, or `groups` of matrices.
+            `materials`, `sets` of the case, or `groups` of matrices; `own` for the members of a
+            frame and the groups of matrices.
         above: standard deviations above the mean index from which a member is named; one is named
             in any case, and no more than there are frequencies.
         shape_weight: of a MAC of 0 beside a frequency that is 100 % off, in the fit.
@@ -50,7 +51,7 @@ class StrainEnergy(FactorStrategy):
         "Shi, Law & Zhang (1998), Structural damage localization from modal strain energy change, "
         "Journal of Sound and Vibration 218, 825-844"
     )
-    needs: ClassVar[frozenset[str]] = frozenset({"shapes", "elements"})
+    needs: ClassVar[frozenset[str]] = frozenset({"shapes", "parts"})
 
     above: float = 1.0
     shape_weight: float = 0.1

@@ -1,0 +1,74 @@
+"""What is known of the groups of a model from matrices before any measurement."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from femubench.core.fem.model import Model
+from femubench.core.modal.eigen import once_for
+from femubench.core.modal.rigid import rigid_body_vectors
+from femubench.core.typing import FloatArray, SparseArray
+
+STRUCTURE_STD = 0.1  # of ln(factor)
+SUPPORT_FACTOR = 5.0  # as likely as not
+QUARTILE = 0.6744897501960817  # of the standard normal distribution
+_FREE = 1e-8  # of the energy that the entries would have without cancelling each other
+_HELD = 0.1  # of it; a part of the structure with some dofs removed has less
+
+
+def support_groups(model: Model) -> frozenset[str]:
+    """Return the groups of the stiffness that hold the structure to ground.
+
+    A group is a support where its matrix couples no two dofs, or where a rigid-body motion costs
+    it a tenth of the energy that its entries would have without cancelling each other. The latter
+    is asked only where positions and directions of the dofs are known to be right: where some group
+    that couples dofs has no energy in any rigid-body motion.
+
+    Examples:
+        >>> modal.support_groups(model)
+        frozenset()
+    """
+    return once_for(model, "support groups", lambda: _support_groups(model))
+
+
+def _support_groups(model: Model) -> frozenset[str]:
+    apart = {name for name, part in model.groups.items() if not _couples(part)}
+    rigid = rigid_body_vectors(model.dofs)
+    rest = {name: part for name, part in model.groups.items() if name not in apart}
+    energy = {name: _energy(part, rigid) for name, part in rest.items()}
+    known = any(share < _FREE for share in energy.values())
+    held = {name for name, share in energy.items() if known and share > _HELD}
+    return frozenset(apart | held)
+
+
+def _couples(part: SparseArray) -> bool:
+    entries = part.tocoo()
+    return bool(np.any(entries.data[entries.row != entries.col] != 0.0))
+
+
+def _energy(part: SparseArray, rigid: FloatArray) -> float:
+    """Return the largest energy of a rigid-body motion, relative to that of its entries."""
+    whole = np.einsum("nr,nr->r", np.abs(rigid), abs(part) @ np.abs(rigid))
+    energy = np.abs(np.einsum("nr,nr->r", rigid, part @ rigid))
+    return float((energy / np.where(whole > 0.0, whole, 1.0)).max(initial=0.0))
+
+
+def group_prior_std(model: Model, name: str) -> float:
+    """Return the standard deviation of ln(factor) of a group.
+
+    What the case states: a factor of so much up or down is as likely as not. Else 0.1, and what
+    belongs to a factor of five for a support.
+
+    Arguments:
+        model: from matrices.
+        name: of a group of its stiffness or mass.
+
+    Examples:
+        >>> modal.group_prior_std(model, "deck")
+        0.1
+    """
+    if name in model.group_priors:
+        return float(np.log(model.group_priors[name]) / QUARTILE)
+    if name in support_groups(model):
+        return float(np.log(SUPPORT_FACTOR) / QUARTILE)
+    return STRUCTURE_STD
