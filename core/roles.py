@@ -234,6 +234,11 @@ class Scenario:
 class Reader(Protocol):
     """Reads a file format that the case format does not know by itself.
 
+    A reader may offer more than is asked here:
+
+    - ``read_responses(path) -> FrequencyResponses | TimeSignals``: what `bench identify` starts
+      from and `frfs` of a case names; both classes are in `femubench.modal`.
+
     Attributes:
         name: for messages, e.g. ``"universal file"``.
         suffixes: lower-case file suffixes with the dot.

@@ -3,7 +3,7 @@
 from femubench.core.modal.complex_modes import real_modes
 from femubench.core.modal.correlation import auto_mac, mac, modal_scale_factor
 from femubench.core.modal.expansion import expand_by_dynamics, expand_by_rotation, expand_by_serep
-from femubench.core.modal.frf import receptance
+from femubench.core.modal.frf import FrequencyResponses, receptance
 from femubench.core.modal.generalised_mass import mass_normalised
 from femubench.core.modal.pairing import Pairing, pair_measured, pair_modes
 from femubench.core.modal.rigid import rigid_body_vectors, rigid_modes_of
@@ -12,9 +12,12 @@ from femubench.core.modal.sensitivity import (
     frequency_sensitivities,
     shape_sensitivities,
 )
+from femubench.core.modal.signals import TimeSignals
 
 __all__ = [
+    "FrequencyResponses",
     "Pairing",
+    "TimeSignals",
     "auto_mac",
     "eigenvalue_sensitivities",
     "expand_by_dynamics",

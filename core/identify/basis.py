@@ -36,6 +36,17 @@ class Lines:
         scaled = responses / noise[:, None, None]
         return Lines(omega, derivative, np.concatenate([scaled.real, scaled.imag]), noise)
 
+    @property
+    def responses(self) -> AnyArray:
+        """Return the lines as complex numbers, whitened, (n_f, n_out, n_ref)."""
+        half = len(self.omega)
+        return np.asarray(self.values[:half] + 1j * self.values[half:])
+
+    @property
+    def raw(self) -> AnyArray:
+        """Return the lines as measured, complex, (n_f, n_out, n_ref)."""
+        return np.asarray(self.responses * self.noise[:, None, None])
+
     def modes(self, poles: AnyArray) -> FloatArray:
         """Return what residues and changes of poles multiply, (2 n_f, n, 4).
 

@@ -104,7 +104,7 @@ def fit_modes(
 
 def _scaled(participation: AnyArray) -> AnyArray:
     largest = np.abs(participation).argmax(axis=0)
-    return participation / participation[largest, np.arange(participation.shape[1])]
+    return np.asarray(participation / participation[largest, np.arange(participation.shape[1])])
 
 
 def _moved(point: _Point, damping: float) -> tuple[AnyArray, AnyArray]:
@@ -241,7 +241,7 @@ def _result(point: _Point, weights: FloatArray) -> ModalFit:
 def _spread(follow: FloatArray, shared: FloatArray) -> FloatArray:
     """Return what the covariance of the shared unknowns adds to that of the shapes."""
     moved = follow @ shared
-    return np.einsum("oraf,prbf->raobp", moved, follow, optimize=True)
+    return np.asarray(np.einsum("oraf,prbf->raobp", moved, follow, optimize=True))
 
 
 def predicted(fit: ModalFit, lines: Lines) -> AnyArray:
@@ -249,7 +249,7 @@ def predicted(fit: ModalFit, lines: Lines) -> AnyArray:
     base = lines.modes(fit.poles)[:, :, :2]
     residues = fit.shapes[:, None, :] * fit.participation[None]  # (out, ref, n)
     pairs = np.stack([residues.real, residues.imag], axis=3)
-    found = np.einsum("fnk,oink->foi", base, pairs, optimize=True)
+    found: FloatArray = np.einsum("fnk,oink->foi", base, pairs, optimize=True)
     found += np.einsum("fk,oik->foi", lines.residuals(), fit.residuals)
     half = len(found) // 2
-    return found[:half] + 1j * found[half:]
+    return np.asarray(found[:half] + 1j * found[half:])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import scipy.linalg
 
@@ -65,9 +63,7 @@ def least_gain(weights: FloatArray) -> float:
     return float(freedom + _SURE * np.sqrt(2.0 * freedom) + _SURE**2)
 
 
-def select(
-    lines: Lines, candidates: Sequence[complex], weights: FloatArray, chosen: AnyArray
-) -> IntArray:
+def select(lines: Lines, candidates: AnyArray, weights: FloatArray, chosen: AnyArray) -> IntArray:
     """Return the candidates that are modes besides the chosen ones, the strongest first.
 
     Arguments:
@@ -76,11 +72,12 @@ def select(
         weights: of the channels, (n_out, n_ref).
         chosen: poles that are in already.
     """
-    poles = np.array(candidates, dtype=complex)
     found: list[int] = []
-    while len(found) < len(poles):
-        rest = np.setdiff1d(np.arange(len(poles)), found)
-        gain = explained(lines, np.concatenate([chosen, poles[found]]), poles[rest], weights)
+    while len(found) < len(candidates):
+        rest = np.setdiff1d(np.arange(len(candidates)), found)
+        gain = explained(
+            lines, np.concatenate([chosen, candidates[found]]), candidates[rest], weights
+        )
         if gain.max() < least_gain(weights):
             break
         found.append(int(rest[gain.argmax()]))

@@ -31,10 +31,12 @@ class FrequencyResponses(Shown):
         quantity: what the motion is.
 
     Examples:
-        >>> hz = np.linspace(50.0, 200.0, 301)
-        >>> force = Sensors(("9Z",), *[x[-1:] for x in (sensors.xyz, sensors.directions)])
+        >>> hz, sensors = np.linspace(50.0, 200.0, 301), measurement.sensors
+        >>> force = femubench.Sensors(("9Z",), sensors.xyz[8:9], sensors.directions[8:9])
         >>> values = modal.receptance(modes, readings, readings[8:9], hz, 0.01)
         >>> print(modal.FrequencyResponses(sensors, force, hz, values))
+        FrequencyResponses: receptance of 13 responses to 1 force
+          lines  301, 50 to 200 Hz
     """
 
     responses: Sensors

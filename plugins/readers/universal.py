@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from femubench import InputError, Measurement, Sensors
-from femubench.modal import real_modes
+from femubench.modal import FrequencyResponses, TimeSignals, real_modes
 
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _COORDINATES, _UNITS, _SYSTEMS, _SHAPES = (15, 2411), 164, (18, 2420), (55, 2414)
@@ -69,6 +69,17 @@ class UniversalReader:
                 what += "; frequency responses (dataset 58) must be turned into modes first"
             raise InputError(what, file=path, expected=expected)
         return _measurement(path, nodes, modes)
+
+    def read_responses(self, path: Path) -> FrequencyResponses | TimeSignals:
+        """Return the functions of dataset 58, with the coordinates of nodes in the same file.
+
+        Raises:
+            InputError: when the file is broken or holds no such function.
+        """
+        from femubench.plugins.readers.universal_functions import read_functions
+
+        has_nodes = any(_of(_datasets(path)[0], *_COORDINATES))
+        return read_functions(path, self.read_modes(path).sensors if has_nodes else None)
 
 
 def _datasets(path: Path) -> tuple[list[Dataset], set[int]]:
