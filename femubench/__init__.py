@@ -38,6 +38,7 @@ __all__ = [
     "Diagnosis",
     "Diverged",
     "FemubenchError",
+    "Identification",
     "InputError",
     "Measurement",
     "Model",
@@ -60,6 +61,7 @@ __all__ = [
     "diagnose",
     "effects",
     "hookimpl",
+    "identify",
     "init_case",
     "new_plugin",
     "publish",
@@ -89,10 +91,12 @@ _NAMES = {
     "femubench.core.errors": (
         "Diverged FemubenchError InputError NotApplicable PluginError StrategyFailure"
     ),
+    "femubench.core.identify.identification": "Identification",
     "femubench.core.library.cases": "cases effects strategies",
     "femubench.core.library.challenge": "Challenge challenge score_challenge",
     "femubench.core.library.compare": "compare",
     "femubench.core.library.diagnose": "diagnose",
+    "femubench.core.library.identify": "identify",
     "femubench.core.library.plugins": "check init_case new_plugin",
     "femubench.core.library.publish": "publish",
     "femubench.core.library.rank": "Run rank read_run",
@@ -122,10 +126,12 @@ if TYPE_CHECKING:
     )
     from femubench.core.fem.model import Model
     from femubench.core.fem.sensors import Sensors
+    from femubench.core.identify.identification import Identification
     from femubench.core.library.cases import cases, effects, strategies
     from femubench.core.library.challenge import Challenge, challenge, score_challenge
     from femubench.core.library.compare import compare
     from femubench.core.library.diagnose import diagnose
+    from femubench.core.library.identify import identify
     from femubench.core.library.plugins import check, init_case, new_plugin
     from femubench.core.library.publish import publish
     from femubench.core.library.rank import Run, rank, read_run

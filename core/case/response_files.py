@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, get_args
 
@@ -194,3 +195,34 @@ def _sensors(file: Path, labels: Sequence[str]) -> Sensors:
             raise InputError(f"{label[:40]!r} says no direction", file=file, expected=_LABELS)
         directions.append(direction)
     return Sensors(tuple(labels), np.full((len(labels), 3), np.nan), tuple(directions))
+
+
+def located(measured: Responses, file: Path) -> Responses:
+    """Return responses whose sensors lie where a table says.
+
+    Arguments:
+        measured: what was read.
+        file: a table label,x,y,z,direction; a label without a direction of its own may be the
+            part before the colon.
+
+    Raises:
+        InputError: when a sensor of the responses is not in the table.
+    """
+    table = read_table(file)
+    table.check_columns(("label", "x", "y", "z"), ("direction",))
+    places = {row.text("label"): row.vector() for row in table.rows}
+
+    def moved(sensors: Sensors) -> Sensors:
+        xyz = []
+        for label in sensors.labels:
+            place = places.get(label, places.get(label.rpartition(":")[0]))
+            if place is None:
+                expected = f"a row for {label!r}"
+                raise InputError("a sensor has no place", file=file, key="label", expected=expected)
+            xyz.append(place)
+        return replace(sensors, xyz=np.array(xyz, dtype=float))
+
+    if isinstance(measured, TimeSignals):
+        return replace(measured, sensors=moved(measured.sensors))
+    forces = moved(measured.references)
+    return replace(measured, responses=moved(measured.responses), references=forces)

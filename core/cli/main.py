@@ -33,6 +33,7 @@ VERBS = {
     ),
     "publish": ("femubench.core.cli.publish", "Merge result files into a static site in DIR."),
     "diagnose": ("femubench.core.cli.diagnose", "Find what a model lacks, and extend it."),
+    "identify": ("femubench.core.cli.identify", "Find modes in measured responses."),
     "reproduce": (
         "femubench.core.cli.reproduce",
         "Recompute the tables of the papers, cell by cell.",

@@ -74,6 +74,11 @@ class Identification(Shown):
         return mean_phase_deviation(self.shapes)
 
     @property
+    def located(self) -> bool:
+        """Tell whether the place of every sensor is known."""
+        return bool(np.isfinite(self.sensors.xyz).all())
+
+    @property
     def measurement(self) -> Measurement:
         """Return the modes as a case has them; shapes are the real parts."""
         return Measurement(
