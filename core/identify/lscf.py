@@ -131,5 +131,5 @@ def _poles_of_order(
     inverse, vectors = np.linalg.eig(companion)
     inverse = np.where(inverse == 0.0, np.finfo(float).tiny, inverse)
     left = vectors[-references:].T
-    left = left / np.linalg.norm(left, axis=1, keepdims=True)
+    left = left / np.maximum(np.linalg.norm(left, axis=1, keepdims=True), np.finfo(float).tiny)
     return -np.log(inverse), left

@@ -14,9 +14,10 @@ from femubench.core.identify.hidden import hidden_poles
 from femubench.core.identify.identification import Identification
 from femubench.core.identify.lscf import Poles, lscf_poles
 from femubench.core.identify.modal_fit import ModalFit, fit_modes, predicted
-from femubench.core.identify.noise import first_weights, noise_left
+from femubench.core.identify.noise import first_weights, noise_left, unevenness
 from femubench.core.identify.selection import explained, least_gain, select
 from femubench.core.identify.shape_scale import scaled_shapes
+from femubench.core.modal.correlation import mac
 from femubench.core.modal.frf import DERIVATIVES, FrequencyResponses
 from femubench.core.typing import AnyArray, BoolArray, FloatArray
 
@@ -26,6 +27,7 @@ _SUPPORT = 0.3  # of the orders, that a candidate appears in
 _SAME = 0.01  # relative distance of a pole to the cluster that it comes from
 _FEWEST_LINES = 32
 _ROUNDS = 5
+_WIDTHS, _ALIKE = 3.0, 0.9  # half-widths and MAC within which two poles are one mode
 _NO_MODE = "no mode stands out of the noise"
 
 
@@ -89,7 +91,7 @@ def _all_poles(
     found = lscf_poles(frequencies, part / rows / columns, min(most_poles, len(frequencies) // 2))
     forces = np.zeros((len(found), seen.shape[1]), dtype=complex)
     forces[:, references] = found.participation * columns
-    forces /= np.linalg.norm(forces, axis=1, keepdims=True)
+    forces /= np.maximum(np.linalg.norm(forces, axis=1, keepdims=True), np.finfo(float).tiny)
     return replace(found, participation=forces)
 
 
@@ -109,18 +111,24 @@ def _fitted(lines: Lines, clusters: Sequence[Cluster], seen: BoolArray) -> tuple
         raise InputError(_NO_MODE, expected="resonances in the band")
     fit = fit_modes(lines, poles[chosen], forces[:, chosen], weights)
     for _ in range(_ROUNDS):
-        lines, weights = noise_left(fit, lines, seen)
+        lines, weights = noise_left(fit, lines, seen, rough=True)
         fit = fit_modes(lines, fit.poles, fit.participation, weights)
         poles, forces = hidden_poles(lines, fit)
         more = select(lines, poles, weights, fit.poles)
-        keep = _needed(lines, fit, weights)
+        keep = _needed(lines, fit, weights) & ~_twice(fit)
         if not len(more) and keep.all():
             break
         start = np.concatenate([fit.poles[keep], poles[more]])
         together = np.concatenate([fit.participation[:, keep], forces[:, more]], axis=1)
         fit = fit_modes(lines, start, together, weights)
     lines, weights = noise_left(fit, lines, seen)
-    return fit_modes(lines, fit.poles, fit.participation, weights), lines
+    fit = fit_modes(lines, fit.poles, fit.participation, weights)
+    of_poles, of_shapes = unevenness(fit, lines).T[:, :, None, None]
+    return replace(
+        fit,
+        pole_covariance=of_poles * fit.pole_covariance,
+        shape_covariance=of_shapes * fit.shape_covariance,
+    ), lines
 
 
 def _starts(clusters: Sequence[Cluster], seen: BoolArray) -> tuple[AnyArray, AnyArray]:
@@ -141,6 +149,19 @@ def _needed(lines: Lines, fit: ModalFit, weights: FloatArray) -> BoolArray:
     ]
     keep[np.argmin(gains)] = min(gains) >= least_gain(weights)
     return keep
+
+
+def _twice(fit: ModalFit) -> BoolArray:
+    """Tell which modes are a stronger neighbour once more: as good as its place, and its shape.
+
+    What a linear model cannot follow, as the bent peak of a joint that slips, is fitted so.
+    """
+    strength = np.linalg.norm(fit.shapes, axis=0) * np.linalg.norm(fit.participation, axis=0)
+    strength = strength / -fit.poles.real
+    apart = np.abs(fit.poles[:, None] - fit.poles)
+    near = apart < _WIDTHS * np.maximum(-fit.poles.real[:, None], -fit.poles.real)
+    alike = mac(fit.shapes, fit.shapes) > _ALIKE
+    return np.asarray((near & alike & (strength[:, None] < strength)).any(axis=1))
 
 
 def _identification(

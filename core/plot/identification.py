@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,11 +11,11 @@ from femubench.core.identify.identification import Identification
 from femubench.core.plot.style import (
     AFTER,
     BEFORE,
+    COLOURS,
+    INK,
     MEMBER,
     SOFT,
     check_kind,
-    draw_curves,
-    name_of,
     own_axes,
 )
 from femubench.core.typing import BoolArray, FloatArray
@@ -24,6 +24,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _UNITS = {"receptance": "m/N", "mobility": "m/(s N)", "accelerance": "m/(s² N)"}
+_CURVES: tuple[tuple[str, str, float, Any], ...] = (
+    ("measured", INK, 2.2, "-"),
+    ("synthesised", BEFORE, 1.6, (0, (5, 2))),
+    ("difference", AFTER, 0.8, (0, (1, 1.6))),
+)
 _NEAR = 0.01  # relative distance of a pole to the mode that it stands for
 _MOST_DAMPING = 0.2
 _MOST_POINTS = 1500  # of a curve
@@ -131,7 +136,7 @@ def synthesis(
 
     Examples:
         >>> plot.synthesis(identified, (0, 0)).get_ylabel()
-        'receptance 1Z to 9Z, dB re 1 m/N'
+        'receptance, dB re 1 m/N'
     """
     check_kind(found, (Identification,), "responses")
     if found.measured is None or found.synthesised is None:
@@ -151,19 +156,15 @@ def synthesis(
         shape = measured.shape[1:]
         if not (0 <= o < shape[0] and 0 <= i < shape[1]) or not np.isfinite(measured[0, o, i]):
             raise InputError(f"no channel {channel}", expected=f"one of {shape[0]} x {shape[1]}")
-        pair = found.measured.responses.labels[o], found.measured.references.labels[i]
-        unit = _UNITS[found.measured.quantity]
-        label = (
-            f"{found.measured.quantity} {name_of(pair[0])} to {name_of(pair[1])}, dB re 1 {unit}"
-        )
+        label = f"{found.measured.quantity}, dB re 1 {_UNITS[found.measured.quantity]}"
         left = measured[:, o, i] - model[:, o, i]
         levels = [_decibels(v) for v in (measured[:, o, i], model[:, o, i], left)]
     ax = own_axes(ax, (7.0, 3.6))
-    names = ("measured", "synthesised", "difference")
-    roles = ("measured", "predicted", "nominal")
     hz = found.measured.frequencies
-    curves = [(n, r, *_thinned(hz, v)) for n, r, v in zip(names, roles, levels, strict=True)]
-    draw_curves(ax, curves)
+    for (name, colour, width, dashes), values in zip(_CURVES, levels, strict=True):
+        x, y = _thinned(hz, values)
+        ax.plot(x, y, color=colour, linewidth=width, linestyle=dashes, label=name)
+    ax.grid(color=COLOURS["grid"], linewidth=0.6)
     ax.set(xlim=found.band, xlabel="frequency, Hz", ylabel=label)
     ax.legend(fontsize=8.5, loc="upper left", bbox_to_anchor=(0.0, 1.15), ncols=3, frameon=False)
     return ax
