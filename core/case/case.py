@@ -10,6 +10,7 @@ import numpy as np
 from femubench.core.display import Shown, counted, modes_line
 from femubench.core.fem.frame import GroundSpring, PointMass
 from femubench.core.fem.model import Model
+from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.modal.measurement import Measurement
 
 TOLERANCE = 0.005
@@ -57,6 +58,8 @@ class Case(Shown):
             model with ordinary scatter.
         structure: the physical structure, which several cases may share; empty for one that no
             other case is known to share.
+        frfs: measured frequency responses of the structure as tested; they hold the held-out modes
+            too, and are drawn, never handed to a strategy.
     """
 
     name: str
@@ -76,6 +79,7 @@ class Case(Shown):
     model_error: float | None = None
     beam_share: float = BEAM_SHARE
     structure: str = ""
+    frfs: FrequencyResponses | None = None
 
     def rows(self) -> list[tuple[str, str]]:
         """Return where the case is from, its model, and what was measured on it."""
@@ -95,6 +99,8 @@ class Case(Shown):
         if self.reference is not None:
             known = self.reference.select(self.reference_used).frequencies
             found.append(("reference", modes_line(self.reference_used, known)))
+        if self.frfs is not None:
+            found.append(("frfs", self.frfs.rows()[0][1]))
         return [*found, *(("modified", str(change)) for change in self.modifications)]
 
     @property

@@ -35,6 +35,7 @@ from femubench.core.case.modes import (
     seen_at,
 )
 from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.case.response_files import read_responses
 from femubench.core.case.schema import CaseSpec, FrameSpec, ModificationSpec, parse_spec
 from femubench.core.case.tables import read_sensors
 from femubench.core.errors import InputError, ModelError
@@ -42,6 +43,7 @@ from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
 from femubench.core.files import read_text
+from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Reader
 
@@ -143,7 +145,7 @@ class _Building:
         )
         measurement = self.measurement(site)
         info = self.spec.case
-        return Case(
+        case = Case(
             name=info.name if name is None else name,
             title=info.title or info.name,
             source=info.source,
@@ -154,14 +156,15 @@ class _Building:
             held_out=self.spec.measurement.held_out,
             modifications=self.modifications(model, site, measurement.sensors),
             band=self.spec.measurement.band,
-            digest=self.files.digest(),
             tolerance=self.spec.diagnosis.tolerance,
             reference=self.reference(site, measurement.sensors),
             reference_used=self.reference_used,
             model_error=self.spec.diagnosis.model_error,
             beam_share=self.spec.diagnosis.beam_share,
             structure=info.structure,
+            frfs=self.frfs(measurement.sensors),
         )
+        return replace(case, digest=self.files.digest())  # of all that was read
 
     def model(self) -> Model:
         spec = self.spec.model
@@ -221,6 +224,22 @@ class _Building:
         if spec.mass is None:
             return measurement
         return replace(measurement, total_mass=(spec.mass.value, spec.mass.std))
+
+    def frfs(self, sensors: Sensors) -> FrequencyResponses | None:
+        """Return the measured frequency responses."""
+        name = self.spec.measurement.frfs
+        if name is None:
+            return None
+        key = ("measurement", "frfs")
+        with at_key(*key):
+            path = self.files.path(name)
+        found = read_responses(path, self.readers, sensors)
+        if not isinstance(found, FrequencyResponses):
+            raise Fault(key, f"{name!r} holds motions over time", "frequency responses")
+        if not set(found.responses.labels) & set(sensors.labels):
+            expected = f"labels as in the file, e.g. {found.responses.labels[0]!r}"
+            raise Fault(key, "no response belongs to a sensor of the case", expected)
+        return found
 
     @property
     def reference_used(self) -> tuple[int, ...]:

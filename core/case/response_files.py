@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any, get_args
 
@@ -27,12 +28,15 @@ _LABELS = "labels such as 12:z, a name and a direction"
 Responses = FrequencyResponses | TimeSignals
 
 
-def read_responses(file: Path, readers: Sequence[Reader] = ()) -> Responses:
+def read_responses(
+    file: Path, readers: Sequence[Reader] = (), known: Sensors | None = None
+) -> Responses:
     """Return the frequency responses of a file, or its signals over time.
 
     Arguments:
         file: of a format that a reader plugin knows, ``.csv``, ``.npz`` or ``.mat``.
         readers: reader plugins that may offer ``read_responses``.
+        known: sensors whose labels need not say a direction.
 
     Raises:
         InputError: when the file holds neither, or numbers that cannot be.
@@ -48,12 +52,12 @@ def read_responses(file: Path, readers: Sequence[Reader] = ()) -> Responses:
             what = f"{reader.name} gave {type(found).__name__}"
             raise InputError(what, file=file, expected="FrequencyResponses or TimeSignals")
     elif name.endswith(_TABLE):
-        found = _of_table(file)
+        found = _of_table(file, known)
     elif name.endswith(_ARRAYS):
-        found = _of_arrays(file, _arrays(file))
+        found = _of_arrays(file, _arrays(file), known)
     else:
-        known = ", ".join([*(s for r in able for s in r.suffixes), ".csv", *_ARRAYS])
-        raise InputError("unknown kind of file", file=file, expected=known)
+        suffixes = ", ".join([*(s for r in able for s in r.suffixes), ".csv", *_ARRAYS])
+        raise InputError("unknown kind of file", file=file, expected=suffixes)
     return _checked(file, found)
 
 
@@ -78,7 +82,7 @@ def _checked(file: Path, found: Responses) -> Responses:
     return found
 
 
-def _of_table(file: Path) -> Responses:
+def _of_table(file: Path, known: Sensors | None) -> Responses:
     """Return the channels of a table: ``frequency`` or ``time``, and a column a channel."""
     table = read_table(file)
     first, *columns = table.columns
@@ -97,7 +101,7 @@ def _of_table(file: Path) -> Responses:
         if not len(step) or step.min() <= 0.0 or np.ptp(step) > 0.01 * step.mean():
             expected = "even steps in s, two rows or more"
             raise InputError("uneven steps", file=file, key="time", expected=expected)
-        sensors = _sensors(file, columns)
+        sensors = _sensors(file, columns, known)
         return TimeSignals(sensors, float(1.0 / step.mean()), np.asarray(numbers[:, 1:].real))
     pairs = [column.partition("/") for column in columns]
     for column, (response, slash, reference) in zip(columns, pairs, strict=True):
@@ -109,7 +113,7 @@ def _of_table(file: Path) -> Responses:
     channels = np.full((len(numbers), len(outputs), len(inputs)), np.nan, dtype=complex)
     for k, (response, _, reference) in enumerate(pairs):
         channels[:, outputs.index(response), inputs.index(reference)] = numbers[:, 1 + k]
-    sensors, forces = _sensors(file, outputs), _sensors(file, inputs)
+    sensors, forces = _sensors(file, outputs, known), _sensors(file, inputs, known)
     return FrequencyResponses(sensors, forces, np.asarray(numbers[:, 0].real), channels, _QUANTITY)
 
 
@@ -135,7 +139,7 @@ def _arrays(file: Path) -> Mapping[str, Any]:
         raise InputError(what, file=file, expected="arrays by name") from None
 
 
-def _of_arrays(file: Path, held: Mapping[str, Any]) -> Responses:
+def _of_arrays(file: Path, held: Mapping[str, Any], known: Sensors | None) -> Responses:
     """Return what arrays of these names say.
 
     ``frequencies`` (n_f), ``responses`` and ``references`` (labels), ``values`` (n_f, n_responses,
@@ -167,7 +171,7 @@ def _of_arrays(file: Path, held: Mapping[str, Any]) -> Responses:
         if values.ndim != 2 or values.shape[1] != len(names) or not 0.0 < rate < np.inf:
             expected = f"(n_samples, {len(names)}) and a rate > 0 in Hz"
             raise InputError("wrong shape", file=file, key="signals", expected=expected)
-        return TimeSignals(_sensors(file, names), rate, values)
+        return TimeSignals(_sensors(file, names, known), rate, values)
     hz = array("frequencies", "fiu").astype(float).ravel()
     outputs, inputs = labels("responses"), labels("references")
     values = array("values", "fiuc").astype(complex)
@@ -180,21 +184,40 @@ def _of_arrays(file: Path, held: Mapping[str, Any]) -> Responses:
     if quantity not in get_args(Quantity):
         expected = ", ".join(get_args(Quantity))
         raise InputError(f"{quantity!r}", file=file, key="quantity", expected=expected)
-    return FrequencyResponses(_sensors(file, outputs), _sensors(file, inputs), hz, values, quantity)
+    return FrequencyResponses(
+        _sensors(file, outputs, known), _sensors(file, inputs, known), hz, values, quantity
+    )
 
 
-def _sensors(file: Path, labels: Sequence[str]) -> Sensors:
-    """Return sensors at unknown places, along what their labels say."""
+def _sensors(file: Path, labels: Sequence[str], known: Sensors | None) -> Sensors:
+    """Return sensors: known ones, or at unknown places along what their labels say."""
     if not labels or len(set(labels)) < len(labels):
         what = "a label is listed twice" if labels else "no labels"
         raise InputError(what, file=file, expected="every label once")
-    directions = []
-    for label in labels:
+    rows = {} if known is None else {label: i for i, label in enumerate(known.labels)}
+    xyz, directions = np.full((len(labels), 3), np.nan), []
+    for k, label in enumerate(labels):
         direction = label.rpartition(":")[2]
-        if direction.lstrip("-") not in DIRECTIONS or not label.isprintable():
+        if known is not None and label in rows:
+            xyz[k], direction = known.xyz[rows[label]], known.directions[rows[label]]
+        elif direction.lstrip("-") not in DIRECTIONS or not label.isprintable():
             raise InputError(f"{label[:40]!r} says no direction", file=file, expected=_LABELS)
         directions.append(direction)
-    return Sensors(tuple(labels), np.full((len(labels), 3), np.nan), tuple(directions))
+    return Sensors(tuple(labels), xyz, tuple(directions))
+
+
+def responses_npz(measured: FrequencyResponses) -> bytes:
+    """Return frequency responses as a NumPy file that `read_responses` reads."""
+    held = BytesIO()
+    np.savez_compressed(
+        held,
+        frequencies=measured.frequencies,
+        values=measured.values,
+        responses=np.array(measured.responses.labels),
+        references=np.array(measured.references.labels),
+        quantity=np.array([measured.quantity]),
+    )
+    return held.getvalue()
 
 
 def located(measured: Responses, file: Path) -> Responses:

@@ -341,6 +341,7 @@ class MeasurementSpec(Table):
     held_out: Many[Count] = Field((), description="a list of mode numbers")
     band: tuple[NotNegative, Positive] | None = Field(None, description=BAND)
     mass: WeightSpec | None = Field(None, description="{value, std} in kg")
+    frfs: FileName | None = Field(None, description="a file in the case folder")
 
 
 class ReferenceSpec(Table):

@@ -35,10 +35,12 @@ from femubench.core.case.matrix_files import (
 )
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.reader import read_case
+from femubench.core.case.response_files import responses_npz
 from femubench.core.case.table_text import common_share, modes_csv, sensors_csv, toml_bytes
 from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
+from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import SparseArray
 
@@ -103,12 +105,26 @@ def check_written(fresh: Path, folder: Path, wanted: Case) -> None:
         if getattr(back, part) != getattr(wanted, part):
             what = f"{getattr(wanted, part)!r} does not read back"
             raise refused(folder, what, part, f"not {getattr(back, part)!r}")
+    if not _same_responses(wanted.frfs, back.frfs):
+        raise refused(folder, "the frequency responses do not read back", "frfs", "finite numbers")
     first, second = (_measurements(case) for case in (wanted, back))
     for one, other in zip(first, second, strict=True):
         column = _differing(one, other)
         if column is not None:
             what = f"the {column.replace('_', ' ')} of a measurement does not read back"
             raise refused(folder, what, "measurement", "finite numbers within their bounds")
+
+
+def _same_responses(one: FrequencyResponses | None, other: FrequencyResponses | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    sides = ("responses", "references")
+    return (
+        all(getattr(one, side).labels == getattr(other, side).labels for side in sides)
+        and one.quantity == other.quantity
+        and np.array_equal(one.frequencies, other.frequencies)
+        and np.array_equal(one.values, other.values, equal_nan=True)
+    )
 
 
 def _measurements(case: Case) -> list[Measurement]:
@@ -215,6 +231,9 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
         files["sensors.csv"] = sensors_csv(case.measurement.sensors)
     files["modes.csv"] = modes_csv(case.measurement, share)
     measurement |= _settings(case)
+    if case.frfs is not None:
+        measurement["frfs"] = "frfs.npz"
+        files["frfs.npz"] = responses_npz(case.frfs)
     told = {key: getattr(case, key) for key in ("name", "title", "source", "structure")}
     info = {key: value for key, value in told.items() if value}
     content: Keys = {"case": info, "model": keys, "measurement": measurement}

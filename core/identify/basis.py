@@ -59,12 +59,15 @@ class Lines:
         jw = 1j * self.omega[:, None]
         weight = (jw**self.derivative) / self.noise[:, None]
         own, mirrored = 1.0 / (jw - poles), 1.0 / (jw - poles.conj())
-        columns = []
-        for power in (1, 2):
-            x, y = own**power, mirrored**power
-            columns += [weight * (x + y), weight * 1j * (x - y)]
-        stacked = np.stack(columns, axis=2)
-        return np.concatenate([stacked.real, stacked.imag])
+        found = np.empty((len(self.values), len(poles), 4))
+        half = len(self.omega)
+        for k in (0, 1):
+            x, y = weight * own, weight * mirrored
+            pair = x + y, 1j * (x - y)
+            for column, values in enumerate(pair, start=2 * k):
+                found[:half, :, column], found[half:, :, column] = values.real, values.imag
+            own, mirrored = own**2, mirrored**2
+        return found
 
     def residuals(self) -> FloatArray:
         """Return what stands for the modes outside of the band, (2 n_f, RESIDUALS)."""

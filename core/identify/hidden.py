@@ -31,10 +31,11 @@ def hidden_poles(lines: Lines, fit: ModalFit) -> tuple[AnyArray, AnyArray]:
     omega = np.geomspace(low, high, max(2, int(np.log(high / low) / _STEP)))
     damping = np.repeat(_DAMPING, len(omega))
     poles = np.tile(omega, len(_DAMPING)) * (-damping + 1j * np.sqrt(1.0 - damping**2))
-    shapes = (1j * lines.omega[:, None]) ** lines.derivative / lines.noise[:, None]
-    shapes = shapes / (1j * lines.omega[:, None] - poles)
-    shapes /= np.linalg.norm(shapes, axis=0)
-    residues = np.tensordot(shapes.conj().T, left, axes=(1, 0))  # (n, out, ref)
+    weight = (1j * lines.omega) ** lines.derivative / lines.noise
+    shapes = (1.0 / (1j * lines.omega[:, None] - poles)).astype(np.complex64)
+    size = np.sqrt(np.square(np.abs(weight)) @ np.square(np.abs(shapes)))
+    flat = (weight.conj()[:, None, None] * left).reshape(len(weight), -1).astype(np.complex64)
+    residues = (shapes.conj().T @ flat / size[:, None]).reshape(-1, *left.shape[1:])
     gains = np.square(np.abs(residues)).sum(axis=(1, 2))
     best = _peaks(gains, poles)
     found = np.divide(

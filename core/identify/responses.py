@@ -15,7 +15,7 @@ from femubench.core.identify.identification import Identification
 from femubench.core.identify.lscf import Poles, lscf_poles
 from femubench.core.identify.modal_fit import ModalFit, fit_modes, predicted
 from femubench.core.identify.noise import first_weights, noise_left, unevenness
-from femubench.core.identify.selection import explained, least_gain, select
+from femubench.core.identify.selection import needed, select
 from femubench.core.identify.shape_scale import scaled_shapes
 from femubench.core.modal.correlation import mac
 from femubench.core.modal.frf import DERIVATIVES, FrequencyResponses
@@ -115,7 +115,7 @@ def _fitted(lines: Lines, clusters: Sequence[Cluster], seen: BoolArray) -> tuple
         fit = fit_modes(lines, fit.poles, fit.participation, weights)
         poles, forces = hidden_poles(lines, fit)
         more = select(lines, poles, weights, fit.poles)
-        keep = _needed(lines, fit, weights) & ~_twice(fit)
+        keep = needed(lines, fit.poles, weights) & ~_twice(fit)
         if not len(more) and keep.all():
             break
         start = np.concatenate([fit.poles[keep], poles[more]])
@@ -136,19 +136,6 @@ def _starts(clusters: Sequence[Cluster], seen: BoolArray) -> tuple[AnyArray, Any
     poles = np.array([cluster.pole for cluster in clusters], dtype=complex)
     forces = np.array([cluster.participation for cluster in clusters], dtype=complex)
     return poles, forces.reshape(len(clusters), seen.shape[1]).T
-
-
-def _needed(lines: Lines, fit: ModalFit, weights: FloatArray) -> BoolArray:
-    """Tell which modes of a fit the data need; at most one is not, the weakest."""
-    n = len(fit.poles)
-    keep = np.ones(n, dtype=bool)
-    if n < 2:
-        return keep
-    gains = [
-        explained(lines, np.delete(fit.poles, k), fit.poles[[k]], weights)[0] for k in range(n)
-    ]
-    keep[np.argmin(gains)] = min(gains) >= least_gain(weights)
-    return keep
 
 
 def _twice(fit: ModalFit) -> BoolArray:

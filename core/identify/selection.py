@@ -1,4 +1,4 @@
-"""Which clusters of poles are modes: those without which the data are not explained."""
+"""Which poles are modes: those without which the data are not explained."""
 
 from __future__ import annotations
 
@@ -6,17 +6,14 @@ import numpy as np
 import scipy.linalg
 
 from femubench.core.identify.basis import RESIDUALS, Lines, Products
-from femubench.core.typing import AnyArray, FloatArray, IntArray
+from femubench.core.typing import AnyArray, BoolArray, FloatArray, IntArray
 
 _BLOCK = 4  # functions of a mode
 _SURE = 8.0  # standard deviations above what a mode of noise explains
 
 
 def explained(
-    lines: Lines,
-    chosen: AnyArray,
-    candidates: AnyArray,
-    weights: FloatArray,
+    products: Products, chosen: IntArray, candidates: IntArray, weights: FloatArray
 ) -> FloatArray:
     """Return how much smaller the misfit gets by each candidate, in units of the noise, (n,).
 
@@ -24,27 +21,26 @@ def explained(
     makes up for an error of theirs explains nothing.
 
     Arguments:
-        lines: the data.
-        chosen: poles of the modes so far, in rad/s, (k,).
-        candidates: poles, (n,).
+        products: of all poles and the data.
+        chosen: positions of the modes so far among the poles.
+        candidates: likewise, (n,).
         weights: of the channels, 0 where nothing was measured, (n_out, n_ref).
     """
-    products = Products.of(lines, np.concatenate([chosen, candidates]))
-    count = _BLOCK * len(chosen)
-    at = count + _BLOCK * np.arange(len(candidates))[:, None] + [0, 1]
-    known = np.concatenate([np.arange(count), len(products.gram) - 1 - np.arange(RESIDUALS)])
+    size = len(products.gram)
+    own = (_BLOCK * chosen[:, None] + np.arange(_BLOCK)).ravel()
+    known = np.concatenate([own, size - 1 - np.arange(RESIDUALS)])
     length = np.sqrt(np.diag(products.gram))
     gram = products.gram / np.outer(length, length)
-    data = products.data.reshape(len(gram), -1) / length[:, None]
-    own = gram[np.ix_(known, known)] + 1e-10 * np.eye(len(known))
-    factor = scipy.linalg.cho_factor(own)
+    data = products.data.reshape(size, -1) / length[:, None]
+    factor = scipy.linalg.cho_factor(gram[np.ix_(known, known)] + 1e-10 * np.eye(len(known)))
     solved = scipy.linalg.cho_solve(factor, np.concatenate([gram[known], data[known]], axis=1))
     weight = np.square(weights).reshape(-1)
     found = np.zeros(len(candidates))
-    for k, pair in enumerate(at):
+    for k, candidate in enumerate(candidates):
+        pair = _BLOCK * candidate + np.arange(2)
         to_known = gram[np.ix_(known, pair)]
         rest = gram[np.ix_(pair, pair)] - to_known.T @ solved[:, pair]
-        left = data[pair] - to_known.T @ solved[:, len(gram) :]
+        left = data[pair] - to_known.T @ solved[:, size:]
         if np.linalg.eigvalsh(rest)[0] > 1e-8:
             found[k] = np.sum(weight * np.einsum("ac,ac->c", left, np.linalg.solve(rest, left)))
     return found
@@ -72,13 +68,28 @@ def select(lines: Lines, candidates: AnyArray, weights: FloatArray, chosen: AnyA
         weights: of the channels, (n_out, n_ref).
         chosen: poles that are in already.
     """
-    found: list[int] = []
-    while len(found) < len(candidates):
-        rest = np.setdiff1d(np.arange(len(candidates)), found)
-        gain = explained(
-            lines, np.concatenate([chosen, candidates[found]]), candidates[rest], weights
-        )
-        if gain.max() < least_gain(weights):
+    products = Products.of(lines, np.concatenate([chosen, candidates]))
+    inside = list(range(len(chosen)))
+    waiting = list(range(len(chosen), len(chosen) + len(candidates)))
+    while waiting:
+        gains = explained(products, np.array(inside, dtype=int), np.array(waiting), weights)
+        if gains.max() < least_gain(weights):
             break
-        found.append(int(rest[gain.argmax()]))
-    return np.array(found, dtype=np.int64)
+        inside.append(waiting.pop(int(gains.argmax())))
+    return np.array(inside[len(chosen) :], dtype=np.int64) - len(chosen)
+
+
+def needed(lines: Lines, poles: AnyArray, weights: FloatArray) -> BoolArray:
+    """Tell which modes the data need beside all others, (n,); at most one is not, the weakest.
+
+    Arguments:
+        lines: the data.
+        poles: in rad/s, (n,).
+        weights: of the channels, (n_out, n_ref).
+    """
+    keep = np.ones(len(poles), dtype=bool)
+    products, every = Products.of(lines, poles), np.arange(len(poles))
+    gains = [explained(products, np.delete(every, k), every[[k]], weights)[0] for k in every]
+    if len(poles) > 1:
+        keep[np.argmin(gains)] = min(gains) >= least_gain(weights)
+    return keep
