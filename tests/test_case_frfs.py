@@ -27,7 +27,7 @@ def with_frfs(plain: Case, tmp_path: Path) -> Case:
     """Give the case with accelerances of a stiffer model, which no curve of the nominal one is."""
     sensors = plain.measurement.sensors
     force = Sensors((sensors.labels[DRIVEN],), sensors.xyz[[DRIVEN]], (sensors.directions[DRIVEN],))
-    hz = np.linspace(5.0, 300.0, 1181)
+    hz = np.linspace(150.0, 300.0, 601)
     modes, rows = femubench.solve_modes(plain.model), plain.model.observe(sensors)
     values = receptance(modes, rows, rows[[DRIVEN]], hz, 0.01)
     values = -values * np.square(2.0 * np.pi * hz)[:, None, None]
@@ -67,7 +67,7 @@ def test_the_measured_curve_is_drawn(with_frfs: Case, plain: Case) -> None:
     assert np.isfinite(levels[inside][1:-1]).all()
     expected = 20.0 * np.log10(np.abs(frfs.receptances[:, DRIVEN, 0]))
     peak = axis[inside][np.argmax(levels[inside])]
-    assert peak == pytest.approx(frfs.frequencies[np.argmax(expected)], abs=2.0)
+    assert peak == pytest.approx(frfs.frequencies[np.argmax(expected)], abs=3.0)
     assert np.nanmax(levels) == pytest.approx(expected.max(), abs=0.06)
 
 

@@ -47,13 +47,9 @@ def identify(
         InputError: when the file holds no responses, or no mode stands out of their noise.
 
     Examples:
-        >>> hz = np.linspace(100.0, 280.0, 721)
-        >>> force = femubench.Sensors(("9Z",), measurement.sensors.xyz[8:9], ("z",))
-        >>> values = modal.receptance(modes, readings, readings[8:9], hz, 0.005)
-        >>> measured = modal.FrequencyResponses(measurement.sensors, force, hz, values)
-        >>> found = femubench.identify(measured)
+        >>> found = femubench.identify(responses, band=(200.0, 290.0))
         >>> print(found.frequencies.round(2), found.damping.round(4))
-        [] []
+        [255.8  277.67] [0.005 0.005]
     """
     if output is not None:
         check_new(Path(output))

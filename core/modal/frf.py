@@ -31,12 +31,9 @@ class FrequencyResponses(Shown):
         quantity: what the motion is.
 
     Examples:
-        >>> hz, sensors = np.linspace(50.0, 200.0, 301), measurement.sensors
-        >>> force = femubench.Sensors(("9Z",), sensors.xyz[8:9], sensors.directions[8:9])
-        >>> values = modal.receptance(modes, readings, readings[8:9], hz, 0.01)
-        >>> print(modal.FrequencyResponses(sensors, force, hz, values))
+        >>> print(modal.FrequencyResponses(sensors, force, lines, curves))
         FrequencyResponses: receptance of 13 responses to 1 force
-          lines  301, 50 to 200 Hz
+          lines  401, 200 to 300 Hz
     """
 
     responses: Sensors
