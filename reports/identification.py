@@ -17,7 +17,7 @@ from femubench.reports.templating import asset, templates
 
 HEADS = ("mode", "frequency, Hz", "sd, Hz", "damping, %", "sd, %", "MPC", "MPD, deg")
 _SHOWN = 4  # channels drawn, those that fit worst
-_OVERVIEW, _SMALL = (8.6, 4.2), (5.2, 3.4)  # inch
+_OVERVIEW, _SMALL = (8.6, 4.2), (4.0, 2.8)  # inch
 
 
 def identification_rows(found: Identification) -> list[list[str]]:

@@ -1,4 +1,4 @@
-"""Read frequency responses and signals: of reader plugins, tables, NumPy and MATLAB files."""
+"""Read frequency responses and signals: of reader plugins, tables and NumPy files."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from femubench.core.case.matrices import reading_with
 from femubench.core.case.tables import Complex, read_table
 from femubench.core.errors import InputError
 from femubench.core.fem.sensors import DIRECTIONS, Sensors
-from femubench.core.files import check_regular
+from femubench.core.files import check_regular, open_regular
 from femubench.core.modal.frf import FrequencyResponses, Quantity
 from femubench.core.modal.signals import TimeSignals
 from femubench.core.roles import Reader
 from femubench.core.typing import AnyArray
 
-_TABLE, _ARRAYS = (".csv", ".txt"), (".npz", ".mat")
+_TABLE, _ARRAYS = (".csv", ".txt"), ".npz"
 _QUANTITY: Quantity = "accelerance"  # where a file does not say: what an accelerometer measures
 _LABELS = "labels such as 12:z, a name and a direction"
 
@@ -34,7 +34,7 @@ def read_responses(
     """Return the frequency responses of a file, or its signals over time.
 
     Arguments:
-        file: of a format that a reader plugin knows, ``.csv``, ``.npz`` or ``.mat``.
+        file: of a format that a reader plugin knows, ``.csv`` or ``.npz``.
         readers: reader plugins that may offer ``read_responses``.
         known: sensors whose labels need not say a direction.
 
@@ -56,7 +56,7 @@ def read_responses(
     elif name.endswith(_ARRAYS):
         found = _of_arrays(file, _arrays(file), known)
     else:
-        suffixes = ", ".join([*(s for r in able for s in r.suffixes), ".csv", *_ARRAYS])
+        suffixes = ", ".join([*(s for r in able for s in r.suffixes), ".csv", _ARRAYS])
         raise InputError("unknown kind of file", file=file, expected=suffixes)
     return _checked(file, found)
 
@@ -126,14 +126,12 @@ def _number(cell: float | Complex | None) -> complex:
 
 def _arrays(file: Path) -> Mapping[str, Any]:
     """Return the variables of a file of arrays."""
-    import scipy.io
-
     try:
-        if file.name.lower().endswith(".npz"):
-            with np.load(file, allow_pickle=False) as held:
-                return {name: held[name] for name in held.files}
-        found: Mapping[str, Any] = scipy.io.loadmat(file, squeeze_me=False, chars_as_strings=True)
-        return found
+        with (
+            open_regular(file, LARGEST_FILE) as stream,
+            np.load(stream, allow_pickle=False) as held,
+        ):
+            return {name: held[name] for name in held.files}
     except Exception as error:  # whatever a broken file makes of these readers
         what = f"cannot be read: {' '.join(str(error).split())[:200]}"
         raise InputError(what, file=file, expected="arrays by name") from None
@@ -160,10 +158,7 @@ def _of_arrays(file: Path, held: Mapping[str, Any], known: Sensors | None) -> Re
         if name not in held:
             array(name, "U")
         flat = np.asarray(held[name]).ravel()
-        return [
-            str(np.asarray(item).ravel()[0] if np.asarray(item).size else "").strip()
-            for item in flat
-        ]
+        return [str(item).strip() for item in flat]
 
     if "signals" in held:
         values, names = array("signals", "fiu").astype(float), labels("sensors")
@@ -175,8 +170,6 @@ def _of_arrays(file: Path, held: Mapping[str, Any], known: Sensors | None) -> Re
     hz = array("frequencies", "fiu").astype(float).ravel()
     outputs, inputs = labels("responses"), labels("references")
     values = array("values", "fiuc").astype(complex)
-    if values.ndim == 2 and len(inputs) == 1:
-        values = values[:, :, None]  # MATLAB drops a last dimension of one
     if values.shape != (len(hz), len(outputs), len(inputs)):
         expected = f"({len(hz)}, {len(outputs)}, {len(inputs)})"
         raise InputError(f"is {values.shape}", file=file, key="values", expected=expected)

@@ -61,7 +61,7 @@ def identify(
 ) -> None:
     """Find modes in measured responses, without a click.
 
-    FILE holds frequency responses (a universal file, .csv, .npz, .mat), or motions over time that
+    FILE holds frequency responses (a universal file, .csv, .npz), or motions over time that
     no force was measured for, which takes femubench[identify].
     """
     if output is not None:

@@ -35,7 +35,7 @@ def identify(
     """Return the modes of measured frequency responses, or of motions over time.
 
     Arguments:
-        measured: a file (universal, ``.csv``, ``.npz``, ``.mat``), or what such a file holds.
+        measured: a file (universal, ``.csv``, ``.npz``), or what such a file holds.
         band: lowest and highest frequency in Hz; None for all that was measured.
         order: number of poles of the largest model; None for 120 of frequency responses, and for
             60 of motions over time.
