@@ -249,6 +249,8 @@ class Reader(Protocol):
     - ``write_model(model, path, original)``, ``write_pair(model, stiffness, mass, originals)``:
       write an updated model in the format of the original file or files, and keep of these what
       an update does not change.
+    - ``read_responses(path) -> FrequencyResponses | TimeSignals``: what `bench identify` starts
+      from and `frfs` of a case names; both classes are in `femubench.modal`.
 
     Attributes:
         name: for messages, e.g. ``"universal file"``.

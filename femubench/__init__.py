@@ -24,6 +24,11 @@ The example of every function starts from these lines:
 >>> torsion = femubench.effects["torsion-constant"]
 >>> found = femubench.diagnose(case, torsion, pairs=False)
 >>> examination = diagnosis.examine(model, measurement, [torsion], tolerance=0.005)
+>>> lines, sensors = np.linspace(200.0, 300.0, 401), measurement.sensors
+>>> force = femubench.Sensors(("9Z",), sensors.xyz[8:9], sensors.directions[8:9])
+>>> curves = modal.receptance(modes, readings, readings[8:9], lines, 0.005)
+>>> responses = modal.FrequencyResponses(sensors, force, lines, curves)
+>>> identified = femubench.identify(responses)
 """
 
 from __future__ import annotations
@@ -38,6 +43,7 @@ __all__ = [
     "Diagnosis",
     "Diverged",
     "FemubenchError",
+    "Identification",
     "InputError",
     "Measurement",
     "Model",
@@ -60,6 +66,7 @@ __all__ = [
     "diagnose",
     "effects",
     "hookimpl",
+    "identify",
     "init_case",
     "new_plugin",
     "publish",
@@ -90,10 +97,12 @@ _NAMES = {
     "femubench.core.errors": (
         "Diverged FemubenchError InputError NotApplicable PluginError StrategyFailure"
     ),
+    "femubench.core.identify.identification": "Identification",
     "femubench.core.library.cases": "cases effects read_case strategies",
     "femubench.core.library.challenge": "Challenge challenge score_challenge",
     "femubench.core.library.compare": "compare",
     "femubench.core.library.diagnose": "diagnose",
+    "femubench.core.library.identify": "identify",
     "femubench.core.library.models": "read_model write_model",
     "femubench.core.library.plugins": "check init_case new_plugin",
     "femubench.core.library.publish": "publish",
@@ -123,10 +132,12 @@ if TYPE_CHECKING:
     )
     from femubench.core.fem.model import Model
     from femubench.core.fem.sensors import Sensors
+    from femubench.core.identify.identification import Identification
     from femubench.core.library.cases import cases, effects, read_case, strategies
     from femubench.core.library.challenge import Challenge, challenge, score_challenge
     from femubench.core.library.compare import compare
     from femubench.core.library.diagnose import diagnose
+    from femubench.core.library.identify import identify
     from femubench.core.library.models import read_model, write_model
     from femubench.core.library.plugins import check, init_case, new_plugin
     from femubench.core.library.publish import publish

@@ -4,7 +4,7 @@ from femubench.core.modal.complex_modes import real_modes
 from femubench.core.modal.correlated_errors import shrunk_correlation
 from femubench.core.modal.correlation import auto_mac, mac, modal_scale_factor
 from femubench.core.modal.expansion import expand_by_dynamics, expand_by_rotation, expand_by_serep
-from femubench.core.modal.frf import receptance
+from femubench.core.modal.frf import FrequencyResponses, receptance
 from femubench.core.modal.generalised_mass import mass_normalised
 from femubench.core.modal.group_prior import group_prior_std, support_groups
 from femubench.core.modal.pairing import Pairing, pair_measured, pair_modes
@@ -14,9 +14,12 @@ from femubench.core.modal.sensitivity import (
     frequency_sensitivities,
     shape_sensitivities,
 )
+from femubench.core.modal.signals import TimeSignals
 
 __all__ = [
+    "FrequencyResponses",
     "Pairing",
+    "TimeSignals",
     "auto_mac",
     "eigenvalue_sensitivities",
     "expand_by_dynamics",

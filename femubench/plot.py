@@ -16,6 +16,7 @@ from femubench.core.plot.diagnosis import (
     residuals,
     strongest_places,
 )
+from femubench.core.plot.identification import stabilisation, synthesis
 from femubench.core.plot.mac import mac
 from femubench.core.plot.matching import matching
 from femubench.core.plot.mode_shape import mode_shape
@@ -39,7 +40,9 @@ __all__ = [
     "receptance",
     "residual_dots",
     "residuals",
+    "stabilisation",
     "strongest_places",
     "svg",
+    "synthesis",
     "wireframe_of",
 ]

@@ -10,6 +10,7 @@ import numpy as np
 from femubench.core.display import Shown, counted, modes_line
 from femubench.core.fem.frame import GroundSpring, PointMass
 from femubench.core.fem.model import Model
+from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import FloatArray
 
@@ -83,6 +84,8 @@ class Case(Shown):
         notes: what was understood otherwise than it stands in the files, one sentence each.
         matches: where each sensor that came with coordinates was taken to sit.
         lines: that draw the structure of the test, in m along the axes of the model, (k, 2, 3).
+        frfs: measured frequency responses of the structure as tested; they hold the held-out modes
+            too, and are drawn, never handed to a strategy.
     """
 
     name: str
@@ -105,6 +108,7 @@ class Case(Shown):
     notes: tuple[str, ...] = ()
     matches: tuple[Match, ...] = ()
     lines: FloatArray | None = None
+    frfs: FrequencyResponses | None = None
 
     def rows(self) -> list[tuple[str, str]]:
         """Return where the case is from, its model, and what was measured on it."""
@@ -124,6 +128,8 @@ class Case(Shown):
         if self.reference is not None:
             known = self.reference.select(self.reference_used).frequencies
             found.append(("reference", modes_line(self.reference_used, known)))
+        if self.frfs is not None:
+            found.append(("frfs", self.frfs.rows()[0][1]))
         found += [("modified", str(change)) for change in self.modifications]
         return [*found, *(("note", note) for note in self.notes)]
 

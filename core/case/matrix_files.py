@@ -219,7 +219,7 @@ def write_matrices(model: Model, folder: str | PathLike[str]) -> tuple[Path, ...
     if not isinstance(geometry, MatrixGeometry):
         geometry = frame_geometry(model)
     try:
-        files = matrix_keys(*matrices_of(model), geometry, model.groups)[1]
+        files = matrix_keys(*matrices_of(model), geometry, model)[1]
     except Fault as fault:
         raise InputError(fault.what, file=place, expected=fault.expected) from None
     make_folder(place)

@@ -40,6 +40,7 @@ from femubench.core.case.modes import (
 )
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.repeats import with_covariance, with_repeats
+from femubench.core.case.response_files import read_responses
 from femubench.core.case.schema import CaseSpec, FileSpec, FrameSpec, ModificationSpec, parse_spec
 from femubench.core.case.sensors import read_sensors
 from femubench.core.case.tables import read_table
@@ -48,6 +49,7 @@ from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
 from femubench.core.files import read_text
+from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Reader
 from femubench.core.typing import FloatArray
@@ -166,16 +168,21 @@ class _Building:
             held_out=self.spec.measurement.held_out,
             modifications=self.modifications(model, site, measurement.sensors),
             band=self.spec.measurement.band,
-            digest=self.files.digest(),
             tolerance=self.spec.diagnosis.tolerance,
             reference=self.reference(site, measurement.sensors),
             reference_used=self.reference_used,
             model_error=self.spec.diagnosis.model_error,
             beam_share=self.spec.diagnosis.beam_share,
             structure=info.structure,
+            frfs=self.frfs(measurement.sensors),
         )
-        notes = tuple(self.notes)
-        return replace(case, notes=notes, matches=self.matches, lines=self.lines)
+        return replace(
+            case,
+            digest=self.files.digest(),  # of all that was read
+            notes=tuple(self.notes),
+            matches=self.matches,
+            lines=self.lines,
+        )
 
     def model(self) -> Model:
         spec = self.spec.model
@@ -263,6 +270,22 @@ class _Building:
         found, told = with_repeats(measurement, path)
         found, more = with_floor(found, spec.repeats, FREQUENCY_STD, spec.shape_std)
         self.notes |= dict.fromkeys((*told, *more))
+        return found
+
+    def frfs(self, sensors: Sensors) -> FrequencyResponses | None:
+        """Return the measured frequency responses."""
+        name = self.spec.measurement.frfs
+        if name is None:
+            return None
+        key = ("measurement", "frfs")
+        with at_key(*key):
+            path = self.files.path(name)
+        found = read_responses(path, self.readers, sensors)
+        if not isinstance(found, FrequencyResponses):
+            raise Fault(key, f"{name!r} holds motions over time", "frequency responses")
+        if not set(found.responses.labels) & set(sensors.labels):
+            expected = f"labels as in the file, e.g. {found.responses.labels[0]!r}"
+            raise Fault(key, "no response belongs to a sensor of the case", expected)
         return found
 
     @property

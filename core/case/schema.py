@@ -390,6 +390,7 @@ class MeasurementSpec(Table):
     variables: dict[Name, Text] = Field(
         {}, description='names of variables, e.g. {frequencies = "f_exp", shapes = "Psi"}'
     )
+    frfs: FileName | None = Field(None, description="a file in the case folder")
 
 
 class ReferenceSpec(Table):

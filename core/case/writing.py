@@ -37,6 +37,7 @@ from femubench.core.case.matrix_files import (
 from femubench.core.case.modes import FREQUENCY_STD
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.reader import read_case
+from femubench.core.case.response_files import responses_npz
 from femubench.core.case.table_text import (
     SHAPE_STD,
     common_share,
@@ -48,6 +49,7 @@ from femubench.core.case.table_text import (
 from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
+from femubench.core.modal.frf import FrequencyResponses
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import SparseArray
 
@@ -113,6 +115,8 @@ def check_written(fresh: Path, folder: Path, wanted: Case) -> None:
             what = f"{getattr(wanted, part)!r} does not read back"
             raise refused(folder, what, part, f"not {getattr(back, part)!r}")
     share = known_from(fresh / CASE_FILE).shape_std or SHAPE_STD
+    if not _same_responses(wanted.frfs, back.frfs):
+        raise refused(folder, "the frequency responses do not read back", "frfs", "finite numbers")
     first, second = (_measurements(case) for case in (wanted, back))
     for one, other in zip(first, second, strict=True):
         # Deviations of next to nothing are raised when they are read.
@@ -120,6 +124,18 @@ def check_written(fresh: Path, folder: Path, wanted: Case) -> None:
         if column is not None:
             what = f"the {column.replace('_', ' ')} of a measurement does not read back"
             raise refused(folder, what, "measurement", "finite numbers within their bounds")
+
+
+def _same_responses(one: FrequencyResponses | None, other: FrequencyResponses | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    sides = ("responses", "references")
+    return (
+        all(getattr(one, side).labels == getattr(other, side).labels for side in sides)
+        and one.quantity == other.quantity
+        and np.array_equal(one.frequencies, other.frequencies)
+        and np.array_equal(one.values, other.values, equal_nan=True)
+    )
 
 
 def _measurements(case: Case) -> list[Measurement]:
@@ -233,6 +249,9 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
         measurement["covariance"] = "covariance.csv"
         files["covariance.csv"] = covariance_csv(case.measurement)
     measurement |= _settings(case)
+    if case.frfs is not None:
+        measurement["frfs"] = "frfs.npz"
+        files["frfs.npz"] = responses_npz(case.frfs)
     told = {key: getattr(case, key) for key in ("name", "title", "source", "structure")}
     info = {key: value for key, value in told.items() if value}
     content: Keys = {"case": info, "model": keys, "measurement": measurement}

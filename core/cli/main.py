@@ -37,6 +37,7 @@ VERBS = {
         "Write the updated model of CASE in the format that it came in.",
     ),
     "diagnose": ("femubench.core.cli.diagnose", "Find what a model lacks, and extend it."),
+    "identify": ("femubench.core.cli.identify", "Find modes in measured responses."),
     "reproduce": (
         "femubench.core.cli.reproduce",
         "Recompute the tables of the papers, cell by cell.",

@@ -20,7 +20,7 @@ from femubench.core.modal.eigen import Modes, modes_of
 from femubench.core.modal.frf import modal_sum, receptance
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import Pairing, pair_measured
-from femubench.core.typing import FloatArray
+from femubench.core.typing import AnyArray, FloatArray
 
 DIGITS = 4
 _AXES = {"in-plane": ("x", "z"), "out-of-plane": ("z",), "3d": ("x", "y", "z")}
@@ -174,19 +174,23 @@ def _decibels(values: FloatArray) -> list[float]:
 
 
 def measured_receptances(case: Case, sensor: str | None = None) -> dict[str, Any]:
-    """Return receptances made of the measured modes, scaled to mass by their nominal partners.
+    """Return receptances as measured, or made of the measured modes and scaled to mass.
 
-    A test of free shapes does not tell modal masses: those of the nominal model stand in, as do
-    its rigid-body modes and its modes above the measured ones.
+    Where no frequency responses were measured at the sensor, modes stand for them. A test of free
+    shapes does not tell modal masses: those of the nominal model stand in, as do its rigid-body
+    modes and its modes above the measured ones.
     """
     drive = _drive(case, sensor)
     if drive is None:
         return {}
-    measured: dict[str, list[float]] = {}
+    measured: dict[str, Sequence[float | None]] = {}
     alone: list[str] = []
     for name, changed, data in _structures(case, case.model):
         _, at_sensors, pairing = paired_with(changed, data)
-        if drive.labels[0] in data.sensors.labels and (pairing.index >= 0).any():
+        as_measured = None if name else _as_measured(case, drive.labels[0])
+        if as_measured is not None:
+            measured[name] = as_measured
+        elif drive.labels[0] in data.sensors.labels and (pairing.index >= 0).any():
             measured[name] = _stand_in(case, changed, data, drive, pairing, at_sensors)
         if not name:
             pairs = zip(data.numbers, pairing.index, strict=True)
@@ -195,7 +199,10 @@ def measured_receptances(case: Case, sensor: str | None = None) -> dict[str, Any
         "Made of the measured modes; scaled to mass, and completed by rigid-body and higher modes, "
         "with the nominal model."
     )
-    if alone:
+    if _point_response(case, drive.labels[0]) is not None:
+        changed_too = f" Of modified structures: {note[0].lower()}{note[1:]}"
+        note = f"As measured.{changed_too if case.modifications else ''}"
+    elif alone:
         note += f" Measured modes without a partner there are not in it: {', '.join(alone)}."
     return {
         "hz": rounded(frequency_axis(case)),
@@ -203,6 +210,37 @@ def measured_receptances(case: Case, sensor: str | None = None) -> dict[str, Any
         "measured": measured,
         "note": note,
     }
+
+
+def _point_response(case: Case, label: str) -> AnyArray | None:
+    """Return the measured receptance of one sensor to a force at it; None where there is none."""
+    frfs = case.frfs
+    if frfs is None or label not in frfs.responses.labels or label not in frfs.references.labels:
+        return None
+    o, i = frfs.responses.labels.index(label), frfs.references.labels.index(label)
+    values: AnyArray = frfs.receptances[:, o, i]
+    return values if np.isfinite(values).any() else None
+
+
+def _as_measured(case: Case, label: str) -> list[float | None] | None:
+    """Return the measured receptance in dB on the axis of all curves; None where there is none.
+
+    Between two points of the axis the largest line counts, so that no resonance is lost.
+    """
+    values = _point_response(case, label)
+    if values is None or case.frfs is None:
+        return None
+    hz, axis = case.frfs.frequencies, frequency_axis(case)
+    levels = 20.0 * np.log10(np.maximum(np.abs(values), 1e-300))
+    known = np.isfinite(levels)
+    hz, levels = hz[known], levels[known]
+    found = np.interp(axis, hz, levels, left=np.nan, right=np.nan)
+    nearest = np.rint((hz - axis[0]) / (axis[1] - axis[0])).astype(int)
+    there = (nearest >= 0) & (nearest < len(axis))
+    held = np.full(len(axis), -np.inf)
+    np.maximum.at(held, nearest[there], levels[there])
+    found = np.where(np.isfinite(held), held, found)
+    return [None if np.isnan(level) else round(float(level), 1) for level in found]
 
 
 def _stand_in(
@@ -267,7 +305,10 @@ def node_motions(model: Model, nominal: Model, shapes: FloatArray) -> FloatArray
 
 
 def drive_sensor(case: Case) -> str | None:
-    """Return the displacement sensor that sees all used modes best; None without shapes."""
+    """Return the displacement sensor that sees all used modes best; None without shapes.
+
+    Where a force was measured at some sensors, it is one of them.
+    """
     sensors = case.measurement.sensors
     moves = np.flatnonzero(["r" not in direction for direction in sensors.directions])
     shapes = np.abs(case.measurement.select(case.used).shapes)[moves]
@@ -276,6 +317,9 @@ def drive_sensor(case: Case) -> str | None:
         return None
     with np.errstate(divide="ignore", invalid="ignore"):
         seen = np.log(shapes / np.nanmax(shapes, axis=0)).sum(axis=1)
+    driven = [_point_response(case, sensors.labels[k]) is not None for k in moves]
+    if any(driven):
+        seen = np.where(driven, seen, -np.inf)
     best = int(np.argmax(np.where(np.isfinite(seen), seen, -np.inf)))
     return sensors.labels[int(moves[best])]
 

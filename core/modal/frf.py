@@ -1,12 +1,79 @@
-"""Receptances from modes and damping."""
+"""Frequency responses: as measured, and from modes and damping."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
+
 import numpy as np
 
+from femubench.core.display import Shown, counted
 from femubench.core.errors import ModelError
+from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import Modes
-from femubench.core.typing import FloatArray, SparseArray
+from femubench.core.typing import AnyArray, FloatArray, SparseArray
+
+Quantity: TypeAlias = Literal["receptance", "mobility", "accelerance"]
+# How often displacement was derived with respect to time.
+DERIVATIVES: dict[str, int] = {"receptance": 0, "mobility": 1, "accelerance": 2}
+
+
+@dataclass(frozen=True, repr=False)
+class FrequencyResponses(Shown):
+    """Measured frequency responses between points of a structure.
+
+    Arguments:
+        responses: where and along what the motion was measured; coordinates nan where unknown.
+        references: where and along what the force acted.
+        frequencies: in Hz, rising, (n_f,).
+        values: motion over force in m, m/s or m/s2 over N, complex, (n_f, n_responses,
+            n_references); nan in the whole of a channel that was not measured.
+        quantity: what the motion is.
+
+    Examples:
+        >>> print(modal.FrequencyResponses(sensors, force, lines, curves))
+        FrequencyResponses: receptance of 13 responses to 1 force
+          lines  401, 200 to 300 Hz
+    """
+
+    responses: Sensors
+    references: Sensors
+    frequencies: FloatArray
+    values: AnyArray
+    quantity: Quantity = "receptance"
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Return what was measured, where, and the band."""
+        sizes = counted(len(self.responses), "response"), counted(len(self.references), "force")
+        low, high = (f"{hz:.6g}" for hz in self.frequencies[[0, -1]])
+        return [
+            ("", f"{self.quantity} of {sizes[0]} to {sizes[1]}"),
+            ("lines", f"{len(self.frequencies)}, {low} to {high} Hz"),
+        ]
+
+    @property
+    def receptances(self) -> AnyArray:
+        """Return displacement over force in m/N; nan at 0 Hz where motion was no displacement."""
+        derivative = DERIVATIVES[self.quantity]
+        if not derivative:
+            return self.values
+        jw = 2j * np.pi * self.frequencies
+        jw[jw == 0.0] = np.nan
+        return np.asarray(self.values / (jw**derivative)[:, None, None])
+
+    def within(self, low: float, high: float) -> FrequencyResponses:
+        """Return the lines between two frequencies in Hz."""
+        keep = (self.frequencies >= low) & (self.frequencies <= high)
+        return replace(self, frequencies=self.frequencies[keep], values=self.values[keep])
+
+    def turned(self) -> FrequencyResponses:
+        """Return the responses with forces and motions exchanged, as reciprocity allows."""
+        return replace(
+            self,
+            responses=self.references,
+            references=self.responses,
+            values=self.values.transpose(0, 2, 1),
+        )
 
 
 def receptance(

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from femubench.core.case.case import Case
 from femubench.core.drawing.prediction import (
@@ -33,8 +35,9 @@ def receptance(
 ) -> Axes:
     """Draw displacement over force at one sensor, force at the same place, in dB re 1 m/N.
 
-    The measured curve is made of the measured modes; a test of shapes without scale gives no modal
-    masses, so that those of the nominal model stand in, as do its rigid-body and higher modes.
+    The measured curve is that of the case's frequency responses. Where it has none there, it is
+    made of the measured modes; a test of shapes without scale gives no modal masses, so that
+    those of the nominal model stand in, as do its rigid-body and higher modes.
 
     Arguments:
         case: its measured modes and its nominal model are drawn.
@@ -52,14 +55,16 @@ def receptance(
     """
     check_kind(case, (Case,), "receptance")
     label = _sensor(case, sensor)
-    known = [change.name for change in case.modifications]
-    if modification is not None and modification not in known:
-        expected = ", ".join(known) or "none: the case has no modifications"
+    names = [change.name for change in case.modifications]
+    if modification is not None and modification not in names:
+        expected = ", ".join(names) or "none: the case has no modifications"
         raise InputError(f"there is no modification {modification!r}", expected=expected)
     change = modification or ""
     named = models if isinstance(models, Mapping) else {} if models is None else {"updated": models}
     measured = measured_receptances(case, label)["measured"].get(change)
-    curves = [("measured modes", "measured", measured)] if measured is not None else []
+    named_so = "measured" if case.frfs is not None and not change else "measured modes"
+    known = np.asarray(measured if measured is not None else [], dtype=float)
+    curves: list[tuple[str, str, Any]] = [(named_so, "measured", known)] if len(known) else []
     curves.append(("nominal model", "nominal", receptances(case, case.model, label)[change]))
     for name, item in named.items():
         check_kind(item, (Model, UpdateResult), "receptance")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from femubench import InputError, Measurement, Sensors
 from femubench.fem import Outline
-from femubench.modal import real_modes
+from femubench.modal import FrequencyResponses, TimeSignals, real_modes
 from femubench.plugins.readers.reading import opened
 
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
@@ -97,6 +97,17 @@ class UniversalReader:
         words = (str(about.get(key, "")).strip() for key in ("model_name", "description"))
         title = ", ".join(dict.fromkeys(word for word in words if word.upper() not in ("", "NONE")))
         return Outline(title, np.array(ends, dtype=float).reshape(-1, 2, 3))
+
+    def read_responses(self, path: Path) -> FrequencyResponses | TimeSignals:
+        """Return the functions of dataset 58, with the coordinates of nodes in the same file.
+
+        Raises:
+            InputError: when the file is broken or holds no such function.
+        """
+        from femubench.plugins.readers.universal_functions import read_functions
+
+        has_nodes = any(_of(_datasets(path)[0], *_COORDINATES))
+        return read_functions(path, self.read_modes(path).sensors if has_nodes else None)
 
 
 def _datasets(path: Path) -> tuple[list[Dataset], set[int]]:

@@ -1,0 +1,1 @@
+"""Modes from measured responses: poles, their selection, the fit with its standard deviations."""

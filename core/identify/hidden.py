@@ -1,0 +1,57 @@
+"""Where what a fit leaves still resonates."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from femubench.core.identify.basis import Lines
+from femubench.core.identify.modal_fit import ModalFit, predicted
+from femubench.core.typing import AnyArray, FloatArray
+
+_DAMPING = (0.0025, 0.006, 0.015)
+_STEP = 0.004  # between frequencies that are looked at, relative
+_MOST = 12
+_APART = 2.0  # half-power bandwidths between candidates
+
+
+def hidden_poles(lines: Lines, fit: ModalFit) -> tuple[AnyArray, AnyArray]:
+    """Return poles that would explain most of what a fit leaves, (n,), and participations.
+
+    What is left is compared with single resonances on a grid of frequencies and dampings: a mode
+    that the forces hardly move is no pole of a model that has to follow its neighbours.
+
+    Arguments:
+        lines: the data.
+        fit: of all modes so far.
+
+    Returns participations (n_ref, n).
+    """
+    left = (lines.responses - predicted(fit, lines)) * fit.weights
+    low, high = lines.omega[0], lines.omega[-1]
+    omega = np.geomspace(low, high, max(2, int(np.log(high / low) / _STEP)))
+    damping = np.repeat(_DAMPING, len(omega))
+    poles = np.tile(omega, len(_DAMPING)) * (-damping + 1j * np.sqrt(1.0 - damping**2))
+    weight = (1j * lines.omega) ** lines.derivative / lines.noise
+    shapes = (1.0 / (1j * lines.omega[:, None] - poles)).astype(np.complex64)
+    size = np.sqrt(np.square(np.abs(weight)) @ np.square(np.abs(shapes)))
+    flat = (weight.conj()[:, None, None] * left).reshape(len(weight), -1).astype(np.complex64)
+    residues = (shapes.conj().T @ flat / size[:, None]).reshape(-1, *left.shape[1:])
+    gains = np.square(np.abs(residues)).sum(axis=(1, 2))
+    best = _peaks(gains, poles)
+    found = np.divide(
+        residues[best], fit.weights, out=np.zeros_like(residues[best]), where=fit.weights > 0.0
+    )
+    forces = np.linalg.svd(found, full_matrices=False)[2][:, 0, :]
+    return poles[best], forces.T
+
+
+def _peaks(gains: FloatArray, poles: AnyArray) -> list[int]:
+    """Return the largest gains that are not side by side."""
+    found: list[int] = []
+    for k in np.argsort(-gains):
+        width = _APART * max(abs(poles[k].real), _STEP * abs(poles[k]))
+        if all(abs(poles[k].imag - poles[j].imag) > width for j in found):
+            found.append(int(k))
+        if len(found) == _MOST:
+            break
+    return found

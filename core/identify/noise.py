@@ -1,0 +1,91 @@
+"""The level of the noise by channel and by frequency, from what a fit leaves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from femubench.core.identify.basis import RESIDUALS, Lines
+from femubench.core.identify.modal_fit import ModalFit, predicted
+from femubench.core.typing import AnyArray, BoolArray, FloatArray
+
+# Lines over which the level is averaged: these, and as many as give so many values of all channels.
+_SHORTEST, _ENOUGH = 9, 300
+_BEST = 1e-4  # noise of a channel over its rms: less is no measurement
+
+
+def first_weights(lines: Lines, poles: AnyArray, seen: BoolArray) -> FloatArray:
+    """Return one over the noise of every channel that no candidate explains, (n_out, n_ref).
+
+    Arguments:
+        lines: the data.
+        poles: of the candidates, in rad/s, (n,).
+        seen: which channels were measured, (n_out, n_ref).
+    """
+    functions = lines.modes(poles)[:, :, :2].reshape(len(lines.values), -1)
+    functions = np.concatenate([functions, lines.residuals()], axis=1)
+    functions = functions / np.linalg.norm(functions, axis=0)
+    flat = lines.values.reshape(len(functions), -1)
+    left = flat - functions @ np.linalg.lstsq(functions, flat, rcond=1e-10)[0]
+    freedom = max(1, len(flat) - functions.shape[1])
+    return _inverse(np.square(left).sum(axis=0) / freedom, lines, seen)
+
+
+def _inverse(variance: FloatArray, lines: Lines, seen: BoolArray) -> FloatArray:
+    """Return one over the noise of every channel; no channel is better than `_BEST`."""
+    power = np.square(lines.values).mean(axis=0)
+    least = np.maximum(variance.reshape(seen.shape), _BEST**2 * power)
+    alive = seen & (power > 0.0)
+    return np.asarray(np.divide(1.0, np.sqrt(least), out=np.zeros_like(least), where=alive))
+
+
+def noise_left(
+    fit: ModalFit, lines: Lines, seen: BoolArray, *, rough: bool = False
+) -> tuple[Lines, FloatArray]:
+    """Return lines and weights with the noise that a fit leaves.
+
+    Its course over frequency is that of all channels together, its level that of each.
+
+    Arguments:
+        fit: of the lines.
+        lines: the data.
+        seen: which channels were measured, (n_out, n_ref).
+        rough: take the course over frequency from second differences of the lines alone, in which
+            a mode that the fit lacks does not show.
+    """
+    error = lines.responses - predicted(fit, lines)
+    scaled = error * fit.weights
+    if rough:
+        padded = np.concatenate([scaled[1:2], scaled, scaled[-2:-1]])
+        scaled = (padded[:-2] - 2.0 * scaled + padded[2:]) / np.sqrt(6.0)
+    left = np.square(np.abs(scaled)).sum(axis=(1, 2))
+    window = min(max(_SHORTEST, -(-_ENOUGH // max(1, int(seen.sum())))), len(left) // 4)
+    kernel = np.ones(window)
+    level = np.convolve(left, kernel, "same") / np.convolve(np.ones_like(left), kernel, "same")
+    level = np.sqrt(np.maximum(level / level.mean(), 1e-6))
+    noise = lines.noise * level
+    rescaled = Lines.of(lines.omega, lines.derivative, lines.raw, noise)
+    error = error / level[:, None, None]
+    unknowns = 2 * len(fit.poles) * sum(seen.shape) / max(1, int(seen.sum())) + RESIDUALS
+    freedom = max(1.0, 2 * len(level) - unknowns)
+    return rescaled, _inverse(np.square(np.abs(error)).sum(axis=0) / freedom, rescaled, seen)
+
+
+def unevenness(fit: ModalFit, lines: Lines) -> FloatArray:
+    """Return the noise around each mode's resonance over what the weights say, (n, 2).
+
+    The noise of a channel need not follow the course of all channels: where it follows the
+    channel's own response it is largest where a mode is seen best. The first column weighs lines
+    as poles depend on them, the second as shapes do.
+    """
+    error = np.square(np.abs((lines.responses - predicted(fit, lines)) * fit.weights))
+    resonance = np.abs((1j * lines.omega[:, None]) ** lines.derivative / lines.noise[:, None])
+    resonance = resonance / np.square(np.abs(1j * lines.omega[:, None] - fit.poles))
+    seen = (
+        np.abs(fit.shapes)[:, None, :] * np.abs(fit.participation)[None] * fit.weights[:, :, None]
+    )
+    found = []
+    for lens in (resonance, np.sqrt(resonance)):
+        there = np.square(lens), np.square(seen)
+        whole = there[0].sum(axis=0) * there[1].sum(axis=(0, 1))
+        found.append(np.einsum("fn,oin,foi->n", *there, error, optimize=True) / (2.0 * whole))
+    return np.stack(found, axis=1)

@@ -1,0 +1,192 @@
+"""Modes from frequency responses: poles, selection and fit in one piece."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from femubench.core.errors import InputError
+from femubench.core.identify.basis import Lines
+from femubench.core.identify.clusters import Cluster, clusters_of
+from femubench.core.identify.hidden import hidden_poles
+from femubench.core.identify.identification import Identification
+from femubench.core.identify.lscf import Poles, lscf_poles
+from femubench.core.identify.modal_fit import ModalFit, fit_modes, predicted
+from femubench.core.identify.noise import first_weights, noise_left, unevenness
+from femubench.core.identify.selection import needed, select
+from femubench.core.identify.shape_scale import scaled_shapes
+from femubench.core.modal.correlation import mac
+from femubench.core.modal.frf import DERIVATIVES, FrequencyResponses
+from femubench.core.typing import AnyArray, BoolArray, FloatArray
+
+MOST_POLES = 120
+_LARGEST_DAMPING = 0.2
+_SUPPORT = 0.3  # of the orders, that a candidate appears in
+_SAME = 0.01  # relative distance of a pole to the cluster that it comes from
+_FEWEST_LINES = 32
+_ROUNDS = 5
+_WIDTHS, _ALIKE = 3.0, 0.9  # half-widths and MAC within which two poles are one mode
+_NO_MODE = "no mode stands out of the noise"
+
+
+def identify_responses(
+    measured: FrequencyResponses,
+    band: tuple[float, float] | None = None,
+    most_poles: int = MOST_POLES,
+) -> Identification:
+    """Return the modes in a band of frequency responses.
+
+    Arguments:
+        measured: the responses; the more numerous of its two sides carries the shapes.
+        band: lowest and highest frequency in Hz; None for all lines.
+        most_poles: of the largest model of the stabilisation diagram.
+
+    Raises:
+        InputError: when there are too few lines, or no mode stands out of the noise.
+    """
+    data = _usable(measured, band)
+    seen: BoolArray = np.asarray(np.isfinite(data.values).all(axis=0))
+    values = np.where(seen, data.values, 0.0)
+    poles = _all_poles(data.frequencies, values, seen, most_poles)
+    omega, derivative = 2.0 * np.pi * data.frequencies, DERIVATIVES[data.quantity]
+    lines = Lines.of(omega, derivative, values, np.ones(len(omega)))
+    clusters = _candidates(poles)
+    fit, lines = _fitted(lines, clusters, seen)
+    return _identification(data, fit, lines, clusters, poles)
+
+
+def _usable(measured: FrequencyResponses, band: tuple[float, float] | None) -> FrequencyResponses:
+    """Return the lines to work with, responses the longer side."""
+    data = measured if band is None else measured.within(*band)
+    data = data.within(np.nextafter(0.0, 1.0), np.inf)
+    if len(data.references) > len(data.responses):
+        data = data.turned()
+    if len(data.frequencies) < _FEWEST_LINES:
+        what = f"{len(data.frequencies)} lines above 0 Hz in the band"
+        raise InputError(what, key="band", expected=f"{_FEWEST_LINES} or more")
+    if not np.abs(np.nan_to_num(data.values)).any():
+        raise InputError("all responses are zero", expected="measured responses")
+    return data
+
+
+def _all_poles(
+    frequencies: FloatArray, values: AnyArray, seen: BoolArray, most_poles: int
+) -> Poles:
+    """Return the poles of all orders, from the references that most responses were measured to."""
+    whole = seen.all(axis=1)
+    references = np.arange(seen.shape[1])
+    if not whole.any():
+        references = np.array([int(seen.sum(axis=0).argmax())])
+        whole = seen[:, references[0]]
+    part = values[:, whole][:, :, references]
+    size = np.sqrt(np.square(np.abs(part)).mean(axis=0))
+    rows = np.sqrt(np.square(size).mean(axis=1, keepdims=True))
+    rows[rows == 0.0] = 1.0
+    columns = np.sqrt(np.square(size / rows).mean(axis=0))
+    columns[columns == 0.0] = 1.0
+    # A weight for every response and one for every force: more would make residues of rank one
+    # residues of any rank.
+    found = lscf_poles(frequencies, part / rows / columns, min(most_poles, len(frequencies) // 2))
+    forces = np.zeros((len(found), seen.shape[1]), dtype=complex)
+    forces[:, references] = found.participation * columns
+    forces /= np.maximum(np.linalg.norm(forces, axis=1, keepdims=True), np.finfo(float).tiny)
+    return replace(found, participation=forces)
+
+
+def _candidates(poles: Poles) -> list[Cluster]:
+    """Return the clusters of poles that may be modes."""
+    able = (poles.damping > 1e-6) & (poles.damping < _LARGEST_DAMPING)
+    orders = len(np.unique(poles.orders))
+    return [c for c in clusters_of(poles.select(able), orders) if c.support >= _SUPPORT]
+
+
+def _fitted(lines: Lines, clusters: Sequence[Cluster], seen: BoolArray) -> tuple[ModalFit, Lines]:
+    """Return the fit of all modes that the data need, and the data with the noise they show."""
+    poles, forces = _starts(clusters, seen)
+    weights = first_weights(lines, poles, seen)
+    chosen = select(lines, poles, weights, poles[:0])
+    if not len(chosen):
+        raise InputError(_NO_MODE, expected="resonances in the band")
+    fit = fit_modes(lines, poles[chosen], forces[:, chosen], weights)
+    for _ in range(_ROUNDS):
+        lines, weights = noise_left(fit, lines, seen, rough=True)
+        fit = fit_modes(lines, fit.poles, fit.participation, weights)
+        poles, forces = hidden_poles(lines, fit)
+        more = select(lines, poles, weights, fit.poles)
+        keep = needed(lines, fit.poles, weights) & ~_twice(fit)
+        if not len(more) and keep.all():
+            break
+        start = np.concatenate([fit.poles[keep], poles[more]])
+        together = np.concatenate([fit.participation[:, keep], forces[:, more]], axis=1)
+        fit = fit_modes(lines, start, together, weights)
+    lines, weights = noise_left(fit, lines, seen)
+    fit = fit_modes(lines, fit.poles, fit.participation, weights)
+    of_poles, of_shapes = unevenness(fit, lines).T[:, :, None, None]
+    return replace(
+        fit,
+        pole_covariance=of_poles * fit.pole_covariance,
+        shape_covariance=of_shapes * fit.shape_covariance,
+    ), lines
+
+
+def _starts(clusters: Sequence[Cluster], seen: BoolArray) -> tuple[AnyArray, AnyArray]:
+    """Return poles and participations of clusters, (n,) and (n_ref, n)."""
+    poles = np.array([cluster.pole for cluster in clusters], dtype=complex)
+    forces = np.array([cluster.participation for cluster in clusters], dtype=complex)
+    return poles, forces.reshape(len(clusters), seen.shape[1]).T
+
+
+def _twice(fit: ModalFit) -> BoolArray:
+    """Tell which modes are a stronger neighbour once more: as good as its place, and its shape.
+
+    What a linear model cannot follow, as the bent peak of a joint that slips, is fitted so.
+    """
+    strength = np.linalg.norm(fit.shapes, axis=0) * np.linalg.norm(fit.participation, axis=0)
+    strength = strength / -fit.poles.real
+    apart = np.abs(fit.poles[:, None] - fit.poles)
+    near = apart < _WIDTHS * np.maximum(-fit.poles.real[:, None], -fit.poles.real)
+    alike = mac(fit.shapes, fit.shapes) > _ALIKE
+    return np.asarray((near & alike & (strength[:, None] < strength)).any(axis=1))
+
+
+def _identification(
+    data: FrequencyResponses,
+    fit: ModalFit,
+    lines: Lines,
+    clusters: Sequence[Cluster],
+    poles: Poles,
+) -> Identification:
+    hz, ratio = np.abs(fit.poles) / (2.0 * np.pi), -fit.poles.real / np.abs(fit.poles)
+    low, high = float(data.frequencies[0]), float(data.frequencies[-1])
+    inside = (hz >= low) & (hz <= high) & (ratio < _LARGEST_DAMPING)
+    order = np.flatnonzero(inside)[np.argsort(hz[inside])]
+    if not len(order):
+        raise InputError(_NO_MODE, expected="resonances in the band")
+    s, size = fit.poles, np.abs(fit.poles)
+    to_hz = np.stack([s.real, s.imag], axis=1) / (2.0 * np.pi * size[:, None])
+    to_ratio = np.stack([-np.square(s.imag), s.real * s.imag], axis=1) / (size**3)[:, None]
+    stds = [
+        np.sqrt(np.einsum("na,nab,nb->n", way, fit.pole_covariance, way))
+        for way in (to_hz, to_ratio)
+    ]
+    shapes, shape_std = scaled_shapes(fit.shapes[:, order], fit.shape_covariance[order])
+    support = [
+        max((c.support for c in clusters if abs(c.pole - pole) < _SAME * abs(pole)), default=0.0)
+        for pole in s[order]
+    ]
+    return Identification(
+        sensors=data.responses,
+        frequencies=hz[order],
+        frequency_std=stds[0][order],
+        damping=ratio[order],
+        damping_std=stds[1][order],
+        shapes=shapes,
+        shape_std=shape_std,
+        support=np.array(support),
+        poles=poles,
+        band=(low, high),
+        measured=data,
+        synthesised=predicted(fit, lines) * lines.noise[:, None, None],
+    )
