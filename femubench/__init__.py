@@ -86,12 +86,11 @@ from femubench.core.version import __version__
 # Module -> the names that it gives.
 _NAMES = {
     "femubench.core.case.case": "Case",
-    "femubench.core.case.reader": "read_case",
     "femubench.core.diagnosis.result": "Diagnosis",
     "femubench.core.errors": (
         "Diverged FemubenchError InputError NotApplicable PluginError StrategyFailure"
     ),
-    "femubench.core.library.cases": "cases effects strategies",
+    "femubench.core.library.cases": "cases effects read_case strategies",
     "femubench.core.library.challenge": "Challenge challenge score_challenge",
     "femubench.core.library.compare": "compare",
     "femubench.core.library.diagnose": "diagnose",
@@ -113,7 +112,6 @@ _HOME = {name: module for module, names in _NAMES.items() for name in names.spli
 
 if TYPE_CHECKING:
     from femubench.core.case.case import Case
-    from femubench.core.case.reader import read_case
     from femubench.core.diagnosis.result import Diagnosis
     from femubench.core.errors import (
         Diverged,
@@ -125,7 +123,7 @@ if TYPE_CHECKING:
     )
     from femubench.core.fem.model import Model
     from femubench.core.fem.sensors import Sensors
-    from femubench.core.library.cases import cases, effects, strategies
+    from femubench.core.library.cases import cases, effects, read_case, strategies
     from femubench.core.library.challenge import Challenge, challenge, score_challenge
     from femubench.core.library.compare import compare
     from femubench.core.library.diagnose import diagnose

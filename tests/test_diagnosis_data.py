@@ -113,6 +113,16 @@ def test_no_two_modes_share_a_partner() -> None:
     assert sorted(partner.tolist()) == [0, 1, 2]
 
 
+def test_no_partner_is_far_away_as_long_as_another_is_left() -> None:
+    """A shape may be as good as identical to a mode at five times the frequency."""
+    shapes = np.array([[1.0], [0.5], [-0.7]])
+    data = toy([100.0], shapes.tolist(), std=0.001)
+    far = np.hstack([shapes + 0.4 * shapes[::-1], shapes])[None]
+    assert data.pair(np.array([[110.0, 150.0]]), far).tolist() == [[1]]
+    assert data.pair(np.array([[110.0, 500.0]]), far).tolist() == [[0]]
+    assert data.pair(np.array([[500.0]]), far[:, :, 1:]).tolist() == [[0]]
+
+
 def test_modes_that_an_effect_swaps_are_followed(ladder: FrameBuilder) -> None:
     """Torsion and bending modes cross as the torsion constant grows."""
     frame = ladder(accelerometer=False)

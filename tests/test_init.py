@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from click.testing import CliRunner, Result
 
 import femubench
+import femubench.plot
 from femubench.core.cli.main import bench
 
 pytest.importorskip("matplotlib")
@@ -85,6 +86,8 @@ def test_folder_runs_and_says_what_was_done(tmp_path: Path) -> None:
     assert keys["case"]["title"] == "chain"
     assert keys["measurement"]["used"] == [1, 2, 3, 4]
     assert keys["measurement"]["held_out"] == [5, 6]
+    drawn = femubench.plot.wireframe_of(femubench.read_case(folder))
+    assert drawn.elements == tuple((i, i + 1) for i in range(SPANS - 1))  # the test's trace line
     for words in (["run", str(folder), "-s", "unchanged", "--store", str(tmp_path / "r")],
                   ["diagnose", str(folder), "--no-pairs", "--effects", "added-mass"]):  # fmt: skip
         found = CliRunner().invoke(bench, words)

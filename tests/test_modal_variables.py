@@ -13,6 +13,7 @@ import scipy.io
 from femubench import InputError, read_case
 from femubench.core.case.case import Case
 from femubench.plugins.readers.matlab import MatlabReader
+from femubench.plugins.readers.modal_variables import read_modal
 
 CASES = Path(__file__).parent / "cases"
 SHAPES = np.array([[1.0, 0.5], [0.5, -1.0], [0.25, 0.75]])
@@ -32,9 +33,8 @@ def test_common_names(tmp_path: Path) -> None:
 
 
 def modes(folder: Path, **variables: Any) -> Any:
-    path = folder / "test.mat"
-    scipy.io.savemat(path, variables)
-    return MatlabReader().read_modes(path)
+    """Return what is read of variables of two dimensions, as MATLAB has them."""
+    return read_modal({k: np.atleast_2d(v) for k, v in variables.items()}, folder / "test.mat", {})
 
 
 def test_eigenvalues_with_deviations(tmp_path: Path) -> None:
@@ -99,6 +99,23 @@ def test_a_case_names_variables_and_takes_stated_deviations(tmp_path: Path) -> N
     assert np.isnan(m.shapes[1]).all()
 
 
+def test_complex_shapes_come_through_a_file(tmp_path: Path) -> None:
+    scipy.io.savemat(tmp_path / "test.mat", {"f": HERTZ, "phi": SHAPES * np.exp(0.7j)})
+    found = MatlabReader().read_modes(tmp_path / "test.mat").shapes
+    np.testing.assert_allclose(np.abs(found), np.abs(SHAPES), rtol=1e-9)
+
+
 def test_names_that_are_not_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"no variable 'peaks' .*f"):
         case_of(tmp_path, 'variables = {frequencies = "peaks"}', f=HERTZ)
+
+
+def test_the_test_of_a_real_bridge() -> None:
+    path = Path(__file__).parents[2] / "shared" / "data" / "bridge" / "ExpModeInfo_FEM.mat"
+    if not path.exists():
+        pytest.skip("the footbridge is not beside the repository")
+    found = MatlabReader().read_modes(path)
+    np.testing.assert_allclose(found.frequencies, [4.063, 4.550, 6.823, 8.653, 11.498], atol=1e-3)
+    np.testing.assert_allclose(found.frequency_std, [0.03, 0.02, 0.04, 0.07, 0.23], atol=6e-3)
+    assert found.shapes.shape == (58, 5)
+    assert found.shape_std.min() < 1e-15  # of what scales a shape

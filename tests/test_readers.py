@@ -339,4 +339,4 @@ def test_files_that_do_not_fit_the_case(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=what):
             read_case(folder, readers=(UniversalReader(),))
     with pytest.raises(InputError, match=r"unknown kind of file 'test\.uff'"):
-        read_case(folder)
+        read_case(folder, readers=())

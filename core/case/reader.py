@@ -92,7 +92,7 @@ def read_case(
     files = CaseFiles(Path(folder), links=installed)
     text = read_text(files.case_file, LARGEST_CASE)
     try:
-        return _Building(files, _parsed(text, files.case_file), tuple(readers)).case(name)
+        return _Building(files, _parsed(text, files.case_file), readers).case(name)
     except Fault as fault:
         line = _line(text, fault.path)
         raise InputError(
@@ -137,7 +137,7 @@ class _Building:
 
     files: CaseFiles
     spec: CaseSpec
-    readers: tuple[Reader, ...]
+    readers: Sequence[Reader]
     readings: dict[Path, Measurement] = field(default_factory=dict)
     notes: dict[str, None] = field(default_factory=dict)
     matches: tuple[Match, ...] = ()
@@ -296,7 +296,7 @@ class _Building:
             return NO_SENSORS, False
         found = self.placed(path, read, site, spec.modes)
         self.matches = found.matches
-        reader: Any = reader_of(path, self.readers)
+        reader: Any = None if read is None else reader_of(path, self.readers)
         if hasattr(reader, "read_outline"):
             with reading_with(reader, path):
                 self.lines = np.asarray(reader.read_outline(path).lines @ found.turn.T)

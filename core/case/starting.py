@@ -17,7 +17,7 @@ from femubench.core.case.matrices import reader_of, reading_with
 from femubench.core.case.model_files import further_files
 from femubench.core.case.reader import read_case
 from femubench.core.case.schema import LengthUnit
-from femubench.core.case.table_text import csv_bytes, number
+from femubench.core.case.table_text import csv_bytes
 from femubench.core.case.tables import read_table
 from femubench.core.case.writing import new_folder
 from femubench.core.errors import InputError
@@ -245,7 +245,7 @@ def _matches_csv(case: Case) -> bytes:
     )
     header = ["sensor", "direction", "place", "distance", "x", "y", "z"]
     rows = [
-        [m.sensor, directions[m.sensor], m.place, f"{m.distance:.3g}", *map(number, m.measured)]
+        [m.sensor, directions[m.sensor], m.place, *(f"{v:.6g}" for v in (m.distance, *m.measured))]
         for m in case.matches
         if m.sensor in directions
     ]

@@ -9,10 +9,11 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter
+from scipy.spatial import cKDTree
 
 from femubench.core.case.case import Case
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.fem.mesh import place_xyz
+from femubench.core.fem.mesh import ON_MEMBER, place_xyz
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
@@ -92,6 +93,7 @@ class Wireframe:
         sensors, masses, springs, supports: what sits on it.
         nodes: of the mesh in m; empty where the mesh is too fine to draw.
         elements: pairs of nodes; `element_labels` (``member/k``) and `member_of` go with them.
+            Without members they are the lines of a test, which belong to none.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(allow_inf_nan=False)
@@ -115,7 +117,8 @@ class Wireframe:
             check_within((joint.node for joint in self.joints), self.nodes, "node")
         check_within(self.member_of, self.members, "member")
         check_same(self.element_labels, self.elements)
-        check_same(self.member_of, self.elements)
+        if self.members:
+            check_same(self.member_of, self.elements)
 
     @property
     def points(self) -> FloatArray:
@@ -184,7 +187,24 @@ def wireframe_of(source: Case | Model) -> Wireframe:
     joints = tuple(
         DrawnJoint(name, to_point(at), "", k) for k, (name, at) in enumerate(known.items())
     )
-    return Wireframe("matrices", joints, (), sensors, nodes=nodes)
+    lines = _test_lines(source, xyz) if isinstance(source, Case) and nodes else ()
+    labels = tuple(f"line {k + 1}" for k in range(len(lines)))
+    return Wireframe(
+        "matrices", joints, (), sensors, nodes=nodes, elements=lines, element_labels=labels
+    )
+
+
+def _test_lines(case: Case, nodes: FloatArray) -> tuple[Pair, ...]:
+    """Return the lines of a test as pairs of the nodes to which their ends were matched."""
+    if case.lines is None or not len(case.lines) or not case.matches:
+        return ()
+    placed = cKDTree([match.measured for match in case.matches])
+    away, which = placed.query(case.lines.reshape(-1, 3))
+    # An end where nothing was measured draws nothing.
+    found = np.array([match.xyz for match in case.matches])[which]
+    node = cKDTree(nodes).query(found)[1].reshape(-1, 2)
+    known = (away.reshape(-1, 2) <= ON_MEMBER).all(axis=1) & (node[:, 0] != node[:, 1])
+    return tuple(dict.fromkeys((int(i), int(j)) for i, j in node[known]))
 
 
 def node_positions(model: Model) -> FloatArray:

@@ -13,10 +13,13 @@ from femubench.core.modal.close_modes import clusters_of, turn_towards
 from femubench.core.modal.correlated_errors import root_of, undone
 from femubench.core.modal.correlation import UNSEEN, seen_modes
 from femubench.core.modal.measurement import Measurement
+from femubench.core.modal.pairing import WINDOW
 from femubench.core.typing import FloatArray, IntArray
 
 # Far from the truth a frequency is no sharper a label of a mode than this.
 _LABEL = 0.03
+_WINDOW = WINDOW**2  # a candidate may be as far from its best fit as that from the mode
+_LAST = 1e9  # chi-square of a partner outside of the window
 
 
 @dataclass(frozen=True)
@@ -143,7 +146,8 @@ class Data:
 
         Which mode fits best, where `pair_measured` asks which is the same and may find none: the
         assignment with the least chi-square; frequencies count with a deviation of at least
-        3 %, since a candidate may be far from its best fit.
+        3 %, since a candidate may be far from its best fit. Modes more than a factor of four apart,
+        the square of the window of `pair_modes`, are partners only where nothing else is left.
 
         Arguments:
             frequencies: predicted, Hz, (g, q).
@@ -159,6 +163,7 @@ class Data:
         label = np.hypot(self.measurement.frequency_std / measured, _LABEL)
         gap = frequencies[:, None, :] / measured[:, None] - 1.0
         cost = np.square(gap / label[:, None])
+        cost += np.where((gap > _WINDOW - 1.0) | (gap < 1.0 / _WINDOW - 1.0), _LAST, 0.0)
         square = np.square(self.weight)
         seen = np.einsum("sm,gsq->gmq", square * self.shapes, readings)
         norm = np.einsum("sm,gsq->gmq", square, np.square(readings))

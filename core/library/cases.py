@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeAlias, TypeVar
@@ -13,7 +14,7 @@ from femubench.core.errors import InputError
 from femubench.core.plugin.loader import Plugins, load_plugins
 from femubench.core.plugin.validation import chosen, unknown
 from femubench.core.plugin.variants import Variant
-from femubench.core.roles import Effect, Scenario
+from femubench.core.roles import Effect, Reader, Scenario
 
 if TYPE_CHECKING:
     from femubench.core.case.case import Case
@@ -28,6 +29,43 @@ def usable_plugins() -> Plugins:
     for fault in plugins.broken:
         warnings.warn(str(fault), stacklevel=2)
     return plugins
+
+
+class InstalledReaders(Sequence[Reader]):
+    """The readers of all plugins; nothing is loaded before a file asks for one."""
+
+    @cached_property
+    def _found(self) -> tuple[Reader, ...]:
+        return tuple(usable_plugins().readers.values())
+
+    def __getitem__(self, index: Any) -> Any:  # noqa: ANN401 - one, or a part of them
+        return self._found[index]
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+
+def read_case(
+    folder: str | PathLike[str], name: str | None = None, readers: Sequence[Reader] | None = None
+) -> Case:
+    """Read a case folder.
+
+    Arguments:
+        folder: a folder with a `case.toml`.
+        name: the name to give to the case; None takes its own.
+        readers: reader plugins for files other than CSV and Matrix Market; None for those that
+            are installed.
+
+    Raises:
+        InputError: for anything wrong in the folder.
+
+    Examples:
+        >>> femubench.read_case(case.folder).used
+        (1, 2, 3)
+    """
+    from femubench.core.case.reader import read_case as read
+
+    return read(folder, name, InstalledReaders() if readers is None else readers)
 
 
 class Catalogue(Mapping[str, Thing], Generic[Thing]):
