@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 SUFFIXES = (".py", ".js", ".html", ".jinja")
 # Words of models and of English that are names too, and what a line says that may have them.
 ALLOWED = {
-    # a kind of model, a method, the axes of a test
+    # kind of model, a method, axes of a test
     "frame": r"kind\b|'frame' or 'matrices'|`parameters` and `frame`|axes",
     "density": r"rhoA|\"E\"",  # a quantity of elements, beside the others
     # likewise, and a symbol in drawings

@@ -174,8 +174,9 @@ def reading_with(reader: Reader, file: Path) -> Iterator[None]:
 
     What it may take of memory grows with the file, whatever the file claims to hold.
     """
+    size = file.stat().st_size if file.is_file() else 0
     try:
-        with limited_memory(_MEMORY + _PER_BYTE * file.stat().st_size):
+        with limited_memory(_MEMORY + _PER_BYTE * size):
             yield
     except FemubenchError:
         raise
