@@ -100,7 +100,7 @@ def _column(found: Mapping[str, Any], key: str, count: int | None, path: Path) -
     value = _numbers(found, key, path)
     if value is None:
         return None
-    column = np.asarray(value.reshape(-1).real, dtype=float)
+    column = np.asarray(np.real(value.reshape(-1)), dtype=float)
     if count is not None and len(column) != count:
         raise _wrong(key, f"{len(column)} numbers", f"{count}, one a mode", path)
     return column
@@ -179,5 +179,5 @@ def _sensors(found: Mapping[str, Any], count: int, path: Path) -> Sensors:
         if places.shape != xyz.shape:
             size = " x ".join(map(str, places.shape))
             raise _wrong("xyz", size, f"{count} x 3, one row a row of shapes", path)
-        xyz = np.asarray(places.real, dtype=float)
+        xyz = np.asarray(np.real(places), dtype=float)
     return Sensors(tuple(labels), xyz, tuple(ways))
