@@ -29,6 +29,7 @@ from femubench.core.fem.frame import (
     Frame,
     GroundSpring,
     JointSpring,
+    Link,
     MemberSet,
     Oscillator,
     Place,
@@ -201,6 +202,8 @@ def full_frames(ladder: Case, portal: Case, bracket: Case) -> Iterator[tuple[str
             sets=(MemberSet("side", ("front-left", "rung-left")),),
         ),
     )
+    link = Link("J5", ("J11",), ("z", "rx"))
+    yield "linked", ladder, replace(base, links=(link,), free=True)
     base = frame_of(portal)
     yield (
         "in-plane",

@@ -34,6 +34,7 @@ from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
+from femubench.plugins.effects.brace_spring import BraceSpring
 
 ALUMINIUM = Material(72e9, 0.3, 2700.0)
 BAR = solid_rectangle(0.1, 0.02)
@@ -295,6 +296,18 @@ def test_a_joint_spring_at_a_follower_turns_against_the_body() -> None:
     assert frequencies(rigid)[6:] == pytest.approx(wanted, rel=1e-4)
     assert (frequencies(soft)[6:10] / wanted[:4]).min() < 0.95
     assert np.count_nonzero(solve_modes(Model.of(soft)).rigid) == 6
+
+
+def test_no_brace_ties_what_links_or_a_straight_run_join() -> None:
+    frame = tee("3d", Link("B", ("D",)))
+    joints = (*frame.joints, joint("F", 0.9, 0.0, 0.05), joint("G", -1.0, 0.3, 0.0))
+    bars = (*frame.members, member("AG"))
+    links = (*frame.links, Link("C", ("F",)))
+    model = Model.of(replace(frame, joints=joints, members=bars, links=links))
+    pairs = set(BraceSpring().places(model))
+    gone = {"B-D", "C-F"} | {"A-C", "A-D", "A-F", "B-F", "C-D", "D-F"}
+    assert not pairs & gone
+    assert {"A-E", "C-E", "E-F", "E-G", "B-G", "C-G", "D-G", "F-G"} == pairs - {"B-E"}
 
 
 def test_attachments_at_followers_act_on_the_body() -> None:
