@@ -546,7 +546,7 @@ def test_what_is_not_there_is_not_applicable(hframe_case: Any) -> None:
     frame = model.frame_structure.frame
     beam = replace(frame, members=frame.members[:1], joints=frame.joints, masses=())
     beam = replace(beam, joints=tuple(j for j in beam.joints if j.name in ("T1", "T2")))
-    for strategy in EVERY:
+    for strategy in (Spring(), Offset(), Local()):
         with pytest.raises(NotApplicable, match="matrices"):
             strategy.update(matrices, data, RNG)
     for strategy in (Local(), Spring(), Offset()):
@@ -564,7 +564,7 @@ def test_the_linear_gaussian_limit_has_the_closed_form(ladder: Any) -> None:
     data = exact.with_noise(rng)
     strategy = Bayesian(stiffness_std=1e-5, torsion_std=2e-5, joint_std=5e-5)
     result = strategy.update(model, data, RNG)
-    unknowns = strategy.unknowns(model.frame_structure, weighed=False)
+    unknowns = strategy.unknowns(model, weighed=False)
     modes = solve_modes(model).elastic.take(np.arange(6))
     slope = eigenvalue_sensitivities(model, modes, [u.parameter for u in unknowns])
     deviation = 8.0 * np.pi**2 * data.frequencies * data.frequency_std
@@ -585,7 +585,7 @@ def test_the_stated_deviations_are_right(ladder: Any) -> None:
     model = Model.of(ladder(elements=2))
     structure = model.frame_structure
     strategy = Bayesian(joint_std=0.3)
-    unknowns = strategy.unknowns(structure, weighed=False)
+    unknowns = strategy.unknowns(model, weighed=False)
     std = np.array([u.prior_std for u in unknowns])
     parameters = [u.parameter for u in unknowns]
     scores = []
@@ -628,7 +628,7 @@ def test_shapes_as_data_sharpen_the_parameters(ladder: Any) -> None:
     model = Model.of(ladder(elements=2))
     options = replace(Bayesian().options, shapes=True)
     structure = model.frame_structure
-    unknowns = Bayesian().unknowns(structure, weighed=False)
+    unknowns = Bayesian().unknowns(model, weighed=False)
     parameters = [u.parameter for u in unknowns]
     values = [0.97, 0.8, 0.7, 1.1, 0.8]
     truth = Model.of(structure.with_values(parameters, values))

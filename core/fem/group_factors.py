@@ -146,5 +146,7 @@ def group_derivatives(model: Model, parameters: Sequence[Parameter]) -> GroupDer
     Raises:
         ModelError: as in `with_group_factors`.
     """
-    parts = [(_matrix(p), _part(model, _matrix(p), p.places)) for p in parameters]
+    parts: list[tuple[Matrix, SparseArray]] = [
+        (_matrix(p), _part(model, _matrix(p), p.places)) for p in parameters
+    ]
     return GroupDerivatives(tuple(parts), model.size)
