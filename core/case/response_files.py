@@ -162,7 +162,7 @@ def _of_arrays(file: Path, held: Mapping[str, Any], known: Sensors | None) -> Re
 
     if "signals" in held:
         values, names = array("signals", "fiu").astype(float), labels("sensors")
-        rate = float(array("rate", "fiu").ravel()[0])
+        rate = float(array("rate", "fiu").mean()) if np.size(held.get("rate", ())) else 0.0
         if values.ndim != 2 or values.shape[1] != len(names) or not 0.0 < rate < np.inf:
             expected = f"(n_samples, {len(names)}) and a rate > 0 in Hz"
             raise InputError("wrong shape", file=file, key="signals", expected=expected)
@@ -173,7 +173,7 @@ def _of_arrays(file: Path, held: Mapping[str, Any], known: Sensors | None) -> Re
     if values.shape != (len(hz), len(outputs), len(inputs)):
         expected = f"({len(hz)}, {len(outputs)}, {len(inputs)})"
         raise InputError(f"is {values.shape}", file=file, key="values", expected=expected)
-    quantity: Any = labels("quantity")[0] if "quantity" in held else _QUANTITY
+    quantity: Any = ", ".join(labels("quantity")) if "quantity" in held else _QUANTITY
     if quantity not in get_args(Quantity):
         expected = ", ".join(get_args(Quantity))
         raise InputError(f"{quantity!r}", file=file, key="quantity", expected=expected)

@@ -94,7 +94,7 @@ def _split(found: dict[str, Any]) -> dict[str, Any]:
             matrix = sp.csc_array(value)
             matrix.check_format(full_check=True)
             arrays |= {f"{key}.{part}": np.asarray(getattr(matrix, part)) for part in _PARTS}
-        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiucUS":
+        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiucbUS":
             arrays[key] = value
         else:
             continue
