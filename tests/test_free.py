@@ -41,6 +41,9 @@ class Tether:
         return proportional(Term("stiffness", RowOperator(row, np.eye(1))))
 
 
+TETHER: Any = (Tether(),)
+
+
 def names(model: Model, *more: Any) -> Counter[str]:
     return Counter(h.name for h in hypotheses_of(model, (*registered_effects(), *more)))
 
@@ -56,9 +59,9 @@ def test_nothing_to_ground_is_a_candidate_and_all_else_is(ladder: Any) -> None:
 
 def test_what_a_stranger_ties_to_ground_is_found_by_its_energy(ladder: Any) -> None:
     model = Model.of(replace(ladder(elements=2), free=True))
-    own = [h for h in hypotheses_of(model, (Tether(),)) if h.name == "tether"]
+    own = hypotheses_of(model, TETHER)
     assert [(h.place, h.places) for h in own] == [("A-F", 1)]
-    assert names(replace(model, free=False), Tether())["tether"] == 2
+    assert names(replace(model, free=False), *TETHER)["tether"] == 2
 
 
 def as_matrices(tmp_path: Path) -> Path:

@@ -21,6 +21,7 @@ from femubench.core.fem.frame import (
     Material,
     Member,
     Place,
+    Plane,
     PointMass,
     Preload,
     Support,
@@ -55,7 +56,7 @@ def times(factor: float) -> Section:
     return Section(*(factor * v for v in (BAR.A, BAR.Iz, BAR.Iz, BAR.J, 1e-9)), kappa=BAR.kappa)
 
 
-def tee(plane: str = "3d", *links: Link, **parts: Any) -> Frame:
+def tee(plane: Plane = "3d", *links: Link, **parts: Any) -> Frame:
     """Return a bar A-B-C and a bar D-E above it, which stands off the former by a link."""
     up = {"3d": (0.02, 0.0, 0.2), "in-plane": (0.02, 0.0, 0.2), "out-of-plane": (0.2, 0.1, 0.0)}
     x, y, z = up[plane]
@@ -77,7 +78,7 @@ def frequencies(frame: Frame, count: int = 12) -> Any:
 
 
 @pytest.mark.parametrize("plane", list(ACTIVE))
-def test_a_body_on_links_is_as_free_as_before(plane: str) -> None:
+def test_a_body_on_links_is_as_free_as_before(plane: Plane) -> None:
     model = Model.of(tee(plane))
     modes = solve_modes(model)
     rigid = 6 if plane == "3d" else 3
@@ -85,12 +86,12 @@ def test_a_body_on_links_is_as_free_as_before(plane: str) -> None:
     assert np.count_nonzero(modes.rigid) == rigid
     assert np.abs(modes.eigenvalues[:rigid]).max() < 1e-9 * modes.eigenvalues[rigid]
     assert modes.eigenvalues[rigid] > 0.0
-    assert "D" not in {model.structure.frame.joints[n].name for n in model.dofs.node if n < 5}
-    assert model.total_mass == pytest.approx(model.structure.total_mass, rel=1e-12)
+    assert "D" not in {model.frame_structure.frame.joints[n].name for n in model.dofs.node if n < 5}
+    assert model.total_mass == pytest.approx(model.frame_structure.total_mass, rel=1e-12)
 
 
 @pytest.mark.parametrize("plane", list(ACTIVE))
-def test_a_mass_at_the_end_of_a_link_is_a_mass_on_an_arm(plane: str) -> None:
+def test_a_mass_at_the_end_of_a_link_is_a_mass_on_an_arm(plane: Plane) -> None:
     frame = tee(plane)
     offset = {"3d": (0.1, -0.2, 0.3), "in-plane": (0.1, 0.0, 0.3), "out-of-plane": (0.1, 0.3, 0.0)}
     end = np.array(frame.joint("E").xyz)
@@ -228,7 +229,7 @@ def test_joints_at_one_point_that_share_their_translations_are_a_hinge() -> None
 def test_sensors_at_followers_read_the_motion_of_the_body() -> None:
     model = Model.of(tee("3d"))
     rigid = rigid_modes_of(model)
-    places = np.array([model.structure.frame.joint(n).xyz for n in "BDE"])
+    places = np.array([model.frame_structure.frame.joint(n).xyz for n in "BDE"])
     sensors = [Sensors(tuple("BDE"), places, (d,) * 3) for d in CLAMP]
     moved = np.stack([model.observe(s) @ rigid for s in sensors], axis=1)  # place, direction, mode
     turn = moved[0, 3:]
@@ -253,7 +254,7 @@ def test_sensitivities_are_those_of_differences() -> None:
         assert found[:, k] / scale == pytest.approx((high - low)[6:] / 2e-5 / scale, abs=1e-6)
 
 
-def ring(plane: str, linked: bool, elements: int = 2) -> Frame:
+def ring(plane: Plane, linked: bool, elements: int = 2) -> Frame:
     """Return a square with a diagonal, one corner of which is a body of two joints."""
     flat = plane == "out-of-plane"
 
@@ -269,7 +270,7 @@ def ring(plane: str, linked: bool, elements: int = 2) -> Frame:
 
 
 @pytest.mark.parametrize("plane", ["in-plane", "out-of-plane", "3d"])
-def test_a_stressed_frame_on_links_keeps_its_rigid_modes(plane: str) -> None:
+def test_a_stressed_frame_on_links_keeps_its_rigid_modes(plane: Plane) -> None:
     structure = Structure.build(ring(plane, linked=True))
     rigid = rigid_modes_of(Model.of(structure))
     assert "AE" in redundant_members(structure)
@@ -314,7 +315,7 @@ def test_attachments_at_followers_act_on_the_body() -> None:
     model = Model.of(tee("3d"))
     mass = PointMass(Place(joint="D"), 2.0)
     changed = model.attach([mass], [])
-    whole = Model.of(replace(model.structure.frame, masses=(mass,)))
+    whole = Model.of(replace(model.frame_structure.frame, masses=(mass,)))
     assert abs(changed.mass - whole.mass).max() < 1e-12
     assert changed.size == model.size
 

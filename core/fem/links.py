@@ -93,7 +93,7 @@ def _check_rings(leader: IntArray, names: Sequence[str], links: Sequence[Link]) 
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
-        ring = [names[i] for i in error.args[1]]
+        ring = [str(names[i]) for i in error.args[1]]
         item = next(link for link in links if link.leads in ring)
         what = f"the links go round in a circle: {', '.join(ring)}"
         raise ModelError(what, item) from None
@@ -113,7 +113,7 @@ def _spread(leader: IntArray, xyz: FloatArray, active: BoolArray) -> SparseArray
     spread = sp.csr_array(sp.diags_array((leader < 0).ravel().astype(float)))
     step = spread
     while step.nnz:  # as often as the longest chain has links
-        step = follow @ step
+        step = sp.csr_array(follow @ step)
         spread = spread + step
     spread.eliminate_zeros()
     return spread
