@@ -146,8 +146,8 @@ def sample_posterior(
     near the most probable ones, and anew with more of them until the rms error over the posterior
     is at most a quarter of each datum's standard deviation, discrepancy included; what is left
     after three rounds widens the likelihood. Where polynomials miss a datum by five times its
-    standard deviation, as over the wide priors of supports, no chain is run: the answer is the normal
-    approximation about the most probable parameters, at the median of the discrepancy.
+    standard deviation, as over the wide priors of supports, no chain is run: the answer is the
+    normal approximation about the most probable parameters, at the median of the discrepancy.
 
     Arguments:
         source: the nominal model, matrices with groups or a frame, or the latter's structure.
