@@ -35,7 +35,7 @@ _POINTS = 1.5  # solutions for every coefficient of the polynomials
 _WIDER = 1.5  # than the normal approximation, from where the first of them are taken
 _ROUNDS = 3
 _OFF = 0.25  # of a datum's standard deviation: rms error of the polynomials that is let pass
-_USELESS = 2.0  # of it: with such polynomials a chain knows less than the normal approximation
+_USELESS = 5.0  # of it: with such polynomials a chain knows less than the normal approximation
 _SAMPLES = 40
 _WALKERS, _FEWEST_WALKERS = 4, 96  # for each unknown, and in all: few take no less time
 _BLOCK, _LONGEST = 500, 8000  # steps
@@ -163,9 +163,9 @@ def sample_posterior(
     Logarithms of frequencies are taken as quadratic in those of the parameters, fitted to solutions
     near the most probable ones, and anew with more of them until the rms error over the posterior
     is at most a quarter of each datum's standard deviation, discrepancy included; what is left
-    after three rounds widens the likelihood. Where polynomials miss a datum by twice its standard
-    deviation, as over the wide priors of supports, no chain is run: the answer is the normal
-    approximation about the most probable parameters, at the median of the discrepancy.
+    after three rounds widens the likelihood. Where polynomials miss a datum by five times its
+    standard deviation, as over the wide priors of supports, no chain is run: the answer is the
+    normal approximation about the most probable parameters, at the median of the discrepancy.
 
     Arguments:
         source: the nominal model, matrices with groups or a frame, or the latter's structure.
