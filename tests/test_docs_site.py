@@ -67,7 +67,7 @@ def _asked_for() -> set[str]:
     project = pyproject["project"]
     extras = project["optional-dependencies"].values()
     lists = [pyproject["build-system"]["requires"], project["dependencies"], *extras]
-    found = {re.match(r"[\w.-]+(\[\w+\])?", line) for lines in lists for line in lines}
+    found = {re.match(r"[\w.-]+(\[[\w,]+\])?", line) for lines in lists for line in lines}
     return {match[0].lower() for match in found if match}
 
 

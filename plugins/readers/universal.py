@@ -174,7 +174,7 @@ _HERE = _System(np.zeros(3), np.eye(3))
 
 def _systems(path: Path, datasets: Sequence[Dataset]) -> dict[int, _System]:
     """Return the coordinate systems by number, in global axes."""
-    systems = dict.fromkeys(_GLOBAL, _HERE)
+    systems: dict[int, _System] = dict.fromkeys(_GLOBAL, _HERE)
     for dataset in _of(datasets, 2420):
         triples = zip(
             dataset["CS_sys_labels"], dataset["CS_types"], dataset["CS_matrices"], strict=True
