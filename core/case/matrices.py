@@ -21,7 +21,7 @@ from femubench.core.case.faults import Fault, Misfit, at_key
 from femubench.core.case.files import LARGEST_FILE, CaseFiles
 from femubench.core.case.nodes import MatrixGeometry, read_dofs
 from femubench.core.case.schema import LARGEST, GroupSpec, MatricesSpec
-from femubench.core.errors import FemubenchError, InputError
+from femubench.core.errors import FemubenchError, InputError, ModelError
 from femubench.core.fem.model import Model
 from femubench.core.files import MIB, limited_memory, open_regular
 from femubench.core.roles import Reader
@@ -178,6 +178,10 @@ def reading_with(reader: Reader, file: Path) -> Iterator[None]:
     try:
         with limited_memory(_MEMORY + _PER_BYTE * size):
             yield
+    except ModelError as error:
+        raise InputError(
+            str(error), file=file, expected="matrices with labels of their rows"
+        ) from None
     except FemubenchError:
         raise
     except Exception as error:

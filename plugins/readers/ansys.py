@@ -64,7 +64,7 @@ def full_file(path: Path) -> dict[str, Any]:
     from ansys.mapdl.reader.full import FullFile
 
     limit_memory(path)
-    file = FullFile(str(path))
+    file: Any = FullFile(str(path))
     rows, stiffness, mass = file.load_km(as_sparse=True, sort=False)
     with path.open("rb") as stream:
         read_table(stream, skip=True)
@@ -88,5 +88,6 @@ def rst_file(path: Path) -> dict[str, Any]:
     from ansys.mapdl.reader import read_binary
 
     limit_memory(path)
-    mesh = read_binary(str(path)).mesh
+    results: Any = read_binary(str(path))
+    mesh = results.mesh
     return {"node": np.asarray(mesh.nnum), "xyz": np.asarray(mesh.nodes)[:, :3]}

@@ -125,7 +125,7 @@ def save_hdf5(path: Path, original: Path, new: Variables) -> None:
     shutil.copyfile(original, path)
     with h5py.File(path, "r+") as file:
         for name, value in new.items():
-            item = file[name]
+            item: Any = file[name]
             if isinstance(item, h5py.Dataset):
                 item[...] = value
                 continue

@@ -48,8 +48,8 @@ def _loaded(path: Path) -> dict[str, tuple[Any, int, int]]:
     with opened(path, _KIND):
         from pyyeti.nastran import op4
 
-        loaded: dict[str, tuple[Any, int, int]] = op4.load(str(path), into="dct", sparse=True)
-        return loaded
+        loaded: Any = op4.load(str(path), into="dct", sparse=True)
+        return dict(loaded)
 
 
 def _whole(matrix: SparseArray, form: int) -> SparseArray:
