@@ -13,8 +13,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
 from click.testing import CliRunner, Result
+from numpy.testing import assert_allclose
 
 import femubench
 import femubench.papers
@@ -22,6 +25,7 @@ from femubench.core.cli.main import bench
 from femubench.core.display import LINES, WIDTH
 from femubench.core.plugin.variants import labelled
 from femubench.core.score.repeatability import result_differences
+from tests.frf_problems import frf_set, write_universal
 from tests.test_cli import put_case
 from tests.toys import reproduction_toys
 from tests.toys.duck import Duck
@@ -129,6 +133,39 @@ class TestEveryCommandOfTheReadme:
         assert texts[0] == texts[1]
         assert found.causes[0].effect == "torsion-constant"
         assert found.sentence in " ".join(str(femubench.report(found)).split())
+
+    def test_identify(self) -> None:
+        measured = frf_set(4, modes=4, pairs=0, references=1, step=0.5, band=(20.0, 200.0)).measured
+        write_universal(Path("test.uff"), measured)
+        call("identify", "test.uff", "--output", "theirs")
+        found = femubench.identify("test.uff")
+        theirs = pd.read_csv("theirs/modes.csv")
+        assert theirs["frequency"].tolist() == found.frequencies.tolist()
+        assert theirs["frequency_std"].tolist() == found.measurement.frequency_std.tolist()
+
+    def test_init_of_files_and_update(self) -> None:
+        n = 6
+        stiffness = 1e6 * (2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+        xyz = np.outer(np.arange(n), [0.5, 0.0, 0.0])
+        labels = {"node": np.arange(1, n + 1), "direction": n * ["x"], "xyz": xyz}
+        np.savez("chain.npz", K=stiffness, M=2.0 * np.eye(n), **labels)
+        values, shapes = np.linalg.eigh(stiffness / 2.0)
+        frequencies = 1.05 * np.sqrt(values[:3]) / (2.0 * np.pi)
+        np.savez("test.npz", frequencies=frequencies, shapes=shapes[:, :3], **labels)
+        call("init", "theirs", "--model", "chain.npz", "--modes", "test.npz")
+        femubench.init_case("ours", "chain.npz", "test.npz")
+        assert Path("ours/case.toml").read_text() == Path("theirs/case.toml").read_text().replace(
+            "theirs", "ours"
+        )
+        call("update", "theirs", "-s", "global", "-o", "updated")
+        case = femubench.read_case("ours")
+        result = femubench.strategies["global"].update(
+            case.model, case.used_measurement(), np.random.default_rng(0)
+        )
+        femubench.write_model(result.model, "written", like="ours/chain.npz")
+        theirs, ours = np.load("updated/chain.npz"), np.load("written/chain.npz")
+        assert_allclose(theirs["K"], 1.05**2 * stiffness, rtol=1e-6)
+        assert_allclose(ours["K"], theirs["K"], rtol=1e-12)
 
     def test_reproduce(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(
