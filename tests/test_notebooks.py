@@ -73,7 +73,7 @@ def test_it_is_kept_without_outputs(path: Path) -> None:
 
 
 def test_the_footbridge_is_kept_with_small_outputs() -> None:
-    """What is kept of GPL data are tables of a few rows and two drawings, and no folder of anyone."""
+    """What is kept of GPL data are tables of a few rows and two drawings."""
     cells = [cell for cell in read(BRIDGE).cells if cell.cell_type == "code"]
     outputs = [output for cell in cells for output in cell.outputs]
     assert len(outputs) == len(cells) - 1  # of all but the imports
