@@ -216,6 +216,7 @@ def test_wide_priors_are_not_sampled_over_useless_polynomials() -> None:
     data = replace(DATA.select([1, 2]), frequency_std=0.01 * DATA.frequencies[:2])
     result = BayesianSampling().update(wide, data, RNG)
     assert result.diagnostics["steps"] == 0.0
+    assert result.diagnostics["normal_approximation"] == 1.0
     assert result.uncertainty is not None
     assert len(result.uncertainty.samples) > 4
     found = solve_modes(result.model).elastic.natural_frequencies[:2]

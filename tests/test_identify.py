@@ -302,3 +302,16 @@ def test_tables_that_are_wrong(tmp_path: Path) -> None:
 def _written(file: Path) -> Path:
     file.write_text("x", encoding="utf-8")
     return file
+
+
+def test_what_is_imaginary_of_a_shape_widens_its_deviations_in_a_case(
+    found: Identification,
+) -> None:
+    twisted = found.shapes + 0.1j * np.linspace(-1.0, 1.0, len(found.shapes))[:, None]
+    wide = replace(found, shapes=twisted).measurement.shape_std
+    rms = 0.1 * np.sqrt(np.mean(np.linspace(-1.0, 1.0, len(found.shapes)) ** 2))
+    assert wide == pytest.approx(rms, rel=0.2)
+    kept, own = (
+        np.linalg.norm(std, axis=0) for std in (found.measurement.shape_std, found.shape_std)
+    )
+    assert (kept < 1.5 * own).all()

@@ -15,11 +15,13 @@ from femubench.core.errors import ModelError
 from femubench.core.fem.frame import (
     ACTIVE,
     Frame,
+    GroundSpring,
     Joint,
     JointSpring,
     Link,
     Material,
     Member,
+    Oscillator,
     Place,
     Plane,
     PointMass,
@@ -201,6 +203,20 @@ def test_a_rigid_floor_sways_and_turns_as_a_model_made_by_hand() -> None:
         "rz",
     ]
     assert frequencies(frame, 3) == pytest.approx(np.sort(wanted), rel=1e-6)
+
+
+@pytest.mark.parametrize("what", ["springs", "oscillators"])
+def test_nothing_hangs_on_a_motion_that_no_link_makes_use_of(what: str) -> None:
+    frame = floor()
+    at = Place(joint=frame.links[0].leads)
+    items: dict[str, Any] = {
+        "springs": lambda d: GroundSpring(at, d, 1e4),
+        "oscillators": lambda d: Oscillator(at, d, 1.0, 20.0),
+    }
+    Model.of(replace(frame, **{what: (items[what]("x"),)}))
+    with pytest.raises(ModelError, match=r"no member ends at joint '\w+' and no link moves it"):
+        Model.of(replace(frame, **{what: (items[what]("-z"),)}))
+    assert not [p for p in BraceSpring().places(Model.of(frame)) if "M" in p]
 
 
 def test_a_free_floor_stays_a_rigid_body() -> None:

@@ -102,3 +102,18 @@ def test_a_chain_that_is_too_short_says_so(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(posterior_sampling, "_LONG_ENOUGH", 400.0)
     with pytest.raises(StrategyFailure, match=r"^500 steps are \d+ autocorrelation times, expec"):
         sampled(CASE.used_measurement())
+
+
+def test_over_rough_polynomials_it_says_that_it_is_the_normal_approximation(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    settled = sampled(CASE.used_measurement())
+    for name, value in (("_LONGEST", 500), ("_LONG_ENOUGH", 400.0), ("_OFF", 0.0), ("_ROUNDS", 1)):
+        monkeypatch.setattr(posterior_sampling, name, value)
+    found = sampled(CASE.used_measurement())
+    assert "normal_approximation" not in settled.diagnostics
+    assert found.diagnostics["normal_approximation"] == 1.0
+    assert found.diagnostics["steps"] == 500.0
+    for one, other in zip(found.parameters, settled.parameters, strict=True):
+        assert one.std is not None
+        assert abs(one.after - other.after) < one.std

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from femubench import strategies
 from femubench.core.conformance.problems import Problem
@@ -130,3 +131,16 @@ def test_without_stiff_parts_nothing_more_is_allowed(ladder: Any) -> None:
     with pytest.raises(SelfCheckFailed) as caught:
         check_used_modes(model, off.shapes, off.eigenvalues)
     assert caught.value.allowed == 1e-8
+
+
+def test_a_model_spoilt_by_enormous_stiffness_is_excused_nothing() -> None:
+    model = aeroplane(1.0)
+    modes, rng = elastic(model), np.random.default_rng(0)
+    basis = np.linalg.qr(modes.shapes)[0]
+    across = rng.standard_normal(model.size)
+    across -= basis @ (basis.T @ across)
+    across *= np.sqrt(1e12 * abs(model.stiffness).max()) / np.linalg.norm(across)
+    added = sp.csr_array(np.outer(across, across))
+    spoilt = replace(model, structure=None, stiffness=sp.csr_array(model.stiffness + added))
+    with pytest.raises(SelfCheckFailed, match="comes out at"):
+        check_used_modes(spoilt, modes.shapes, 1.5 * modes.eigenvalues)

@@ -177,6 +177,11 @@ def _tie(
     idle = np.zeros(joints.shape, dtype=bool)
     idle[bare] = joints[bare] & ~used[bare]
     joints[idle] = False
+    for item in (*frame.springs, *frame.oscillators):
+        column = DIRECTIONS.index(item.direction.lstrip("+-"))
+        if item.at.joint is not None and idle[frame.joint_index[item.at.joint], column]:
+            what = f"no member ends at joint {item.at.joint!r} and no link moves it along"
+            raise ModelError(f"{what} {DIRECTIONS[column]}", item)
     return tie, np.flatnonzero(idle)
 
 

@@ -80,7 +80,13 @@ class Identification(Shown):
 
     @property
     def measurement(self) -> Measurement:
-        """Return the modes as a case has them; shapes are the real parts."""
+        """Return the modes as a case has them; shapes are the real parts.
+
+        No real mode of an undamped model is closer to a complex one than its imaginary part is
+        large, so that what of this exceeds the noise counts as a deviation of every component.
+        """
+        own = np.square(self.shape_std)
+        beyond = (np.square(self.shapes.imag) - own).mean(axis=0)
         return Measurement(
             sensors=self.sensors,
             numbers=tuple(range(1, len(self) + 1)),
@@ -88,5 +94,5 @@ class Identification(Shown):
             frequency_std=self.frequency_std,
             damping=self.damping,
             shapes=np.asarray(self.shapes.real),
-            shape_std=self.shape_std,
+            shape_std=np.sqrt(own + np.maximum(beyond, 0.0)),
         )

@@ -165,7 +165,9 @@ def sample_posterior(
     is at most a quarter of each datum's standard deviation, discrepancy included; what is left
     after three rounds widens the likelihood. Where polynomials miss a datum by five times its
     standard deviation, as over the wide priors of supports, no chain is run: the answer is the
-    normal approximation about the most probable parameters, at the median of the discrepancy.
+    normal approximation about the most probable parameters, at the median of the discrepancy. So
+    it is where they miss by more than a quarter, and the chain is too short. Of such an answer
+    ``normal_approximation`` in the diagnostics is 1.
 
     Arguments:
         source: the nominal model, matrices with groups or a frame, or the latter's structure.
@@ -178,7 +180,7 @@ def sample_posterior(
     Raises:
         NotApplicable: when a frequency has no standard deviation.
         StrategyFailure: when no measured mode has a partner, too few points give a model, or the
-            chain is too short for its autocorrelation.
+            chain is too short for its autocorrelation though the polynomials are good.
 
     Source: Goodman & Weare (2010), Commun. Appl. Math. Comput. Sci. 5, 65-80, as implemented by
     Foreman-Mackey, Hogg, Lang & Goodman (2013), PASP 125, 306-312.
@@ -195,16 +197,21 @@ def sample_posterior(
         40
     """
     target, covariance = most_probable(source, unknowns, measurement, discrepancy, options)
-    sampler, off = _fitted(target, np.asarray(np.linalg.cholesky(covariance)), rng)
+    sampler, off, rough = _fitted(target, np.asarray(np.linalg.cholesky(covariance)), rng)
     if sampler is None:
         return _normal_result(target, covariance, off)
-    chain, found = _settled(sampler)
+    try:
+        chain, found = _settled(sampler)
+    except StrategyFailure:
+        if not rough:
+            raise
+        return _normal_result(target, covariance, off, float(sampler.iteration))
     drawn = chain[rng.choice(len(chain), _SAMPLES, replace=False), :-1]
     return _result(target, chain, drawn, {**found, "surrogate_error": off})
 
 
-def _fitted(target: Target, root: FloatArray, rng: np.random.Generator) -> tuple[Any, float]:
-    """Return a sampler after its first steps, and the largest error of the polynomials there.
+def _fitted(target: Target, root: FloatArray, rng: np.random.Generator) -> tuple[Any, float, bool]:
+    """Return a sampler after its first steps, the largest error of the polynomials, if too large.
 
     No sampler where the polynomials are useless.
 
@@ -217,16 +224,17 @@ def _fitted(target: Target, root: FloatArray, rng: np.random.Generator) -> tuple
     for _ in range(_ROUNDS):
         fit = QuadraticFit.of(points, values)
         if (fit.error > _USELESS * target.std(np.zeros(1))).any():
-            return None, float(fit.error.max())
+            return None, float(fit.error.max()), True
         sampler = _started(target, fit, root, rng)
         drawn = sampler.get_chain(discard=_BLOCK // 2, flat=True)
         drawn = drawn[rng.choice(len(drawn), count, replace=False)]
         more, exact = target.predicted(drawn[:, :-1])
         off = np.sqrt(np.mean(np.square(fit(more) - exact), axis=0))
-        if (off <= _OFF * target.std(drawn[:, -1])).all():
+        rough = not (off <= _OFF * target.std(drawn[:, -1])).all()
+        if not rough:
             break
         points, values = np.vstack([points, more]), np.vstack([values, exact])
-    return sampler, float(off.max())
+    return sampler, float(off.max()), rough
 
 
 def most_probable(
@@ -302,12 +310,15 @@ def _settled(sampler: Any) -> tuple[FloatArray, dict[str, float]]:  # noqa: ANN4
     }
 
 
-def _normal_result(target: Target, covariance: FloatArray, off: float) -> UpdateResult:
+def _normal_result(
+    target: Target, covariance: FloatArray, off: float, steps: float = 0.0
+) -> UpdateResult:
     """Return the most probable model and the normal approximation about it.
 
     Arguments:
         covariance: of scaled parameters there, (p, p).
         off: largest error of the polynomials that were tried.
+        steps: of a chain that did not settle.
     """
     iteration, point = target.iteration, target.point
     own = target.discrepancy.median
@@ -318,7 +329,8 @@ def _normal_result(target: Target, covariance: FloatArray, off: float) -> Update
         parameters=iteration.estimates(point, covariance),
         diagnostics={
             "discrepancy_std": own,
-            "steps": 0.0,
+            "steps": steps,
+            "normal_approximation": 1.0,
             "surrogate_error": off,
             "paired_modes": float(len(target.measurement)),
         },

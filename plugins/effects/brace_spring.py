@@ -53,9 +53,12 @@ class BraceSpring(FrameEffect):
         joined = {frozenset(body[name] for name in member.ends) for member in frame.members}
         joined |= {frozenset([number]) for number in body.values()}
         joined |= _in_line(frame, body) if frame.links else set()
+        # Where no member ends, a joint of links may have motions that nothing makes use of.
+        loose = set((model.frame_structure.kinematics.unused // 6).tolist())
+        names = [name for name, i in frame.joint_index.items() if i not in loose]
         pairs = [
             (first, last)
-            for first, last in combinations(frame.joint_index, 2)
+            for first, last in combinations(names, 2)
             if frozenset([body[first], body[last]]) not in joined
         ]
         return [f"{first}-{last}" for first, last in _nearest(frame, pairs)]
