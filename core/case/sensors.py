@@ -67,7 +67,8 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> Placed:
     for row, match, way in zip(table.rows, matches, directions, strict=True):
         _check_sensor(row, match.xyz, way, site, "x")
     try:
-        check_apart(list(zip(matches, directions, strict=True)))
+        every = np.array([row.vector() for row in table.rows], dtype=float)
+        check_apart(list(zip(matches, directions, strict=True)), site, alignment, every)
     except Misfit as misfit:
         raise InputError(misfit.what, file=file, expected=misfit.expected) from None
     xyz = np.array([match.xyz for match in matches], dtype=float)
