@@ -178,6 +178,33 @@ def check_near(match: Match, site: Site, alignment: Alignment, every: FloatArray
     raise Misfit(what, f"{expected}{_advice(every, site, alignment)}")
 
 
+def span_told(
+    matches: Sequence[Match], file: str, site: Site, alignment: Alignment, every: FloatArray
+) -> tuple[str, ...]:
+    """Return what to say of sensors that lie close together beside the size of the structure.
+
+    Arguments:
+        matches: of all sensors.
+        file: that lists them.
+        site, alignment, every: as in `check_near`.
+
+    Raises:
+        Misfit: when they are moved, and lie closer together than they may be moved.
+    """
+    span = size_of(np.array([match.measured for match in matches]))
+    size, limit = size_of(site.points), alignment.limit(site)
+    if not ON_MEMBER < span < _EXTENT[0] * size:
+        return ()
+    what = f"the sensors span {span:.3g} m, the structure {size:.3g} m"
+    question = "is one of the units wrong?"
+    if span <= limit and any(match.distance > ON_MEMBER for match in matches):
+        fitting = bool(_units_by_size(every, site))
+        advice = _advice(every, site, alignment) if fitting else f"; {question}"
+        expected = f"more than {limit:.3g} m (tolerance = {alignment.tolerance:g} of its size)"
+        raise Misfit(what, f"{expected}{advice}")
+    return (f"{file}: {what}: {question}",)
+
+
 def _advice(every: FloatArray, site: Site, alignment: Alignment) -> str:
     """Return the unit and the frame of axes with which all points of a test would fit."""
     limit, units = alignment.limit(site), _units_by_size(every, site)
@@ -249,13 +276,11 @@ def fitted_sensors(
         InputError: when a sensor lies off the structure, or none is left.
     """
     scale = 1.0
-    known = np.isfinite(read.xyz).all(axis=1)
+    known = np.asarray(np.isfinite(read.xyz).all(axis=1))
     if not known.any():
         raise InputError("sensors without places", file=file, expected=PLACES)
     rows = [
-        i
-        for i, label in enumerate(read.labels)
-        if known[i] and (wanted is None or label in wanted)
+        i for i, label in enumerate(read.labels) if known[i] and (wanted is None or label in wanted)
     ]
     kept: list[tuple[Match, str]] = []
     told: tuple[str, ...] = ()
@@ -266,8 +291,7 @@ def fitted_sensors(
         matches = matches_of([read.labels[i] for i in rows], xyz, site, alignment, scale)
         ways = [alignment.direction(read.directions[i]) for i in rows]
         found_as = replace(alignment, unit=scale)
-        kept = _fitting(list(zip(matches, ways, strict=True)), file, site, found_as, xyz)
-        told = told_of([match for match, _ in kept], file.name)
+        kept, told = _fitting(list(zip(matches, ways, strict=True)), file, site, found_as, xyz)
         if alignment.unit is None and unit != "m":
             told = (_detected(file.name, unit, size_of(xyz) / size_of(site.points)), *told)
     if not kept:
@@ -286,10 +310,15 @@ def _fitting(
     site: Site,
     alignment: Alignment,
     every: FloatArray,
-) -> list[tuple[Match, str]]:
-    """Return those matches whose direction the model has; raises InputError for one too far."""
+) -> tuple[list[tuple[Match, str]], tuple[str, ...]]:
+    """Return the matches whose direction the model has, and what to say of all places.
+
+    Raises:
+        InputError: for one too far.
+    """
     kept: list[tuple[Match, str]] = []
     try:
+        told = span_told([match for match, _ in found], file.name, site, alignment, every)
         for match, direction in found:
             check_near(match, site, alignment, every)
             x, y, z = (float(v) for v in match.xyz)
@@ -299,7 +328,7 @@ def _fitting(
         check_apart(kept, site, alignment, every)
     except Misfit as misfit:
         raise InputError(misfit.what, file=file, expected=misfit.expected) from None
-    return kept
+    return kept, (*told, *told_of([match for match, _ in kept], file.name))
 
 
 def _detected(file: str, unit: str, ratio: float) -> str:
