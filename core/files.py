@@ -7,7 +7,7 @@ import stat
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -188,6 +188,24 @@ def make_folder(folder: Path) -> None:
         raise InputError(f"cannot make the folder: {fault.strerror}", file=folder) from fault
     if not os.access(folder, os.W_OK | os.X_OK):
         raise InputError("folder cannot be written to", file=folder)
+
+
+@contextmanager
+def folder_made(folder: Path) -> Iterator[None]:
+    """Make a folder with its parents; those that are empty go again where what follows fails.
+
+    Raises:
+        InputError: when that fails or the folder may not be written to.
+    """
+    made = [path for path in (folder, *folder.parents) if not path.exists()]
+    make_folder(folder)
+    try:
+        yield
+    except BaseException:
+        for path in made:
+            with suppress(OSError):
+                path.rmdir()
+        raise
 
 
 def check_new(folder: Path) -> None:

@@ -130,6 +130,27 @@ def test_two_sensors_at_one_place_and_direction(tmp_path: Path) -> None:
     assert [match.place for match in case.matches][:2] == ["B", "B"]
 
 
+@pytest.mark.parametrize(
+    ("xyz", "keys", "advice"),
+    [
+        (PLACES, 'frame = "x,z,-y"', 'with frame = "x,y,z" all fit'),
+        (PLACES, 'unit = "cm"', 'with unit = "m" all fit'),
+        (PLACES, 'unit = "in"\ntolerance = 0.5', 'with unit = "m" all fit'),
+        (1e-5 * PLACES, "", "the structure 1.92 m (expected more than 0.0192 m"),
+        (np.full((4, 3), np.nan), "", "expected sensors: a table label,x,y,z,direction"),
+    ],
+)
+def test_what_would_fit_is_told(tmp_path: Path, xyz: np.ndarray, keys: str, advice: str) -> None:
+    with pytest.raises(InputError) as fault:
+        read(tmp_path, Reader(xyz), keys)
+    assert advice in str(fault.value)
+
+
+def test_a_test_of_a_small_part_is_told(tmp_path: Path) -> None:
+    case = read(tmp_path, Reader(PLACES[0] + 0.02 * (PLACES - PLACES[0])))
+    assert any("the structure 1.92 m: is one of the units wrong?" in note for note in case.notes)
+
+
 def test_oblique_sensor_reads_the_projection(tmp_path: Path) -> None:
     """A reading along an oblique axis is the projection of the motion, in frames and matrices."""
     case = read_case(CASES / "3d")

@@ -331,7 +331,8 @@ def test_ansys_files_have_the_frequencies_of_ansys(tmp_path: Path) -> None:
     expected = [1283.200, 1283.200, 5781.975, 6919.399]
     np.testing.assert_allclose(frequencies(model, 4), expected, atol=6e-4)
     with pytest.raises(InputError, match="IMPORT,MMF"):
-        femubench.write_model(model, tmp_path, like=full)
+        femubench.write_model(model, tmp_path / "new" / "folder", like=full)
+    assert not (tmp_path / "new").exists()
 
 
 def test_real_files_of_nastran() -> None:

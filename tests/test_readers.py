@@ -332,7 +332,7 @@ def test_files_that_do_not_fit_the_case(tmp_path: Path) -> None:
     far = nodes_15(x=[9.0, 0.0, 0.0])
     for datasets, what in [
         ([far, *modes(*SHAPES)], "off the structure"),
-        (modes(*SHAPES), "no sensor fits the structure"),
+        (modes(*SHAPES), "sensors without places"),
         ([nodes_15()], "no modes"),
     ]:
         write(folder / "test.uff", *datasets)

@@ -206,3 +206,9 @@ def test_one_of_the_two(tmp_path: Path) -> None:
     (folder / "case.toml").write_text(text.replace("repeats =", 'covariance = "c.csv"\nrepeats ='))
     with pytest.raises(InputError, match="both repeats and covariance"):
         read_case(folder)
+
+
+def test_rounded_repeats_that_go_together_can_be_drawn() -> None:
+    correlation, _ = shrunk_correlation(np.array([[1.0, 2.0], [1.0, 2.0], [2.0, 3.0], [2.0, 3.0]]))
+    assert correlation[0, 1] == pytest.approx(1.0, abs=1e-5)
+    assert np.isfinite(np.linalg.cholesky(correlation)).all()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations, product
 from pathlib import Path
 from typing import NamedTuple
@@ -16,6 +16,7 @@ from femubench.core.case.case import Match
 from femubench.core.case.faults import Misfit, WrongDirection
 from femubench.core.case.frames import Site
 from femubench.core.case.schema import LengthUnit
+from femubench.core.case.tables import PLACES
 from femubench.core.case.units import METRES
 from femubench.core.errors import InputError
 from femubench.core.fem.mesh import ON_MEMBER
@@ -174,20 +175,52 @@ def check_near(match: Match, site: Site, alignment: Alignment, every: FloatArray
         f"{match.place} at ({foot})"
     )
     expected = f"at most {limit:.3g} m (tolerance = {alignment.tolerance:g} of its size)"
-    raise Misfit(what, f"{expected}{_advice(every, site, limit)}")
+    raise Misfit(what, f"{expected}{_advice(every, site, alignment)}")
 
 
-def _advice(every: FloatArray, site: Site, limit: float) -> str:
+def span_told(
+    matches: Sequence[Match], file: str, site: Site, alignment: Alignment, every: FloatArray
+) -> tuple[str, ...]:
+    """Return what to say of sensors that lie close together beside the size of the structure.
+
+    Arguments:
+        matches: of all sensors.
+        file: that lists them.
+        site, alignment, every: as in `check_near`.
+
+    Raises:
+        Misfit: when they are moved, and lie closer together than they may be moved.
+    """
+    span = size_of(np.array([match.measured for match in matches]))
+    size, limit = size_of(site.points), alignment.limit(site)
+    if not ON_MEMBER < span < _EXTENT[0] * size:
+        return ()
+    what = f"the sensors span {span:.3g} m, the structure {size:.3g} m"
+    question = "is one of the units wrong?"
+    if span <= limit and any(match.distance > ON_MEMBER for match in matches):
+        fitting = bool(_units_by_size(every, site))
+        advice = _advice(every, site, alignment) if fitting else f"; {question}"
+        expected = f"more than {limit:.3g} m (tolerance = {alignment.tolerance:g} of its size)"
+        raise Misfit(what, f"{expected}{advice}")
+    return (f"{file}: {what}: {question}",)
+
+
+def _advice(every: FloatArray, site: Site, alignment: Alignment) -> str:
     """Return the unit and the frame of axes with which all points of a test would fit."""
-    for unit in _units_by_size(every, site):
+    limit, units = alignment.limit(site), _units_by_size(every, site)
+    if not units and len(every) > 1:
+        sizes = f"{size_of(every):.3g} as they stand, the structure {size_of(site.points):.3g} m"
+        return f"; the sensors span {sizes}: is one of the units wrong?"
+    for unit in units:
         for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
             turn = _turn(order, signs)
             points = METRES[unit] * every @ turn.T
             if np.linalg.det(turn) > 0.0 and _gaps(points, site).max() <= limit:
                 axes = zip(order, signs, strict=True)
                 frame = ",".join(f"{'-' if s < 0 else ''}{'xyz'[k]}" for k, s in axes)
-                keys = [f'unit = "{unit}"'] if unit != "m" else []
-                keys += [f'frame = "{frame}"'] if frame != "x,y,z" else []
+                other = METRES[unit] != (alignment.unit or 1.0)
+                keys = [f'unit = "{unit}"'] if other else []
+                keys += [] if np.array_equal(turn, alignment.turn) else [f'frame = "{frame}"']
                 return f"; with {' and '.join(keys)} all fit" if keys else ""
     return ""
 
@@ -198,11 +231,14 @@ def _turn(order: Sequence[int], signs: Sequence[float]) -> FloatArray:
     return turn
 
 
-def check_apart(found: Sequence[tuple[Match, str]]) -> None:
+def check_apart(
+    found: Sequence[tuple[Match, str]], site: Site, alignment: Alignment, every: FloatArray
+) -> None:
     """Check that no two sensors of different places went to one place and direction.
 
     Arguments:
         found: every match and its direction.
+        site, alignment, every: as in `check_near`, for advice.
 
     Raises:
         Misfit: naming both sensors and the place.
@@ -216,7 +252,8 @@ def check_apart(found: Sequence[tuple[Match, str]]) -> None:
                 f"sensors {other.sensor!r} and {match.sensor!r} both lie nearest to {match.place}, "
                 f"direction {way} ({other.distance:.3g} and {match.distance:.3g} m away)"
             )
-            raise Misfit(what, "a finer model, or one of the two left out")
+            expected = "a finer model, or one of the two left out"
+            raise Misfit(what, f"{expected}{_advice(every, site, alignment)}")
 
 
 def fitted_sensors(
@@ -238,14 +275,13 @@ def fitted_sensors(
     Raises:
         InputError: when a sensor lies off the structure, or none is left.
     """
-    scale, rows = (
-        1.0,
-        [
-            i
-            for i, label in enumerate(read.labels)
-            if np.isfinite(read.xyz[i]).all() and (wanted is None or label in wanted)
-        ],
-    )
+    scale = 1.0
+    known = np.asarray(np.isfinite(read.xyz).all(axis=1))
+    if not known.any():
+        raise InputError("sensors without places", file=file, expected=PLACES)
+    rows = [
+        i for i, label in enumerate(read.labels) if known[i] and (wanted is None or label in wanted)
+    ]
     kept: list[tuple[Match, str]] = []
     told: tuple[str, ...] = ()
     if rows:
@@ -254,8 +290,8 @@ def fitted_sensors(
         scale = METRES[unit] if alignment.unit is None else alignment.unit
         matches = matches_of([read.labels[i] for i in rows], xyz, site, alignment, scale)
         ways = [alignment.direction(read.directions[i]) for i in rows]
-        kept = _fitting(list(zip(matches, ways, strict=True)), file, site, alignment, xyz)
-        told = told_of([match for match, _ in kept], file.name)
+        found_as = replace(alignment, unit=scale)
+        kept, told = _fitting(list(zip(matches, ways, strict=True)), file, site, found_as, xyz)
         if alignment.unit is None and unit != "m":
             told = (_detected(file.name, unit, size_of(xyz) / size_of(site.points)), *told)
     if not kept:
@@ -274,20 +310,25 @@ def _fitting(
     site: Site,
     alignment: Alignment,
     every: FloatArray,
-) -> list[tuple[Match, str]]:
-    """Return those matches whose direction the model has; raises InputError for one too far."""
+) -> tuple[list[tuple[Match, str]], tuple[str, ...]]:
+    """Return the matches whose direction the model has, and what to say of all places.
+
+    Raises:
+        InputError: for one too far.
+    """
     kept: list[tuple[Match, str]] = []
     try:
+        told = span_told([match for match, _ in found], file.name, site, alignment, every)
         for match, direction in found:
             check_near(match, site, alignment, every)
             x, y, z = (float(v) for v in match.xyz)
             with suppress(WrongDirection):
                 site.check_sensor((x, y, z), direction)
                 kept.append((match, direction))
-        check_apart(kept)
+        check_apart(kept, site, alignment, every)
     except Misfit as misfit:
         raise InputError(misfit.what, file=file, expected=misfit.expected) from None
-    return kept
+    return kept, (*told, *told_of([match for match, _ in kept], file.name))
 
 
 def _detected(file: str, unit: str, ratio: float) -> str:

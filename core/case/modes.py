@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from femubench.core.case.schema import SMALLEST
-from femubench.core.case.tables import RESERVED, Complex, Table, read_table
+from femubench.core.case.tables import PLACES, RESERVED, Complex, Table, read_table
 from femubench.core.errors import InputError
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.sensors import Sensors
@@ -36,6 +36,10 @@ def read_modes(file: Path, sensors: Sensors, shape_std: float) -> Measurement:
     table = read_table(file)
     labels = sensors.labels
     known = {*RESERVED, *labels, *(f"{label}_std" for label in labels)}
+    more = [column[:60] for column in table.columns if column not in known]
+    if more and not labels:
+        expected = f"{', '.join(RESERVED)}; for columns of shapes {PLACES}"
+        raise InputError("unknown column", file=file, line=1, key=more[0], expected=expected)
     table.check_columns(("mode", "frequency"), known)
     if not table.rows:
         raise InputError("no modes", file=file, expected="a row for every mode")

@@ -16,6 +16,7 @@ from femubench.core.typing import FloatArray
 
 _FEWEST = 3
 _SAME_STD = 1e-9  # relative
+_ROUNDING = 1e-12  # of an eigenvalue of a correlation matrix
 _TOLD = 0.05  # share of the correlations that is shrunk away without a word
 
 
@@ -83,7 +84,7 @@ def with_covariance(measurement: Measurement, file: Path) -> Measurement:
         what = "not a symmetric matrix with a positive diagonal"
         raise InputError(what, file=file, expected="a covariance in Hz^2")
     correlation = 0.5 * (covariance + covariance.T) / size
-    if np.linalg.eigvalsh(correlation)[0] <= 0.0:
+    if np.linalg.eigvalsh(correlation)[0] <= _ROUNDING:
         raise InputError("not positive definite", file=file, expected="a covariance in Hz^2")
     places = list(columns.values())
     own = measurement.frequency_std[places]

@@ -15,6 +15,7 @@ from femubench.core.case.matching import (
     check_apart,
     check_near,
     matches_of,
+    span_told,
     told_of,
 )
 from femubench.core.case.tables import RESERVED, Row, Table, parse_place, read_table
@@ -62,24 +63,25 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> Placed:
             (),
             np.eye(3),
         )
-    matches = _placed(table, site, alignment)
+    every = np.array([row.vector() for row in table.rows], dtype=float)
+    matches = _placed(table, every, site, alignment)
     directions = [alignment.direction(way) for way in directions]
     for row, match, way in zip(table.rows, matches, directions, strict=True):
         _check_sensor(row, match.xyz, way, site, "x")
     try:
-        check_apart(list(zip(matches, directions, strict=True)))
+        close = span_told(matches, file.name, site, alignment, every)
+        check_apart(list(zip(matches, directions, strict=True)), site, alignment, every)
     except Misfit as misfit:
         raise InputError(misfit.what, file=file, expected=misfit.expected) from None
     xyz = np.array([match.xyz for match in matches], dtype=float)
     sensors = Sensors(tuple(labels), xyz, tuple(directions))
     turn = (alignment.unit or 1.0) * alignment.turn
-    return Placed(sensors, matches, told_of(matches, file.name), turn)
+    return Placed(sensors, matches, (*close, *told_of(matches, file.name)), turn)
 
 
-def _placed(table: Table, site: Site, alignment: Alignment) -> tuple[Match, ...]:
+def _placed(table: Table, xyz: FloatArray, site: Site, alignment: Alignment) -> tuple[Match, ...]:
     """Return where the coordinates of a table put its sensors."""
     labels = [row.cells["label"] for row in table.rows]
-    xyz = np.array([row.vector() for row in table.rows], dtype=float)
     matches = matches_of(labels, xyz, site, alignment, alignment.unit or 1.0)
     for row, match in zip(table.rows, matches, strict=True):
         try:

@@ -89,7 +89,8 @@ def start_case(
                 error, {fresh / name: path for path, name in copies.items()}
             ) from None
         (fresh / CASE_FILE).write_text(keys.text(readers, case), encoding="utf-8")
-        (fresh / MATCHES).write_bytes(_matches_csv(case))
+        if case.matches:
+            (fresh / MATCHES).write_bytes(_matches_csv(case))
         case = read_case(fresh, readers=readers)
         if draw is not None and case.matches:
             draw(case, fresh / PICTURE)

@@ -26,6 +26,7 @@ _NUMBER = re.compile(_REAL, re.ASCII)
 _COMPLEX = re.compile(rf"\(?(?:({_REAL})(?=[+-]))?({_REAL})[ijIJ]\)?", re.ASCII)
 _WHOLE = re.compile(r"\+?\d{1,9}", re.ASCII)
 RESERVED = ("mode", "frequency", "frequency_std", "damping")
+PLACES = "sensors: a table label,x,y,z,direction, or label,at,direction"
 
 
 class Complex(NamedTuple):

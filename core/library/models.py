@@ -20,7 +20,7 @@ from femubench.core.case.units import METRES
 from femubench.core.case.writing import write_case
 from femubench.core.errors import InputError, NotApplicable, StrategyFailure
 from femubench.core.fem.model import Model
-from femubench.core.files import make_folder
+from femubench.core.files import folder_made
 from femubench.core.library.cases import CaseLike, one_case, usable_plugins
 from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import chosen
@@ -83,8 +83,9 @@ def write_model(
         >>> bool(np.load("updated/model.npz")["K"][0, 0] == result.model.stiffness[0, 0])
         True
     """
-    make_folder(Path(folder))
-    write_files(model, Path(folder), _paths(like, mass, None), _readers(unit), unit)
+    files, readers = _paths(like, mass, None), _readers(unit)
+    with folder_made(Path(folder)):
+        write_files(model, Path(folder), files, readers, unit)
 
 
 def _paths(model: FileLike, mass: FileLike | None, dofs: FileLike | None) -> ModelFiles:
@@ -137,5 +138,5 @@ def write_updated(case: Case, model: Model, folder: Path, plugins: Plugins) -> N
         write_case(folder, case, model, name=f"{case.name[:60]}-updated")
         return
     files, unit = found
-    make_folder(folder)
-    write_files(model, folder, files, tuple(plugins.readers.values()), unit)
+    with folder_made(folder):
+        write_files(model, folder, files, tuple(plugins.readers.values()), unit)

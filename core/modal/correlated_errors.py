@@ -60,5 +60,6 @@ def shrunk_correlation(repeats: FloatArray) -> tuple[FloatArray, float]:
     apart = ~np.eye(len(raw), dtype=bool)
     total = float(np.square(raw[apart]).sum())
     share = min(float(spread[apart].sum()) / total, 1.0) if total > 0.0 else 0.0
+    share = max(share, _LEAST)  # rounded frequencies may go together without any scatter
     found = np.where(apart, (1.0 - share) * raw, 1.0)
     return np.asarray(found), share

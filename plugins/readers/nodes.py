@@ -69,7 +69,8 @@ def _lines(path: Path, above: Path | None = None, depth: int = 0) -> Iterator[Li
         )
         raise InputError(what, file=path, expected="files beside the input file")
     if not found.is_file() or found.stat().st_size > _LARGEST:
-        raise InputError("cannot be read", file=path, expected="a file of at most 256 MiB")
+        what = "is too large" if found.is_file() else "is not there"
+        raise InputError(what, file=path, expected="a file of at most 256 MiB")
     for number, line in enumerate(found.read_text(encoding="latin-1").splitlines(), start=1):
         line = line.strip()
         if not line or line.startswith("**"):
