@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.beam import BeamProperties, shape_functions
-from femubench.core.fem.frame import ACTIVE, Frame, Place
+from femubench.core.fem.frame import ACTIVE, Frame, GroundSpring, Oscillator, Place
 from femubench.core.fem.links import Linkage, linkage, rigid_arm
 from femubench.core.fem.mesh import ON_MEMBER, SAME_STATION, Connection, Mesh, member_axes
 from femubench.core.fem.sensors import DIRECTIONS
@@ -177,7 +177,8 @@ def _tie(
     idle = np.zeros(joints.shape, dtype=bool)
     idle[bare] = joints[bare] & ~used[bare]
     joints[idle] = False
-    for item in (*frame.springs, *frame.oscillators):
+    hung: tuple[GroundSpring | Oscillator, ...] = (*frame.springs, *frame.oscillators)
+    for item in hung:
         column = DIRECTIONS.index(item.direction.lstrip("+-"))
         if item.at.joint is not None and idle[frame.joint_index[item.at.joint], column]:
             what = f"no member ends at joint {item.at.joint!r} and no link moves it along"
