@@ -16,6 +16,8 @@ import femubench
 from femubench import InputError, Model, Sensors
 from femubench.core.case.units import from_si, in_si
 from femubench.core.cli.main import bench
+from femubench.core.run.answers import packed, unpacked
+from femubench.core.run.jobs import JobOutcome
 from femubench.core.typing import FloatArray
 from femubench.fem import Coupling, Eccentricity, GroundSpring, LowRank, Parameter, Place, PointMass
 from femubench.plugins.readers.bulk_data import BulkDataReader
@@ -809,3 +811,13 @@ def test_a_truss_is_diagnosed(tmp_path: Path) -> None:
     places = {cause.place for cause in found.causes}
     assert found.verdict in ("named", "ambiguous")
     assert places & {"E2", "E2/1"}
+
+
+@pytest.mark.parametrize("cards", [TWO, KINDS, TRUSS])
+def test_a_run_takes_over_what_a_strategy_makes_of_the_model(
+    model: Callable[..., Model], cards: str
+) -> None:
+    wanted = changed(model(cards), {("E", "all"): 1.1})
+    found = unpacked(packed(JobOutcome("ok", model=wanted))).model
+    assert found is not None
+    assert near(found, wanted, 0.0)
