@@ -240,6 +240,8 @@ class Reader(Protocol):
       `fem.matrix_model`, or `Model.of(frame)` where the file holds elements.
     - ``read_pair(stiffness, mass) -> Model``: likewise, from two files; without it `read_matrix`
       reads them, and a table must give the labels.
+    - ``read_remarks(path) -> Sequence[str]``: what `read_model` left out or took otherwise than it
+      stands in the file, one sentence each, which become notes of a case.
     - ``model_files(path) -> Sequence[Path]``: further files that `read_model` opens.
     - ``read_nodes(path) -> Mapping[str, Sequence[float]]``: coordinates of nodes by name, for
       models whose own files have none.

@@ -16,6 +16,8 @@ import femubench
 from femubench import InputError, Model, Sensors
 from femubench.core.case.units import from_si, in_si
 from femubench.core.cli.main import bench
+from femubench.core.run.answers import packed, unpacked
+from femubench.core.run.jobs import JobOutcome
 from femubench.core.typing import FloatArray
 from femubench.fem import Coupling, Eccentricity, GroundSpring, LowRank, Parameter, Place, PointMass
 from femubench.plugins.readers.bulk_data import BulkDataReader
@@ -633,3 +635,189 @@ def test_coordinates_for_matrices_of_other_files(tmp_path: Path) -> None:
                     "CORD2R,5,0,1.,0.,0.,2.,0.,0.,+\n+,1.,1.,0.\n")  # fmt: skip
     nodes = READER.read_nodes(file)
     np.testing.assert_allclose([nodes["1"], nodes["7"]], [[1, 2, 3], [1, 1, 0]], atol=1e-12)
+
+
+def by_formula(E: float, G: float, numbers: tuple[float, ...], length: float) -> FloatArray:
+    """Return the stiffness of Euler's and Bernoulli's bar along x, plane 1 in x-y, (12, 12).
+
+    Arguments:
+        numbers: A, I1, I2, J.
+    """
+    area, i1, i2, j = numbers
+    k = np.zeros((12, 12))
+    for row, rigidity in ((0, E * area), (3, G * j)):
+        k[np.ix_([row, row + 6], [row, row + 6])] = rigidity / length * np.array([[1, -1], [-1, 1]])
+    for rows, inertia, sign in (([1, 5, 7, 11], i1, 1.0), ([2, 4, 8, 10], i2, -1.0)):
+        a, b = 6.0 * length * sign, length**2
+        block = [[12, a, -12, a], [a, 4 * b, -a, 2 * b], [-12, -a, 12, -a], [a, 2 * b, -a, 4 * b]]
+        k[np.ix_(rows, rows)] = E * inertia / length**3 * np.array(block)
+    return k
+
+
+def test_a_bar_is_that_which_nastran_punched(model: Callable[..., Model]) -> None:
+    # Numbers of the bar of NASTRAN_CoFE; its punch has these ten digits.
+    E, nu, numbers = 1.44e9, 0.33, (15000.0, 2500.0, 250.0, 25000.0)
+    found = model(
+        "MDLPRM,HDF5,0\nMAT1,501,1440.E6,,.33,5.37078819\nCBAR,1,101,1,2,0.,1.,0.\n"
+        "GRID,1,0,0.0,0.0,0.0,0\nGRID,2,0,1.0,0.0,0.0,0\nFORCE,1,2,,1.0E8,0.25,0.5,-1.0\n"
+        "PBAR,101,501,15000.,2500.,250.,25000.,0.0\n,.1,.1,-0.1,.1,-0.1,-0.1,.1,-0.1\n,0.0,0.0\n"
+    )
+    stiffness = found.stiffness.toarray()
+    wanted = by_formula(E, E / (2 * (1 + nu)), numbers, 1.0)
+    np.testing.assert_allclose(stiffness, wanted, rtol=1e-12, atol=1.0)
+    punched = {(0, 0): 2.16e13, (1, 1): 4.32e13, (2, 2): 4.32e12, (3, 3): 1.353383459e13}
+    punched |= {(2, 4): -2.16e12, (4, 4): 1.44e12, (1, 5): 2.16e13, (5, 5): 1.44e13}
+    for (i, j), value in punched.items():
+        assert stiffness[i, j] == pytest.approx(value, rel=5e-10)
+    assert found.total_mass == pytest.approx(5.37078819 * 15000.0)
+
+
+TRUSS = """SPC = 1
+BEGIN BULK
+GRID,1,,0.,0.,0.
+GRID,2,,3.,0.,0.
+GRID,3,,0.,4.,0.
+GRID,4,,3.,4.,0.
+CROD,1,1,1,2
+CROD,2,1,2,4
+CROD,3,1,3,4
+CROD,4,2,1,4
+CROD,5,2,2,3
+PROD,1,1,2.-4,1.-9
+PROD,2,1,1.-4,,,.3
+MAT1,1,7.+10,2.6+10,,2700.
+SPC1,1,12345,1,3
+SPC1,1,3,2,4
+"""
+
+
+def test_a_truss_is_rods_between_hinges(model: Callable[..., Model]) -> None:
+    found = model(TRUSS)
+    assert sorted(found.dofs.direction) == ["x", "x", "y", "y"]
+    wanted = np.zeros((4, 4))
+    for unit, stiffness in (
+        (np.array([1.0, 0.0, 0.0, 0.0]), 7e10 * 2e-4 / 3.0),
+        (np.array([0.0, -1.0, 0.0, 1.0]), 7e10 * 2e-4 / 4.0),
+        (np.array([0.0, 0.0, 1.0, 0.0]), 7e10 * 2e-4 / 3.0),
+        (np.array([0.0, 0.0, 0.6, 0.8]), 7e10 * 1e-4 / 5.0),
+        (np.array([0.6, -0.8, 0.0, 0.0]), 7e10 * 1e-4 / 5.0),
+    ):
+        wanted += stiffness * np.outer(unit, unit)
+    np.testing.assert_allclose(found.stiffness.toarray(), wanted, rtol=1e-12, atol=1e-3)
+    length = 3.0 + 4.0 + 3.0
+    total = 2700.0 * (2e-4 * length + 1e-4 * 10.0) + 0.3 * 10.0
+    assert found.total_mass == pytest.approx(total)
+
+
+def test_an_updated_truss_goes_back_into_its_cards(tmp_path: Path) -> None:
+    original, path = tmp_path / "truss.bdf", tmp_path / "new.bdf"
+    original.write_text(TRUSS)
+    draws = {("E", "E1"): 1.2, ("density", "E2"): 0.9, ("EA", "E4"): 0.7, ("rhoA", "E5"): 1.3}
+    wanted = changed(READER.read_model(original), draws)
+    READER.write_model(wanted, path, original)
+    assert near(READER.read_model(path), wanted)
+
+
+def test_a_rod_beside_bars_pulls_and_twists_but_turns_with_no_joint(
+    model: Callable[..., Model],
+) -> None:
+    portal = CLAMPED + f"GRID,3,,0.,.6,0.\nGRID,4,,{L},.6,0.\nCBAR,2,10,3,4,0.,1.,0.\n"
+    portal += "SPC1,1,123456,3\nPROD,20,1,2.-5,{}\nCROD,9,20,2,4\n"
+    bare, twisting = model(portal.format("")), model(portal.format("3.-9"))
+    gained = (twisting.stiffness - bare.stiffness).tocoo()
+    i, j = row(bare, "2", "ry"), row(bare, "4", "ry")
+    k = E / 2.6 * 3e-9 / 0.6
+    stiffness = np.zeros(bare.stiffness.shape)
+    stiffness[np.ix_([i, j], [i, j])] = [[k, -k], [-k, k]]
+    np.testing.assert_allclose(gained.toarray(), stiffness, atol=1e-6)
+    alone = model(portal.format("").replace("CROD,9,20,2,4\n", ""))
+    lumps = (bare.mass - alone.mass).diagonal()
+    halves = [lumps[row(bare, joint, d)] for joint in "24" for d in "xyz"]
+    assert halves == pytest.approx([0.5 * RHO * 2e-5 * 0.6] * 6)
+    assert lumps.sum() == pytest.approx(sum(halves))
+    softer = changed(bare, {("E", "E9"): 0.5})
+    assert not near(softer, bare, 1e-6)
+
+
+def test_systems_by_grids_and_spheres_place_grids(model: Callable[..., Model]) -> None:
+    plain = model(CLAMPED)
+    frame = "GRID,11,,1.,0.,0.\nGRID,12,,2.,0.,0.\nGRID,13,,1.,1.,0.\nGRID,14,,1.,0.,5.\n"
+    # z along basic x, x along basic y; the second system of the card is not used.
+    by_grids = CLAMPED.replace(f"GRID,2,,{L},0.,0.", f"GRID,2,5,0.,0.,{L - 1.0},5") + frame
+    assert near(model(by_grids + "CORD1R,5,11,12,13,6,11,12,13\n"), plain)
+    for k, (system, place) in enumerate(
+        (("CORD1C", f"0.,0.,{L - 1.0}"), ("CORD1S", f"{1.0 - L},180.,0.")), 1
+    ):
+        text = CLAMPED.replace(f"GRID,2,,{L},0.,0.", f"GRID,2,5,{place}") + frame
+        assert near(model(f"{text}{system},{k},11,12,14,5,11,12,13\n"), plain)
+    # Along the radius, downwards and around at a point in the x-y plane.
+    ball = CLAMPED.replace(f"GRID,2,,{L},0.,0.", f"GRID,2,7,{L},90.,0.,7") + "SPC1,1,2,2\n"
+    ball += "CORD2S,7,0,0.,0.,0.,0.,0.,1.,+\n+,1.,0.,0.\n"
+    assert near(model(ball), model(CLAMPED + "SPC1,1,3,2\n"))
+
+
+def test_a_case_says_what_of_its_file_does_not_count(tmp_path: Path) -> None:
+    idle = "FORCE,3,2,,1.,0.,0.,1.\nDESVAR,1,A,1.\nDRESP1,1,F,FREQ,,,1\nMAT4,1,204.\nDTI,X,1\n"
+    idle += "PSHELL,5,1,.1\nASET1,123456,2\nMDLPRM,HDF5,0\nPARAM,POST,-1\n"
+    (tmp_path / "truss.bdf").write_text(TRUSS + idle)
+    (tmp_path / "modes.csv").write_text("mode,frequency,frequency_std,damping\n1,15.0,0.1,\n")
+    (tmp_path / "case.toml").write_text(
+        '[case]\nname = "truss"\n[model]\nkind = "file"\nfile = "truss.bdf"\n'
+        '[measurement]\nmodes = "modes.csv"\nused = [1]\n'
+    )
+    notes = femubench.read_case(tmp_path, readers=(READER,)).notes
+    assert notes == (
+        "truss.bdf: cards left out: DESVAR (1), DRESP1 (1), DTI (1), FORCE (1), MAT4 (1), "
+        "MDLPRM (1), PARAM (1), PSHELL (1)",
+        "truss.bdf: nothing is reduced or held by ASET1 (1): all directions stay",
+        "truss.bdf: J of PROD is left out: a joint of rods alone takes up no twist",
+        "truss.bdf: masses are consistent; the file asks for lumped ones (COUPMASS)",
+    )
+    plain = tmp_path / "plain.bdf"
+    plain.write_text(CLAMPED + "PARAM,COUPMASS,1\n")
+    assert READER.read_remarks(plain) == ("cards left out: PARAM (1)",)
+
+
+FOREIGN = {
+    "/BATCH\n/COM, a model\n": "an input file of Ansys: '/BATCH'",
+    "*HEADING\n beam\n": "an input file of Abaqus or CalculiX: '*HEADING'",
+    CLAMPED + "BEGIN SUPER=1\n": "superelements are not read: 'BEGIN SUPER=1'",
+    CLAMPED + "SECONCT,1,0\n": "SECONCT 1: superelements are not read",
+    CLAMPED + "=,*(1),=,*(1.),==\n": "(replication)",
+    CLAMPED + "INCLUDE 'parts\\bar.inc'\n": "'parts\\\\bar.inc' is not there",
+    CLAMPED + "MPC,1,2,1,1.,1,1,-1.\n": "MPC 1: this card is not read",
+    CLAMPED.replace("CBAR", "CBEAM").replace("PBAR", "PBEAML"): "this property is not read",
+}
+
+
+@pytest.mark.parametrize("text", FOREIGN)
+def test_what_is_no_frame_of_bars_is_named(model: Callable[..., Model], text: str) -> None:
+    with pytest.raises(InputError, match=re.escape(FOREIGN[text])):
+        model(text)
+
+
+def test_a_truss_is_diagnosed(tmp_path: Path) -> None:
+    (tmp_path / "truss.bdf").write_text(TRUSS)
+    nominal = READER.read_model(tmp_path / "truss.bdf")
+    truth = hertz(changed(nominal, {("E", "E2"): 0.7}))
+    rows = [f"{k},{f},{1e-4 * f},0.01" for k, f in enumerate(truth, 1)]
+    head = "mode,frequency,frequency_std,damping"
+    (tmp_path / "modes.csv").write_text("\n".join([head, *rows]))
+    (tmp_path / "case.toml").write_text(
+        '[case]\nname = "truss"\n[model]\nkind = "file"\nfile = "truss.bdf"\n'
+        '[measurement]\nmodes = "modes.csv"\nused = [1, 2, 3, 4]\n'
+    )
+    found = femubench.diagnose(femubench.read_case(tmp_path, readers=(READER,)))
+    places = {cause.place for cause in found.causes}
+    assert found.verdict in ("named", "ambiguous")
+    assert places & {"E2", "E2/1"}
+
+
+@pytest.mark.parametrize("cards", [TWO, KINDS, TRUSS])
+def test_a_run_takes_over_what_a_strategy_makes_of_the_model(
+    model: Callable[..., Model], cards: str
+) -> None:
+    wanted = changed(model(cards), {("E", "all"): 1.1})
+    found = unpacked(packed(JobOutcome("ok", model=wanted))).model
+    assert found is not None
+    assert near(found, wanted, 0.0)

@@ -508,3 +508,24 @@ def test_data_in_other_files_is_refused(tmp_path: Path) -> None:
         file.create_dataset("K", (2, 2), float, external=[(str(tmp_path / "secret"), 0, 32)])
     with pytest.raises(InputError, match="'K' is kept in another file"):
         femubench.read_model(tmp_path / "a.h5")
+
+
+def test_a_punch_of_extseout_is_found_by_the_number_of_its_superelement(tmp_path: Path) -> None:
+    import pandas as pd
+    from pyyeti.nastran import bulk
+
+    from femubench.plugins.readers.dmig import DmigReader
+
+    path = tmp_path / "punch.pch"
+    points = pd.MultiIndex.from_product([(1, 2), (1, 2)], names=["id", "dof"])
+    K, M, other = (scale * np.diag([1.0, 2.0, 3.0, 4.0]) for scale in (5.0, 0.1, 9.0))
+    for names in (("k10", "m10"), ("kaa10", "maa10"), ("kaax", "maax")):
+        frames = dict(zip((*names, "mug1t"), (K, M, other), strict=True))
+        tables = {n: pd.DataFrame(m, index=points, columns=points) for n, m in frames.items()}
+        bulk.wtdmig(str(path), tables)
+        found = DmigReader().read_model(path)
+        np.testing.assert_allclose(found.stiffness.toarray(), K)
+        np.testing.assert_allclose(found.mass.toarray(), M)
+    path.write_text("$ a punch\nGRID,1\nENDDATA\n")
+    with pytest.raises(InputError, match="there are no DMIG cards"):
+        DmigReader().read_model(path)

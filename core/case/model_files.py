@@ -108,6 +108,25 @@ def further_files(path: Path, readers: Sequence[Reader]) -> tuple[Path, ...]:
         return tuple(Path(further) for further in reader.model_files(path))
 
 
+def remarks_of(spec: FileSpec, files: CaseFiles, readers: Sequence[Reader]) -> tuple[str, ...]:
+    """Return what the reader of a model took otherwise than it stands in the file.
+
+    Arguments:
+        spec: of a case whose model has been read.
+        files: of the case.
+        readers: reader plugins.
+
+    Raises:
+        InputError: for what is wrong in the file.
+    """
+    path = files.path(spec.file)
+    reader = _reader(path, readers)
+    if spec.mass is not None or not hasattr(reader, "read_remarks"):
+        return ()
+    with reading_with(reader, path):
+        return tuple(f"{spec.file}: {remark}" for remark in reader.read_remarks(path))
+
+
 def model_of_file(spec: FileSpec, files: CaseFiles, readers: Sequence[Reader]) -> Model:
     """Return the model of a case of kind ``file``.
 

@@ -29,7 +29,7 @@ from femubench.core.case.files import LARGEST_CASE, CaseFiles
 from femubench.core.case.frames import FrameSite, Site, attachments, frame_of
 from femubench.core.case.matching import Alignment, Placed, fitted_sensors
 from femubench.core.case.matrices import model_of_matrices, reader_of, reading_with
-from femubench.core.case.model_files import model_of_file
+from femubench.core.case.model_files import model_of_file, remarks_of
 from femubench.core.case.modes import (
     FREQUENCY_STD,
     NO_SENSORS,
@@ -188,7 +188,9 @@ class _Building:
         spec = self.spec.model
         with at_key("model"), np.errstate(all="ignore"):
             if isinstance(spec, FileSpec):
-                return known_free(model_of_file(spec, self.files, self.readers), spec.free)
+                model = known_free(model_of_file(spec, self.files, self.readers), spec.free)
+                self.notes |= dict.fromkeys(remarks_of(spec, self.files, self.readers))
+                return model
             if not isinstance(spec, FrameSpec):
                 return known_free(model_of_matrices(spec, self.files, self.readers), spec.free)
             frame = frame_of(spec)

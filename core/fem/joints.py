@@ -160,6 +160,12 @@ def elements_at(structure: Structure, group: JointGroup) -> tuple[str, ...]:
     )
 
 
+def _bends(frame: Frame, member: str) -> bool:
+    """Tell whether a member resists bending; a rod of a truss does not."""
+    section = frame.members[frame.member_index[member]].section
+    return max(section.Iy, section.Iz) > 0.0
+
+
 def flexible_ends(frame: Frame, group: JointGroup) -> tuple[str, ...]:
     """Return the ends of a group that take a spring: all but one a joint where none passes.
 
@@ -171,13 +177,14 @@ def flexible_ends(frame: Frame, group: JointGroup) -> tuple[str, ...]:
         ('back-right@J1', 'front-right@J3', 'rung-left@J7', 'back-left@J9')
     """
     taken = {f"{spring.member}@{spring.joint}" for spring in frame.joint_springs}
-    ends = group.ends
+    ends = tuple(end for end in group.ends if _bends(frame, end.rpartition("@")[0]))
     if group.role == "through":
         return ()
     if group.role == "end":
         first: set[str] = set()
         for joint in {end.rpartition("@")[2] for end in ends}:
-            first.add(f"{_members_at(frame, joint)[0].name}@{joint}")
+            bent = (m.name for m in _members_at(frame, joint) if _bends(frame, m.name))
+            first.add(f"{next(bent)}@{joint}")
         ends = tuple(end for end in ends if end not in first)
     return tuple(end for end in ends if end not in taken)
 

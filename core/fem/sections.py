@@ -41,18 +41,30 @@ class Section:
     name: str = field(default="", compare=False)
 
 
-def constant_kappa(value: float) -> ShearCoefficients:
-    """Return a shear coefficient that is the same along both axes and for every material.
+def constant_kappa(value: float, along_z: float | None = None) -> ShearCoefficients:
+    """Return shear coefficients that are the same for every material.
+
+    Arguments:
+        value: along both axes, or along y where `along_z` is given.
+        along_z: along z.
 
     Examples:
         >>> fem.constant_kappa(0.44)(0.33)
         (0.44, 0.44)
+        >>> fem.constant_kappa(0.44, 0.85)(0.33)
+        (0.44, 0.85)
     """
-    return partial(_constant, value)
+    if along_z is None or along_z == value:
+        return partial(_constant, value)
+    return partial(_constant_pair, value, along_z)
 
 
 def _constant(value: float, nu: float) -> tuple[float, float]:
     return value, value
+
+
+def _constant_pair(along_y: float, along_z: float, nu: float) -> tuple[float, float]:
+    return along_y, along_z
 
 
 def bredt(b: float, h: float, wall: float) -> float:

@@ -178,13 +178,20 @@ def finer(hypothesis: Hypothesis, model: Model, effects: Iterable[Effect]) -> li
 def _hypotheses(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ...]:
     found = []
     for effect in effects:
-        places = tuple(dict.fromkeys(effect.places(model)))
+        # A rod has no bending stiffness by which a rotational spring could be measured.
+        places = tuple(
+            p for p in dict.fromkeys(effect.places(model)) if _has_scale(model, effect, p)
+        )
         own = [hypothesis_at(model, effect, place, len(places)) for place in places]
         if model.free:
             own = [one for one in own if not _holds(model, one)]
             own = [replace(one, places=len(own)) for one in own]
         found += own
     return tuple(found)
+
+
+def _has_scale(model: Model, effect: Effect, place: str) -> bool:
+    return all(parameter.scale > 0.0 for parameter in effect.parameters(model, place))
 
 
 def _holds(model: Model, hypothesis: Hypothesis) -> bool:

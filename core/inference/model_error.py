@@ -212,7 +212,9 @@ def _end_moments(
                     labels.append((kind[joint], d))
     known = {label: i for i, label in enumerate(dict.fromkeys(labels))}
     types = np.array([known[label] for label in labels], dtype=np.int64)
-    return np.array(moments[0]), np.array(moments[1]), types
+    # In a truss no end has a moment.
+    elastic, inertial = (np.array(rows).reshape(len(labels), local.shape[2]) for rows in moments)
+    return elastic, inertial, types
 
 
 @dataclass(frozen=True)

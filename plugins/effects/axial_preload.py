@@ -75,5 +75,6 @@ def euler_load(frame: Frame, name: str) -> float:
     """Return pi^2 E I / L^2 of a member in N, with the smaller second moment that is known."""
     member = frame.members[frame.member_index[name]]
     # A frame in one plane needs Iy alone.
-    inertia = min(i for i in (member.section.Iy, member.section.Iz) if i > 0.0)
+    own = (member.section.Iy, member.section.Iz)
+    inertia = min((i for i in own if i > 0.0), default=0.0)  # of a rod
     return float(np.pi**2 * member.material.E * inertia / member_length(frame, name) ** 2)

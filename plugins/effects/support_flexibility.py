@@ -48,7 +48,10 @@ class SupportFlexibility(FrameEffect):
 
     def places(self, model: Model) -> Sequence[str]:
         """Return the supports and springs to ground, all of them, each, and each direction."""
-        return () if model.structure is None else support_places(model.structure.frame)
+        if model.structure is None:
+            return ()
+        frame = model.structure.frame
+        return tuple(place for place in support_places(frame) if _parts(frame, place))
 
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return the stiffnesses; the scale is that of what is held, or of the springs there."""
@@ -82,11 +85,15 @@ _Held = Mapping[tuple[str, str], float]
 
 
 def _parts(frame: Frame, place: str) -> dict[tuple[str, str], _Held]:
-    """Return name and unit of every parameter with what it belongs to, and how stiff that is."""
+    """Return name and unit of every parameter with what it belongs to, and how stiff that is.
+
+    What is held though nothing pulls at it, as the rotations of a truss, is left out.
+    """
     held = {
         (word, direction): stiffness
         for word, own in supports_of(frame, place).items()
         for direction, stiffness in own.items()
+        if np.isfinite(stiffness) or _resistance(frame, word, direction) > 0.0
     }
     kinds = (("translation", "N/m", _TRANSLATIONS), ("rotation", "N m/rad", _ROTATIONS))
     parts = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -21,7 +22,7 @@ _LARGEST = 6_000  # rows; pyYeti fills the whole matrix
 
 
 class DmigReader:
-    """Reads square matrices with grids and components, e.g. KAAX and MAAX of EXTSEOUT.
+    """Reads square matrices with grids and components, e.g. KAAX and MAAX, K10 and M10 of EXTSEOUT.
 
     Coordinates are not in such a file. Cards have 16 columns a number, which hold 10 digits.
     """
@@ -37,9 +38,7 @@ class DmigReader:
     def read_model(self, path: Path) -> Model:
         """Return stiffness and mass on the grids that either has; raises InputError."""
         frames = _frames(path)
-        stiffness, mass = (
-            frames[chosen(_values(frames), known, path)] for known in (STIFFNESS, MASS)
-        )
+        stiffness, mass = (frames[_chosen(frames, known, path)] for known in (STIFFNESS, MASS))
         return _model(stiffness, mass, path)
 
     def read_pair(self, stiffness: Path, mass: Path) -> Model:
@@ -56,8 +55,8 @@ class DmigReader:
         """Write an updated model, all other matrices as they were; raises InputError."""
         frames = _frames(original)
         names = (
-            chosen(_values(frames), STIFFNESS, original),
-            chosen(_values(frames), MASS, original),
+            _chosen(frames, STIFFNESS, original),
+            _chosen(frames, MASS, original),
         )
         points = set(frames[names[0]].index) | set(frames[names[1]].index)
         new = dict(zip(names, _labelled(model, points, original), strict=True))
@@ -84,6 +83,9 @@ def _frames(path: Path) -> dict[str, pd.DataFrame]:
         from pyyeti.nastran import bulk
 
         with path.open(encoding="latin-1") as stream:
+            if not any(line[:4].upper() == "DMIG" for line in stream):
+                raise InputError("there are no DMIG cards", file=path, expected=_KIND)
+            stream.seek(0)
             frames: dict[str, pd.DataFrame] = bulk.rddmig(stream, follow_includes=False)
     if not frames:
         raise InputError("no matrix", file=path, expected=_KIND)
@@ -92,6 +94,17 @@ def _frames(path: Path) -> dict[str, pd.DataFrame]:
 
 def _values(frames: dict[str, pd.DataFrame]) -> dict[str, np.ndarray]:
     return {name: frame.to_numpy() for name, frame in frames.items()}
+
+
+def _chosen(frames: dict[str, pd.DataFrame], known: tuple[str, ...], path: Path) -> str:
+    """Return the name of the stiffness or of the mass, which may end with a number.
+
+    EXTSEOUT calls them by the superelement, e.g. K10 or KAA10; transformations that it adds begin
+    with M too.
+    """
+    numbered = [name for name in frames if re.fullmatch(rf"{known[1]}(aa)?x?\d+", name)]
+    own = tuple(numbered) if len(numbered) == 1 else ()
+    return chosen(_values(frames), (*known, *own), path)
 
 
 def _model(stiffness: pd.DataFrame, mass: pd.DataFrame, path: Path) -> Model:

@@ -124,7 +124,7 @@ def _flexible(structure: Structure, groups: tuple[JointGroup, ...]) -> dict[str,
     found = {group.name: flexible_ends(structure.frame, group) for group in groups}
     flexible = {name: ends for name, ends in found.items() if ends}
     if not flexible:
-        raise NotApplicable("all member ends at the joints have springs already")
+        raise NotApplicable("no member end at a joint bends and has no spring yet")
     return flexible
 
 

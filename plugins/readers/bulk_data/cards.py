@@ -23,6 +23,9 @@ _ENDS = re.compile(rb"\r\n?|\n")
 _NAME = re.compile(r"[A-Z][A-Z0-9]{0,7}")
 _BEGIN = re.compile(r"\s*BEGIN\b", re.IGNORECASE)
 _BULK = re.compile(r"\s*BEGIN[\s,]*BULK\s*", re.IGNORECASE)
+_ANSYS = re.compile(r"/[A-Za-z]{2,}")
+_KEYWORD = re.compile(r"\*[A-Za-z]{3,}")  # of Abaqus and CalculiX; in Nastran a continuation
+_ONE_SECTION = "BEGIN BULK, and all of the structure in it"
 _INCLUDE = re.compile(r"""\s*INCLUDE\s*['"]?([^'"]+?)['"]?\s*""", re.IGNORECASE)
 _CHOICE = re.compile(r"\s*(SPC|MPC)\s*=\s*(\d{1,8})\s*", re.IGNORECASE)
 
@@ -204,8 +207,7 @@ class _Reading:
                 raise InputError(what, file=self.deck.file, line=line, expected="BEGIN BULK")
             return 0
         if not _BULK.fullmatch(_text(lines[begin])):
-            what = repr(_text(lines[begin]).strip()[:40])
-            raise InputError(what, file=self.deck.file, line=begin + 1, expected="BEGIN BULK")
+            raise _section(self.deck.file, begin + 1, _text(lines[begin]))
         self.deck.controlled = True
         for i in range(begin):
             if found := _CHOICE.fullmatch(_text(lines[i])):
@@ -224,6 +226,8 @@ class _Reading:
             text = _text(lines[i])
             if not text.strip():
                 continue
+            if _BEGIN.match(text):
+                raise _section(file, i + 1, text)
             found = _INCLUDE.fullmatch(text)
             words = text.split(maxsplit=1)
             if not found and words[0].upper() != "ENDDATA":
@@ -240,6 +244,8 @@ class _Reading:
 
     def line(self, file: Path, i: int, text: str, card: _Rows | None) -> _Rows:
         """Take up one line; return the card that the next line may continue."""
+        if card is None and not self.deck.cards:
+            _check_language(text, file, i + 1)
         line = _split(text, file, i + 1)
         if not line.continues:
             self.close(card)
@@ -288,12 +294,31 @@ def _split(text: str, file: Path, number: int) -> _Line:
         width = _LARGE if "*" in head else _SMALL
         starts = range(_SMALL, 72, width)
         line = _Line(head, [wide[s : s + width].strip() for s in starts], wide[72:80].strip())
+    if any(item.startswith("=") for item in (line.head, *line.fields)):
+        what = "a card that repeats another one (replication)"
+        raise InputError(what, file=file, line=number, expected="cards without =, written out")
     if not line.continues and not _NAME.fullmatch(line.head.rstrip("* ")):
         raise InputError(_shown(line.head), file=file, line=number, expected="the name of a card")
-    if any(item.startswith("=") for item in (line.head, *line.fields)):
-        what = "a card that repeats another one"
-        raise InputError(what, file=file, line=number, expected="cards without =")
     return line
+
+
+def _section(file: Path, line: int, text: str) -> InputError:
+    """Return the error of a second section of bulk data, or of one of another kind."""
+    told = " ".join(text.split())[:40]
+    kind = "superelements are not read: " if "SUPER" in text.upper() else ""
+    return InputError(f"{kind}{told!r}", file=file, line=line, expected=_ONE_SECTION)
+
+
+def _check_language(text: str, file: Path, line: int) -> None:
+    """Check that the first line is none of another program; raises InputError."""
+    word = text.split(maxsplit=1)[0][:20]
+    for pattern, program, expected in (
+        (_ANSYS, "Ansys", "Nastran bulk data; of Ansys its .full file is read"),
+        (_KEYWORD, "Abaqus or CalculiX", "Nastran bulk data; their matrices are read from .mtx"),
+    ):
+        if pattern.match(word):
+            what = f"an input file of {program}: {word!r}"
+            raise InputError(what, file=file, line=line, expected=expected)
 
 
 class _Rows:
@@ -328,18 +353,22 @@ class _Rows:
 
 
 def _inside(main: Path, file: Path, name: str, line: int) -> Path:
-    """Return an included file; raises InputError outside of the folder of the main file."""
-    wrong = InputError(
-        f"included file {name[:80]!r}",
-        file=file,
-        line=line,
-        key="INCLUDE",
-        expected="a file in the folder of the main file",
-    )
+    """Return an included file; raises InputError outside of the folder of the main file.
+
+    Backslashes part folders too, as on Windows.
+    """
+
+    def wrong(why: str) -> InputError:
+        what = f"included file {name[:80]!r} {why}"
+        expected = "a file in the folder of the main file"
+        return InputError(what, file=file, line=line, key="INCLUDE", expected=expected)
+
     try:
-        path = (file.parent / name).resolve()
-        if not path.is_relative_to(main.parent.resolve()) or not path.is_file():
-            raise wrong
+        path = (file.parent / name.replace("\\", "/")).resolve()
+        if not path.is_relative_to(main.parent.resolve()):
+            raise wrong("lies elsewhere")
+        if not path.is_file():
+            raise wrong("is not there")
     except (OSError, ValueError):
-        raise wrong from None
+        raise wrong("cannot be opened") from None
     return main.parent / path.relative_to(main.parent.resolve())

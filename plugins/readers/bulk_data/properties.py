@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from femubench.fem import (
     Material,
     Section,
+    constant_kappa,
     rectangular_tube,
     round_tube,
     solid_rectangle,
@@ -21,21 +22,6 @@ from femubench.plugins.readers.bulk_data.cards import Card
 _SAME = 1e-9
 # What is left of a row of a PBEAM station, besides A, I1, I2, I12, J, NSM.
 _STATION = ("A", "I1", "I2", "I12", "J", "NSM")
-
-
-@dataclass(frozen=True)
-class Shear:
-    """Shear coefficients of a section, whatever Poisson's ratio is.
-
-    A 0 stands for a bar without shear flexibility, whose share is taken out elsewhere.
-    """
-
-    along_y: float
-    along_z: float
-
-    def __call__(self, nu: float) -> tuple[float, float]:
-        """Return the coefficients for shear along y and along z."""
-        return self.along_y or 1.0, self.along_z or 1.0
 
 
 @dataclass(frozen=True)
@@ -96,7 +82,8 @@ class Bar:
             Iz=of.I1,
             J=share * of.J,
             Jp=of.I1 + of.I2,
-            kappa=Shear(share * of.K1, share * of.K2),
+            # 0 is a bar without shear flexibility, whose share is taken out elsewhere.
+            kappa=constant_kappa(share * of.K1 or 1.0, share * of.K2 or 1.0),
             name=name,
         )
 

@@ -12,7 +12,7 @@ from femubench.plugins.readers.bulk_data.writing import write_cards
 
 
 class BulkDataReader:
-    """Reads and writes frames of CBAR and CBEAM in Nastran bulk data."""
+    """Reads and writes frames of CBAR and CBEAM, and trusses of CROD, in Nastran bulk data."""
 
     name: str = "Nastran bulk data"
     suffixes: tuple[str, ...] = (".bdf", ".dat", ".nas")
@@ -32,6 +32,16 @@ class BulkDataReader:
             InputError: at the line of the first card that is wrong or is not read.
         """
         return Reading(read_deck(path)).model()
+
+    def read_remarks(self, path: Path) -> tuple[str, ...]:
+        """Return what the model leaves out or takes otherwise, one sentence each.
+
+        Raises:
+            InputError: as `read_model`.
+        """
+        reading = Reading(read_deck(path))
+        reading.frame()
+        return reading.remarks()
 
     def read_nodes(self, path: Path) -> dict[str, tuple[float, float, float]]:
         """Return where the grids are, whatever the elements are; raises InputError."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -37,20 +39,33 @@ _MOST_MEMBERS, _MOST_CARDS = 20_000, 1_000_000
 _ALONG = 1e-6  # how far a spring between two grids may point off the line between them
 _SAME = 1e-9
 
-# What changes neither mass nor stiffness: loads, output, damping, how to solve.
-_WORDS = """
-    ASET ASET1 CDAMP1 CDAMP2 CDAMP3 CDAMP4 CVISC DAREA DLOAD DPHASE ECHOOFF ECHOON EIGB EIGC
-    EIGR EIGRL FORCE FORCE1 FORCE2 FREQ FREQ1 FREQ2 FREQ3 FREQ4 GRAV LOAD MODTRAK MOMENT MOMENT1
-    MOMENT2 OMIT OMIT1 PARAM PDAMP PLOAD1 PLOTEL PVISC RFORCE RLOAD1 RLOAD2 SET1 SET3 SUPORT
-    SUPORT1 TABDMP1 TABLED1 TABLED2 TABLED3 TABLED4 TEMP TEMPD TLOAD1 TLOAD2 TSTEP USET USET1
+# What changes neither mass nor stiffness: loads, output, damping, design, how to solve; and
+# properties and materials, which without an element carry nothing.
+_IDLE = """
+    ACCEL ACCEL1 CDAMP1 CDAMP2 CDAMP3 CDAMP4 CVISC DAREA DCONADD DCONSTR DDVAL DEFORM DELAY DEQATN
+    DESVAR DLINK DLOAD DOPTPRM DPHASE DRESP1 DRESP2 DRESP3 DSCREEN DTABLE DTI DVBSHAP DVCREL1
+    DVCREL2 DVGRID DVMREL1 DVMREL2 DVPREL1 DVPREL2 DVSET DVSHAP ECHOOFF ECHOON EIGB EIGC EIGP EIGR
+    EIGRL FORCE FORCE1 FORCE2 FREQ FREQ1 FREQ2 FREQ3 FREQ4 FREQ5 GRAV LOAD LSEQ MAT10 MAT2 MAT3 MAT4
+    MAT5 MAT8 MAT9 MDLPRM MODTRAK MOMENT MOMENT1 MOMENT2 MPC MPCADD NLPARM PARAM PBCOMP PBEAML PBEND
+    PBUSH PBUSH1D PBUSHT PCOMP PCOMPG PDAMP PGAP PLOAD PLOAD1 PLOAD2 PLOAD4 PLOTEL PLSOLID PMASS
+    PSHEAR PSHELL PSOLID PTUBE PVISC RANDPS RANDT1 RFORCE RLOAD1 RLOAD2 SET1 SET2 SET3 SLOAD SPCD
+    SPOINT TABDMP1 TABLED1 TABLED2 TABLED3 TABLED4 TABLEM1 TABLEM2 TABLEM3 TABLEM4 TABLES1 TABLEST
+    TABRND1 TABRNDG TEMP TEMPD TEMPP1 TEMPRB TIC TLOAD1 TLOAD2 TSTEP TSTEPNL
 """
-IGNORED = frozenset(_WORDS.split())
+_REDUCTION = """
+    ASET ASET1 BNDFIX BNDFIX1 BNDFREE BNDFREE1 BSET BSET1 CSET CSET1 DYNRED OMIT OMIT1 QSET QSET1
+    RVDOF RVDOF1 SUPORT SUPORT1 USET USET1
+"""
+_REDUCING = frozenset(_REDUCTION.split())
+IGNORED = frozenset(_IDLE.split()) | _REDUCING
 _READ = frozenset(
     (
         *(*PROPERTIES, *_BARS, *KINDS, "GRID", "GRDSET", "BAROR", "CROD", "MAT1", "CONM2"),
         *("CELAS1", "CELAS2", "PELAS", "RBE2", "SPC", "SPC1", "SPCADD"),
     )
 )
+_OTHER = frozenset(("PBCOMP", "PBEAML", "PBEND"))  # left out where no bar names them
+_SUPERELEMENT = re.compile(r"SE(?!T)\w+|CSUP(ER|EXT)|EXTRN")
 
 
 @dataclass(frozen=True)
@@ -88,19 +103,23 @@ def numbered(deck: Deck, *names: str) -> dict[int, Card]:
 
 def grids_of(deck: Deck) -> dict[int, Grid]:
     """Return the grids by their numbers; raises InputError."""
-    systems = Systems(numbered(deck, *KINDS))
     usual = next((card for card in deck.cards if card.name == "GRDSET"), None)
-    first = 0 if usual is None else usual.id(2, "CP", 0)
     shown = 0 if usual is None else usual.id(6, "CD", 0)
-    found = {}
+    systems, found = systems_of(deck), {}
     for number, card in numbered(deck, "GRID").items():
-        place = systems.find(card.id(2, "CP", first), card, "CP")
-        xyz = place.point(np.array(card.vector(3, "X")))
+        xyz = systems.place(card)
         if card.text(6) == "-1":
             raise card.error("a point of a fluid", "a grid of a structure", "CD")
         motion = systems.find(card.id(6, "CD", shown), card, "CD")
         found[number] = Grid(card, xyz, motion.axes_at(xyz))
     return found
+
+
+def systems_of(deck: Deck) -> Systems:
+    """Return the coordinate systems of a file; raises InputError."""
+    usual = next((card for card in deck.cards if card.name == "GRDSET"), None)
+    first = 0 if usual is None else usual.id(2, "CP", 0)
+    return Systems(deck.cards, numbered(deck, "GRID"), first)
 
 
 @dataclass
@@ -131,6 +150,13 @@ class Parts:
         self.of[id(part)] = card
 
 
+def _unread(card: Card) -> InputError:
+    if _SUPERELEMENT.fullmatch(card.name):
+        return card.error("superelements are not read", "all of the structure in one section")
+    expected = "a frame of CBAR, CBEAM, CROD, CONM2, CELAS2, RBE2, SPC; see the docs"
+    return card.error("this card is not read", expected)
+
+
 class Reading:
     """Bulk data as a frame.
 
@@ -147,11 +173,10 @@ class Reading:
         self.named: dict[str, list[Card]] = {}
         for card in deck.cards:
             if card.name not in _READ | IGNORED:
-                expected = "a frame of CBAR, CBEAM, CROD, CONM2, CELAS2, RBE2, SPC; see the docs"
-                raise card.error("this card is not read", expected)
+                raise _unread(card)
             self.named.setdefault(card.name, []).append(card)
         self.weight = self._weight()
-        self.systems = Systems(numbered(deck, *KINDS))
+        self.systems = systems_of(deck)
         self.grids = grids_of(deck)
         self.sorted = sorted(self.grids)
         self.listed = 0  # grids in lists so far
@@ -160,7 +185,7 @@ class Reading:
         properties = numbered(deck, *PROPERTIES).items()
         self.bars = {number: bar_of(card, materials) for number, card in properties}
         self.parts = Parts()
-        self.pid: dict[str, int] = {}  # of every member
+        self.bar_of: dict[str, Bar] = {}  # by member
         self.card_of: dict[str, Card] = {}
 
     def frame(self) -> Frame:
@@ -169,13 +194,15 @@ class Reading:
         actions: dict[str, Callable[[Card], None]] = {
             **dict.fromkeys(_BARS, self._bar),
             **dict.fromkeys(("CELAS1", "CELAS2"), self._spring),
-            **{"CROD": self._rod, "CONM2": self._mass, "RBE2": self._link},
+            **{"CONM2": self._mass, "RBE2": self._link},
         }
         for card in elements.values():
-            actions[card.name](card)
+            if card.name in actions:
+                actions[card.name](card)
+        self._rods([card for card in elements.values() if card.name not in actions])
         if not self.parts.members:
-            expected = "a frame of CBAR or CBEAM"
-            raise InputError("there is no bar", file=self.deck.file, expected=expected)
+            what, expected = "there is no bar", "a frame of CBAR or CBEAM, or a truss of CROD"
+            raise InputError(what, file=self.deck.file, expected=expected)
         self._supports()
         self._check_held()
         return self._assembled()
@@ -253,7 +280,8 @@ class Reading:
         usual = next(self._cards("BAROR"), None) if card.name == "CBAR" else None
         own = card.id(1, "EID")
         number = card.id(2, "PID", own if usual is None else usual.id(2, "PID", own))
-        self._property(card, number, ("PBAR", "PBARL") if card.name == "CBAR" else ("PBEAM",))
+        kinds = ("PBAR", "PBARL") if card.name == "CBAR" else ("PBEAM",)
+        bar = self._property(card, number, kinds)
         ends = [self.grid(card, 3 + i, key) for i, key in enumerate(("GA", "GB"))]
         flags = card.text(8) or (usual.text(8) if usual else "") or "GGG"
         if flags not in ("GGG", "BGG", "GGO", "GOG", "GOO", "BGO", "BOG", "BOO"):
@@ -274,25 +302,17 @@ class Reading:
         up = np.cross(x, v)
         if not np.linalg.norm(up) > 1e-6 * np.linalg.norm(v):
             raise card.error("the orientation vector lies along the bar", "one across it", "X1")
-        bar = self.bars[number]
-        up = up / np.linalg.norm(up)
-        name = f"E{card.id(1, 'EID')}"
-        member = Member(
-            name,
-            (names[0], names[1]),
-            1,
-            bar.frame_section(),
-            bar.frame_material(weight=self.weight),
-            (float(up[0]), float(up[1]), float(up[2])),
-        )
-        self.parts.add("members", member, card)
-        self.pid[name], self.card_of[name] = number, card
-        self._pins(card, member)
+        self._pins(card, self._member(card, bar, (names[0], names[1]), up))
 
     def _property(self, card: Card, number: int, kinds: tuple[str, ...]) -> Bar:
         bar = self.bars.get(number)
         if bar is None or bar.card.name not in kinds:
             wanted = " or ".join(kinds)
+            other = next(
+                (c for c in self.deck.cards if c.name in _OTHER and c.text(1) == str(number)), None
+            )
+            if other is not None:
+                raise other.error("this property is not read", f"a {wanted}")
             raise card.error(f"there is no {wanted} {number}", f"the number of a {wanted}", "PID")
         return bar
 
@@ -331,21 +351,61 @@ class Reading:
         if card.name == "CBEAM" and any(card.real(i, "SA", 0.0) for i in (17, 18)):
             raise card.error("warping", "no SA and SB", "SA")
 
-    def _rod(self, card: Card) -> None:
-        """Add a rod: a spring along its line, and half of its mass at either end."""
-        bar = self._property(card, card.id(2, "PID", card.id(1, "EID")), ("PROD",))
-        ends = [self.grid(card, 3 + i, f"G{i + 1}") for i in range(2)]
-        length = float(np.linalg.norm(ends[1].xyz - ends[0].xyz))
+    def _rods(self, cards: list[Card]) -> None:
+        """Add rods, when it is known which joints bars, links and springs can turn."""
+        turning = self._turning()
+        for card in cards:
+            number = card.id(2, "PID", card.id(1, "EID"))
+            bar = self._property(card, number, ("PROD",))
+            ends = tuple(self.grid(card, 3 + i, f"G{i + 1}") for i in range(2))
+            names = {grid.name for grid in ends}
+            if not names <= turning:  # the joint turns freely with the rod
+                bar = replace(bar, of=replace(bar.of, J=0.0))
+            self._rod(card, bar, ends, lumped=bool(names & turning))
+
+    def _joined(self) -> set[str]:
+        """Return the joints of bars and links, which take up rotations."""
+        found = {name for link in self.parts.links for name in (link.leads, *link.follows)}
+        bars = (m for m in self.parts.members if self.card_of[m.name].name != "CROD")
+        return found | {name for member in bars for name in member.ends}
+
+    def _turning(self) -> set[str]:
+        """Return the joints whose rotations a bar, a link or a spring takes up."""
+        springs = (s for s in self.parts.springs if s.direction in DIRECTIONS[3:])
+        found = {spring.at.joint for spring in springs if spring.at.joint is not None}
+        return found | self._joined()
+
+    def _rod(self, card: Card, bar: Bar, ends: tuple[Grid, ...], *, lumped: bool) -> None:
+        """Add a member that does not bend; lumped: half of its mass at either end, else its own.
+
+        Where a joint turns, mass of a member would turn with it.
+        """
+        x = ends[1].xyz - ends[0].xyz
+        length = float(np.linalg.norm(x))
         if not length > 0.0:
             raise card.error("the rod has no length", "two grids apart", "G2")
-        if bar.of.J * bar.G > 0.0:
-            expected = "no J, or a CBAR"
-            raise bar.card.error("a rod that resists twist is not read", expected, "J")
-        brace = Brace((ends[0].name, ends[1].name), bar.E * bar.of.A / length)
-        self.parts.add("braces", brace, card)
         half = 0.5 * self.weight * (bar.rho * bar.of.A + bar.of.nsm) * length
-        for grid in ends if half > 0.0 else ():
-            self.parts.add("masses", PointMass(Place(joint=grid.name), half), card)
+        if lumped:
+            bar = replace(bar, rho=0.0, of=replace(bar.of, nsm=0.0))
+            for grid in ends if half > 0.0 else ():
+                self.parts.add("masses", PointMass(Place(joint=grid.name), half), card)
+        up = np.cross(x, np.eye(3)[np.abs(x).argmin()])  # any across: nothing depends on it
+        self._member(card, bar, (ends[0].name, ends[1].name), up)
+
+    def _member(self, card: Card, bar: Bar, ends: tuple[str, str], up: FloatArray) -> Member:
+        """Add the member of an element."""
+        name, z = f"E{card.id(1, 'EID')}", up / np.linalg.norm(up)
+        member = Member(
+            name,
+            ends,
+            1,
+            bar.frame_section(),
+            bar.frame_material(weight=self.weight),
+            (float(z[0]), float(z[1]), float(z[2])),
+        )
+        self.parts.add("members", member, card)
+        self.bar_of[name], self.card_of[name] = bar, card
+        return member
 
     def _spring(self, card: Card) -> None:
         direct = card.name == "CELAS2"
@@ -458,6 +518,9 @@ class Reading:
         if "MPC" in self.deck.chosen:
             what = "a set of MPC is chosen"
             raise InputError(what, file=self.deck.file, expected="RBE2 instead")
+        if not self.deck.controlled:
+            for card in self._cards("MPC", "MPCADD"):
+                raise card.error("this card is not read", "RBE2, or case control without MPC")
         if self.deck.controlled:
             chosen = {self.deck.chosen["SPC"]} if "SPC" in self.deck.chosen else set()
             for card in self._cards("SPCADD"):
@@ -492,31 +555,59 @@ class Reading:
 
     def _check_held(self) -> None:
         """Check that every joint is part of the structure; hold rotations that nothing resists."""
-        ends = {name for member in self.parts.members for name in member.ends}
-        linked = {name for link in self.parts.links for name in (link.leads, *link.follows)}
-        braced = {name for brace in self.parts.braces for name in brace.ends}
+        joined = self._joined()
+        ends = [member.ends for member in self.parts.members]
+        ends += [brace.ends for brace in self.parts.braces]
+        pulled = {name for pair in ends for name in pair}
         sprung: dict[str | None, set[str]] = {}
         for spring in self.parts.springs:
             sprung.setdefault(spring.at.joint, set()).add(spring.direction)
         for name in self.parts.joints:
-            if name in ends or name in linked:
+            if name in joined:
                 continue
-            if name not in braced and name not in sprung:
+            if name not in pulled and name not in sprung:
                 card = self.grids[int(name)].card
                 raise card.error("nothing holds this grid", "a bar, a rod, a spring or an RBE2")
             idle = tuple(d for d in DIRECTIONS[3:] if d not in sprung.get(name, ()))
             if idle:
                 self.parts.supports.append(Support(Place(joint=name), idle))
 
+    def remarks(self) -> tuple[str, ...]:
+        """Return what the frame leaves out or takes otherwise than the file says."""
+        counts = Counter(card.name for card in self.deck.cards)
+        rods = [name for name, card in self.card_of.items() if card.name == "CROD"]
+        lumped = [name for name in rods if not self.bar_of[name].rho > 0.0]
+        twisting = [n for n in rods if self.bar_of[n].card.real(4, "J", 0.0) > self.bar_of[n].of.J]
+        found = [
+            _listed("cards left out: {}", counts, IGNORED - _REDUCING),
+            _listed("nothing is reduced or held by {}: all directions stay", counts, _REDUCING),
+        ]
+        if any(name in counts for name in ("DVPREL1", "DVPREL2", "DVMREL1", "DVMREL2")):
+            found.append("properties are those of their cards, not of the design variables")
+        if lumped:
+            what = "half of their mass at either end, which no factor on density changes"
+            found.append(f"{len(lumped)} CROD beside bars: {what}")
+        if twisting:
+            found.append("J of PROD is left out: a joint of rods alone takes up no twist")
+        if not self._consistent() and any(m.material.rho > 0.0 for m in self.parts.members):
+            found.append("masses are consistent; the file asks for lumped ones (COUPMASS)")
+        return tuple(filter(None, found))
+
+    def _consistent(self) -> bool:
+        """Tell whether the file asks for consistent masses, which are not Nastran's default."""
+        cards = [card for card in self._cards("PARAM") if card.text(1) == "COUPMASS"]
+        return any(card.text(2) == "YES" or card.text(2).strip("+0") == "1" for card in cards)
+
     def _assembled(self) -> Frame:
         parts = self.parts
         if len(parts.members) > _MOST_MEMBERS or len(parts.joints) > _MOST_MEMBERS:
             what, expected = f"{len(parts.members)} bars", f"at most {_MOST_MEMBERS}"
             raise InputError(what, file=self.deck.file, expected=expected)
-        bars = {m.name: self.bars[self.pid[m.name]] for m in parts.members}
         return Frame(
             plane="3d",
-            beam="timoshenko" if any(b.has_shear for b in bars.values()) else "euler-bernoulli",
+            beam="timoshenko"
+            if any(b.has_shear for b in self.bar_of.values())
+            else "euler-bernoulli",
             joints=tuple(sorted(parts.joints.values(), key=lambda j: self._order(j.name))),
             members=tuple(parts.members),
             masses=tuple(parts.masses),
@@ -525,13 +616,19 @@ class Reading:
             joint_springs=tuple(parts.joint_springs),
             links=tuple(parts.links),
             braces=tuple(parts.braces),
-            factors=tuple(_factors(bars)),
+            factors=tuple(_factors(self.bar_of)),
             families=_families(parts.members),
         )
 
     def _order(self, name: str) -> tuple[int, int]:
         grid, _, number = name.partition(".")
         return int(grid), int(number or 0)
+
+
+def _listed(sentence: str, counts: Counter[str], names: frozenset[str]) -> str:
+    """Return a sentence that lists the cards of some names, empty where there are none."""
+    there = ", ".join(f"{name} ({counts[name]})" for name in sorted(names & set(counts)))
+    return sentence.format(there) if there else ""
 
 
 def _families(members: list[Member]) -> tuple[MemberSet, ...]:

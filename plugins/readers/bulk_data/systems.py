@@ -1,9 +1,10 @@
-"""Coordinate systems of bulk data: rectangular and cylindrical, each given in another one."""
+"""Coordinate systems of bulk data: rectangular, cylindrical and spherical, by points or grids."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -11,48 +12,82 @@ from femubench.fem import FloatArray
 from femubench.plugins.readers.bulk_data.cards import Card
 
 _DEEPEST = 50  # systems one in another
+Kind = Literal["R", "C", "S"]  # the last letter of a card
 
 
 @dataclass(frozen=True)
 class System:
-    """A coordinate system: its origin, its axes as rows, and whether it is cylindrical."""
+    """A coordinate system: its origin, its axes as rows, and what its coordinates are.
+
+    Arguments:
+        kind: R for x, y, z; C for radius, angle about z, z; S for radius, angle from z, angle
+            about z.
+    """
 
     origin: FloatArray
     axes: FloatArray
-    cylindrical: bool = False
+    kind: Kind = "R"
 
     def point(self, coordinates: FloatArray) -> FloatArray:
-        """Return where a point lies in basic coordinates, (3,)."""
+        """Return where a point lies in basic coordinates, (3,); angles are in degrees."""
         local = coordinates
-        if self.cylindrical:
-            radius, angle, z = coordinates
-            angle = np.radians(angle)
-            local = np.array([radius * np.cos(angle), radius * np.sin(angle), z])
+        if self.kind == "C":
+            radius, around, z = coordinates
+            local = np.array([*(radius * _circle(around)), z])
+        elif self.kind == "S":
+            radius, down, around = coordinates
+            z, beside = radius * _circle(down)
+            local = np.array([*(beside * _circle(around)), z])
         return np.asarray(self.origin + local @ self.axes)
 
     def axes_at(self, point: FloatArray) -> FloatArray:
-        """Return the axes of displacements at a point (basic coordinates), as rows, (3, 3)."""
-        if not self.cylindrical:
+        """Return the axes of displacements at a point (basic coordinates), as rows, (3, 3).
+
+        On the axis of a system that is not rectangular, the point counts as beside it along x.
+        """
+        if self.kind == "R":
             return self.axes
-        x, y, _ = self.axes @ (point - self.origin)
-        radius = float(np.hypot(x, y))
-        c, s = (x / radius, y / radius) if radius > 0.0 else (1.0, 0.0)
-        return np.asarray(np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ self.axes)
+        x, y, z = self.axes @ (point - self.origin)
+        beside = float(np.hypot(x, y))
+        c, s = (x / beside, y / beside) if beside > 0.0 else (1.0, 0.0)
+        turned = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        if self.kind == "S":
+            radius = float(np.hypot(beside, z))
+            up, out = (z / radius, beside / radius) if radius > 0.0 else (1.0, 0.0)
+            along, across, pole = turned
+            turned = np.array([out * along + up * pole, up * along - out * pole, across])
+        return np.asarray(turned @ self.axes)
+
+
+def _circle(degrees: float) -> FloatArray:
+    angle = np.radians(degrees)
+    return np.array([np.cos(angle), np.sin(angle)])
 
 
 BASIC = System(np.zeros(3), np.eye(3))
-KINDS = ("CORD2R", "CORD2C")
+_BY_GRIDS, _BY_POINTS = ("CORD1R", "CORD1C", "CORD1S"), ("CORD2R", "CORD2C", "CORD2S")
+KINDS = (*_BY_GRIDS, *_BY_POINTS)
 
 
 class Systems:
     """The coordinate systems of a file by their numbers, 0 for the basic one.
 
     Arguments:
-        cards: the CORD2R and CORD2C by number.
+        cards: of the file, of any kind.
+        grids: the GRID cards by number, on which systems may hang.
+        usual: the system in which grids lie that name none.
+
+    Raises:
+        InputError: where a number is there twice, for different systems.
     """
 
-    def __init__(self, cards: Mapping[int, Card]) -> None:
-        self._cards = cards
+    def __init__(self, cards: Iterable[Card], grids: Mapping[int, Card], usual: int = 0) -> None:
+        self._cards: dict[int, Card] = {}
+        for card in (c for both in cards if both.name in KINDS for c in _parted(both)):
+            other = self._cards.setdefault(card.id(1, "CID"), card)
+            if (other.name, other.fields) != (card.name, card.fields):
+                raise card.error(f"{other} is there already", "a number of its own")
+        self._grids, self._usual = grids, usual
         self._known = {0: BASIC}
 
     def find(self, number: int, user: Card, key: str, depth: int = 0) -> System:
@@ -70,17 +105,42 @@ class Systems:
         if number not in self._known:
             card = self._cards.get(number)
             if card is None or depth > _DEEPEST:
-                expected = f"0 or the number of a {' or '.join(KINDS)}, none within itself"
+                expected = "0 or the number of a CORD1 or CORD2, none within itself"
                 raise user.error(f"there is no coordinate system {number}", expected, key)
-            base = self.find(card.id(2, "RID", 0), card, "RID", depth + 1)
-            self._known[number] = _system(card, base)
+            self._known[number] = _system(card, self._points(card, depth + 1))
         return self._known[number]
 
+    def place(self, grid: Card, depth: int = 0) -> FloatArray:
+        """Return where a grid lies in basic coordinates, (3,); raises InputError."""
+        system = self.find(grid.id(2, "CP", self._usual), grid, "CP", depth)
+        return system.point(np.array(grid.vector(3, "X")))
 
-def _system(card: Card, base: System) -> System:
+    def _points(self, card: Card, depth: int) -> list[FloatArray]:
+        """Return the three points of a system: origin, on z, in x-z."""
+        if card.name in _BY_POINTS:
+            base = self.find(card.id(2, "RID", 0), card, "RID", depth)
+            return [base.point(np.array(card.vector(3 + 3 * i, k))) for i, k in enumerate("ABC")]
+        found = []
+        for i in (2, 3, 4):
+            number = card.id(i, f"G{i - 1}")
+            if number not in self._grids:
+                expected = "the number of a GRID"
+                raise card.error(f"there is no GRID {number}", expected, f"G{i - 1}")
+            found.append(self.place(self._grids[number], depth))
+        return found
+
+
+def _parted(card: Card) -> list[Card]:
+    """Return a card for every system of a card: a CORD1 may hold two."""
+    if card.name in _BY_POINTS or len(card.fields) <= 4:
+        return [card]
+    halves = card.fields[:4], card.fields[4:8]
+    return [Card(card.name, half, card.file, card.first, card.last) for half in halves]
+
+
+def _system(card: Card, points: list[FloatArray]) -> System:
     """Return the system of three points: origin, on z, in x-z."""
-    points = [np.array(card.vector(3 + 3 * i, name)) for i, name in enumerate("ABC")]
-    origin, on_z, in_xz = (base.point(point) for point in points)
+    origin, on_z, in_xz = points
     z, towards_x = on_z - origin, in_xz - origin
     y = np.cross(z, towards_x)
     sizes = np.linalg.norm(z), np.linalg.norm(towards_x), np.linalg.norm(y)
@@ -88,4 +148,5 @@ def _system(card: Card, base: System) -> System:
         raise card.error("the points lie on one line", "a point on z, and one in x-z beside it")
     z, y = z / sizes[0], y / sizes[2]
     axes = np.array([np.cross(y, z), y, z])
-    return System(origin, axes, card.name == "CORD2C")
+    kinds: dict[str, Kind] = {"R": "R", "C": "C", "S": "S"}
+    return System(origin, axes, kinds[card.name[-1]])

@@ -64,13 +64,11 @@ def write_cards(model: Model, path: Path, original: Path) -> None:
     deck = read_deck(original)
     reading = Reading(deck)
     nominal = reading.model().frame_structure
-    bars = {name: reading.bars[number] for name, number in reading.pid.items()}
     if model.structure is None or model.mass_change or model.stiffness_change:
         raise _refusal(path)
     masses, springs = _added(model.structure.frame, nominal.frame)
-    changed = _changed(
-        model, nominal.rebuilt(nominal.frame.with_attachments(masses, springs)), bars, path
-    )
+    laden = nominal.rebuilt(nominal.frame.with_attachments(masses, springs))
+    changed = _changed(model, laden, reading.bar_of, path)
     cards = _Cards(reading)
     cards.assign(changed)
     cards.attach(masses, springs, path)
@@ -206,7 +204,8 @@ class _Cards:
         """Find cards for the new numbers of every bar."""
         wanted: dict[int, dict[tuple[Numbers, Numbers], list[str]]] = {}
         for name, numbers in changed.items():
-            wanted.setdefault(self.reading.pid[name], {}).setdefault(numbers, []).append(name)
+            pid = self.reading.bar_of[name].card.id(1, "PID")
+            wanted.setdefault(pid, {}).setdefault(numbers, []).append(name)
         number_of = self._materials(wanted)
         for property_number, groups in wanted.items():
             bar = self.reading.bars[property_number]
@@ -266,9 +265,7 @@ class _Cards:
         """Return from a material and its new numbers to the number of a card that has them."""
         variants: dict[str, dict[Numbers, Bar]] = {}
         for number, bar in self.reading.bars.items():
-            rods: dict[tuple[Numbers, Numbers], object] = {((), ()): None}  # stay as they are
-            groups = rods if bar.card.name == "PROD" else wanted.get(number, {})
-            for _, numbers in groups:
+            for _, numbers in wanted.get(number, {}):
                 variants.setdefault(_material_of(bar), {})[numbers] = bar
         found: dict[tuple[str, Numbers], str] = {}
         for material, own in variants.items():
@@ -343,7 +340,7 @@ def _property(
         texts = ["", "", *(real(numbers[key]) for key in _ROW), *[""] * 9]
         texts += [real(numbers["K1"]), real(numbers["K2"])]
     else:
-        row = (2, 3, 4, 5, 6) if name == "PBAR" else (2, 3, 4, 6, 7)
+        row = {"PBAR": (2, 3, 4, 5, 6), "PROD": (2, 0, 0, 3, 5)}.get(name, (2, 3, 4, 6, 7))
         places = dict(zip(_ROW, row, strict=True)) | {"K1": 16, "K2": 17}
         if name == "PBEAM":  # one section all along, so that no station is needed
             texts = [*texts[:16], *(real(getattr(of, key)) for key in ("K1", "K2"))]
