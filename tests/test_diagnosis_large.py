@@ -215,7 +215,7 @@ class TestNaming:
         rung = sp.csc_array(2.0 * (model.stiffness - weaker))
         held = sp.csc_array(whole - rung)
         bare = Model(model.mass, held + rung, dofs, geometry, groups={"frame": held, "rung": rung})
-        truth = MemberStiffness().extend(bare, "rung", [0.6])
+        truth = MemberStiffness().extend(bare, "group:rung", [0.6])
         rows = np.arange(10, n, 47)
         labels = tuple(f"s{i}" for i in rows)
         sensors = Sensors(labels, xyz[rows], ("z",) * len(rows))
@@ -224,7 +224,9 @@ class TestNaming:
         used, held_out = tuple(range(1, USED + 1)), tuple(range(USED + 1, USED + HELD_OUT + 1))
         case = Case("case", "", "", Path(), bare, measurement, used, held_out)
         diagnosis = diagnose(case, [MemberStiffness(), YoungsModulus()], pairs=False)
-        assert [(c.effect, c.place) for c in diagnosis.causes] == [("member-stiffness", "rung")]
+        assert [(c.effect, c.place) for c in diagnosis.causes] == [
+            ("member-stiffness", "group:rung")
+        ]
         assert diagnosis.causes[0].parameters[0].value == pytest.approx(0.6, rel=0.2)
 
 

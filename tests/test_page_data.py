@@ -285,7 +285,7 @@ class TestDocument:
         assert html.count("<script") == 2
 
     def test_every_asset_of_the_run_page_is_in_it(self) -> None:
-        others = ("compare", "diagnosis", "site", "publish", "history")
+        others = ("compare", "diagnosis", "identification", "site", "publish", "history")
         own = [p.name for p in ASSETS.iterdir() if not p.name.startswith(others)]
         assert sorted(own) == sorted([*SCRIPTS, *STYLES, "run.html"])
 

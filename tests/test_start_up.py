@@ -30,7 +30,9 @@ HEAVY = {
     *("tabulate", "threadpoolctl", "tomlkit", "pyuff", "pyarrow"),
 }
 # Imported under a name of its own, as the package that brings it documents.
-PART_OF = {"pydantic_core": "pydantic", "markupsafe": "jinja2", "pyoma2": "pyoma_2"}
+PART_OF = {"pydantic_core": "pydantic", "markupsafe": "jinja2", "pyoma2": "pyoma_2"} | {
+    "ansys": "ansys_mapdl_reader"
+}
 RUN = """
 import sys
 from femubench.core.cli.main import bench
@@ -124,7 +126,8 @@ def test_dependencies_are_what_is_imported() -> None:
     found = {entry for path in FILES for entry in third_party(path)}
     extras = PROJECT["optional-dependencies"]
     needed = names(PROJECT["dependencies"])
-    optional = names([*extras["identify"], *extras["parquet"], *extras["plot"]])
+    imported = ("ansys", "hdf5", "identify", "nastran", "parquet", "plot")
+    optional = names([text for extra in imported for text in extras[extra]])
     # pytest loads the plugin for pytest itself.
     assert {name for name, _ in found} == needed | optional | {"pytest"}
     assert not {name for name, at_once in found if at_once} & optional

@@ -37,14 +37,17 @@ VERBS = {
         "Write the updated model of CASE in the format that it came in.",
     ),
     "diagnose": ("femubench.core.cli.diagnose", "Find what a model lacks, and extend it."),
-    "identify": ("femubench.core.cli.identify", "Find modes in measured responses."),
+    "identify": (
+        "femubench.core.cli.identify",
+        "Find modes in measured responses, without a click.",
+    ),
     "reproduce": (
         "femubench.core.cli.reproduce",
         "Recompute the tables of the papers, cell by cell.",
     ),
     "init": (
         "femubench.core.cli.init",
-        "Write a commented example case into FOLDER, which must be new or empty.",
+        "Write a case folder into FOLDER, which must be new or empty.",
     ),
     "challenge": (
         "femubench.core.cli.challenge",
