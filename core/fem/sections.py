@@ -54,17 +54,20 @@ def constant_kappa(value: float, along_z: float | None = None) -> ShearCoefficie
         >>> fem.constant_kappa(0.44, 0.85)(0.33)
         (0.44, 0.85)
     """
-    if along_z is None or along_z == value:
-        return partial(_constant, value)
-    return partial(_constant_pair, value, along_z)
+    return partial(_constant, value) if along_z is None else _ConstantPair(value, along_z)
 
 
 def _constant(value: float, nu: float) -> tuple[float, float]:
     return value, value
 
 
-def _constant_pair(along_y: float, along_z: float, nu: float) -> tuple[float, float]:
-    return along_y, along_z
+@dataclass(frozen=True)
+class _ConstantPair:
+    along_y: float
+    along_z: float
+
+    def __call__(self, nu: float) -> tuple[float, float]:
+        return self.along_y, self.along_z
 
 
 def bredt(b: float, h: float, wall: float) -> float:

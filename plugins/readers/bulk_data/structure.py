@@ -389,7 +389,8 @@ class Reading:
             bar = replace(bar, rho=0.0, of=replace(bar.of, nsm=0.0))
             for grid in ends if half > 0.0 else ():
                 self.parts.add("masses", PointMass(Place(joint=grid.name), half), card)
-        up = np.cross(x, np.eye(3)[np.abs(x).argmin()])  # any across: nothing depends on it
+        # Any vector across will do: nothing depends on it.
+        up = np.asarray(np.cross(x, np.eye(3)[np.abs(x).argmin()]), dtype=float)
         self._member(card, bar, (ends[0].name, ends[1].name), up)
 
     def _member(self, card: Card, bar: Bar, ends: tuple[str, str], up: FloatArray) -> Member:
