@@ -201,6 +201,9 @@ class _Keys:
             sides = " x ".join(f"{side:.4g}" for side in size)
             yield f"# It has {case.model.size} degrees of freedom, spans {sides} m along x, y, z"
             yield f"# and has a mass of {case.model.total_mass:.4g} kg."
+        yield "# free = true   # if it hung free: nothing that holds it to ground is then suspected"
+        if case is not None and case.model.structure is not None:
+            return
         yield "# Parts that may be wrong by a factor are the parameters of most strategies:"
         yield "# [[model.groups]]"
         yield '# name = "bearings"'
