@@ -73,6 +73,7 @@ def test_folder_runs_and_says_what_was_done(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     told = " ".join(done.output.split())
     assert "coordinates were taken in mm" in told
+    assert "along x, y, z and has a mass of" in told
     assert "8 of the 8 sensors of test.uff were moved" in told
     assert told.count("1.000") == 6  # MAC
     assert told.count("held out") == 2

@@ -21,6 +21,7 @@ from femubench.core.case.table_text import csv_bytes
 from femubench.core.case.tables import read_table
 from femubench.core.case.writing import new_folder
 from femubench.core.errors import InputError
+from femubench.core.fem.model import Model
 from femubench.core.files import check_regular
 from femubench.core.roles import Reader
 
@@ -197,10 +198,7 @@ class _Keys:
         told = "" if given.model_unit else "   # not told: m, N and kg were taken"
         yield f'unit = "{given.model_unit or "m"}"{told}'
         if case is not None:
-            size = np.ptp(case.model.dofs.xyz, axis=0) if len(case.model.dofs) else np.zeros(3)
-            sides = " x ".join(f"{side:.4g}" for side in size)
-            yield f"# It has {case.model.size} degrees of freedom, spans {sides} m along x, y, z"
-            yield f"# and has a mass of {case.model.total_mass:.4g} kg."
+            yield f"# It {sizes_of(case.model)}."
         yield "# free = true   # if it hung free: nothing that holds it to ground is then suspected"
         if case is not None and case.model.structure is not None:
             return
@@ -231,6 +229,16 @@ class _Keys:
         yield f"held_out = {list(self.held_out)}   # {share}"
         yield "# band = [LOW, HIGH]   # in Hz, if every mode in between was found"
         yield "# mass = {value = KG, std = KG}   # if the structure was weighed"
+
+
+def sizes_of(model: Model) -> str:
+    """Return how large and heavy a model is, as a clause: a wrong unit shows there first."""
+    extent = np.ptp(model.dofs.xyz, axis=0) if len(model.dofs) else np.zeros(3)
+    sides = " x ".join(f"{side:.4g}" for side in extent)
+    return (
+        f"has {model.size} degrees of freedom, spans {sides} m along x, y, z and has a mass of "
+        f"{model.total_mass:.4g} kg"
+    )
 
 
 def _quoted(text: str) -> str:

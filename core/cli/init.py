@@ -87,8 +87,10 @@ def init(
 
 def _tell(case: Case) -> None:
     """Print how well model and test go together, and which modes are held out."""
+    from femubench.core.case.starting import sizes_of
     from femubench.core.library.new_case import nominal_pairs
 
+    click.echo(wrapped(f"The model {sizes_of(case.model)}.", hanging=2))
     for note in case.notes:
         click.echo(wrapped(f"Note: {note}", hanging=2))
     if case.matches:
