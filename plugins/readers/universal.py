@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import redirect_stdout
 from dataclasses import dataclass
-from io import StringIO
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +17,7 @@ from femubench import InputError, Measurement, Sensors
 from femubench.fem import Outline
 from femubench.modal import FrequencyResponses, TimeSignals, real_modes
 from femubench.plugins.readers.reading import opened
+from femubench.plugins.readers.universal_datasets import Dataset, read_datasets
 
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _COORDINATES, _UNITS, _SYSTEMS, _SHAPES = (15, 2411), 164, (18, 2420), (55, 2414)
@@ -26,11 +25,9 @@ _HEADER, _TRACES, _ELEMENTS = 151, 82, 2412
 _WANTED = (*_COORDINATES, _UNITS, *_SYSTEMS, *_SHAPES, _HEADER, _TRACES, _ELEMENTS)
 _NORMAL_MODE, _COMPLEX_MODES = 2, (3, 7)
 _MOTIONS = (0, 1, 8, 11, 12)  # unknown, general, displacement, velocity, acceleration
-_LARGEST, _MOST_NUMBERS = 256, 20_000_000  # MiB of a file; modes times places
+_MOST_NUMBERS = 20_000_000  # modes times places
 _GLOBAL = (0, 1)  # numbers that writers use for the global axes without defining them
 _DRAWN = (_HEADER, _TRACES, _ELEMENTS)  # of no use to modes, and left out where they are broken
-
-Dataset = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -70,17 +67,7 @@ class UniversalReader:
         Raises:
             InputError: when the file is broken, or holds neither nodes nor modes.
         """
-        datasets, other = _datasets(path)
-        # A dataset that is cut short may lack any column.
-        with opened(path, "whole datasets"):
-            nodes, modes = _nodes(path, datasets), _modes(path, datasets)
-        if not nodes and not modes:
-            expected = "datasets 15 or 2411 with nodes, 55 or 2414 with modes"
-            what = "neither nodes nor modes"
-            if 58 in other:
-                what += "; frequency responses (dataset 58) must be turned into modes first"
-            raise InputError(what, file=path, expected=expected)
-        return _measurement(path, nodes, modes)
+        return _sensors_and_modes(path, *read_datasets(path, _WANTED, _DRAWN))
 
     def read_outline(self, path: Path) -> Outline:
         """Return the title of a test, and the lines that draw its structure.
@@ -88,7 +75,7 @@ class UniversalReader:
         Raises:
             InputError: when the file is broken.
         """
-        datasets, _ = _datasets(path)
+        datasets, _ = read_datasets(path, _WANTED, _DRAWN)
         with opened(path, "whole datasets"):
             nodes = _nodes(path, datasets)
         pairs = dict.fromkeys(tuple(sorted(pair)) for pair in _lines(datasets, nodes))
@@ -106,37 +93,23 @@ class UniversalReader:
         """
         from femubench.plugins.readers.universal_functions import read_functions
 
-        has_nodes = any(_of(_datasets(path)[0], *_COORDINATES))
-        return read_functions(path, self.read_modes(path).sensors if has_nodes else None)
+        datasets, other = read_datasets(path, _WANTED, _DRAWN)
+        has_nodes = any(_of(datasets, *_COORDINATES))
+        places = _sensors_and_modes(path, datasets, other).sensors if has_nodes else None
+        return read_functions(path, places)
 
 
-def _datasets(path: Path) -> tuple[list[Dataset], set[int]]:
-    """Return the datasets that are of use, and the numbers of the others."""
-    import pyuff
-
-    if path.stat().st_size > _LARGEST * 2**20:
-        raise InputError("file is too large", file=path, expected=f"at most {_LARGEST} MiB")
-    wanted: list[Dataset] = []
-    other: set[int] = set()
-    try:
-        file: Any = pyuff.UFF(str(path))
-        types = [int(number) for number in file.get_set_types()]
-    except Exception as error:  # pyuff raises nothing more special
-        raise InputError(f"cannot be read: {error}", file=path) from None
-    for i, number in enumerate(types):
-        if number not in _WANTED:
-            other.add(number)
-            continue
-        try:
-            # pyuff prints what it does not know.
-            with redirect_stdout(StringIO()):
-                wanted.append(file.read_sets(i))
-        except Exception as error:
-            if number in _DRAWN:
-                continue
-            key = f"dataset {number} (block {i + 1})"
-            raise InputError(f"cannot be read: {error}", file=path, key=key) from None
-    return wanted, other
+def _sensors_and_modes(path: Path, datasets: Sequence[Dataset], other: set[int]) -> Measurement:
+    # A dataset that is cut short may lack any column.
+    with opened(path, "whole datasets"):
+        nodes, modes = _nodes(path, datasets), _modes(path, datasets)
+    if not nodes and not modes:
+        expected = "datasets 15 or 2411 with nodes, 55 or 2414 with modes"
+        what = "neither nodes nor modes"
+        if 58 in other:
+            what += "; frequency responses (dataset 58) must be turned into modes first"
+        raise InputError(what, file=path, expected=expected)
+    return _measurement(path, nodes, modes)
 
 
 def _of(datasets: Sequence[Dataset], *numbers: int) -> Iterator[Dataset]:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import redirect_stdout
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +13,17 @@ from numpy.typing import NDArray
 
 from femubench import InputError, Sensors
 from femubench.modal import FrequencyResponses, TimeSignals
+from femubench.plugins.readers.universal_datasets import Dataset, read_datasets
 
 _DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 _TIME, _RESPONSE = 1, 4  # types of a function
 _QUANTITIES = {8: "receptance", 11: "mobility", 12: "accelerance"}
 _FORCES = (0, 9, 13)  # unknown, reaction, excitation
-_LARGEST, _MOST_NUMBERS = 256, 50_000_000  # MiB of a file; lines times channels
+_MOST_NUMBERS = 50_000_000  # lines times channels
 _SAME_AXIS = 1e-6  # of the step
 _KEY = "dataset 58"
 _EMPTY = "dataset 58 with frequency responses (type 4) or time responses (type 1)"
 
-Dataset = Mapping[str, Any]
 Place = tuple[int, str]
 
 
@@ -66,27 +64,10 @@ def read_functions(path: Path, positions: Sensors | None) -> FrequencyResponses 
 
 def _datasets(path: Path) -> tuple[list[Dataset], tuple[float, float]]:
     """Return the functions, and what lengths and forces must be divided by to be in m and N."""
-    import pyuff
-
-    if path.stat().st_size > _LARGEST * 2**20:
-        raise InputError("file is too large", file=path, expected=f"at most {_LARGEST} MiB")
-    found: list[Dataset] = []
     length = force = 1.0
-    try:
-        file: Any = pyuff.UFF(str(path))
-        types = [int(number) for number in file.get_set_types()]
-    except Exception as error:  # pyuff raises nothing more special
-        raise InputError(f"cannot be read: {error}", file=path) from None
-    for i, number in enumerate(types):
-        if number not in (58, 164):
-            continue
-        try:
-            with redirect_stdout(StringIO()):  # pyuff prints what it does not know
-                dataset = file.read_sets(i)
-        except Exception as error:
-            key = f"dataset {number} (block {i + 1})"
-            raise InputError(f"cannot be read: {error}", file=path, key=key) from None
-        if number == 164:
+    found: list[Dataset] = []
+    for dataset in read_datasets(path, (58, 164))[0]:
+        if dataset["type"] == 164:
             length, force = float(dataset["length"]), float(dataset["force"])
         else:
             found.append(dataset)

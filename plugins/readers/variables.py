@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -134,7 +135,7 @@ def _directions(column: Any, path: Path) -> tuple[str, ...]:  # noqa: ANN401
     return tuple(words)
 
 
-class VariablesReader:
+class VariablesReader(ABC):
     """Reads and writes models of a format that holds variables by name.
 
     A format has a name, suffixes, and two methods of its own.
@@ -143,13 +144,13 @@ class VariablesReader:
     name: str
     suffixes: tuple[str, ...]
 
+    @abstractmethod
     def variables(self, path: Path) -> dict[str, Any]:
         """Return everything in a file that may be a matrix or labels; raises InputError."""
-        raise NotImplementedError
 
+    @abstractmethod
     def save(self, path: Path, original: Path, new: Variables) -> None:
         """Write what is in the original with some variables renewed."""
-        raise NotImplementedError
 
     def read_matrix(self, path: Path) -> SparseArray:
         """Return the only matrix; raises InputError."""
