@@ -27,7 +27,7 @@ ALONE := $(addprefix tests/,browser $(addprefix test_,harness_*.py report_robust
 # few tests take long and would come last.
 ON_ALL_CORES := -n 2 --dist loadfile --no-loadscope-reorder -p no:benchmark
 
-.PHONY: run test docs kernels bench sweep fuzz truths format clean
+.PHONY: run test docs kernels bench bench-report sweep fuzz truths format clean
 .DELETE_ON_ERROR:
 
 run: $(VENV)/.installed
@@ -59,6 +59,10 @@ kernels: $(VENV)/.installed-test
 
 bench: $(VENV)/.installed-test
 	$(BIN)/pytest benchmarks -o addopts="--import-mode=importlib -ra" --benchmark-only $(ARGS)
+
+# Half an hour and up to 1.5 GB; docs/performance.md tells what is measured.
+bench-report: $(VENV)/.installed-test
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/performance.py --write $(ARGS)
 
 sweep: $(VENV)/.installed-test
 	$(BIN)/pytest -m sweep $(ARGS)

@@ -1,0 +1,228 @@
+"""How the cost of things grows with their size, beside what one would else use.
+
+    make bench-report                             # everything, into docs/performance.md
+    python benchmarks/performance.py --only modes --within 60
+
+Every figure is that of a process of its own (`benchmarks/scaling.py`), on one thread, in seconds of
+processor; exponents are fitted to the larger half of the sizes. What takes longer than --within is
+shown as such, and so is what fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+ROOT = Path(__file__).parents[1]
+PAGE, KEPT = ROOT / "docs" / "performance.md", ROOT / "docs" / "figures" / "performance.json"
+_BEGIN, _END = "<!-- performance -->\n", "<!-- /performance -->"
+_GRIDS, _LATTICES = (12, 36, 115, 364), (4, 6, 9, 13, 19)
+_LIBRARIES = ("numpy", "scipy", "scikit-sparse", "openseespy", "distributed")
+
+
+@dataclass(frozen=True)
+class Series:
+    """One thing at several sizes.
+
+    Arguments:
+        name: of the measurement in `benchmarks/scaling.py`.
+        sizes: what it is called with.
+    """
+
+    name: str
+    sizes: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Section:
+    """Series that belong to one question.
+
+    Arguments:
+        word: for `--only`.
+        title: of the table.
+        unit: what a size is: a key of the measured rows.
+        series: the first is ours.
+    """
+
+    word: str
+    title: str
+    unit: str
+    series: tuple[Series, ...]
+
+
+SECTIONS = (
+    Section(
+        "grid",
+        "Twelve modes of a planar grid that hangs free",
+        "dofs",
+        (
+            Series("modes of a planar grid", _GRIDS),
+            Series("one factorisation, planar grid", _GRIDS),
+            Series("eigsh as called, planar grid", _GRIDS[:3]),
+        ),
+    ),
+    Section(
+        "lattice",
+        "Twelve modes of a lattice that hangs free",
+        "dofs",
+        (
+            Series("modes of a lattice", _LATTICES),
+            Series("one factorisation, lattice", _LATTICES),
+            Series("eigsh as called, lattice", _LATTICES[:3]),
+        ),
+    ),
+    Section(
+        "opensees",
+        "Twelve modes of a lattice on four supports",
+        "dofs",
+        (
+            Series("modes of a standing lattice", _LATTICES[:4]),
+            Series("OpenSees, standing lattice", _LATTICES[:4]),
+        ),
+    ),
+    Section(
+        "gradients",
+        "Derivatives of twelve eigenvalues, 27 702 dofs",
+        "parameters",
+        (
+            Series("gradients", (10, 100, 1000, 10000)),
+            Series("forward differences", (10, 100, 1000, 10000)),
+        ),
+    ),
+    Section(
+        "fit",
+        "Member stiffnesses of a lattice from ten frequencies",
+        "parameters",
+        (
+            Series("least squares with derivatives", (3, 4, 5)),
+            Series("least squares with differences", (3, 4, 5)),
+        ),
+    ),
+)
+
+
+def measured(name: str, size: int, within: float) -> dict[str, Any]:
+    """Return one measurement of a process of its own, or why there is none."""
+    command = [sys.executable, str(Path(__file__).with_name("scaling.py")), name, str(size)]
+    try:
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=within, check=False)
+    except subprocess.TimeoutExpired:
+        return {"failed": f"over {within:g} s"}
+    lines = [line for line in ended.stdout.splitlines() if line.startswith("{")]
+    if ended.returncode or not lines:
+        words = (ended.stderr.strip() or f"exit code {ended.returncode}").splitlines()[-1]
+        return {"failed": words[:80]}
+    return dict(json.loads(lines[-1]))
+
+
+def exponent(sizes: Sequence[float], seconds: Sequence[float]) -> float:
+    """Return the slope of the larger half of the sizes on logarithmic axes."""
+    half = max(len(sizes) // 2, 2)
+    return float(np.polyfit(np.log(sizes[-half:]), np.log(seconds[-half:]), 1)[0])
+
+
+def rows_of(section: Section, within: float) -> list[dict[str, Any]]:
+    """Return the measurements of a section, those of one size after each other."""
+    rows = []
+    for place in range(max(len(series.sizes) for series in section.series)):
+        for series in section.series:
+            if place < len(series.sizes):
+                row = measured(series.name, series.sizes[place], within)
+                rows.append({"series": series.name, "size": series.sizes[place], **row})
+                print(json.dumps(rows[-1]), flush=True)
+    return rows
+
+
+def table(section: Section, rows: Sequence[dict[str, Any]]) -> str:
+    """Return a section as a table: seconds, ratios to ours, memory, exponents in the last line."""
+    known = {row["size"]: row[section.unit] for row in rows if section.unit in row}
+    sizes = list(dict.fromkeys(row["size"] for row in rows))
+    of = {(row["series"], row["size"]): row for row in rows}
+    ours = section.series[0].name
+    lines = []
+    for size in sizes:
+        own = of[ours, size]
+        line = {section.unit: f"{known.get(size, size):,}".replace(",", " ")}
+        for series in section.series:
+            line[series.name] = _cell(of.get((series.name, size)), own, series.name == ours)
+        lines.append(line)
+    last = {section.unit: "grows with"}
+    for series in section.series:
+        good = [row for row in rows if row["series"] == series.name and "seconds" in row]
+        x = [row.get(section.unit, row["size"]) for row in good]
+        power = exponent(x, [row["seconds"] for row in good]) if len(good) > 1 else np.nan
+        last[series.name] = "" if np.isnan(power) else f"size^{power:.2f}"
+    return str(pd.DataFrame([*lines, last]).to_markdown(index=False, disable_numparse=True))
+
+
+def _cell(row: dict[str, Any] | None, own: dict[str, Any], first: bool) -> str:
+    if row is None:
+        return ""
+    if "seconds" not in row:
+        return str(row["failed"])
+    text = f"{row['seconds']:.3g} s"
+    if row.get("added_mb", 0.0) >= 1.0:
+        text += f", +{row['added_mb']:.0f} MB"
+    if first or "seconds" not in own:
+        return text
+    return f"{text} ({row['seconds'] / own['seconds']:.3g} x)"
+
+
+def machine() -> str:
+    """Return what was measured on, in one sentence."""
+    words = Path("/proc/cpuinfo")
+    lines = words.read_text(encoding="utf-8").splitlines() if words.exists() else []
+    named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    processor = named[0] if named else platform.processor() or platform.machine()
+    known = []
+    for library in _LIBRARIES:
+        try:
+            known.append(f"{library} {version(library)}")
+        except ImportError:
+            known.append(f"no {library}")
+    when = datetime.now(UTC).strftime("%Y-%m-%d")
+    return (
+        f"Measured {when} on one thread of {len(named) or 1} ({processor}), {platform.system()}, "
+        f"Python {platform.python_version()}, {', '.join(known)}."
+    )
+
+
+def main() -> None:
+    """Measure, keep the figures, and with --write put the tables into the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", nargs="+", choices=[one.word for one in SECTIONS])
+    parser.add_argument("--within", type=float, default=300.0, help="seconds a measurement")
+    parser.add_argument("--write", action="store_true", help=f"into {PAGE.name}")
+    words = parser.parse_args()
+    kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
+    for section in SECTIONS:
+        if not words.only or section.word in words.only:
+            kept[section.word] = {"machine": machine(), "rows": rows_of(section, words.within)}
+    if words.write:
+        KEPT.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+    parts = []
+    for section in SECTIONS:
+        if section.word in kept:
+            found = kept[section.word]
+            parts += [f"### {section.title}", table(section, found["rows"]), found["machine"]]
+    text = "\n\n".join(parts)
+    print(text)
+    if words.write:
+        head, _, rest = PAGE.read_text(encoding="utf-8").partition(_BEGIN)
+        PAGE.write_text(f"{head}{_BEGIN}{text}\n{_END}{rest.partition(_END)[2]}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
