@@ -25,8 +25,11 @@ from femubench.core.score.statistics import (
     structures_of,
     tell_apart,
 )
+from femubench.core.study.axes import Axes, Setting
+from femubench.core.study.skill import skill_by
 
 __all__ = [
+    "Axes",
     "Block",
     "FEWEST",
     "FLOORS",
@@ -36,6 +39,7 @@ __all__ = [
     "PairedMode",
     "Reporter",
     "Run",
+    "Setting",
     "SCORE_OF_FAILURE",
     "Store",
     "TIE",
@@ -59,6 +63,7 @@ __all__ = [
     "run_to_json",
     "score_model",
     "scored_on",
+    "skill_by",
     "stiffness_difference",
     "structures_of",
     "tell_apart",

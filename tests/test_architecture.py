@@ -20,7 +20,7 @@ ROOMS = (
     *("version", "errors", "typing", "ties", "gauss_newton", "files", "display", "roles", "schema"),
     *("plugin", "fem", "modal", "identify", "case", "update"),
     *("effect", "inference", "look", "advise"),
-    *("score", "drawing", "diagnosis", "plot"),
+    *("score", "study", "drawing", "diagnosis", "plot"),
     *("run", "publish", "reproduction", "challenge", "conformance", "library", "cli"),
 )
 

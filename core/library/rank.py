@@ -29,6 +29,7 @@ from femubench.core.run.starts import Start, Starts
 from femubench.core.run.store import Store
 from femubench.core.schema import records as serial, results
 from femubench.core.score.leaderboard import leaderboard
+from femubench.core.study.skill import skill_by
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -118,6 +119,10 @@ class Run(results.Run):
     def leaderboard(self) -> pd.DataFrame:
         """Return one row a strategy, best first."""
         return leaderboard(self)
+
+    def skill_by(self, *axes: str) -> pd.DataFrame:
+        """Return one row a cell of a study; see `femubench.results.skill_by`."""
+        return skill_by(self, *axes)
 
     def rows(self) -> list[tuple[str, str]]:
         """Return what was run, and who leads."""
@@ -295,8 +300,8 @@ def plan_of(
         ),
         read,
         found,
-        _textbook(read),
-        _classes(plugins),
+        textbook_of(read),
+        classes_of(plugins),
         repeatable=plain and all(isinstance(item, str) for item in wanted),
     )
 
@@ -306,10 +311,10 @@ def repeated(request: Request, plugins: Plugins) -> Plan:
     found = _strategies(request.strategies, plugins)
     _known(request.timeouts, found)
     read = read_cases(request.cases, plugins)
-    return Plan(request, read, found, _textbook(read), _classes(plugins))
+    return Plan(request, read, found, textbook_of(read), classes_of(plugins))
 
 
-def _textbook(cases: Sequence[Case]) -> dict[str, Case]:
+def textbook_of(cases: Sequence[Case]) -> dict[str, Case]:
     """Return the cases with their textbook models by name, without those that have none.
 
     They are made of this package's own effects: no plugin moves what all are measured against.
@@ -328,7 +333,7 @@ def _textbook(cases: Sequence[Case]) -> dict[str, Case]:
     return found
 
 
-def _classes(plugins: Plugins) -> dict[str, tuple[str, ...]]:
+def classes_of(plugins: Plugins) -> dict[str, tuple[str, ...]]:
     """Return kinds of structure and truth by case."""
     listed = plugins.scenarios.values()
     return {case: scenario.classes for scenario in listed for case in scenario.cases}
@@ -345,7 +350,7 @@ def _strategies(given: Sequence[object], plugins: Plugins) -> list[Strategy]:
     words = [word for word in wanted if isinstance(word, str)]
     chosen("strategy", (word.partition(":")[0] for word in words), plugins.strategies)
     found = [
-        strategy_of(item, plugins.strategies) if isinstance(item, str) else _named(item, plugins)
+        strategy_of(item, plugins.strategies) if isinstance(item, str) else named(item, plugins)
         for item in wanted or plugins.strategies
     ]
     if not found:
@@ -353,7 +358,7 @@ def _strategies(given: Sequence[object], plugins: Plugins) -> list[Strategy]:
     return found
 
 
-def _named(given: object, plugins: Plugins) -> Strategy:
+def named(given: object, plugins: Plugins) -> Strategy:
     """Return a strategy under a name that tells its options where they are not the usual ones."""
     strategy = check_strategy(given.base if isinstance(given, Variant) else given)
     usual = plugins.strategies.get(strategy.name)

@@ -19,7 +19,7 @@ from femubench.core.run.schedule import computed, slots_of
 from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
 from femubench.core.schema.results import Run
-from femubench.core.score.scoring import rank_results, reference_of
+from femubench.core.score.scoring import Reference, rank_results, reference_of
 
 _AS_GIVEN = Starts()
 
@@ -72,7 +72,7 @@ def run_jobs(
     settings: dict[str, Any] = {"seed": run_seed, "jobs": workers, "timeout": timeout}
     settings |= {"memory": share, "request": dict(request or {})}
     with threadpool_limits(1), ExitStack() as stack:
-        references = {case.name: reference_of(starts.yardstick(case)) for case in cases}
+        references = _references([starts.yardstick(case) for case in cases])
         slots = list(slots_of((one for c in cases for one in starts.of(c)), strategies, seeds))
         settings["plan"] = plan_digest(slot.key for slot in slots)
         meta = run_meta(cases, strategies, references, seeds, settings, starts.about(cases))
@@ -80,7 +80,9 @@ def run_jobs(
         meta, known = recorded(stack, store, meta, overwrite, resume)
         ending = stack.enter_context(ended(store, meta["run"]))
         results = Results(slots, store, meta["run"], progress)
-        for one in computed(slots, results.keep(known), references, limits, workers, results.shelf):
+        # Seed after seed: what is there early says something of every case and strategy.
+        wanted = sorted(results.keep(known), key=lambda index: slots[index].seed)
+        for one in computed(slots, wanted, references, limits, workers, results.shelf):
             results.add(*one)
     return Run({**meta, **ending}, rank_results(results.in_order(), meta["reference"]))
 
@@ -104,3 +106,15 @@ def _check_names(**given: Sequence[Case] | Sequence[Strategy]) -> None:
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise InputError(f"{kind} {twice[0]!r} occurs twice", expected="every name once")
+
+
+def _references(cases: Sequence[Case]) -> dict[str, Reference]:
+    """Return what the model of every case gives, solved once for cases that share it."""
+    solved: dict[tuple[int, int, int], Reference] = {}
+    found = {}
+    for case in cases:
+        same = id(case.model), id(case.measurement), id(case.modifications)
+        if same not in solved:
+            solved[same] = reference_of(case)
+        found[case.name] = solved[same]
+    return found

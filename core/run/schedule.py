@@ -60,7 +60,8 @@ class Slot:
         """Return the job with the whole provenance of a run's results."""
         version = str(self.provenance["strategy"])
         digest = meta["cases"][self.case.name]["digest"]
-        return replace(self, provenance=provenance(meta, digest, version, self.seed))
+        found = provenance(meta, digest, version, self.seed)
+        return replace(self, provenance={**found, **self.case.conditions(self.seed)})
 
 
 def slots_of(
