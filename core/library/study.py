@@ -30,7 +30,7 @@ from femubench.core.run.schedule import slots_of
 from femubench.core.run.starts import Start, Starts
 from femubench.core.run.store import Store
 from femubench.core.schema.records import MOST_RESULTS
-from femubench.core.schema.results import DONE, Nominal
+from femubench.core.schema.results import DONE, NOMINALS, Nominal
 from femubench.core.score.scoring import reference_of
 from femubench.core.study.axes import Axes, Choice, Setting
 from femubench.core.study.conditions import varied
@@ -165,9 +165,9 @@ def study(
 
     Examples:
         >>> from pathlib import Path
-        >>> lines = ['axes = {cases = ["rod"], noise = [1, 2], seeds = 1}']
         >>> file = Path("study.toml")
-        >>> _ = file.write_text("\\n".join([*lines, "[[strategies]]", 'name = "unchanged"']))
+        >>> axes = f'axes = {{cases = ["{case.name}"], noise = [1, 2], seeds = 1}}'
+        >>> _ = file.write_text(f'{axes}\\n[[strategies]]\\nname = "{nominal.name}"')
         >>> femubench.study(file).skill_by("noise")["jobs"].tolist()
         [1, 1]
     """
@@ -193,7 +193,8 @@ def study_plan(read: StudyFile, plugins: Plugins) -> StudyPlan:
     axes = read.tables.axes
     originals = _cases(read, plugins)
     textbook = textbook_of(originals)
-    cases, known, settings = [], {}, {}
+    cases: list[Case] = []
+    known, settings = dict[str, Case](), dict[str, Setting]()
     for original in originals:
         for noise, left_out in product(axes.noise, axes.sensors_left_out):
             case = varied(original, noise, left_out)
@@ -210,7 +211,7 @@ def study_plan(read: StudyFile, plugins: Plugins) -> StudyPlan:
         choices,
         read.tables.study.title,
         None if shown is None else (shown.x, shown.y),
-        ("textbook", "drawn") if both else axes.nominal,
+        tuple(reversed(NOMINALS)) if both else axes.nominal,
     )
     _check_heat_map(read, found)
     kinds = classes_of(plugins)

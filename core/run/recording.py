@@ -73,7 +73,8 @@ class Results:
             elif store is not None:
                 store.append(self._run, result)
             self._tell(index, result)
-        return missing
+        # Seed after seed: what is there early says something of every case and strategy.
+        return sorted(missing, key=lambda index: self._slots[index].seed)
 
     def _tell(self, index: int, result: JobResult) -> None:
         self._found[index] = result

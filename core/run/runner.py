@@ -80,9 +80,7 @@ def run_jobs(
         meta, known = recorded(stack, store, meta, overwrite, resume)
         ending = stack.enter_context(ended(store, meta["run"]))
         results = Results(slots, store, meta["run"], progress)
-        # Seed after seed: what is there early says something of every case and strategy.
-        wanted = sorted(results.keep(known), key=lambda index: slots[index].seed)
-        for one in computed(slots, wanted, references, limits, workers, results.shelf):
+        for one in computed(slots, results.keep(known), references, limits, workers, results.shelf):
             results.add(*one)
     return Run({**meta, **ending}, rank_results(results.in_order(), meta["reference"]))
 

@@ -11,7 +11,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 from femubench.core.errors import InputError
 from femubench.core.plugin.validation import did_you_mean
 from femubench.core.schema.records import Name
-from femubench.core.schema.results import Nominal, Run
+from femubench.core.schema.results import NOMINALS, Nominal, Run
 
 Value = bool | int | float | str | None
 _NOISE, _LEFT_OUT = "noise", "sensors_left_out"
@@ -64,7 +64,7 @@ class Axes:
     strategies: Mapping[Name, Choice]
     title: Name = ""
     heat_map: tuple[Name, Name] | None = None
-    nominals: tuple[Nominal, ...] = ("textbook",)
+    nominals: tuple[Nominal, ...] = NOMINALS[1:]
 
     @classmethod
     def of(cls, run: Run) -> Axes:
@@ -111,8 +111,8 @@ class Axes:
             raise InputError(f"there is no axis {axis!r}{near}", expected=expected)
         first_case, first_strategy = next(iter(self.cases)), next(iter(self.strategies))
         places = [
-            *(self.place(case, first_strategy, "textbook") for case in self.cases),
-            *(self.place(first_case, name, "textbook") for name in self.strategies),
+            *(self.place(case, first_strategy, NOMINALS[0]) for case in self.cases),
+            *(self.place(first_case, name, NOMINALS[0]) for name in self.strategies),
             *(self.place(first_case, first_strategy, nominal) for nominal in self.nominals),
         ]
         if axis == "nominal":

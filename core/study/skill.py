@@ -40,8 +40,8 @@ def skill_by(run: Run, *axes: str) -> pd.DataFrame:
         InputError: for an axis that the run does not have.
 
     Examples:
-        >>> results.skill_by(run, "strategy")[["strategy", "skill"]].round(2).values.tolist()
-        [['unchanged', -1.97], ['global', 0.47]]
+        >>> results.skill_by(run, "strategy")["skill"].round(2).tolist()
+        [-1.97, 0.47]
     """
     import pandas as pd
 

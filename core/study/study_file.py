@@ -36,11 +36,11 @@ def _each_once(values: tuple[_T, ...]) -> tuple[_T, ...]:
 
 
 def _seeds(given: object) -> int | tuple[int, ...]:
-    listed = given if isinstance(given, list) else [given]
-    plain = all(type(seed) is int and 0 <= seed < _LARGEST_SEED for seed in listed)
-    if not plain or (listed is not given and not 1 <= listed[0] <= _MOST_SEEDS):
-        raise misfit("neither a number of draws nor a list of seeds", _SEEDS)
-    return _each_once(tuple(listed)) if listed is given else listed[0]
+    if type(given) is int and 1 <= given <= _MOST_SEEDS:
+        return given
+    if isinstance(given, list) and all(type(s) is int and 0 <= s < _LARGEST_SEED for s in given):
+        return _each_once(tuple(given))
+    raise misfit("neither a number of draws nor a list of seeds", _SEEDS)
 
 
 def _values(given: object) -> tuple[Value, ...]:
@@ -82,7 +82,7 @@ class AxesKeys(Table):
     )
     sensors_left_out: _Numbers = Field((0,), description="whole numbers >= 0")
     nominal: _Nominals = Field(
-        ("textbook",), description=f"a list of {' or '.join(map(repr, NOMINALS))}"
+        NOMINALS[1:], description=f"a list of {' or '.join(map(repr, NOMINALS))}"
     )
 
 
@@ -103,7 +103,7 @@ class HeatMapKeys(Table):
 class StudyTables(Table):
     """The whole of a study file."""
 
-    study: StudyKeys = Field(StudyKeys(), description="a table")
+    study: StudyKeys = Field(default_factory=StudyKeys, description="a table")
     axes: AxesKeys = Field(description="a table [axes]")
     strategies: Annotated[Many[StrategyKeys], Field(min_length=1)] = Field(
         description="one table [[strategies]] at least"
