@@ -209,7 +209,7 @@ def study_plan(read: StudyFile, plugins: Plugins) -> StudyPlan:
     found = Axes(
         settings,
         choices,
-        read.tables.study.title,
+        read.title,
         None if shown is None else (shown.x, shown.y),
         tuple(reversed(NOMINALS)) if both else axes.nominal,
     )
@@ -217,7 +217,7 @@ def study_plan(read: StudyFile, plugins: Plugins) -> StudyPlan:
     kinds = classes_of(plugins)
     classes = {name: kinds[s.case] for name, s in settings.items() if s.case in kinds}
     starts = Starts(known, nominal, classes)
-    plan = StudyPlan(found, cases, strategies, read.seeds, starts, read.tables.study.seed)
+    plan = StudyPlan(found, cases, strategies, read.seeds, starts, read.seed)
     if plan.jobs > MOST_RESULTS:
         raise InputError(f"{plan.jobs} jobs", file=read.file, expected=f"at most {MOST_RESULTS}")
     return plan

@@ -103,7 +103,7 @@ class HeatMapKeys(Table):
 class StudyTables(Table):
     """The whole of a study file."""
 
-    study: StudyKeys = Field(default_factory=StudyKeys, description="a table")
+    study: StudyKeys | None = Field(None, description="a table")
     axes: AxesKeys = Field(description="a table [axes]")
     strategies: Annotated[Many[StrategyKeys], Field(min_length=1)] = Field(
         description="one table [[strategies]] at least"
@@ -126,9 +126,19 @@ class StudyFile:
     tables: StudyTables
 
     @property
+    def title(self) -> str:
+        """Return the title, which may be empty."""
+        return self.tables.study.title if self.tables.study is not None else ""
+
+    @property
+    def seed(self) -> int:
+        """Return the first seed, which is that of the statistics too."""
+        return self.tables.study.seed if self.tables.study is not None else 0
+
+    @property
     def seeds(self) -> tuple[int, ...]:
         """Return the seeds: 0 is the data as recorded, every other one a draw of noise."""
-        given, first = self.tables.axes.seeds, self.tables.study.seed
+        given, first = self.tables.axes.seeds, self.seed
         if isinstance(given, tuple):
             return given
         if given is None:
@@ -147,8 +157,13 @@ class StudyFile:
         except InputError as error:
             if error.file is not None:
                 raise
-            where = {"line": key_line(self.text, path), "key": dotted(path)}
-            raise InputError(error.what, file=self.file, expected=error.expected, **where) from None
+            raise InputError(
+                error.what,
+                file=self.file,
+                line=key_line(self.text, path),
+                key=dotted(path),
+                expected=error.expected,
+            ) from None
 
 
 def read_study(file: str | PathLike[str]) -> StudyFile:
