@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from femubench.core.errors import InputError
-from femubench.core.run import provenance as keys, schedule as slots, store as locks
+from femubench.core.run import provenance as keys, slots, store as locks
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult, Run

@@ -117,7 +117,7 @@ def run(
     plugins = _checked(ctx, cases, strategies)
     from femubench.core.library.rank import repeated, request_of, store_in
     from femubench.core.library.report import reporter, run_name
-    from femubench.core.run.runner import worker_count
+    from femubench.core.run.executor import worker_count
     from femubench.core.schema.results import DONE
 
     outputs = _outputs(plugins, json_file, csv_file, report_file)

@@ -26,7 +26,7 @@ from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Strategy
 from femubench.core.run.recording import Overwrite, Progress
 from femubench.core.run.runner import run_jobs
-from femubench.core.run.schedule import slots_of
+from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Start, Starts
 from femubench.core.run.store import Store
 from femubench.core.schema.records import MOST_RESULTS
@@ -82,7 +82,7 @@ class StudyPlan:
         known = store.by_key() if store is not None and store.path.exists() else {}
         left = [
             (slot.case.name, slot.strategy)
-            for slot in slots_of(self.models, self.strategies, self.seeds)
+            for slot in Slots(self.models, self.strategies, self.seeds)
             if slot.key not in known or known[slot.key].status not in DONE
         ]
         judging = {}

@@ -9,7 +9,8 @@ from datetime import UTC, datetime
 from typing import Any, Literal
 
 from femubench.core.drawing.prediction import keep_drawings
-from femubench.core.run.schedule import Show, Slot
+from femubench.core.run.schedule import Show
+from femubench.core.run.slots import Slot
 from femubench.core.run.store import Store
 from femubench.core.schema.results import DONE, JobResult
 
@@ -39,7 +40,7 @@ class Results:
     def add(self, index: int, result: JobResult) -> None:
         """Take a result that was just computed."""
         slot = self._slots[index]
-        key, provenance = slot.key, dict(slot.provenance)
+        key, provenance = slot.key, {**slot.provenance, **result.provenance}
         if slot.stale:
             # Workers import a strategy when they need it: this may be the result of either source.
             key, provenance["strategy"] = "", f"{provenance['strategy']}, changed during the run"
