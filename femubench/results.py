@@ -25,11 +25,10 @@ from femubench.core.score.statistics import (
     structures_of,
     tell_apart,
 )
-from femubench.core.study.axes import Axes, Setting
+from femubench.core.study.axes import StudyAxes
 from femubench.core.study.skill import skill_by
 
 __all__ = [
-    "Axes",
     "Block",
     "FEWEST",
     "FLOORS",
@@ -39,9 +38,9 @@ __all__ = [
     "PairedMode",
     "Reporter",
     "Run",
-    "Setting",
     "SCORE_OF_FAILURE",
     "Store",
+    "StudyAxes",
     "TIE",
     "block_weights",
     "counted_blocks",

@@ -26,6 +26,10 @@ DONE, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 # stands here so that `bench --help` imports none of them.
 VERBS = {
     "run": ("femubench.core.cli.run", "Run strategies on cases and rank them."),
+    "study": (
+        "femubench.core.cli.study",
+        "Run strategies under conditions that vary: noise, sensors, options.",
+    ),
     "report": ("femubench.core.cli.report", "Write a report on a stored run."),
     "compare": (
         "femubench.core.cli.compare",

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from femubench.core.cli import options
+from femubench.core.cli.outputs import finish, outputs_of
 from femubench.core.cli.progress import progress_bar
 from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of
 from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
 from femubench.core.errors import InputError, PluginError
-from femubench.core.files import write_atomically
 from femubench.core.library.cases import case_folders
 from femubench.core.plugin.validation import chosen
 from femubench.core.version import __version__
@@ -22,7 +22,6 @@ from femubench.core.version import __version__
 if TYPE_CHECKING:
     from femubench.core.library.rank import Plan
     from femubench.core.plugin.loader import Plugins
-    from femubench.core.roles import Reporter
     from femubench.core.run.recording import Overwrite
     from femubench.core.run.starts import Start
     from femubench.core.run.store import Store
@@ -120,7 +119,7 @@ def run(
     from femubench.core.run.executor import worker_count
     from femubench.core.schema.results import DONE
 
-    outputs = _outputs(plugins, json_file, csv_file, report_file)
+    outputs = outputs_of(plugins, json_file, csv_file, report_file)
     kept = store_in(store)
     old = None if locked is None else kept.load(locked)
     plan = _plan(ctx, plugins, kept) if old is None else repeated(request_of(old), plugins)
@@ -132,7 +131,7 @@ def run(
         for writer in (reporter(plugins, name) for name in ("html", "markdown")):
             outputs[kept.folder / f"{run_name(outcome)}{writer.suffix}"] = writer
     screen = None if quiet else reporter(plugins, "terminal")
-    _finish(outcome, kept.exhibits, outputs, screen)
+    finish(outcome, kept.exhibits, outputs, screen)
     if old is not None:
         return _compare(old, outcome)
     return int(any(result.status not in DONE for result in outcome.results))
@@ -205,22 +204,6 @@ def _compare(old: Run, new: Run) -> int:
     return int(bool(results))
 
 
-def _outputs(
-    plugins: Plugins, json_file: Path | None, csv_file: Path | None, report_file: Path | None
-) -> dict[Path, Reporter]:
-    """Return who writes which file."""
-    from femubench.core.library.report import reporter, reporter_for
-
-    outputs: dict[Path, Reporter] = {}
-    for path, name in ((json_file, "json"), (csv_file, "csv"), (report_file, None)):
-        if path is None:
-            continue
-        if path in outputs:
-            raise InputError("is to hold two outputs", file=path, expected="a file for each")
-        outputs[path] = reporter(plugins, name) if name else reporter_for(plugins, path)
-    return outputs
-
-
 def _header(plan: Plan, workers: int) -> str:
     """Return one line with everything that decides on the outcome."""
     request, cases, strategies = plan.request, len(plan.cases), len(plan.strategies)
@@ -236,22 +219,3 @@ def _header(plan: Plan, workers: int) -> str:
         f"{counted(plan.jobs, 'job')}, {counted(workers, 'worker')}, "
         f"timeout {spoken(request.timeout)}{own}"
     )
-
-
-def _finish(
-    run: Run, exhibits: object, outputs: dict[Path, Reporter], screen: Reporter | None
-) -> None:
-    """Write the files, then show the ranking and where the files are."""
-    from femubench.core.library.report import rendered, text_of
-
-    written, broken = [], None
-    for path, writer in outputs.items():
-        try:
-            write_atomically(path, rendered(writer, run, exhibits))
-            written.append(f"{writer.name}: {path}")
-        except PluginError as fault:
-            broken = fault
-    if screen is not None:
-        click.echo("\n".join(["", text_of(screen, rendered(screen, run)), *written]))
-    if broken is not None:
-        raise broken

@@ -32,7 +32,7 @@ from femubench.core.run.store import Store
 from femubench.core.schema.records import MOST_RESULTS
 from femubench.core.schema.results import DONE, NOMINALS, Nominal
 from femubench.core.score.scoring import reference_of
-from femubench.core.study.axes import Axes, Choice, Setting
+from femubench.core.study.axes import Choice, Setting, StudyAxes
 from femubench.core.study.conditions import varied
 from femubench.core.study.estimate import Forecast, forecast
 from femubench.core.study.study_file import StudyFile, grid, read_study
@@ -51,7 +51,7 @@ class StudyPlan:
         seed: of the statistics.
     """
 
-    axes: Axes
+    axes: StudyAxes
     cases: Sequence[Case]
     strategies: Sequence[Strategy]
     seeds: Sequence[int]
@@ -206,7 +206,7 @@ def study_plan(read: StudyFile, plugins: Plugins) -> StudyPlan:
     both = len(axes.nominal) > 1
     nominal: Start = "both" if both else axes.nominal[0]
     shown = read.tables.heat_map
-    found = Axes(
+    found = StudyAxes(
         settings,
         choices,
         read.title,
@@ -273,7 +273,7 @@ def _folder(read: StudyFile, word: str, known: Sequence[str]) -> Path:
     raise unknown("case", word, known)
 
 
-def _check_heat_map(read: StudyFile, axes: Axes) -> None:
+def _check_heat_map(read: StudyFile, axes: StudyAxes) -> None:
     shown = read.tables.heat_map
     if shown is None:
         return

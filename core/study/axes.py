@@ -49,7 +49,7 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Axes:
+class StudyAxes:
     """Where the jobs of a run stand.
 
     Arguments:
@@ -67,13 +67,13 @@ class Axes:
     nominals: tuple[Nominal, ...] = NOMINALS[1:]
 
     @classmethod
-    def of(cls, run: Run) -> Axes:
+    def of(cls, run: Run) -> StudyAxes:
         """Return the axes of a run; one of no study has case, strategy and nominal model.
 
         Raises:
             InputError: when what the run says of them is wrong.
         """
-        found = asked(run) or cls({}, {})
+        found = cls.asked(run) or cls({}, {})
         cases = [*(run.meta.get("cases") or ()), *(result.case for result in run.results)]
         names = [*run.meta.get("strategies", ()), *(result.strategy for result in run.results)]
         return cls(
@@ -83,6 +83,43 @@ class Axes:
             found.heat_map,
             run.nominals,
         )
+
+    @classmethod
+    def asked(cls, run: Run) -> StudyAxes | None:
+        """Return the axes that a study asked for; None for a run of no study.
+
+        Raises:
+            InputError: when what the run keeps of them is wrong.
+        """
+        request = run.meta.get("request")
+        kept = request.get("study") if isinstance(request, Mapping) else None
+        if kept is None:
+            return None
+        try:
+            return _READER.validate_python(kept)
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            key = ".".join(map(str, ("request", "study", *first["loc"])))
+            what = f"run {run.meta.get('run')}: {first['msg']}"
+            raise InputError(what, key=key, expected="what `bench study` keeps") from error
+
+    @staticmethod
+    def title_of(axis: str) -> str:
+        """Return what an axis is, with its unit, for a drawing or a column."""
+        known = {
+            _NOISE: "noise, times the stated standard deviations",
+            _LEFT_OUT: "sensors left out, number of them",
+            "nominal": "nominal model",
+        }
+        base, dot, option = axis.partition(".")
+        return known.get(axis, f"{option} of {base}" if dot else axis)
+
+    @staticmethod
+    def text_of(value: object) -> str:
+        """Return a value of an axis as one would type it."""
+        if isinstance(value, bool):
+            return str(value).lower()
+        return f"{value:.6g}" if isinstance(value, float) else str(value)
 
     def to_json(self) -> dict[str, Any]:
         """Return plain data for the run's `request`."""
@@ -150,23 +187,4 @@ class Axes:
         return x, y
 
 
-_READER = TypeAdapter(Axes)
-
-
-def asked(run: Run) -> Axes | None:
-    """Return the axes that a study asked for; None for a run of no study.
-
-    Raises:
-        InputError: when what the run keeps of them is wrong.
-    """
-    request = run.meta.get("request")
-    kept = request.get("study") if isinstance(request, Mapping) else None
-    if kept is None:
-        return None
-    try:
-        return _READER.validate_python(kept)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = ".".join(map(str, ("request", "study", *first["loc"])))
-        what = f"run {run.meta.get('run')}: {first['msg']}"
-        raise InputError(what, key=key, expected="what `bench study` keeps") from error
+_READER = TypeAdapter(StudyAxes)

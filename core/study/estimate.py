@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from statistics import median
 
 from femubench.core.schema.results import JobResult
-from femubench.core.study.axes import Axes
+from femubench.core.study.axes import StudyAxes
 
 Pair = tuple[str, str]  # case and strategy without conditions and options
 
@@ -39,7 +39,7 @@ class Forecast:
 
 def forecast(
     left: Iterable[tuple[str, str]],
-    axes: Axes,
+    axes: StudyAxes,
     before: Iterable[JobResult],
     judging: Mapping[str, float],
 ) -> tuple[float, float, Counter[Pair]]:

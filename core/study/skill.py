@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from femubench.core.schema.results import DONE, JobResult, Nominal, Run
 from femubench.core.score.leaderboard import leaderboard
-from femubench.core.study.axes import Axes, Value
+from femubench.core.study.axes import StudyAxes, Value
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,7 +45,7 @@ def skill_by(run: Run, *axes: str) -> pd.DataFrame:
     """
     import pandas as pd
 
-    known = Axes.of(run)
+    known = StudyAxes.of(run)
     chosen = axes or tuple(name for name in known.varied if name != "case") or ("strategy",)
     for name in chosen:
         known.values(name)
@@ -64,7 +64,7 @@ def skill_by(run: Run, *axes: str) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*chosen, *FIGURES])
 
 
-def _cells(axes: Axes, chosen: Sequence[str]) -> dict[tuple[Value, ...], list[_Arm]]:
+def _cells(axes: StudyAxes, chosen: Sequence[str]) -> dict[tuple[Value, ...], list[_Arm]]:
     """Return what is in every cell, in the order of the study's values."""
     found: dict[tuple[Value, ...], list[_Arm]] = defaultdict(list)
     for nominal, case, strategy in product(axes.nominals, axes.cases, axes.strategies):
