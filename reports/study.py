@@ -27,6 +27,7 @@ from femubench.results import Run, StudyAxes, skill_by
 _MOST_ON_SCREEN = 60  # cells, and values along the columns of a table
 _MOST_COLUMNS = 9
 _MOST_FAILURES = 20
+_SHORT = {"sensors_left_out": "left out"}
 _COUNTED = (
     "A cell is a leaderboard of its own: every structure counts once, a job that failed or is "
     "missing counts ten times the error of the textbook model, and with several seeds skill is "
@@ -77,7 +78,7 @@ def _sections(run: Run, *, short: bool = False, drawing: Block | None = None) ->
         said = f"{len(cells)} cells: see the report, or `skill_by` in Python."
         yield Section(title, [said])
     else:
-        yield Section(title, [_cells(cells), _COUNTED])
+        yield Section(title, [*_cells(cells), _COUNTED])
     yield from _failures(run, short=short)
     notes = [("Note", note) for note in notes_of(run)]
     if notes:
@@ -123,27 +124,39 @@ def _grid(run: Run, known: StudyAxes, x: str, y: str) -> Block:
     )
 
 
-def _cells(cells: Sequence[dict[Any, Any]]) -> Table:
-    """Return every cell with its interval and what of it failed."""
-    names = list(cells[0]) if cells else []
-    axes = names[: names.index("skill")] if names else []
-    width = max(8, 40 // max(len(axes), 1))
+def _cells(cells: Sequence[dict[Any, Any]]) -> Iterator[Block]:
+    """Yield every cell with its interval and what of it failed."""
+    names = list(cells[0])
+    axes = names[: names.index("skill")]
+    options = [name for name in axes if "." in name]
+    plain_axes = [name for name in axes if name not in options]
+    lost = any(row["failed"] + row["missing"] for row in cells)
     heads = [
-        *(Column(name, width, left=True, wrap=True) for name in axes),
-        Column("skill", 7),
+        *(Column(_SHORT.get(name, name), 16, left=True, wrap=True) for name in plain_axes),
+        *([Column("options", 14, left=True, wrap=True)] if options else []),
+        Column("skill", 8),
         Column("95 % interval", 16),
-        Column("failed", 12),
+        *([Column("failed", 14, wrap=True)] if lost else []),
     ]
     rows = [
         [
-            *(NOTHING if _absent(row[name]) else StudyAxes.text_of(row[name]) for name in axes),
+            *(StudyAxes.text_of(row[name]) for name in plain_axes),
+            *([_options(row, options)] if options else []),
             _skill(row),
             interval(row["skill_low"], row["skill_high"]),
-            _lost(row),
+            *([_lost(row)] if lost else []),
         ]
         for row in cells
     ]
-    return Table(heads, rows)
+    yield Table(heads, rows)
+    if not lost:
+        yield "No job failed or is missing."
+
+
+def _options(row: dict[Any, Any], names: Sequence[str]) -> str:
+    """Return the options of a cell's strategy."""
+    told = {name.partition(".")[2]: row[name] for name in names if not _absent(row[name])}
+    return ", ".join(f"{name} {StudyAxes.text_of(v)}" for name, v in told.items()) or NOTHING
 
 
 def _absent(value: object) -> bool:

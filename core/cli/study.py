@@ -111,8 +111,9 @@ def study(
 
 def _title(plan: StudyPlan) -> str:
     named = plan.axes.title or "study"
-    size = f"{counted(plan.cells, 'cell')}, {counted(len(plan.seeds), 'seed')}"
-    return f"{named}: {size}, {counted(plan.jobs, 'job')}"
+    cases = counted(len(plan.axes.values("case")), "case")
+    over = f"{counted(plan.cells, 'cell')} on {cases}, {counted(len(plan.seeds), 'seed')}"
+    return f"{named}: {over}, {counted(plan.jobs, 'job')}"
 
 
 def _forecast(plan: StudyPlan, store: Store, workers: int) -> Iterator[str]:

@@ -65,13 +65,14 @@ class StudyPlan:
 
     @property
     def cells(self) -> int:
-        """Return the number of combinations, seeds taken together."""
-        return sum(1 for _ in self.models) * len(self.strategies)
+        """Return the number of rows of `skill_by`, which takes cases and seeds together."""
+        conditions = len(self.axes.values("noise")) * len(self.axes.values("sensors_left_out"))
+        return conditions * len(self.axes.nominals) * len(self.strategies)
 
     @property
     def jobs(self) -> int:
         """Return the number of jobs."""
-        return self.cells * len(self.seeds)
+        return sum(1 for _ in self.models) * len(self.strategies) * len(self.seeds)
 
     def forecast(self, store: Store | None = None) -> Forecast:
         """Return how many jobs are left and what they take; runs none of them.
@@ -93,8 +94,7 @@ class StudyPlan:
                 reference_of(self.starts.yardstick(case))
                 judging[origin] = time.process_time() - start
         seconds, longest, strange = forecast(left, self.axes, known.values(), judging)
-        done = self.jobs - len(left)
-        return Forecast(self.cells, self.jobs, done, seconds, longest, strange)
+        return Forecast(self.jobs, self.jobs - len(left), seconds, longest, strange)
 
     def run(
         self,

@@ -18,14 +18,12 @@ class Forecast:
     """What a study will take.
 
     Arguments:
-        cells: combinations of conditions, strategies with options, cases and nominal models.
         jobs, done: in all, and in the store already.
         seconds: of strategies and of judging them, for the jobs that are left and known.
         longest: seconds of the longest of them.
         unknown: how many jobs of which case and strategy nothing is known of.
     """
 
-    cells: int
     jobs: int
     done: int
     seconds: float
