@@ -29,7 +29,8 @@ def skill_by(run: Run, *axes: str) -> pd.DataFrame:
     together with every structure counted once, and so are the values of the axes left out; with
     several seeds it is the median over them. `skill_low` and `skill_high` are its 95 % interval,
     over structures where there are six or more, else over seeds. A job that failed or is missing
-    counts ten times the textbook model's error. A cell without such an option has none there.
+    counts ten times the textbook model's error. Of an axis of options there are the cells of its
+    strategy alone, unless ``strategy`` is an axis too: then the others have none there.
 
     Arguments:
         run: of a study, or any other.
@@ -69,7 +70,8 @@ def _cells(axes: StudyAxes, chosen: Sequence[str]) -> dict[tuple[Value, ...], li
     found: dict[tuple[Value, ...], list[_Arm]] = defaultdict(list)
     for nominal, case, strategy in product(axes.nominals, axes.cases, axes.strategies):
         place = axes.place(case, strategy, nominal)
-        found[tuple(place.get(name) for name in chosen)].append((nominal, case, strategy))
+        if "strategy" in chosen or all(name in place for name in chosen):
+            found[tuple(place.get(name) for name in chosen)].append((nominal, case, strategy))
     orders = [{value: i for i, value in enumerate(axes.values(name))} for name in chosen]
 
     def order(cell: tuple[Value, ...]) -> list[int]:
