@@ -18,6 +18,7 @@ from femubench.core.cli.main import bench
 from femubench.core.library.report import rendered, reporter
 from femubench.core.library.study import StudyPlan, study_plan
 from femubench.core.plugin.loader import Plugins, load_plugins
+from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult, Run
 from femubench.core.study.conditions import varied
@@ -77,7 +78,7 @@ def spied(tmp_path_factory: pytest.TempPathFactory) -> Run:
     put_case(at / "rod", sensors_csv=SENSORS, modes_csv=MODES)
     text = STUDY.replace("[1.0, 1.2], loud = [false, true]", f"[1.0, 1.2, {BROKEN}]")
     (at / "study.toml").write_text(text.replace("[0.5, 1.0, 2.0]", "[1.0, 2.0]"), encoding="utf-8")
-    return study_plan(read_study(at / "study.toml"), PLUGINS).run(2)
+    return study_plan(read_study(at / "study.toml"), PLUGINS).run(LocalProcesses(2))
 
 
 class TestExpansion:
@@ -96,7 +97,7 @@ class TestExpansion:
         text = STUDY.replace("[0.5, 1.0, 2.0]", "[1.0]").replace("[0, 3]", "[0]")
         text = text.replace("[1.0, 1.2], loud = [false, true]", "1.2")
         store = Store("results")
-        plan_of(text).run(1, store)
+        plan_of(text).run(LocalProcesses(1), store)
         keys = {result.key for result in store.load().results}
         femubench.rank(
             "rod", Spy(1.2), seeds=2, nominal="textbook", jobs=1, store=store, overwrite="missing"
@@ -243,35 +244,37 @@ class TestResume:
                 raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            plan.run(1, store, progress=stop)
+            plan.run(LocalProcesses(1), store, progress=stop)
         early = store.load()
         assert len(early.results) == 3
         # Seed after seed: the first jobs are of different cells.
         assert {result.seed for result in early.results} == {1}
         seen: list[int] = []
-        resumed = plan.run(2, store, progress=lambda result, done, total: seen.append(done))
+        resumed = plan.run(
+            LocalProcesses(2), store, progress=lambda result, done, total: seen.append(done)
+        )
         assert seen == list(range(1, 9))
         assert store.runs() == (early.meta["run"],)
-        whole = plan.run(2, Store("calm"))
+        whole = plan.run(LocalProcesses(2), Store("calm"))
         fields = ("status", "score", "key", "blocks", "diagnostics")
         assert values(resumed, *fields) == values(whole, *fields)
         assert resumed.skill_by().equals(
             whole.skill_by().assign(seconds=resumed.skill_by()["seconds"])
         )
-        again = plan.run(2, store)
+        again = plan.run(LocalProcesses(2), store)
         assert [r.seconds for r in again.results] == [r.seconds for r in resumed.results]
 
     def test_a_level_that_is_added_takes_the_others_from_the_store(self) -> None:
         store = Store("results")
         text = STUDY.replace(", loud = [false, true]", "").replace("[0, 3]", "[0]")
-        plan_of(text.replace("[0.5, 1.0, 2.0]", "[1.0]")).run(1, store)
+        plan_of(text.replace("[0.5, 1.0, 2.0]", "[1.0]")).run(LocalProcesses(1), store)
         plan = plan_of(text.replace("[0.5, 1.0, 2.0]", "[1.0, 4.0]"))
         found = plan.forecast(store)
         assert (found.jobs, found.done) == (8, 4)
         assert not found.unknown
         assert found.seconds > 0.0
         before = {r.key: r.seconds for r in store.load().results}
-        after = {r.key: r.seconds for r in plan.run(1, store).results}
+        after = {r.key: r.seconds for r in plan.run(LocalProcesses(1), store).results}
         assert before.items() < after.items()
 
 
@@ -305,7 +308,7 @@ WRONG = {
     "seeds = 2|sedes = 2": "study.toml:6: axes.sedes: unknown key; is 'seeds' meant?",
     "[0.5, 1.0, 2.0]|[0.5, 0.0]": "study.toml:7: axes.noise[1]: 0.0 is not allowed",
     "[0, 3]|[0, 5]": "study.toml:8: axes.sensors_left_out[1]: 5 sensors left out of rod",
-    'name = "spy"|name = "spi"': "study.toml:10: strategies[0].name: no strategy 'spi'; did you mean 'spy'?",
+    'name = "spy"|name = "spi"': "study.toml:10: strategies[0].name: no strategy 'spi'; did you",
     "{factor = |{facto = ": "study.toml:11: strategies[0].options: strategy 'spy' has no option",
     "[1.0, 1.2]|[1.0, \"x\"]": "study.toml:11: strategies[0].options: strategy 'spy': option",
     "[1.0, 1.2]|[]": "study.toml:11: strategies[0].options.factor: an empty list",

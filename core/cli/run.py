@@ -34,10 +34,9 @@ if TYPE_CHECKING:
     "-s", "--strategy", "strategies", multiple=True, metavar="STRATEGY",
     help="Run this strategy, or STRATEGY:OPTION=VALUE,...; may be repeated. Default: all.",
 )  # fmt: skip
-@click.option(
-    "-j", "--jobs", type=click.IntRange(1), metavar="N",
-    help="Number of worker processes. Default: one per core.",
-)  # fmt: skip
+@options.jobs
+@options.scheduler
+@options.cluster
 @click.option(
     "--seeds", type=click.IntRange(1), metavar="N",
     help="Run N draws of measurement noise, seeds S+1 .. S+N, instead of the data as recorded.",
@@ -93,6 +92,8 @@ def run(
     cases: tuple[str, ...],
     strategies: tuple[str, ...],
     jobs: int | None,
+    scheduler: str | None,
+    cluster: str | None,
     seeds: int | None,
     seed: int,
     nominal: Start,
@@ -116,17 +117,24 @@ def run(
     plugins = _checked(ctx, cases, strategies)
     from femubench.core.library.rank import repeated, request_of, store_in
     from femubench.core.library.report import reporter, run_name
-    from femubench.core.run.executor import worker_count
+    from femubench.core.run.executor import executor_of
     from femubench.core.schema.results import DONE
 
     outputs = outputs_of(plugins, json_file, csv_file, report_file)
     kept = store_in(store)
     old = None if locked is None else kept.load(locked)
     plan = _plan(ctx, plugins, kept) if old is None else repeated(request_of(old), plugins)
-    if not quiet:
-        click.echo(wrapped(_header(plan, worker_count(jobs)), hanging=2))
-    with progress_bar(quiet=quiet) as progress:
-        outcome = plan.run(jobs, kept, overwrite=overwrite, resume=resume, progress=progress)
+    with executor_of(jobs, scheduler, cluster) as executor:
+        if not quiet:
+            click.echo(wrapped(_header(plan, executor.spoken), hanging=2))
+        with progress_bar(quiet=quiet) as progress:
+            outcome = plan.run(
+                store=kept,
+                overwrite=overwrite,
+                resume=resume,
+                progress=progress,
+                executor=executor,
+            )
     if report_file is None:
         for writer in (reporter(plugins, name) for name in ("html", "markdown")):
             outputs[kept.folder / f"{run_name(outcome)}{writer.suffix}"] = writer
@@ -204,7 +212,7 @@ def _compare(old: Run, new: Run) -> int:
     return int(bool(results))
 
 
-def _header(plan: Plan, workers: int) -> str:
+def _header(plan: Plan, place: str) -> str:
     """Return one line with everything that decides on the outcome."""
     request, cases, strategies = plan.request, len(plan.cases), len(plan.strategies)
     seeds = request.all_seeds
@@ -216,6 +224,6 @@ def _header(plan: Plan, workers: int) -> str:
     return (
         f"femubench {__version__}: {counted(cases, 'case')}{start}, "
         f"{counted(strategies, 'strategy')}, {named} ({meaning}), "
-        f"{counted(plan.jobs, 'job')}, {counted(workers, 'worker')}, "
+        f"{counted(plan.jobs, 'job')}, {place}, "
         f"timeout {spoken(request.timeout)}{own}"
     )

@@ -27,10 +27,9 @@ if TYPE_CHECKING:
     "--dry-run", is_flag=True,
     help="Check the file, say how many jobs there are and how long they take; run none.",
 )  # fmt: skip
-@click.option(
-    "-j", "--jobs", type=click.IntRange(1), metavar="N",
-    help="Number of worker processes. Default: one per core.",
-)  # fmt: skip
+@options.jobs
+@options.scheduler
+@options.cluster
 @click.option(
     "--timeout", "timeouts", multiple=True, callback=timeouts_of, metavar="DURATION",
     help="Give up on a job after this time, e.g. 90s, 10m, 1h. STRATEGY=DURATION is for one "
@@ -62,6 +61,8 @@ def study(
     file: Path,
     dry_run: bool,
     jobs: int | None,
+    scheduler: str | None,
+    cluster: str | None,
     timeouts: dict[str, float],
     memory: int | None,
     overwrite: Overwrite,
@@ -80,7 +81,7 @@ def study(
     from femubench.core.library.rank import store_in
     from femubench.core.library.report import reporter, run_name
     from femubench.core.library.study import study_plan
-    from femubench.core.run.executor import worker_count
+    from femubench.core.run.executor import executor_of, worker_count
     from femubench.core.schema.results import DONE
     from femubench.core.study.study_file import read_study
 
@@ -89,19 +90,20 @@ def study(
     if dry_run:
         click.echo("\n".join(_forecast(plan, kept, worker_count(jobs))))
         return 0
-    if not quiet:
-        click.echo(wrapped(f"{_title(plan)}, {counted(worker_count(jobs), 'worker')}", hanging=2))
     limits = dict(timeouts)
-    with progress_bar(quiet=quiet) as progress:
-        found = plan.run(
-            jobs,
-            kept,
-            timeout=limits.pop("", None),
-            timeouts=limits,
-            memory=memory,
-            overwrite=overwrite,
-            progress=progress,
-        )
+    with executor_of(jobs, scheduler, cluster) as executor:
+        if not quiet:
+            click.echo(wrapped(f"{_title(plan)}, {executor.spoken}", hanging=2))
+        with progress_bar(quiet=quiet) as progress:
+            found = plan.run(
+                executor,
+                kept,
+                timeout=limits.pop("", None),
+                timeouts=limits,
+                memory=memory,
+                overwrite=overwrite,
+                progress=progress,
+            )
     if report_file is None:
         for writer in (reporter(plugins, name) for name in ("html", "markdown")):
             outputs[kept.folder / f"{run_name(found)}{writer.suffix}"] = writer

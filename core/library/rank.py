@@ -22,6 +22,7 @@ from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import check_strategy, chosen
 from femubench.core.plugin.variants import Variant, labelled, strategy_of
 from femubench.core.roles import Strategy
+from femubench.core.run.executor import Executor, executor_of
 from femubench.core.run.frames import modes_frame, results_frame
 from femubench.core.run.recording import Overwrite, Progress
 from femubench.core.run.runner import run_jobs
@@ -168,8 +169,13 @@ class Plan:
         overwrite: Overwrite | None = None,
         resume: bool = False,
         progress: Progress | None = None,
+        executor: Executor | None = None,
     ) -> Run:
-        """Run every strategy on every case with every seed; see `rank`."""
+        """Run every strategy on every case with every seed; see `rank`.
+
+        Arguments:
+            executor: what runs the jobs, from `executor_of`; None for `jobs` workers here.
+        """
         if store is not None:
             make_folder(store.folder)
         asked = self.request
@@ -189,6 +195,7 @@ class Plan:
                 run_seed=asked.seed,
                 request=asked.to_json() if self.repeatable else {"nominal": asked.nominal},
                 starts=Starts(self.textbook, asked.nominal, self.classes),
+                executor=executor,
             )
         )
 
@@ -208,6 +215,8 @@ def rank(
     overwrite: Overwrite | None = None,
     resume: bool = False,
     progress: Progress | None = None,
+    scheduler: str | None = None,
+    cluster: str | None = None,
 ) -> Run:
     """Run strategies on cases, each job in a process of its own, and rank them.
 
@@ -220,7 +229,8 @@ def rank(
         nominal: the model that all strategies start from: as it was ``drawn``, with what handbooks
             give (``textbook``), or ``both``, which is the default. Ranks are from the textbook
             model where that is among them. Errors are measured against the textbook model always.
-        jobs: number of worker processes; None for one a processor.
+        jobs: number of worker processes; None for one a processor. With ``cluster="slurm:QUEUE"``
+            the number of Slurm jobs.
         timeout: seconds that a job may take; 600 by default.
         timeouts: the same for single strategies, by name.
         memory: bytes that a job may take; None for an even share of the machine's.
@@ -230,6 +240,8 @@ def rank(
         resume: go on with the last run of these jobs in the store; where neither cases nor
             strategies are given, with the last run.
         progress: called with (result, jobs done, jobs in all).
+        scheduler: address of a Dask scheduler whose workers run the jobs, ``tcp://HOST:PORT``.
+        cluster: one that is started for the run: ``local:N`` workers, or ``slurm:QUEUE``.
 
     Raises:
         InputError: for an unknown name, an option that does not exist, or a faulty case.
@@ -251,7 +263,10 @@ def rank(
         memory=memory,
         resumed=kept if resume else None,
     )
-    return plan.run(jobs, kept, overwrite=overwrite, resume=resume, progress=progress)
+    with executor_of(jobs, scheduler, cluster) as executor:
+        return plan.run(
+            store=kept, overwrite=overwrite, resume=resume, progress=progress, executor=executor
+        )
 
 
 def plan_of(

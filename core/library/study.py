@@ -24,6 +24,7 @@ from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import chosen, unknown
 from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Strategy
+from femubench.core.run.executor import Executor, executor_of
 from femubench.core.run.recording import Overwrite, Progress
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.slots import Slots
@@ -98,7 +99,7 @@ class StudyPlan:
 
     def run(
         self,
-        jobs: int | None = None,
+        executor: Executor,
         store: Store | None = None,
         *,
         timeout: float | None = None,
@@ -107,7 +108,11 @@ class StudyPlan:
         overwrite: Overwrite | None = None,
         progress: Progress | None = None,
     ) -> Run:
-        """Run what the store does not have, seed after seed; see `study`."""
+        """Run what the store does not have, seed after seed; see `study`.
+
+        Arguments:
+            executor: what runs the jobs, from `executor_of`.
+        """
         if store is not None:
             make_folder(store.folder)
         bases = {name: choice.strategy for name, choice in self.axes.strategies.items()}
@@ -119,7 +124,6 @@ class StudyPlan:
                 self.cases,
                 self.strategies,
                 seeds=self.seeds,
-                jobs=jobs,
                 timeout=DEFAULT_TIMEOUT if timeout is None else timeout,
                 timeouts={name: limit for name, limit in own.items() if limit is not None},
                 memory=memory,
@@ -130,6 +134,7 @@ class StudyPlan:
                 run_seed=self.seed,
                 request={"study": self.axes.to_json()},
                 starts=self.starts,
+                executor=executor,
             )
         )
 
@@ -138,6 +143,8 @@ def study(
     file: str | PathLike[str],
     *,
     jobs: int | None = None,
+    scheduler: str | None = None,
+    cluster: str | None = None,
     timeout: float | None = None,
     timeouts: Mapping[str, float] | None = None,
     memory: int | None = None,
@@ -152,6 +159,7 @@ def study(
     Arguments:
         file: a study file; see docs/studies.md.
         jobs: number of worker processes; None for one a processor.
+        scheduler, cluster: where the jobs run instead, as in `femubench.rank`.
         timeout: seconds that a job may take; 600 by default.
         timeouts: the same for single strategies, by name, with or without options.
         memory: bytes that a job may take; None for an even share of the machine's.
@@ -172,15 +180,16 @@ def study(
         [1, 1]
     """
     plan = study_plan(read_study(file), usable_plugins())
-    return plan.run(
-        jobs,
-        None if store is None else store_in(store),
-        timeout=timeout,
-        timeouts=timeouts,
-        memory=memory,
-        overwrite=overwrite,
-        progress=progress,
-    )
+    with executor_of(jobs, scheduler, cluster) as executor:
+        return plan.run(
+            executor,
+            None if store is None else store_in(store),
+            timeout=timeout,
+            timeouts=timeouts,
+            memory=memory,
+            overwrite=overwrite,
+            progress=progress,
+        )
 
 
 def study_plan(read: StudyFile, plugins: Plugins) -> StudyPlan:

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
+from femubench.core.display import counted
 from femubench.core.errors import InputError, require
 from femubench.core.roles import Strategy
 from femubench.core.run.limits import Limits, memory_share
@@ -23,6 +24,10 @@ class Executor(Protocol):
     @property
     def workers(self) -> int:
         """Return how many jobs run at a time, as far as is known now."""
+
+    @property
+    def spoken(self) -> str:
+        """Return what a user reads of it, such as ``2 workers``."""
 
     @property
     def share(self) -> int | None:
@@ -60,6 +65,11 @@ class LocalProcesses:
     """
 
     workers: int
+
+    @property
+    def spoken(self) -> str:
+        """Return the number of workers in words."""
+        return counted(self.workers, "worker")
 
     @property
     def share(self) -> int:

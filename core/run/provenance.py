@@ -13,6 +13,7 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from functools import cache, lru_cache
 from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +59,22 @@ def strategy_version(strategy: Strategy) -> str:
     return f"{_number(top)}+{_digest(tuple(_stamps(top, type(inner).__module__)))}"
 
 
+def package_version(top: str) -> str:
+    """Return the version of an installed package and a digest of its source, without importing it.
+
+    Arguments:
+        top: name of the package, or of a module that is no package.
+    """
+    spec = find_spec(top)
+    if spec is None:
+        return "not installed"
+    folders = spec.submodule_search_locations or ()
+    files = sorted(file for folder in folders for file in _python_files(Path(folder)))
+    if spec.origin and not files:
+        files = [Path(spec.origin)]
+    return f"{_installed(top, '0')}+{_digest(tuple(map(_stamp, files)))}"
+
+
 @cache
 def _number(top: str) -> str:
     return str(getattr(sys.modules.get(top), "__version__", "") or _installed(top, "0"))
@@ -78,13 +95,15 @@ def _stamps(top: str, module: str) -> Iterator[Stamp]:
     own = getattr(sys.modules.get(module), "__file__", None)
     if not files and own:
         files = [Path(own)]
-    for file in files:
-        try:
-            found = file.stat()
-        except OSError:  # a link that leads nowhere is no source
-            yield file, 0, 0
-        else:
-            yield file, found.st_mtime_ns, found.st_size
+    yield from map(_stamp, files)
+
+
+def _stamp(file: Path) -> Stamp:
+    try:
+        found = file.stat()
+    except OSError:  # a link that leads nowhere is no source
+        return file, 0, 0
+    return file, found.st_mtime_ns, found.st_size
 
 
 @lru_cache(maxsize=64)
@@ -199,9 +218,10 @@ def run_meta(
     }
 
 
-def versions() -> dict[str, str]:
-    """Return the versions of Python and of the packages that results depend on."""
-    installed = {package: _installed(package, "not installed") for package in _PACKAGES}
+def versions(*more: str) -> dict[str, str]:
+    """Return the versions of Python, of the packages that results depend on, and of more."""
+    packages = (*_PACKAGES, *more)
+    installed = {package: _installed(package, "not installed") for package in packages}
     return {"python": platform.python_version(), **installed}
 
 

@@ -30,7 +30,9 @@ class Results:
         if store is not None:
             # What is drawn of a case starts from the model that makes the ranks, which comes first.
             drawn = {slot.case.name: slot.case for slot in reversed(slots)}
-            keep_drawings(store.exhibits, drawn.values())
+            # Under other conditions nothing of it looks otherwise.
+            own = [case for case in drawn.values() if not case.conditions(0)]
+            keep_drawings(store.exhibits, own)
 
     @property
     def shelf(self) -> Show | None:

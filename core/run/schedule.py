@@ -90,7 +90,7 @@ class _Bench:
             yield index, self.unjudged(index, job)
             return
         if answer:
-            shown = self._show is not None and slot.seed == self._shown
+            shown = self._show is not None and slot.seed == self._shown and not slot.varied
             names = slot.strategy, slot.seed, slot.nominal
             verdict = Verdict(self._case(slot), answer, *names, exhibited=shown)
             ending = workers.start(task, run_judge, verdict, self._judging(slot.strategy))

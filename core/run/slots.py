@@ -78,6 +78,11 @@ class Slot:
         return Job(*parts, words)  # type: ignore[arg-type]
 
     @property
+    def varied(self) -> bool:
+        """Tell whether the case is under other conditions than its files say."""
+        return bool(self.case.conditions(self.seed))
+
+    @property
     def stale(self) -> bool:
         """Tell whether the source of the strategy has changed since the key was made."""
         return self.now is not None and self.now() != self.version

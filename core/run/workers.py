@@ -324,7 +324,7 @@ class Workers(Generic[Key]):
         process = context.Process(target=serve, args=arguments)
         try:
             _server_mark()  # a job may have ended the server
-            with _no_script():
+            with no_script():
                 process.start()
         except (OSError, EOFError) as error:
             for end in (answer, output):
@@ -410,15 +410,24 @@ def _server_awake() -> Iterator[None]:
         watcher.join()
 
 
+_hiding = threading.Lock()
+_hidden: list[ModuleType] = []
+
+
 @contextmanager
-def _no_script() -> Iterator[None]:
+def no_script() -> Iterator[None]:
     """Hide the script or notebook from a worker that starts, which would run it once more."""
-    script = sys.modules["__main__"]
-    sys.modules["__main__"] = ModuleType("__main__")
+    with _hiding:
+        _hidden.append(sys.modules["__main__"])
+        sys.modules["__main__"] = ModuleType("__main__")
     try:
         yield
     finally:
-        sys.modules["__main__"] = script
+        with _hiding:
+            # Blocks of several threads overlap; what the first of them found comes back last.
+            script = _hidden.pop()
+            if not _hidden:
+                sys.modules["__main__"] = script
 
 
 def _wake_server() -> None:
