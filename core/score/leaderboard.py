@@ -155,6 +155,17 @@ def leaderboard(run: Run, floor_percent: float = OFFSET_PERCENT) -> pd.DataFrame
     return pd.DataFrame(listed, columns=list(COLUMNS))
 
 
+def row_of(run: Run, strategy: str) -> dict[str, Any]:
+    """Return the row of one strategy on a leaderboard, without its rank; results have scores.
+
+    Arguments:
+        run: as for `leaderboard`.
+        strategy: its name.
+    """
+    found = [result for result in run.ranked if result.strategy == strategy]
+    return _row(strategy, found, _Table.of(run, OFFSET_PERCENT))
+
+
 def ranks_by_floor(run: Run) -> dict[str, tuple[int, ...]]:
     """Return the ranks of every strategy for each of `FLOORS`, in the order of the leaderboard.
 

@@ -9,7 +9,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from femubench.core.schema.results import DONE, JobResult, Nominal, Run
-from femubench.core.score.leaderboard import leaderboard
+from femubench.core.score.leaderboard import row_of
 from femubench.core.study.axes import StudyAxes, Value
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def _figures(run: Run, arms: Sequence[_Arm], by_arm: dict[_Arm, list[JobResult]]
         "structures": {name: structures.get(arm[1], arm[1]) for arm, name in names.items()},
         "reference": {n: reference[arm[1]] for arm, n in names.items() if arm[1] in reference},
     }
-    row = leaderboard(Run(meta, results)).iloc[0]
+    row = row_of(Run(meta, results), "cell")
     told = {name: row[name] for name in ("skill", "skill_low", "skill_high", "ok", "unphysical")}
     failed = sum(result.status not in DONE for result in results)
     jobs = int(row["total"])
