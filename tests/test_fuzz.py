@@ -164,7 +164,7 @@ def results_format(folder: Path, share: float, format: str) -> None:
         nonlocal count
         if format == "store":
             with suppress(FemubenchError):
-                Store(folder).load(lenient=True)
+                Store(folder).load()
         run = read_run(file) if format == "run" else Store(folder).load()
         count += 1
         for reporter in REPORTERS:

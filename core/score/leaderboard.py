@@ -149,8 +149,14 @@ def leaderboard(run: Run, floor_percent: float = OFFSET_PERCENT) -> pd.DataFrame
     import pandas as pd
 
     table = _Table.of(run, floor_percent)
-    scored = rank_results(run.ranked, run.meta.get("reference") or None, run.meta.get("baseline"))
-    rows = [_row(name, [r for r in scored if r.strategy == name], table) for name in table.names]
+    scored = run.ranked
+    if any(block == WHOLE for _, block in table.grid.weights):
+        reference = run.meta.get("reference") or None
+        scored = rank_results(scored, reference, run.meta.get("baseline"))
+    own: dict[str, list[JobResult]] = {name: [] for name in table.names}
+    for result in scored:
+        own[result.strategy].append(result)
+    rows = [_row(name, results, table) for name, results in own.items()]
     listed = [{**row, "rank": rank} for rank, row in ranked(rows, _order)]
     return pd.DataFrame(listed, columns=list(COLUMNS))
 
