@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import gc
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -62,6 +63,22 @@ def held(path: Path) -> int:
         os.close(descriptor)
 
 
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Look for no circles of references meanwhile.
+
+    Results have none, and to look for them while there are more and more takes half as long as to
+    read them.
+    """
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
+
+
 class Store:
     """Results of many runs in one folder, each in a file of its own.
 
@@ -101,8 +118,13 @@ class Store:
         return Exhibits(self.folder)
 
     def begin(self, meta: Mapping[str, Any]) -> None:
-        """Record the start of a run; `meta` has its id under ``run``."""
-        self._write(meta["run"], partial(begun, meta), at_once=True)
+        """Record the start of a run, twice: without it the run could not be continued.
+
+        Arguments:
+            meta: has the id of the run under ``run``.
+        """
+        for _ in range(2):
+            self._write(meta["run"], partial(begun, meta), at_once=True)
 
     def append(self, run_id: str, result: JobResult) -> None:
         """Record the result of one job; after a crash it is there whole or not at all."""
@@ -116,6 +138,7 @@ class Store:
         """Return the ids of all runs, oldest first; none where nothing was stored."""
         return tuple(self._begun([]))
 
+    @uncollected()
     def load(self, run_id: str | None = None) -> Run:
         """Return a run with scores and ranks, its results in the order of its jobs.
 
@@ -132,7 +155,7 @@ class Store:
         meta: dict[str, Any] = {"run": wanted, "finished": None}
         results: dict[tuple[str, str, int, Nominal], JobResult] = {}
         faults: list[InputError] = []
-        for record in self._records(wanted, faults):
+        for record in self.records(wanted, faults):
             try:
                 if record.kind == "result":
                     found = record.result()
@@ -148,6 +171,7 @@ class Store:
         reference = meta.get("reference") or None
         return Run({**meta, "notes": notes}, rank_results(listed, reference, meta.get("baseline")))
 
+    @uncollected()
     def by_key(self, run_id: str | None = None, *, but: str | None = None) -> dict[str, JobResult]:
         """Return the latest result of every job that has a key.
 
@@ -160,7 +184,7 @@ class Store:
         """
         found: dict[str, JobResult] = {}
         for run in (*self.runs(),) if run_id is None else (run_id,):
-            for record in self._records(run, []) if run != but else ():
+            for record in self.records(run, []) if run != but else ():
                 known = found.get(record.key)
                 if not record.key or record.kind != "result":
                     continue
@@ -203,8 +227,16 @@ class Store:
             path.unlink(missing_ok=True)
             os.close(descriptor)
 
-    def _records(self, run_id: str, faults: list[InputError]) -> Iterator[AnyRecord]:
-        """Yield the records of a run, those of earlier versions first."""
+    def records(self, run_id: str, faults: list[InputError]) -> Iterator[AnyRecord]:
+        """Yield the records of a run, those of earlier versions first.
+
+        Arguments:
+            run_id: the whole id.
+            faults: takes an error for every line that is no record.
+
+        Raises:
+            InputError: when a file cannot be read.
+        """
         old, own = self.folder / OLD_FILE, self.folder / f"{run_id}{_SUFFIX}"
         if old.exists():
             yield from (r for r in records_of(old, faults) if r.run == run_id)

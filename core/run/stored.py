@@ -6,7 +6,9 @@ import json
 import re
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +23,7 @@ from femubench.core.schema.records import (
     result_to_line,
 )
 from femubench.core.schema.results import JobResult
-from femubench.core.schema.sealing import TAIL, is_whole, sealed
+from femubench.core.schema.sealing import TAIL, is_whole, sealed, sum_of
 
 SCHEMA = 2
 OLD_FILE = "results.jsonl"  # of schema 1: the records of all runs, without checksums
@@ -56,6 +58,20 @@ class Record:
     key: str
     status: str
     _text: bytes
+
+    def following(self, after: bytes) -> bytes:
+        """Return the line of the same record behind another one.
+
+        Arguments:
+            after: checksum of that.
+        """
+        own, new = (f'"after":"{s.decode()}"'.encode() for s in (self.after, after))
+        return sealed(self._text[:-TAIL].replace(own, new, 1) + b"}")
+
+    @property
+    def checksum(self) -> bytes:
+        """Return the checksum with which its line ends."""
+        return sum_of(self._text)
 
     def result(self) -> JobResult:
         """Return the result.
@@ -106,13 +122,33 @@ class OldRecord:
         """Return the meta data, as `Record` does."""
         return meta_from_json(self._data.get("meta"), file=self.file, line=self.number)
 
+    def following(self, after: bytes) -> bytes:
+        """Return the line of the same record in the schema of this version.
+
+        Raises:
+            InputError: when it cannot be read.
+        """
+        if self.kind == "result":
+            return done(self.result(), after)
+        if self.kind == "end":
+            return ended(self.meta(), after)
+        return begun(self.meta(), after, self._at())
+
+    def _at(self) -> float:
+        """Return about when the run began, in the order of the file, in seconds since 1970."""
+        with suppress(TypeError, ValueError):
+            start = datetime.fromisoformat(self._data["meta"].get("started"))
+            return start.timestamp() + 1e-6 * min(self.number, 10**6)
+        return 0.0
+
 
 AnyRecord = Record | OldRecord
 
 
-def begun(meta: Mapping[str, Any], after: bytes) -> bytes:
-    """Return the line of a run that begins now."""
-    return _line("run", after, compact({"at": time.time(), "meta": meta}))
+def begun(meta: Mapping[str, Any], after: bytes, at: float | None = None) -> bytes:
+    """Return the line of a run that begins now, or began at a time in seconds since 1970."""
+    when = time.time() if at is None else at
+    return _line("run", after, compact({"at": when, "meta": meta}))
 
 
 def ended(meta: Mapping[str, Any], after: bytes) -> bytes:
