@@ -12,6 +12,7 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from io import BufferedReader
 from pathlib import Path
 
 from femubench.core.files import MIB, open_regular
@@ -19,6 +20,7 @@ from femubench.core.schema.sealing import TAIL, is_whole, sum_of
 
 LARGEST = 4096 * MIB  # bytes of a file, in which there are a million results and more
 _LONGEST_LINE = 64 * MIB
+_BUFFER = MIB
 _SYNCED_WITHIN = 1.0  # s
 
 
@@ -28,7 +30,7 @@ def lines_of(path: Path) -> Iterator[tuple[int, bytes, bool]]:
     Raises:
         InputError: when the file cannot be read.
     """
-    with open_regular(path, LARGEST) as stream:
+    with BufferedReader(open_regular(path, LARGEST).detach(), _BUFFER) as stream:
         number = 0
         while line := stream.readline(_LONGEST_LINE):
             number += 1

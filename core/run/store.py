@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import fcntl
-import gc
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -14,6 +13,7 @@ from typing import Any
 
 from femubench.core.drawing.files import Exhibits
 from femubench.core.errors import InputError
+from femubench.core.garbage import uncollected
 from femubench.core.run.sealed_file import Syncing, add, sync
 from femubench.core.run.stored import (
     OLD_FILE,
@@ -61,22 +61,6 @@ def held(path: Path) -> int:
             if os.path.samestat(os.fstat(descriptor), path.stat()):
                 return descriptor
         os.close(descriptor)
-
-
-@contextmanager
-def uncollected() -> Iterator[None]:
-    """Look for no circles of references meanwhile.
-
-    Results have none, and to look for them while there are more and more takes half as long as to
-    read them.
-    """
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
 
 
 class Store:
@@ -313,14 +297,22 @@ def in_order_of_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> l
     Arguments:
         meta: ``cases``, ``seeds`` and ``strategies`` of the run; what they lack comes last.
     """
-    listed = (
-        *(meta.get("cases") or (), tuple(reversed(NOMINALS))),
-        *(meta.get("seeds") or (), meta.get("strategies") or ()),
+    cases, nominals, seeds, strategies = (
+        {name: place for place, name in enumerate(names)}
+        for names in (
+            meta.get("cases") or (),
+            tuple(reversed(NOMINALS)),
+            meta.get("seeds") or (),
+            meta.get("strategies") or (),
+        )
     )
-    places = [{name: place for place, name in enumerate(names)} for names in listed]
 
-    def place(result: JobResult) -> list[int]:
-        words = result.case, result.nominal, result.seed, result.strategy
-        return [known.get(word, len(known)) for known, word in zip(places, words, strict=True)]
+    def place(result: JobResult) -> tuple[int, int, int, int]:
+        return (
+            cases.get(result.case, len(cases)),
+            nominals.get(result.nominal, len(nominals)),
+            seeds.get(result.seed, len(seeds)),
+            strategies.get(result.strategy, len(strategies)),
+        )
 
     return sorted(results, key=place)

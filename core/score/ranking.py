@@ -7,6 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from femubench.core.garbage import uncollected
 from femubench.core.schema.results import JobResult, Nominal
 from femubench.core.score.counting import WHOLE, counted_blocks
 
@@ -103,6 +104,7 @@ def ranked(
     return [(rank, item) for rank, _, item in sorted(found, key=lambda entry: entry[:2])]
 
 
+@uncollected()
 def rank_results(
     results: Iterable[JobResult],
     reference: Mapping[str, Mapping[str, float]] | None = None,
