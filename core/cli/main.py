@@ -35,6 +35,7 @@ VERBS = {
         "femubench.core.cli.compare",
         "Compare run B with run A; exit with 1 if B is worse.",
     ),
+    "store": ("femubench.core.cli.store", "Check, repair or export stored runs."),
     "publish": ("femubench.core.cli.publish", "Merge result files into a static site in DIR."),
     "update": (
         "femubench.core.cli.update",

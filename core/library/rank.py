@@ -294,7 +294,7 @@ def plan_of(
             if value is not None:
                 what = f"--resume alone goes on as before; {name} needs CASE or -s beside it"
                 raise InputError(what)
-        request = request_of(resumed.load())
+        request = request_of(results.Run(resumed.begun(), ()))
         if timeout is not None or timeouts:
             request = replace(request, timeout=timeout or DEFAULT_TIMEOUT, timeouts=timeouts or {})
         request = request if memory is None else replace(request, memory=memory)
@@ -403,15 +403,12 @@ def store_in(folder: Store | str | PathLike[str] | None = None) -> Store:
 def read_run(
     run: results.Run | str | PathLike[str] | None = None,
     store: Store | str | PathLike[str] | None = None,
-    *,
-    lenient: bool = False,
 ) -> Run:
     """Return a run.
 
     Arguments:
         run: a file that ``run --json`` wrote, a run id or its first letters; None for the last.
         store: where runs are kept.
-        lenient: whether lines of the store that cannot be read are left out.
 
     Raises:
         InputError: when there is no such run, or it cannot be read.
@@ -425,4 +422,4 @@ def read_run(
         return Run.of(run)
     if run is not None and os.path.exists(run) and not os.path.isdir(run):
         return Run.of(serial.read_run(Path(run)))
-    return Run.of(store_in(store).load(None if run is None else str(run), lenient=lenient))
+    return Run.of(store_in(store).load(None if run is None else str(run)))

@@ -67,7 +67,7 @@ def report(
         found = diagnosis_in(Path(what)) or read_run(what)
     elif what is None or isinstance(what, (str, PathLike)):
         kept = store_in(store)
-        found = read_run(what, kept, lenient=True)
+        found = read_run(what, kept)
     if isinstance(found, Run):
         content = _run_report(found, path, style, kept)
     else:
