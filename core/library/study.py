@@ -81,7 +81,7 @@ class StudyPlan:
         Arguments:
             store: whose results are done, and tell how long such jobs take.
         """
-        known = store.by_key() if store is not None and store.path.exists() else {}
+        known = {} if store is None else store.by_key()
         left = [
             (slot.case.name, slot.strategy)
             for slot in Slots(self.models, self.strategies, self.seeds)

@@ -10,8 +10,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from femubench.core.errors import InputError
 from femubench.core.plugin.validation import did_you_mean
-from femubench.core.schema.records import Name
-from femubench.core.schema.results import NOMINALS, Nominal, Run
+from femubench.core.schema.results import NOMINALS, Name, Nominal, Run
 
 Value = bool | int | float | str | None
 _NOISE, _LEFT_OUT = "noise", "sensors_left_out"
