@@ -297,6 +297,22 @@ class TestDryRun:
         assert not Path("kept").exists()
 
 
+def test_the_example_is_a_study() -> None:
+    file = Path(__file__).parents[1] / "examples" / "noise-and-weight.toml"
+    plan = study_plan(read_study(file), load_plugins())
+    assert (plan.cells, plan.jobs) == (32, 192)
+    assert plan.axes.pictured[0] == "noise"
+
+
+def test_a_study_goes_on_by_its_own_command() -> None:
+    store = Store("results")
+    text = STUDY.replace("[0.5, 1.0, 2.0]", "[2.0]").replace("[0, 3]", "[0]")
+    text = text.replace("[1.0, 1.2], loud = [false, true]", "1.0").replace("seeds = 2", "seeds = 1")
+    plan_of(text).run(LocalProcesses(1), store)
+    with pytest.raises(InputError, match="is a study .expected `bench study FILE`"):
+        femubench.rank(resume=True, store=store)
+
+
 WRONG = {
     'cases = ["./rod"]|cases = []': "study.toml:5: axes.cases: an empty list",
     'cases = ["./rod"]|cases = ["./rod", "./rot"]': "study.toml:5: axes.cases[1]: there is no case",

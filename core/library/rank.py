@@ -85,6 +85,9 @@ def request_of(run: results.Run) -> Request:
         InputError: when it was not kept, as by earlier versions and by calls from Python.
     """
     kept = run.meta.get("request")
+    if isinstance(kept, Mapping) and "study" in kept:
+        what = f"run {run.meta.get('run')} is a study"
+        raise InputError(what, expected="`bench study FILE`, which goes on where it stopped")
     if not isinstance(kept, Mapping) or not {"cases", "strategies"} <= kept.keys():
         what = f"run {run.meta.get('run')} does not tell what it was asked for"
         raise InputError(what, expected="a run of `bench run` of this version")
