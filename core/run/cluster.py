@@ -282,18 +282,19 @@ def started(words: str, jobs: int | None = None) -> Iterator[DaskWorkers]:
 
     Arguments:
         words: ``local:N`` or ``slurm:QUEUE``.
-        jobs: number of Slurm jobs; must be None with ``local``.
+        jobs: number of Slurm jobs; must be None with ``local:N``.
 
     Raises:
         InputError: for other words, or where it cannot be started.
     """
-    kind, _, rest = words.partition(":")
-    if kind == "local" and re.fullmatch(r"[1-9]\d{0,3}", rest):
+    rest = words.partition(":")[2]
+    queued = words.startswith("slurm:")
+    if re.fullmatch(r"local:[1-9]\d{0,3}", words):
         if jobs is not None:
             what = f"{words} tells the number of workers"
             raise InputError(what, key="cluster", expected="no --jobs beside it")
         make, jobs = partial(_local, int(rest)), int(rest)
-    elif kind == "slurm" and re.fullmatch(r"[\w.,-]+", rest):
+    elif queued and re.fullmatch(r"[\w.,-]+", rest):
         require("dask_jobqueue", "cluster", "--cluster slurm")
         if shutil.which("sbatch") is None:
             what = f"{words} needs sbatch, which is not here"
@@ -308,10 +309,10 @@ def started(words: str, jobs: int | None = None) -> Iterator[DaskWorkers]:
         except (OSError, RuntimeError, ValueError, TimeoutError) as error:
             what = f"{words} cannot be started: {one_line(error)}"
             raise InputError(what, key="cluster", expected="machines to run on") from error
-        size = {"jobs": jobs} if kind == "slurm" else {"n": jobs}
+        size = {"jobs": jobs} if queued else {"n": jobs}
         stack.enter_context(_kept(partial(cluster.scale, **size)))
         client = stack.enter_context(_client(cluster))
-        yield DaskWorkers(client, words, waits=kind == "slurm")
+        yield DaskWorkers(client, words, waits=queued)
 
 
 def _local(count: int) -> Cluster:
