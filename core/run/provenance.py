@@ -22,7 +22,8 @@ from femubench.core.roles import Strategy
 from femubench.core.score.scoring import Reference
 from femubench.core.version import __version__
 
-Stamp = tuple[Path, int, int]  # a file, when it was changed, its size
+Stamp = tuple[str, int, int]  # a file, when it was changed, its size
+_OWN = "femubench"
 
 
 def job_key(case: Case, strategy: str, code: bytes, version: str, seed: int) -> str:
@@ -53,9 +54,24 @@ def strategy_version(strategy: Strategy) -> str:
 
     The digest is there because a package in the making changes and keeps its number.
     """
-    inner = strategy.base if isinstance(strategy, Variant) else strategy
-    top = type(inner).__module__.partition(".")[0]
-    return f"{_number(top)}+{_digest(tuple(_stamps(top, type(inner).__module__)))}"
+    top, module = _home(strategy)
+    return f"{_number(top)}+{source_digest(top, module)}"
+
+
+def comes_along(strategy: Strategy) -> bool:
+    """Tell whether a strategy is one of those that come with femubench."""
+    return _home(strategy)[0] == _OWN
+
+
+def _home(strategy: Strategy) -> tuple[str, str]:
+    """Return the package and the module of a strategy."""
+    module = type(strategy.base if isinstance(strategy, Variant) else strategy).__module__
+    return module.partition(".")[0], module
+
+
+def source_digest(top: str = _OWN, module: str = "") -> str:
+    """Return a digest of the Python files of a package, or of the file of a lone module."""
+    return _digest(tuple(_stamps(top, module)))
 
 
 @cache
@@ -72,15 +88,14 @@ def _installed(package: str, missing: str) -> str:
 
 def _stamps(top: str, module: str) -> Iterator[Stamp]:
     """Yield the Python files of a package, or the file of a lone module, with time and size."""
-    package = sys.modules.get(top)
-    folders = [Path(folder) for folder in getattr(package, "__path__", ())]
+    folders = getattr(sys.modules.get(top), "__path__", ())
     files = sorted({file for folder in folders for file in _python_files(folder)})
     own = getattr(sys.modules.get(module), "__file__", None)
     if not files and own:
-        files = [Path(own)]
+        files = [own]
     for file in files:
         try:
-            found = file.stat()
+            found = os.stat(file)
         except OSError:  # a link that leads nowhere is no source
             yield file, 0, 0
         else:
@@ -91,17 +106,22 @@ def _stamps(top: str, module: str) -> Iterator[Stamp]:
 def _digest(stamps: tuple[Stamp, ...]) -> str:
     """Return a digest of files; they are read once as long as they stay as they are."""
     found = hashlib.sha256()
-    for file, _, _ in stamps:
+    for name, _, _ in stamps:
+        file = Path(name)
         found.update(file.name.encode() + b"\0")
         with suppress(OSError):
             found.update(file.read_bytes())
     return found.hexdigest()[:12]
 
 
-def _python_files(folder: Path) -> Iterable[Path]:
-    for where, below, names in os.walk(folder, followlinks=True):
-        below[:] = [name for name in below if name != "__pycache__"]
-        yield from (Path(where) / name for name in names if name.endswith(".py"))
+def _python_files(folder: str) -> Iterator[str]:
+    """Yield the paths of the Python files below a folder; strings, since `Path` takes its time."""
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.endswith(".py"):
+                yield entry.path
+            elif entry.name != "__pycache__" and entry.is_dir():
+                yield from _python_files(entry.path)
 
 
 def provenance(meta: Mapping[str, Any], digest: str, version: str, seed: int) -> dict[str, Any]:

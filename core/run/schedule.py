@@ -20,7 +20,12 @@ from femubench.core.run.answers import AnswerError, head_of
 from femubench.core.run.jobs import Job, JobOutcome, one_line, seed_words, sent
 from femubench.core.run.judging import Verdict, judged, run_judge, run_strategy
 from femubench.core.run.limits import Limits
-from femubench.core.run.provenance import job_key, provenance, strategy_version
+from femubench.core.run.provenance import (
+    comes_along,
+    job_key,
+    provenance,
+    strategy_version,
+)
 from femubench.core.run.workers import Ending, Workers
 from femubench.core.schema.records import result_from_json
 from femubench.core.schema.results import JobResult, Nominal, Status
@@ -38,7 +43,8 @@ class Slot:
         provenance: of its result, in plain data.
         job: what a worker is given; None where it could not be made.
         fault: why.
-        version: returns that of the strategy as its source is now.
+        version: returns that of the strategy as its source is now; None where workers import no
+            source of it.
     """
 
     case: Case
@@ -84,7 +90,9 @@ def slots_of(
                 job = None if fault else Job(*parts, words)  # type: ignore[arg-type]
                 known = _identity(strategy, code)
                 key = job_key(case, strategy.name, known, version, seed)
-                plain, now = {"strategy": version}, partial(strategy_version, strategy)
+                plain = {"strategy": version}
+                # Workers have what comes along from the start: it is as it was all the run.
+                now = None if comes_along(strategy) else partial(strategy_version, strategy)
                 yield Slot(case, strategy.name, seed, nominal, key, plain, job, fault, now)
 
 
