@@ -13,13 +13,12 @@ from importlib import import_module
 from multiprocessing import popen_forkserver  # noqa: F401 - every worker imports it
 from pkgutil import iter_modules
 
-import emcee
 import scipy.linalg
 import scipy.optimize
-import scipy.sparse.linalg
-import scipy.stats  # noqa: F401 - loaded for its time
+import scipy.sparse.linalg  # noqa: F401 - loaded for its time
 from threadpoolctl import threadpool_limits
 
+import femubench.core.drawing.prediction
 import femubench.core.plugin.variants
 import femubench.core.run.judging
 import femubench.core.run.worker  # noqa: F401 - loaded for its time
