@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import sys
-import warnings
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from femubench import Measurement, Model, UpdateResult
-from femubench.update import FactorStrategy, factor_result, modal_space, stiffness_parts
+from femubench.update import (
+    FactorStrategy,
+    factor_result,
+    importing_without,
+    modal_space,
+    stiffness_parts,
+)
 
 
 @dataclass(frozen=True)
@@ -55,7 +59,11 @@ class CmaEs(FactorStrategy):
             NotApplicable: when the model has no such parameters.
             StrategyFailure: when no mode of the model looks like any measured mode.
         """
-        cma = _package()
+        # Here, since it takes longer to import than most updates take, and without what draws and
+        # a rank correlation of which it has its own.
+        with importing_without("matplotlib", "scipy.stats"):
+            import cma
+
         parts = stiffness_parts(model, self.parameters)
         space = modal_space(parts, measurement, shape_weight=self.shape_weight, size=self.basis)
         limit = float(np.log(self.largest))
@@ -83,22 +91,3 @@ class CmaEs(FactorStrategy):
             history,
             cost=float(search.result.fbest),
         )
-
-
-def _package() -> Any:  # noqa: ANN401 - `cma` has no types
-    """Return the package `cma`; here, since it takes longer to import than most updates take.
-
-    Most of that is for drawings, and for a rank correlation of which it has its own: where these
-    are not loaded yet, they are hidden meanwhile, and `cma` goes on without.
-    """
-    nothing: Any = None
-    hidden = [name for name in ("matplotlib", "scipy.stats") if name not in sys.modules]
-    sys.modules.update(dict.fromkeys(hidden, nothing))
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # that it cannot draw without matplotlib
-            import cma
-    finally:
-        for name in hidden:
-            del sys.modules[name]
-    return cma
