@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 
 from femubench.core.display import counted
 from femubench.core.errors import FemubenchError, InputError, require
-from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Strategy
 from femubench.core.run.cluster_worker import (
     Demand,
@@ -31,6 +30,7 @@ from femubench.core.run.cluster_worker import (
 )
 from femubench.core.run.jobs import JobOutcome, one_line
 from femubench.core.run.limits import Limits
+from femubench.core.run.provenance import home_of
 from femubench.core.run.schedule import Show, unjudged
 from femubench.core.run.slots import Slot, Start
 from femubench.core.run.workers import no_script
@@ -82,7 +82,8 @@ class DaskWorkers:
         """
         if not self._waits:
             self._meet()
-        packages = tuple(sorted({"femubench", *map(_package, strategies)} - {"__main__"}))
+        homes = {home_of(strategy)[0] for strategy in strategies}
+        packages = tuple(sorted({"femubench", *homes} - {"__main__"}))
         self._demand = Demand(all_versions(packages), packages, memory)
         found = self._client.run(unfit, self._demand, on_error="return")
         for worker, reason in found.items():
@@ -128,11 +129,6 @@ class DaskWorkers:
             return max(_AHEAD * threads, _LEAST_AHEAD)
 
         return capacity
-
-
-def _package(strategy: Strategy) -> str:
-    inner = strategy.base if isinstance(strategy, Variant) else strategy
-    return type(inner).__module__.partition(".")[0]
 
 
 def _unlike(what: str) -> InputError:

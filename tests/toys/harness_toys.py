@@ -371,6 +371,7 @@ class Spy(Strategy):
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator
     ) -> UpdateResult:
+        gc.unfreeze()  # what the server has kept from the search for garbage is looked into too
         found = search([model, measurement, rng, *gc.get_objects()], self.hashes)
         return UpdateResult(model, diagnostics=found)
 
