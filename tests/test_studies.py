@@ -309,7 +309,7 @@ def test_a_study_goes_on_by_its_own_command() -> None:
     text = STUDY.replace("[0.5, 1.0, 2.0]", "[2.0]").replace("[0, 3]", "[0]")
     text = text.replace("[1.0, 1.2], loud = [false, true]", "1.0").replace("seeds = 2", "seeds = 1")
     plan_of(text).run(LocalProcesses(1), store)
-    with pytest.raises(InputError, match="is a study .expected `bench study FILE`"):
+    with pytest.raises(InputError, match=r"is a study \(expected `bench study FILE`"):
         femubench.rank(resume=True, store=store)
 
 

@@ -72,10 +72,11 @@ def study(
     report_file: Path | None,
     quiet: bool,
 ) -> int:
-    """Run strategies with grids of options under conditions that vary.
+    """Run strategies under conditions that vary: noise, sensors, options.
 
-    FILE says which: cases, strategies, seeds, noise, sensors left out (docs/studies.md). A study
-    goes on where it stopped, and takes from the store what is there already.
+    FILE names cases, strategies with grids of options, seeds, noise and numbers of sensors left
+    out (docs/studies.md). A study goes on where it stopped, and takes from the store what is
+    there already.
     """
     plugins = plugins_for(ctx)
     from femubench.core.library.rank import store_in

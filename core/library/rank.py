@@ -168,11 +168,11 @@ class Plan:
         self,
         jobs: int | None = None,
         store: Store | None = None,
+        executor: Executor | None = None,
         *,
         overwrite: Overwrite | None = None,
         resume: bool = False,
         progress: Progress | None = None,
-        executor: Executor | None = None,
     ) -> Run:
         """Run every strategy on every case with every seed; see `rank`.
 
@@ -227,24 +227,19 @@ def rank(
         cases: names, folders or `Case`s; the default set where there is none.
         strategies: names (``"NAME:OPTION=VALUE"`` with options), ``strategies[NAME](...)``,
             classes or instances, also of a notebook; all that are installed where there is none.
-        seeds: number of draws of measurement noise; None for the data as recorded.
-        seed: the first seed; 0 by default.
-        nominal: the model that all strategies start from: as it was ``drawn``, with what handbooks
-            give (``textbook``), or ``both``, which is the default. Ranks are from the textbook
-            model where that is among them. Errors are measured against the textbook model always.
-        jobs: number of worker processes; None for one a processor. With ``cluster="slurm:QUEUE"``
-            the number of Slurm jobs.
-        timeout: seconds that a job may take; 600 by default.
-        timeouts: the same for single strategies, by name.
+        seeds, seed: number of draws of noise, None for the data as recorded; the first seed.
+        nominal: the model to start from: as ``drawn``, with handbook values (``textbook``), or
+            ``both``, the default; ranks are from ``textbook`` where it is among them.
+        jobs: number of worker processes, or of Slurm jobs; None for one a processor.
+        timeout, timeouts: seconds that a job may take, 600 by default; of single strategies.
         memory: bytes that a job may take; None for an even share of the machine's.
         store: folder that keeps the results, so that a run can be continued; None for none.
         overwrite: which stored results of the same jobs are computed anew: ``always`` all,
             ``missing`` none, ``failed`` the failures. Default: all, of a resumed run the failures.
-        resume: go on with the last run of these jobs in the store; where neither cases nor
-            strategies are given, with the last run.
+        resume: go on with the last run of these jobs in the store; without cases and strategies,
+            with the last run.
         progress: called with (result, jobs done, jobs in all).
-        scheduler: address of a Dask scheduler whose workers run the jobs, ``tcp://HOST:PORT``.
-        cluster: one that is started for the run: ``local:N`` workers, or ``slurm:QUEUE``.
+        scheduler, cluster: ``tcp://HOST:PORT`` of Dask; ``local:N`` or ``slurm:QUEUE`` to start.
 
     Raises:
         InputError: for an unknown name, an option that does not exist, or a faulty case.
@@ -254,10 +249,9 @@ def rank(
         [0.0, -0.15]
     """
     kept = None if store is None else store_in(store)
+    given = cases, strategies, usable_plugins()
     plan = plan_of(
-        cases,
-        strategies,
-        usable_plugins(),
+        *given,
         seeds=seeds,
         seed=seed,
         nominal=nominal,
@@ -266,10 +260,8 @@ def rank(
         memory=memory,
         resumed=kept if resume else None,
     )
-    with executor_of(jobs, scheduler, cluster) as executor:
-        return plan.run(
-            store=kept, overwrite=overwrite, resume=resume, progress=progress, executor=executor
-        )
+    with executor_of(jobs, scheduler, cluster) as where:
+        return plan.run(None, kept, where, overwrite=overwrite, resume=resume, progress=progress)
 
 
 def plan_of(

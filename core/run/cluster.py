@@ -6,6 +6,8 @@ import logging
 import pickle
 import re
 import secrets
+import shutil
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 
 from femubench.core.display import counted
 from femubench.core.errors import FemubenchError, InputError, require
-from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Strategy
 from femubench.core.run.cluster_worker import (
     Demand,
@@ -29,6 +30,7 @@ from femubench.core.run.cluster_worker import (
 )
 from femubench.core.run.jobs import JobOutcome, one_line
 from femubench.core.run.limits import Limits
+from femubench.core.run.provenance import home_of
 from femubench.core.run.schedule import Show, unjudged
 from femubench.core.run.slots import Slot, Start
 from femubench.core.run.workers import no_script
@@ -43,6 +45,7 @@ _AHEAD = 2  # jobs on their way a thread, so that none waits for the next one
 _ANSWER = 5.0  # s that a scheduler may take to answer, and its first worker to be there
 _COUNTED = 2.0  # s that a count of threads is good for
 _SLURM_JOBS = 10
+_DASHBOARD = "127.0.0.1:0"
 _LEAST_AHEAD = 4  # jobs on their way while nobody works
 
 
@@ -79,7 +82,8 @@ class DaskWorkers:
         """
         if not self._waits:
             self._meet()
-        packages = tuple(sorted({"femubench", *map(_package, strategies)} - {"__main__"}))
+        homes = {home_of(strategy)[0] for strategy in strategies}
+        packages = tuple(sorted({"femubench", *homes} - {"__main__"}))
         self._demand = Demand(all_versions(packages), packages, memory)
         found = self._client.run(unfit, self._demand, on_error="return")
         for worker, reason in found.items():
@@ -125,11 +129,6 @@ class DaskWorkers:
             return max(_AHEAD * threads, _LEAST_AHEAD)
 
         return capacity
-
-
-def _package(strategy: Strategy) -> str:
-    inner = strategy.base if isinstance(strategy, Variant) else strategy
-    return type(inner).__module__.partition(".")[0]
 
 
 def _unlike(what: str) -> InputError:
@@ -279,20 +278,24 @@ def started(words: str, jobs: int | None = None) -> Iterator[DaskWorkers]:
 
     Arguments:
         words: ``local:N`` or ``slurm:QUEUE``.
-        jobs: number of Slurm jobs; must be None with ``local``.
+        jobs: number of Slurm jobs; must be None with ``local:N``.
 
     Raises:
         InputError: for other words, or where it cannot be started.
     """
-    kind, _, rest = words.partition(":")
-    if kind == "local" and re.fullmatch(r"[1-9]\d{0,3}", rest):
+    rest = words.partition(":")[2]
+    queued = words.startswith("slurm:")
+    if re.fullmatch(r"local:[1-9]\d{0,3}", words):
         if jobs is not None:
             what = f"{words} tells the number of workers"
             raise InputError(what, key="cluster", expected="no --jobs beside it")
-        make = partial(_local, int(rest))
-    elif kind == "slurm" and re.fullmatch(r"[\w.,-]+", rest):
+        make, jobs = partial(_local, int(rest)), int(rest)
+    elif queued and re.fullmatch(r"[\w.,-]+", rest):
         require("dask_jobqueue", "cluster", "--cluster slurm")
-        make = partial(slurm_cluster, rest, jobs or _SLURM_JOBS)
+        if shutil.which("sbatch") is None:
+            what = f"{words} needs sbatch, which is not here"
+            raise InputError(what, key="cluster", expected="a machine that submits to Slurm")
+        make, jobs = partial(slurm_cluster, rest), jobs or _SLURM_JOBS
     else:
         expected = "local:N, such as local:4, or slurm:QUEUE"
         raise InputError(f"{words!r} is no cluster", key="cluster", expected=expected)
@@ -302,8 +305,10 @@ def started(words: str, jobs: int | None = None) -> Iterator[DaskWorkers]:
         except (OSError, RuntimeError, ValueError, TimeoutError) as error:
             what = f"{words} cannot be started: {one_line(error)}"
             raise InputError(what, key="cluster", expected="machines to run on") from error
+        size = {"jobs": jobs} if queued else {"n": jobs}
+        stack.enter_context(_kept(partial(cluster.scale, **size)))
         client = stack.enter_context(_client(cluster))
-        yield DaskWorkers(client, words, waits=kind == "slurm")
+        yield DaskWorkers(client, words, waits=queued)
 
 
 def _local(count: int) -> Cluster:
@@ -326,21 +331,20 @@ def _local(count: int) -> Cluster:
         threads_per_worker=1,
         host="127.0.0.1",
         worker_class=SilentNanny,
-        dashboard_address=None,
+        dashboard_address=_DASHBOARD,
         silence_logs=logging.CRITICAL,
         scheduler_kwargs={"allowed_failures": 1},
     )
 
 
-def slurm_cluster(queue: str, jobs: int) -> Cluster:
-    """Return a cluster of Slurm jobs, each a worker, that is kept at its number.
+def slurm_cluster(queue: str) -> Cluster:
+    """Return a cluster that has no Slurm job yet.
 
     What ``jobqueue.yaml`` says under ``jobqueue.slurm`` holds; a core and 2 GiB a job where it
     says nothing.
 
     Arguments:
         queue: the partition.
-        jobs: number of Slurm jobs.
     """
     import dask
     from dask_jobqueue import SLURMCluster
@@ -351,9 +355,32 @@ def slurm_cluster(queue: str, jobs: int) -> Cluster:
         for key, value in own.items()
         if dask.config.get(f"jobqueue.slurm.{key}", None) is None
     }
-    cluster = SLURMCluster(queue=queue, silence_logs=logging.CRITICAL, **missing)
-    cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs)
-    return cluster
+    known = dask.config.get("jobqueue.slurm.scheduler-options", None) or {}
+    return SLURMCluster(
+        queue=queue,
+        scheduler_options={"dashboard_address": _DASHBOARD, **known},
+        silence_logs=logging.CRITICAL,
+        **missing,
+    )
+
+
+@contextmanager
+def _kept(scale: Callable[[], None]) -> Iterator[None]:
+    """Keep a cluster at its size: a nanny gives up a worker that dies as it starts."""
+    done = threading.Event()
+
+    def tend() -> None:
+        while not done.wait(_COUNTED):
+            scale()
+
+    scale()
+    tender = threading.Thread(target=tend, daemon=True)
+    tender.start()
+    try:
+        yield
+    finally:
+        done.set()
+        tender.join()
 
 
 @contextmanager

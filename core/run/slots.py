@@ -15,7 +15,7 @@ from typing import Any, overload
 from femubench.core.case.case import Case
 from femubench.core.roles import Strategy
 from femubench.core.run.jobs import Job, JobOutcome, one_line, seed_words, sent
-from femubench.core.run.provenance import job_key, provenance, strategy_version
+from femubench.core.run.provenance import comes_along, job_key, provenance, strategy_version
 from femubench.core.schema.results import Nominal
 
 _LASTING = 1.0  # s that a look at the source of a strategy is good for
@@ -44,7 +44,8 @@ class Slot:
         code: the strategy as a worker is given it, or why it cannot be sent to one.
         key: of everything that decides on its result.
         version: of the strategy when the key was made.
-        now: returns that of the strategy as its source is now.
+        now: returns that of the strategy as its source is now; None where workers import no source
+            of it.
         meta: of the run.
     """
 
@@ -124,7 +125,11 @@ class Slots(Sequence[Slot]):
         self.meta: Mapping[str, Any] = {}
         self._codes = [_pickled(strategy, sent) for strategy in strategies]
         self._versions = [strategy_version(strategy) for strategy in strategies]
-        self._now = [_Lately(partial(strategy_version, item)) for item in strategies]
+        # Workers have what comes along from the start: it is as it was all the run.
+        self._now = [
+            None if comes_along(strategy) else _Lately(partial(strategy_version, strategy))
+            for strategy in strategies
+        ]
         known = map(_identity, strategies, self._codes)
         self.keys = self._all_keys(list(known))
 

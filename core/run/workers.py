@@ -26,6 +26,7 @@ from typing import Any, Generic, Literal, TypeVar
 import psutil
 
 from femubench.core.run.limits import Limits, spoken_bytes
+from femubench.core.run.provenance import source_digest
 from femubench.core.run.worker import LENGTH_BYTES, READY, environment, scratch_root, serve
 
 MARK = "FEMUBENCH_WORKERS"
@@ -294,6 +295,7 @@ class Workers(Generic[Key]):
     def open(self) -> Iterator[Workers[Key]]:
         """Start what the workers need, and leave no process and no file behind."""
         self._root = scratch_root()
+        _end_old_server()
         self._mark = _server_mark()
         with adopting(), _server_awake():
             try:
@@ -380,9 +382,10 @@ class Workers(Generic[Key]):
 
 def _server_mark() -> str:
     """Start the server from which workers fork where there is none; return its mark."""
-    global _mark
+    global _mark, _source
     _mark = _mark or secrets.token_hex(8)
     if not alive(_server()):
+        _source = source_digest()
         get_context("forkserver").set_forkserver_preload(["femubench.core.run.preload"])
         with environment(**{MARK: _mark}):
             forkserver.ensure_running()
@@ -390,6 +393,13 @@ def _server_mark() -> str:
 
 
 _mark = ""
+_source = ""  # what the server has loaded
+
+
+def _end_old_server() -> None:
+    """End the server where the source that it has loaded has changed since."""
+    if alive(_server()) and _source != source_digest():
+        forkserver._forkserver._stop()  # type: ignore[attr-defined]
 
 
 @contextmanager
