@@ -168,7 +168,7 @@ class TestRun:
         assert "noise" not in found["rod", 1].provenance
 
     def test_held_out_scores_do_not_depend_on_what_was_hidden(self, spied: Run) -> None:
-        blocks: dict[str, set[tuple[float, float]]] = {}
+        blocks: dict[str, set[tuple[str, float]]] = {}
         for result in spied.results:
             for block in result.blocks:
                 error = round(result.blocks[block].rms_percent, 9)
@@ -188,9 +188,7 @@ class TestRun:
         assert_allclose(table["skill"][[(1.0, 1.2), (2.0, 1.2)]], expected)
         broken = table.loc[(2.0, BROKEN)]
         assert (broken["failed"], broken["missing"]) == (4, 0)
-        assert broken["skill"] == pytest.approx(
-            -9.0
-        )  # ten times the error, as a leaderboard has it
+        assert broken["skill"] == pytest.approx(-9.0)  # ten times the error
         part = Run(spied.meta, spied.results[1:])
         assert skill_by(part, "spy.factor")["missing"].tolist() == [1, 0, 0]
 

@@ -49,14 +49,10 @@ def skill_by(run: Run, *axes: str) -> pd.DataFrame:
     chosen = axes or tuple(name for name in known.varied if name != "case") or ("strategy",)
     for name in chosen:
         known.values(name)
-    results = {
-        (nominal, result.case, result.strategy, result.seed): result
-        for nominal in known.nominals
-        for result in run.started_from(nominal)
-    }
     by_arm: dict[_Arm, list[JobResult]] = defaultdict(list)
-    for (nominal, case, strategy, _), result in results.items():
-        by_arm[nominal, case, strategy].append(result)
+    for nominal in known.nominals:
+        for result in run.started_from(nominal):
+            by_arm[nominal, result.case, result.strategy].append(result)
     rows = [
         {**dict(zip(chosen, cell, strict=True)), **_figures(run, arms, by_arm)}
         for cell, arms in _cells(known, chosen).items()

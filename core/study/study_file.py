@@ -44,7 +44,7 @@ def _seeds(given: object) -> int | tuple[int, ...]:
 
 
 def _values(given: object) -> tuple[Value, ...]:
-    listed = given if isinstance(given, list) else [given]
+    listed: list[Value] = given if isinstance(given, list) else [given]  # type: ignore[list-item]
     if not all(isinstance(value, Value) for value in listed):
         raise misfit("not a value of an option", _VALUES)
     # 1 and true are equal, and two values.
