@@ -77,7 +77,7 @@ def sorting(page: Page, key: str) -> tuple[float, float]:
 def main(store: Path) -> None:
     """Measure and print."""
     shelf = Store(store)
-    run = shelf.load(lenient=True)
+    run = shelf.load()
     path = os.environ.get("FEMUBENCH_CHROMIUM") or shutil.which("chromium")
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=path, args=["--no-sandbox"])

@@ -79,6 +79,7 @@ __all__ = [
     "score_challenge",
     "solve_modes",
     "strategies",
+    "study",
     "write_model",
 ]
 
@@ -109,6 +110,7 @@ _NAMES = {
     "femubench.core.library.rank": "Run rank read_run",
     "femubench.core.library.report": "report",
     "femubench.core.library.reproduce": "reproduce",
+    "femubench.core.library.study": "study",
     "femubench.core.fem.sensors": "Sensors",
     "femubench.core.modal.measurement": "Measurement",
     "femubench.core.modal.eigen": "Modes solve_modes",
@@ -144,6 +146,7 @@ if TYPE_CHECKING:
     from femubench.core.library.rank import Run, rank, read_run
     from femubench.core.library.report import report
     from femubench.core.library.reproduce import reproduce
+    from femubench.core.library.study import study
     from femubench.core.modal.eigen import Modes, solve_modes
     from femubench.core.modal.measurement import Measurement
     from femubench.core.plugin.markers import hookimpl

@@ -16,6 +16,7 @@ from femubench.core.plot.diagnosis import (
     residuals,
     strongest_places,
 )
+from femubench.core.plot.heat_map import heat_map
 from femubench.core.plot.identification import stabilisation, synthesis
 from femubench.core.plot.mac import mac
 from femubench.core.plot.matching import matching
@@ -33,6 +34,7 @@ __all__ = [
     "convergence",
     "error_against_cost",
     "evidence",
+    "heat_map",
     "mac",
     "matching",
     "mode_shape",

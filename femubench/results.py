@@ -25,6 +25,8 @@ from femubench.core.score.statistics import (
     structures_of,
     tell_apart,
 )
+from femubench.core.study.axes import StudyAxes
+from femubench.core.study.skill import skill_by
 
 __all__ = [
     "Block",
@@ -38,6 +40,7 @@ __all__ = [
     "Run",
     "SCORE_OF_FAILURE",
     "Store",
+    "StudyAxes",
     "TIE",
     "block_weights",
     "counted_blocks",
@@ -59,6 +62,7 @@ __all__ = [
     "run_to_json",
     "score_model",
     "scored_on",
+    "skill_by",
     "stiffness_difference",
     "structures_of",
     "tell_apart",

@@ -6,7 +6,7 @@ import json
 from typing import Any
 
 from femubench.reports.page.rounding import clean
-from femubench.results import Run, leaderboard, run_to_json, tell_apart
+from femubench.results import Run, StudyAxes, leaderboard, run_to_json, skill_by, tell_apart
 
 # Names of the contract, and the columns of the leaderboard that they stand for.
 _FIGURES = {
@@ -25,7 +25,7 @@ class JsonReporter:
 
     def render(self, run: Run) -> str:
         """Return strict JSON: what is not a finite number is null."""
-        plain = {**run_to_json(run), "leaderboard": board_of(run)}
+        plain = {**run_to_json(run), "leaderboard": board_of(run), **cells_of(run)}
         return json.dumps(plain, indent=1, allow_nan=False)
 
 
@@ -45,3 +45,11 @@ def board_of(run: Run) -> list[dict[str, Any]]:
         }
         for row in board.to_dict("records")
     ]
+
+
+def cells_of(run: Run) -> dict[str, list[dict[str, Any]]]:
+    """Return the skill of every cell of a study; nothing for another run."""
+    if StudyAxes.asked(run) is None:
+        return {}
+    rows = skill_by(run).to_dict("records")
+    return {"cells": [{str(name): clean(value) for name, value in row.items()} for row in rows]}

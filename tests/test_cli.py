@@ -339,15 +339,15 @@ class TestGoingOn:
         words = ("-s", "test-nothing", "-s", "test-fails", "--seeds", 2, "-j", 1)
         words += ("--nominal", "drawn")
         assert invoke("run", case, *words).exit_code == 1
-        store = tmp_path / "femubench-results" / "results.jsonl"
+        (store,) = Store(tmp_path / "femubench-results").files
         lines = store.read_text().splitlines()
         # As if the power had failed after the first result.
-        store.write_text("\n".join(lines[:2]) + "\n" + lines[2][:40])
+        store.write_text("\n".join(lines[:3]) + "\n" + lines[3][:40])
         result = invoke("run", "--resume", "-j", 1)
         assert result.exit_code == 1
         assert "2 strategies, seeds 1-2" in " ".join(result.stdout.split())
         records = [json.loads(line) for line in store.read_text().splitlines()]
-        assert [item["record"] for item in records].count("run") == 1
+        assert [item["record"] for item in records].count("run") == 2
         jobs = [
             (item["result"]["strategy"], item["result"]["seed"])
             for item in records
@@ -519,7 +519,8 @@ class TestRun:
         assert (result.exit_code, result.output) == (0, "")
         assert (tmp_path / "mine.csv").read_text().splitlines()[1].startswith("rod,test-nothing,3")
         kept = sorted(path.name for path in (tmp_path / "elsewhere").iterdir())
-        assert kept == ["exhibits", "results.jsonl"]
+        (file,) = Store(tmp_path / "elsewhere").files
+        assert kept == [file.name, "exhibits"]
 
     def test_ctrl_c(self, site: Path, tmp_path: Path) -> None:
         """A real signal to a real process: exit code 130, no traceback, no worker left behind."""
@@ -538,9 +539,9 @@ class TestRun:
             stderr=subprocess.PIPE,
             text=True,
         ) as process:
-            started = tmp_path / "femubench-results" / "results.jsonl"
+            store = Store(tmp_path / "femubench-results")
             deadline = time.monotonic() + 60.0
-            while not started.exists() and time.monotonic() < deadline:
+            while not store.files and time.monotonic() < deadline:
                 time.sleep(0.05)
             time.sleep(0.5)
             process.send_signal(signal.SIGINT)
@@ -580,7 +581,7 @@ class TestPluginsAndScenarios:
         case = put_case(tmp_path / "case")
         result = invoke("run", case, "-s", "test-nothing", "-q")
         assert result.exit_code == 0
-        assert len((tmp_path / "femubench-results" / "results.jsonl").read_text().split()) > 3
+        assert len(Store(tmp_path / "femubench-results").load().results) > 0
         lines = [line for line in result.stderr.splitlines() if "cli_" in line]
         for name, what in (
             ("cli_broken", "ModuleNotFoundError"),

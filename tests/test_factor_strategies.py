@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import qmc
 
 import femubench
 from femubench import InputError, Measurement, Model, NotApplicable, Sensors, Strategy, solve_modes
@@ -25,7 +26,7 @@ from femubench.modal import mac, rigid_modes_of
 from femubench.plugins.strategies.cma_es import CmaEs
 from femubench.plugins.strategies.cross_model import CrossModel
 from femubench.plugins.strategies.eigensensitivity import Eigensensitivity
-from femubench.plugins.strategies.multi_start import MultiStart
+from femubench.plugins.strategies.multi_start import MultiStart, _latin_hypercube
 from femubench.plugins.strategies.secant import Secant
 from femubench.plugins.strategies.sparse import Sparse
 from femubench.plugins.strategies.strain_energy import StrainEnergy, energy_change_index
@@ -156,6 +157,13 @@ def test_searches_repeat_with_the_seed_and_leave_the_random_state_alone() -> Non
         first = factors_of(strategy, model, measurement)
         assert factors_of(strategy, model, measurement) == first
     assert repr(np.random.get_state()) == state  # noqa: NPY002
+
+
+def test_starts_are_those_of_the_latin_hypercube_of_scipy() -> None:
+    for count, size in ((8, 5), (3, 1)):
+        theirs = qmc.LatinHypercube(size, rng=np.random.default_rng(count)).random(count)
+        ours = _latin_hypercube(count, size, np.random.default_rng(count))
+        assert ours == pytest.approx(theirs, rel=1e-15)
 
 
 def test_slopes_are_those_of_differences_and_few_shapes_give_the_same_frequencies() -> None:

@@ -7,7 +7,7 @@ import shutil
 import sys
 from collections import Counter
 from collections.abc import Callable
-from contextlib import redirect_stdout, suppress
+from contextlib import redirect_stdout
 from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
@@ -17,7 +17,7 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from femubench import FemubenchError, read_case
+from femubench import FemubenchError, InputError, read_case
 from femubench.core.cli.main import bench
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.schema.records import read_run
@@ -162,10 +162,9 @@ def results_format(folder: Path, share: float, format: str) -> None:
 
     def report() -> None:
         nonlocal count
-        if format == "store":
-            with suppress(FemubenchError):
-                Store(folder).load(lenient=True)
         run = read_run(file) if format == "run" else Store(folder).load()
+        if any("left out" in note for note in run.meta.get("notes") or ()):
+            raise InputError("left out", file=file)
         count += 1
         for reporter in REPORTERS:
             if reporter.name == "html" and count % _PAGE_SHARE != 1:

@@ -21,6 +21,8 @@ from femubench.core.errors import InputError
 from femubench.core.run.frames import modes_frame, results_frame, run_from_json, run_to_json
 from femubench.core.run.provenance import git_commit, new_run_id, versions
 from femubench.core.run.store import Store
+from femubench.core.run.upkeep import faults_of, repair, unsealed
+from femubench.core.schema.records import result_to_json
 from femubench.core.schema.results import Block, JobResult, PairedMode, Run
 from femubench.core.score.ranking import rank_results
 
@@ -110,23 +112,28 @@ def test_an_unfinished_run_is_loaded_as_far_as_it_went(tmp_path: Path) -> None:
 
 def test_a_truncated_last_line_is_left_out_and_told(tmp_path: Path) -> None:
     store = stored(tmp_path)
-    whole = store.path.read_bytes().splitlines(keepends=True)
-    store.path.write_bytes(b"".join(whole[:-2]) + whole[-2][:40])
+    (file,) = store.files
+    whole = file.read_bytes().splitlines(keepends=True)
+    file.write_bytes(b"".join(whole[:-2]) + whole[-2][:40])
     run = store.load()
     assert [item.strategy for item in run.results] == ["softer"]
-    assert run.meta["notes"] == [f"{store.path}:3: the last line is cut short and was left out"]
+    (note,) = run.meta["notes"]
+    assert note.startswith(f"{file}:4: the last line is cut short")
     # The next record does not end up behind the torso.
     store.append(META["run"], BAD)
     assert [item.strategy for item in store.load().results] == ["softer", "failing"]
     assert store.load().meta["notes"] == []
 
 
-def test_a_last_line_without_its_end_is_kept(tmp_path: Path) -> None:
+@pytest.mark.parametrize("end", [b"", b"*"])
+def test_a_last_line_without_its_end_is_kept(end: bytes, tmp_path: Path) -> None:
     store = stored(tmp_path, results=[GOOD])
-    store.path.write_bytes(store.path.read_bytes().rstrip(b"\n"))
-    assert store.load().meta["finished"] is not None
+    (file,) = store.files
+    file.write_bytes(file.read_bytes().rstrip(b"\n") + end)
     store.append(META["run"], BAD)
     assert len(store.load().results) == 2
+    assert store.load().meta["finished"] is not None
+    assert faults_of(store) == []
 
 
 def full(descriptor: int, data: bytes) -> int:
@@ -142,13 +149,14 @@ def test_a_record_that_does_not_fit_on_the_disk_leaves_no_trace(
     write: Callable[[int, bytes], int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = stored(tmp_path, results=[GOOD])
-    before = store.path.read_bytes()
+    (file,) = store.files
+    before = file.read_bytes()
     monkeypatch.setattr(os, "write", write)
     with pytest.raises(InputError, match="cannot be written: No space left on device") as caught:
         store.append(META["run"], BAD)
-    assert str(store.path) in str(caught.value)
+    assert str(file) in str(caught.value)
     assert "\n" not in str(caught.value)
-    assert store.path.read_bytes() == before
+    assert file.read_bytes() == before
 
 
 def test_a_store_that_cannot_be_made_is_told(tmp_path: Path) -> None:
@@ -160,6 +168,14 @@ def test_a_store_that_cannot_be_made_is_told(tmp_path: Path) -> None:
         pass
 
 
+def earlier(folder: Path, results: Sequence[JobResult] = (GOOD, BAD)) -> list[str]:
+    """Return the lines of a store as version 0.1 wrote them."""
+    records = [{"record": "run", "meta": META}]
+    records += [{"record": "result", "result": result_to_json(item)} for item in results]
+    records += [{"record": "end", "meta": {"finished": "2026-01-01T00:00:09+00:00"}}]
+    return [json.dumps({"schema": 1, **item, "run": META["run"]}) for item in records]
+
+
 @pytest.mark.parametrize(
     ("line", "message"),
     [
@@ -169,20 +185,50 @@ def test_a_store_that_cannot_be_made_is_told(tmp_path: Path) -> None:
         ('{"record": "run", "schema": 1}', ":2: run: no run id"),
     ],
 )
-def test_damage_is_told_with_its_line(tmp_path: Path, line: str, message: str) -> None:
-    store = stored(tmp_path)
-    lines = store.path.read_text().splitlines()
-    store.path.write_text("\n".join([lines[0], line, *lines[1:]]) + "\n")
-    with pytest.raises(InputError, match=message):
-        store.load()
+def test_a_store_of_an_earlier_version_is_read_and_its_damage_told(
+    tmp_path: Path, line: str, message: str
+) -> None:
+    lines = earlier(tmp_path)
+    (tmp_path / "results.jsonl").write_text("\n".join([lines[0], line, *lines[1:]]) + "\n")
+    run = Store(tmp_path).load()
+    assert run.results == rank_results([GOOD, BAD], META["reference"])
+    (note,) = run.meta["notes"]
+    assert re.search(message, note)
 
 
 def test_a_wrong_field_is_told_with_its_key(tmp_path: Path) -> None:
-    store = stored(tmp_path)
-    text = store.path.read_text().replace('"measured_hz": 200.0', '"measured_hz": "high"')
-    store.path.write_text(text)
-    with pytest.raises(InputError, match=r":2: result\.used\.modes\[1\]\.measured_hz: "):
-        store.load()
+    text = "\n".join(earlier(tmp_path)).replace('"measured_hz": 200.0', '"measured_hz": "high"')
+    (tmp_path / "results.jsonl").write_text(text)
+    run = Store(tmp_path).load()
+    assert [item.strategy for item in run.results] == ["failing"]
+    assert ":2: result.used.modes[1].measured_hz: " in run.meta["notes"][0]
+
+
+def test_a_store_of_an_earlier_version_goes_on_and_is_converted(tmp_path: Path) -> None:
+    (tmp_path / "results.jsonl").write_text("\n".join(earlier(tmp_path)) + "\n{}\n")
+    store, late = Store(tmp_path), replace(GOOD, strategy="late", key="ab")
+    store.append(META["run"], late)
+    before = store.load()
+    assert [item.strategy for item in before.results] == ["softer", "failing", "late"]
+    stored(tmp_path, "20260102T000000Z-bbbbbb")
+    assert unsealed(store) == 4
+    assert [item.lost for item in repair(store)] == [1]
+    assert store.load(META["run"]).results == before.results
+    assert store.runs() == (META["run"], "20260102T000000Z-bbbbbb")
+    assert (unsealed(store), faults_of(store)) == (0, [])
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        f"{META['run']}.jsonl",
+        "20260102T000000Z-bbbbbb.jsonl",
+        "results.jsonl.converted",
+        "results.jsonl.damaged",
+    ]
+
+
+def test_a_run_id_that_is_no_file_name_is_refused(tmp_path: Path) -> None:
+    for name in ("../evil", "", ".hidden", "a/b", "results"):
+        with pytest.raises(InputError, match="run id"):
+            Store(tmp_path / "store").begin({"run": name})
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_empty_folder_has_no_runs(tmp_path: Path) -> None:

@@ -17,7 +17,8 @@ from femubench.core.run import runner, workers
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.limits import MIB, Limits
 from femubench.core.run.runner import run_jobs
-from femubench.core.run.schedule import Slot, _Bench
+from femubench.core.run.schedule import _Bench
+from femubench.core.run.slots import Slot, Start
 from femubench.core.run.workers import Ending
 from femubench.core.schema.records import result_from_json, result_to_json
 from femubench.core.schema.results import JobResult, Run
@@ -80,7 +81,7 @@ def test_what_they_say_can_be_stored(runs: dict[str, Run]) -> None:
 
 def test_a_judgement_out_of_bounds_ends_its_job_alone() -> None:
     record = {"case": "c", "strategy": "s", "seed": 0, "status": "ok", "parameter_count": -1}
-    slot = Slot(toys.tiny_case(), "s", 0, "drawn", "", {}, None)
+    slot = Slot(Start("drawn", toys.tiny_case()), "s", 0, b"")
     answer = json.dumps({"result": record, "exhibit": None}).encode()
     outcome = _Bench([slot], {}, {}, None)._judgement(slot, Ending("answer", answer))
     assert isinstance(outcome, JobOutcome)

@@ -88,6 +88,18 @@ class TestEveryCommandOfTheReadme:
         with pytest.raises(femubench.InputError, match="resume alone goes on as before; seeds"):
             femubench.rank(resume=True, seeds=4, store="b")
 
+    def test_study(self) -> None:
+        lines = ['axes = {cases = ["rod"], seeds = 1, noise = [1, 2]}', "[[strategies]]"]
+        Path("study.toml").write_text("\n".join([*lines, 'name = "unchanged"']), encoding="utf-8")
+        call("study", "study.toml", "-q", "-j", 2, "--json", "theirs.json", "--store", "s")
+        run = femubench.study("study.toml", jobs=2)
+        femubench.report(run, "ours.json")
+        assert data("ours.json")["cells"][0].keys() == data("theirs.json")["cells"][0].keys()
+        cells = [[cell["skill"] for cell in data(f)["cells"]] for f in ("ours.json", "theirs.json")]
+        assert cells[0] == cells[1] == run.skill_by("noise")["skill"].tolist()
+        again = femubench.study("study.toml", store="s")
+        assert again.meta["run"] == data("theirs.json")["meta"]["run"]
+
     def test_report(self) -> None:
         femubench.rank("rod", TWO, jobs=2, store="s")
         call("report", "--store", "s", "-f", "html,md,csv", "-o", "out")

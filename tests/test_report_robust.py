@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 from click.testing import CliRunner, Result
 
-from femubench import InputError
 from femubench.core.cli.main import bench
+from femubench.core.run.upkeep import exported
 from femubench.reports.csvs import CsvReporter
 from femubench.reports.htmls import HtmlReporter
 from femubench.reports.markdown import MarkdownReporter
@@ -51,7 +51,7 @@ def stored(folder: Path, run: Run = RUN, *, end: bool = True) -> Path:
         store.append(run.meta["run"], result)
     if end:
         store.end(run.meta["run"], {"finished": run.meta["finished"], "interrupted": False})
-    return store.path
+    return store.file_of(run.meta["run"])
 
 
 @pytest.fixture
@@ -69,11 +69,21 @@ def report(folder: Path) -> Report:
 
 
 def lines_of(folder: Path) -> list[str]:
-    return (folder / "results.jsonl").read_text(encoding="utf-8").splitlines()
+    return Store(folder).file_of(RUN_ID).read_text(encoding="utf-8").splitlines()
 
 
 def put(folder: Path, lines: list[str], end: str = "\n") -> None:
-    (folder / "results.jsonl").write_text("\n".join(lines) + end, encoding="utf-8")
+    Store(folder).file_of(RUN_ID).write_text("\n".join(lines) + end, encoding="utf-8")
+
+
+def put_earlier(folder: Path, change: Callable[[int, str], str]) -> list[str]:
+    """Write the store as version 0.1 did, with changed lines, and return these."""
+    records = [json.loads(line) for line in exported(Store(folder), RUN_ID, [])]
+    lines = [json.dumps({"schema": 1, **record}) for record in records]
+    lines = [change(place, line) for place, line in enumerate(lines)]
+    Store(folder).file_of(RUN_ID).unlink()
+    (folder / "results.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return lines
 
 
 def told(report: Report, folder: Path) -> list[str]:
@@ -87,14 +97,14 @@ def told(report: Report, folder: Path) -> list[str]:
 class TestDamage:
     def test_a_run_that_is_still_going(self, report: Report, folder: Path) -> None:
         lines = lines_of(folder)
-        put(folder, lines[:11])
+        put(folder, lines[:12])
         (note,) = told(report, folder)
         assert note == f"the run has not ended: 10 of {len(RUN.results)} jobs are there"
 
     @pytest.mark.parametrize("name", ["terminal", "md", "json", "csv", "modes-csv", "parquet"])
     def test_every_format_tells(self, report: Report, folder: Path, name: str) -> None:
         """In the text itself, or on stderr where it has no room for notes."""
-        put(folder, lines_of(folder)[:11])
+        put(folder, lines_of(folder)[:12])
         result = report("-f", name)
         assert result.exit_code == 0
         shown, other = result.stdout, result.stderr
@@ -105,10 +115,10 @@ class TestDamage:
         assert said not in other
 
     def test_a_last_line_that_is_cut(self, report: Report, folder: Path) -> None:
-        lines = lines_of(folder)[:11]
+        lines = lines_of(folder)[:12]
         put(folder, [*lines, lines[-1][:200]], end="")
         notes = told(report, folder)
-        assert any("12: the last line is cut short" in note for note in notes)
+        assert any("13: the last line is cut short" in note for note in notes)
         assert any("10 of" in note for note in notes)
 
     @pytest.mark.parametrize(
@@ -125,35 +135,47 @@ class TestDamage:
     def test_a_broken_line_in_the_middle(
         self, report: Report, folder: Path, line: str, message: str
     ) -> None:
-        lines = lines_of(folder)
-        lines[5] = line
-        put(folder, lines)
+        put_earlier(folder, lambda place, text: line if place == 5 else text)
         notes = told(report, folder)
         assert any(message in note and ":6" in note and "left out" in note for note in notes)
         assert f"1 of {len(RUN.results)} jobs are missing and score as failures" in notes
-        with pytest.raises(InputError):
-            Store(folder).load()
+
+    def test_a_changed_bit(self, report: Report, folder: Path) -> None:
+        lines = lines_of(folder)
+        lines[5] = lines[5].replace("ok", "oj", 1)
+        put(folder, lines)
+        notes = told(report, folder)
+        assert any(":6: damaged" in note and "left out" in note for note in notes)
+        assert f"1 of {len(RUN.results)} jobs are missing and score as failures" in notes
 
     def test_a_result_of_another_shape(self, report: Report, folder: Path) -> None:
-        lines = lines_of(folder)
-        record = json.loads(lines[3])
-        record["result"]["used"] = {"rms_percent": "much"}
-        lines[3] = json.dumps(record)
-        put(folder, lines)
+        def change(place: int, line: str) -> str:
+            record = json.loads(line)
+            if place == 3:
+                record["result"]["used"] = {"rms_percent": "much"}
+            return json.dumps(record)
+
+        put_earlier(folder, change)
         assert any("rms_percent" in note and "left out" in note for note in told(report, folder))
 
-    def test_a_first_line_that_is_lost_leaves_the_results(
-        self, report: Report, folder: Path
-    ) -> None:
+    def test_a_first_line_that_is_lost_leaves_the_run(self, report: Report, folder: Path) -> None:
         put(folder, ["{broken", *lines_of(folder)[1:]])
         notes = told(report, folder)
-        assert any(":1: not JSON" in note for note in notes)
+        assert any(":1: damaged" in note for note in notes)
+        page = data_in((folder / f"{RUN_ID}.html").read_text(encoding="utf-8"))
+        assert len(page["results"]) == len(RUN.results)
+        assert Store(folder).load().meta["cases"] == RUN.meta["cases"]
+
+    def test_both_first_lines_that_are_lost_leave_the_results(
+        self, report: Report, folder: Path
+    ) -> None:
+        put(folder, ["{broken", "{broken", *lines_of(folder)[2:]])
+        assert len([note for note in told(report, folder) if "damaged" in note]) == 2
         page = data_in((folder / f"{RUN_ID}.html").read_text(encoding="utf-8"))
         assert len(page["results"]) == len(RUN.results)
 
     def test_a_store_of_an_older_version_is_one_line(self, report: Report, folder: Path) -> None:
-        lines = [line.replace('"schema": 1', '"schema": 0') for line in lines_of(folder)]
-        put(folder, lines)
+        lines = put_earlier(folder, lambda _, line: line.replace('"schema": 1', '"schema": 0'))
         result = report("-f", "html")
         assert result.exit_code == 2
         assert "schema 0" in result.stderr
@@ -162,7 +184,7 @@ class TestDamage:
 
     def test_lines_of_older_runs_do_not_hide_this_one(self, report: Report, folder: Path) -> None:
         old = ['{"schema": 0, "record": "result", "run": "old"}'] * 50
-        put(folder, [*old, *lines_of(folder)])
+        (folder / "results.jsonl").write_text("\n".join(old) + "\n", encoding="utf-8")
         notes = told(report, folder)
         assert len(notes) == 4
         assert notes[-1].endswith("47 more lines were left out")

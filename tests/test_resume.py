@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from femubench.core.errors import InputError
-from femubench.core.run import provenance as keys, schedule as slots, store as locks
+from femubench.core.run import provenance as keys, slots, store as locks
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult, Run
@@ -49,7 +49,12 @@ def by_name(run: Run) -> list[JobResult]:
 
 
 def records(store: Store) -> list[Mapping[str, Any]]:
-    return [json.loads(line) for line in store.path.read_text().splitlines()]
+    """Return what was recorded, with the id of the run."""
+    return [
+        {**json.loads(line), "run": file.stem}
+        for file in store.files
+        for line in file.read_text().splitlines()
+    ]
 
 
 def some(store: Store, **options: Any) -> Run:
@@ -132,12 +137,24 @@ def test_a_result_of_a_source_that_changed_has_no_key(
         assert bool(store.by_key()) is kept
 
 
-def test_a_damaged_store_is_told_before_anything_is_written(tmp_path: Path) -> None:
+def test_a_damaged_record_keeps_nobody_from_going_on(tmp_path: Path) -> None:
     store = Store(tmp_path)
-    store.path.write_text("{}\n")
-    with pytest.raises(InputError, match="not a record"):
-        some(store)
-    assert store.path.read_text() == "{}\n"
+    first = some(store)
+    file = store.file_of(first.meta["run"])
+    lines = file.read_bytes().splitlines(keepends=True)
+    place = next(i for i, line in enumerate(lines) if b'"softer"' in line and b'"result"' in line)
+    for damaged in (0, place):
+        lines[damaged] = lines[damaged].replace(b'"', b"'", 1)
+    file.write_bytes(b"".join(lines))
+    loaded = store.load()
+    assert {item.strategy for item in loaded.results} == {"unchanged", "failing"}
+    assert len(loaded.meta["notes"]) == 2
+    done: list[str] = []
+    again = some(store, resume=True, progress=lambda result, *_: done.append(result.strategy))
+    assert done[0] == "unchanged"  # the one that is kept
+    assert stable(again) == stable(first)
+    assert store.runs() == (first.meta["run"],)
+    assert stable(store.load()) == stable(first)
 
 
 def test_another_run_takes_results_from_the_store(tmp_path: Path) -> None:
@@ -214,7 +231,8 @@ def test_one_process_works_on_a_run(tmp_path: Path) -> None:
     run = some(store)
     with store.exclusive(run.meta["run"]), pytest.raises(InputError, match="another process"):
         some(store, resume=True)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["exhibits", "results.jsonl"]
+    names = sorted(path.name for path in tmp_path.iterdir())
+    assert names == sorted(["exhibits", f"{run.meta['run']}.jsonl"])
 
 
 def test_the_lock_of_an_interrupted_run_is_removed(tmp_path: Path) -> None:
@@ -333,6 +351,6 @@ def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(tmp_p
     ]
     assert len(good) == len(set(good)) == JOBS  # no result was computed twice
     names = {path.name for path in stores["killed"].folder.iterdir()}
-    assert names == {"exhibits", "results.jsonl"}
+    assert names == {"exhibits", f"{killed.meta['run']}.jsonl"}
     kept = {key for key in good if stores["killed"].exhibits.of(key) is not None}
     assert len(kept) == 4  # of the first seed: two cases, two strategies

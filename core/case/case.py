@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -155,3 +156,7 @@ class Case(Shown):
             return used
         words = [seed, *self.name.encode()]
         return used.with_noise(np.random.default_rng(np.random.SeedSequence(words)))
+
+    def conditions(self, seed: int) -> Mapping[str, float | str]:
+        """Return what a job of this seed is given otherwise than the files of the case say."""
+        return {}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -11,20 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic import ValidationError
 
 from femubench.core.case.case import Case, Match, Modification
 from femubench.core.case.checks import FREE_YET_HELD, NOT_HELD, check_unique
 from femubench.core.case.deviations import with_floor
-from femubench.core.case.faults import (
-    Fault,
-    KeyPath,
-    at_key,
-    dotted,
-    first_fault,
-    key_lines,
-    line_of,
-)
+from femubench.core.case.faults import Fault, KeyPath, at_key
 from femubench.core.case.files import LARGEST_CASE, CaseFiles
 from femubench.core.case.frames import FrameSite, Site, attachments, frame_of
 from femubench.core.case.matching import Alignment, Placed, fitted_sensors
@@ -41,10 +30,11 @@ from femubench.core.case.modes import (
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.repeats import with_covariance, with_repeats
 from femubench.core.case.response_files import read_responses
-from femubench.core.case.schema import CaseSpec, FileSpec, FrameSpec, ModificationSpec, parse_spec
+from femubench.core.case.schema import CaseSpec, FileSpec, FrameSpec, ModificationSpec
 from femubench.core.case.sensors import read_sensors
 from femubench.core.case.tables import read_table
-from femubench.core.errors import InputError, ModelError
+from femubench.core.case.toml_text import located, spec_of
+from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
@@ -65,9 +55,6 @@ _EXPECTED = {
     "preloads": "a member of a ring with all constants of its section",
 }
 _MOST_CHANGED = 5_000_000  # every change is built once while the case is read
-# The look-behind and the possessive plus keep the search linear.
-_LONG_KEY = re.compile(r"""(?<![\w"'.-])(?:["'\w-]++[ \t]*+\.[ \t]*+){50}""")
-_AT_LINE = re.compile(r"\s*\(at line (\d+), column \d+\)")
 
 
 def read_case(
@@ -96,43 +83,10 @@ def read_case(
     files = CaseFiles(Path(folder), links=installed)
     text = read_text(files.case_file, LARGEST_CASE)
     try:
-        return _Building(files, _parsed(text, files.case_file), readers).case(name)
+        spec = spec_of(text, files.case_file, CaseSpec)
+        return _Building(files, spec, readers).case(name)
     except Fault as fault:
-        line = _line(text, fault.path)
-        raise InputError(
-            fault.what,
-            file=files.case_file,
-            line=line,
-            key=dotted(fault.path) or None,
-            expected=fault.expected,
-        ) from None
-
-
-def _line(text: str, path: KeyPath) -> int | None:
-    try:
-        return line_of(key_lines(text), path)
-    except RecursionError:  # nearly too deep for the parser, and too deep for this one
-        return None
-
-
-def _parsed(text: str, file: Path) -> CaseSpec:
-    deep = InputError("nested too deeply", file=file, expected="a flat table")
-    # The parser takes time with the square of the parts of a dotted key.
-    if _LONG_KEY.search(text):
-        raise deep
-    try:
-        return parse_spec(tomllib.loads(text))
-    except ValidationError as error:
-        raise first_fault(error, CaseSpec) from None
-    except RecursionError:
-        raise deep from None
-    except tomllib.TOMLDecodeError as error:
-        found = _AT_LINE.search(str(error))
-        line = int(found.group(1)) if found else None
-        what = _AT_LINE.sub("", str(error))
-        raise InputError(what, file=file, line=line, expected="valid TOML") from None
-    except ValueError:  # Python's own, at whole numbers of more than 4300 digits
-        raise InputError("a number is too long", file=file, expected="valid TOML") from None
+        raise located(fault, text, files.case_file) from None
 
 
 @dataclass

@@ -26,11 +26,16 @@ DONE, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 # stands here so that `bench --help` imports none of them.
 VERBS = {
     "run": ("femubench.core.cli.run", "Run strategies on cases and rank them."),
+    "study": (
+        "femubench.core.cli.study",
+        "Run strategies under conditions that vary: noise, sensors, options.",
+    ),
     "report": ("femubench.core.cli.report", "Write a report on a stored run."),
     "compare": (
         "femubench.core.cli.compare",
         "Compare run B with run A; exit with 1 if B is worse.",
     ),
+    "store": ("femubench.core.cli.store", "Check, repair or export stored runs."),
     "publish": ("femubench.core.cli.publish", "Merge result files into a static site in DIR."),
     "update": (
         "femubench.core.cli.update",

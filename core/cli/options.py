@@ -63,3 +63,20 @@ def store(what: str) -> Option:
     """Return the option for the store of runs."""
     text = f"{what} Default: $FEMUBENCH_STORE or femubench-results."
     return click.option("--store", type=FOLDER, metavar="DIR", help=text)
+
+
+jobs = click.option(
+    "-j", "--jobs", type=click.IntRange(1), metavar="N",
+    help="Number of worker processes. Default: one per core. With --cluster slurm:QUEUE the number "
+    "of Slurm jobs.",
+)  # fmt: skip
+
+scheduler = click.option(
+    "--scheduler", metavar="ADDRESS",
+    help="Run the jobs on the workers of the Dask scheduler there, e.g. tcp://host:8786.",
+)  # fmt: skip
+
+cluster = click.option(
+    "--cluster", metavar="CLUSTER",
+    help="Start a Dask cluster for the run: local:N workers here, or slurm:QUEUE.",
+)  # fmt: skip

@@ -77,7 +77,7 @@ def report(
     else:
         writers = [plugins.reporters[w] for w in chosen("report format", words, plugins.reporters)]
         kept = store_in(store)
-        found = read_run(run, kept, lenient=True)
+        found = read_run(run, kept)
         _tell(found, writers)
         exhibits = kept.exhibits if file is None else None
         above = kept.folder if file is None else file.parent

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from femubench.core.cli import options
+from femubench.core.cli.outputs import finish, outputs_of
 from femubench.core.cli.progress import progress_bar
 from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of
 from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
 from femubench.core.errors import InputError, PluginError
-from femubench.core.files import write_atomically
 from femubench.core.library.cases import case_folders
 from femubench.core.plugin.validation import chosen
 from femubench.core.version import __version__
@@ -22,7 +22,6 @@ from femubench.core.version import __version__
 if TYPE_CHECKING:
     from femubench.core.library.rank import Plan
     from femubench.core.plugin.loader import Plugins
-    from femubench.core.roles import Reporter
     from femubench.core.run.recording import Overwrite
     from femubench.core.run.starts import Start
     from femubench.core.run.store import Store
@@ -35,10 +34,9 @@ if TYPE_CHECKING:
     "-s", "--strategy", "strategies", multiple=True, metavar="STRATEGY",
     help="Run this strategy, or STRATEGY:OPTION=VALUE,...; may be repeated. Default: all.",
 )  # fmt: skip
-@click.option(
-    "-j", "--jobs", type=click.IntRange(1), metavar="N",
-    help="Number of worker processes. Default: one per core.",
-)  # fmt: skip
+@options.jobs
+@options.scheduler
+@options.cluster
 @click.option(
     "--seeds", type=click.IntRange(1), metavar="N",
     help="Run N draws of measurement noise, seeds S+1 .. S+N, instead of the data as recorded.",
@@ -94,6 +92,8 @@ def run(
     cases: tuple[str, ...],
     strategies: tuple[str, ...],
     jobs: int | None,
+    scheduler: str | None,
+    cluster: str | None,
     seeds: int | None,
     seed: int,
     nominal: Start,
@@ -117,22 +117,29 @@ def run(
     plugins = _checked(ctx, cases, strategies)
     from femubench.core.library.rank import repeated, request_of, store_in
     from femubench.core.library.report import reporter, run_name
-    from femubench.core.run.runner import worker_count
+    from femubench.core.run.executor import executor_of
     from femubench.core.schema.results import DONE
 
-    outputs = _outputs(plugins, json_file, csv_file, report_file)
+    outputs = outputs_of(plugins, json_file, csv_file, report_file)
     kept = store_in(store)
     old = None if locked is None else kept.load(locked)
     plan = _plan(ctx, plugins, kept) if old is None else repeated(request_of(old), plugins)
-    if not quiet:
-        click.echo(wrapped(_header(plan, worker_count(jobs)), hanging=2))
-    with progress_bar(quiet=quiet) as progress:
-        outcome = plan.run(jobs, kept, overwrite=overwrite, resume=resume, progress=progress)
+    with executor_of(jobs, scheduler, cluster) as executor:
+        if not quiet:
+            click.echo(wrapped(_header(plan, executor.spoken), hanging=2))
+        with progress_bar(quiet=quiet) as progress:
+            outcome = plan.run(
+                store=kept,
+                overwrite=overwrite,
+                resume=resume,
+                progress=progress,
+                executor=executor,
+            )
     if report_file is None:
         for writer in (reporter(plugins, name) for name in ("html", "markdown")):
             outputs[kept.folder / f"{run_name(outcome)}{writer.suffix}"] = writer
     screen = None if quiet else reporter(plugins, "terminal")
-    _finish(outcome, kept.exhibits, outputs, screen)
+    finish(outcome, kept.exhibits, outputs, screen)
     if old is not None:
         return _compare(old, outcome)
     return int(any(result.status not in DONE for result in outcome.results))
@@ -205,23 +212,7 @@ def _compare(old: Run, new: Run) -> int:
     return int(bool(results))
 
 
-def _outputs(
-    plugins: Plugins, json_file: Path | None, csv_file: Path | None, report_file: Path | None
-) -> dict[Path, Reporter]:
-    """Return who writes which file."""
-    from femubench.core.library.report import reporter, reporter_for
-
-    outputs: dict[Path, Reporter] = {}
-    for path, name in ((json_file, "json"), (csv_file, "csv"), (report_file, None)):
-        if path is None:
-            continue
-        if path in outputs:
-            raise InputError("is to hold two outputs", file=path, expected="a file for each")
-        outputs[path] = reporter(plugins, name) if name else reporter_for(plugins, path)
-    return outputs
-
-
-def _header(plan: Plan, workers: int) -> str:
+def _header(plan: Plan, place: str) -> str:
     """Return one line with everything that decides on the outcome."""
     request, cases, strategies = plan.request, len(plan.cases), len(plan.strategies)
     seeds = request.all_seeds
@@ -233,25 +224,6 @@ def _header(plan: Plan, workers: int) -> str:
     return (
         f"femubench {__version__}: {counted(cases, 'case')}{start}, "
         f"{counted(strategies, 'strategy')}, {named} ({meaning}), "
-        f"{counted(plan.jobs, 'job')}, {counted(workers, 'worker')}, "
+        f"{counted(plan.jobs, 'job')}, {place}, "
         f"timeout {spoken(request.timeout)}{own}"
     )
-
-
-def _finish(
-    run: Run, exhibits: object, outputs: dict[Path, Reporter], screen: Reporter | None
-) -> None:
-    """Write the files, then show the ranking and where the files are."""
-    from femubench.core.library.report import rendered, text_of
-
-    written, broken = [], None
-    for path, writer in outputs.items():
-        try:
-            write_atomically(path, rendered(writer, run, exhibits))
-            written.append(f"{writer.name}: {path}")
-        except PluginError as fault:
-            broken = fault
-    if screen is not None:
-        click.echo("\n".join(["", text_of(screen, rendered(screen, run)), *written]))
-    if broken is not None:
-        raise broken

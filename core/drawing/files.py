@@ -16,12 +16,15 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from femubench.core.drawing.wireframe import Wireframe, adapter, check_same
 from femubench.core.errors import InputError
-from femubench.core.files import read_text, write_atomically
+from femubench.core.files import read_bytes, write_atomically
 from femubench.core.schema.records import parse_json
+from femubench.core.schema.sealing import TAIL, is_whole, sealed, sum_of
 
 FOLDER = "exhibits"
 MOST_BYTES = 4 * 2**20
 _CASE = "structure-"
+_SCHEMA = 2  # of 1 there were no checksums
+_HEAD = b'{"schema":2,'
 _KEY = re.compile(r"[0-9a-f]{8,64}")
 _MOST = 20_000
 _STALE = 60.0  # s; a file is written in a fraction of one
@@ -138,6 +141,16 @@ class Exhibits:
         path = self._path(_name(digest))
         return path is None or path.exists()
 
+    def faults(self) -> list[InputError]:
+        """Return an error for every file that is not as it was written."""
+        found = []
+        for path in sorted(self._folder.glob("*.json")):
+            try:
+                _whole(path)
+            except InputError as fault:
+                found.append(fault)
+        return found
+
     def put(self, key: str, exhibit: Mapping[str, Any]) -> None:
         """Keep the exhibit of a job; a store without room does without."""
         self._write(key, exhibit)
@@ -155,7 +168,7 @@ class Exhibits:
         if path is None or not path.is_file():
             return None
         try:
-            data = parse_json(read_text(path, MOST_BYTES), file=path, expected="an exhibit")
+            data = parse_json(_whole(path), file=path, expected="an exhibit")
             found = adapter(kind)
             plain: dict[str, Any] = found.dump_python(found.validate_python(data), mode="json")
         except (InputError, ValidationError) as error:
@@ -170,11 +183,24 @@ class Exhibits:
             return
         # Pictures are worth no failed run: a full disk is told by the results.
         with suppress(OSError, ValueError):
-            text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-            if len(text) > MOST_BYTES:
+            plain = {"schema": _SCHEMA, **data}
+            text = json.dumps(plain, allow_nan=False, separators=(",", ":"))
+            if len(text) > MOST_BYTES - TAIL:
                 return
             self._folder.mkdir(parents=True, exist_ok=True)
-            write_atomically(path, text)
+            write_atomically(path, sealed(text.encode()))
+
+
+def _whole(path: Path) -> bytes:
+    """Return the content of a file; one of an earlier version has no checksum.
+
+    Raises:
+        InputError: when it is not as it was written.
+    """
+    content = read_bytes(path, MOST_BYTES)
+    if not is_whole(content) and (content.startswith(_HEAD) or sum_of(content)):
+        raise InputError("damaged", file=path, expected="the picture that was written")
+    return content
 
 
 def _name(digest: str) -> str:

@@ -94,25 +94,32 @@ def point_rows(frame: Frame, mesh: Mesh, properties: BeamProperties, place: Plac
 
     Between nodes the element's shape functions interpolate; on a rigid arm it moves as a body.
     """
+    block, columns = point_block(frame, mesh, properties, place)
+    bounds = len(columns) * np.arange(7)
     shape = (6, 6 * len(mesh.xyz))
+    return sp.csr_array((block.ravel(), np.tile(columns, 6), bounds), shape=shape)
+
+
+def point_block(
+    frame: Frame, mesh: Mesh, properties: BeamProperties, place: Place
+) -> tuple[FloatArray, IntArray]:
+    """Return what moves a point, (6, k), and which node displacements those are, (k,)."""
     node = node_at(frame, mesh, place)
     if node is not None:
-        return sp.csr_array((np.ones(6), (np.arange(6), 6 * node + np.arange(6))), shape=shape)
+        return np.eye(6), 6 * node + np.arange(6)
     element, s = _element_at(frame, mesh, place)
     s0, s1 = mesh.stations[element]
-    axes = np.kron(np.eye(2), mesh.axes[element])
     if s < s0 or s > s1:
         end = 0 if s < s0 else 1
         base = next(c.base for c in mesh.connections if c.node == mesh.ends[element, end])
         ends = [frame.joint(name).xyz for name in frame.members[mesh.member[element]].ends]
         point = np.array(ends[0]) * (1 - s) + np.array(ends[1]) * s
-        block, columns = rigid_arm(point - mesh.xyz[base]), 6 * base + np.arange(6)
-    else:
-        local = shape_functions(properties, element, float((s - s0) / (s1 - s0)))
-        block = axes.T @ local @ np.kron(np.eye(2), axes)
-        columns = (6 * mesh.ends[element][:, None] + np.arange(6)).ravel()
-    rows = np.repeat(np.arange(6), len(columns))
-    return sp.csr_array((block.ravel(), (rows, np.tile(columns, 6))), shape=shape)
+        return rigid_arm(point - mesh.xyz[base]), 6 * base + np.arange(6)
+    axes = mesh.axes[element]
+    local = shape_functions(properties, element, float((s - s0) / (s1 - s0)))
+    turned = (axes.T @ local.reshape(2, 3, 4, 3).transpose(0, 2, 1, 3)) @ axes
+    block = turned.transpose(0, 2, 1, 3).reshape(6, 12)
+    return block, (6 * mesh.ends[element][:, None] + np.arange(6)).ravel()
 
 
 def spring_rows(mesh: Mesh, connection: Connection) -> SparseArray:

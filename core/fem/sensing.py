@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from femubench.core.fem.kinematics import point_rows
+from femubench.core.fem.kinematics import point_block
 from femubench.core.fem.mesh import SAME_STATION, locate
 from femubench.core.fem.meshed_frame import MeshedFrame
 from femubench.core.fem.sensors import Sensors
@@ -22,17 +22,17 @@ def sensor_rows(structure: MeshedFrame, sensors: Sensors) -> SparseArray:
     if not len(sensors.xyz):
         return sp.csr_array((0, transform.shape[1]))
     node = _nodes_at(structure, sensors.xyz)
-    columns = 6 * np.maximum(node, 0)[:, None] + np.arange(6)
-    bounds = np.arange(0, columns.size + 1, 6)
-    shape = (len(node), transform.shape[0])
-    rows = sp.csr_array((sensors.axes.ravel(), columns.ravel(), bounds), shape=shape)
+    axes = sensors.axes
+    values = list(axes)
+    columns = list(6 * np.maximum(node, 0)[:, None] + np.arange(6))
+    for i in np.flatnonzero(node < 0):
+        values[i], columns[i] = _between_nodes(structure, axes[i], sensors.xyz[i])
+    bounds = np.cumsum([0, *map(len, values)])
+    rows = sp.csr_array(
+        (np.concatenate(values), np.concatenate(columns), bounds),
+        shape=(len(node), transform.shape[0]),
+    )
     rows.eliminate_zeros()
-    if (node < 0).any():
-        parts = [
-            _between_nodes(structure, sensors, i) if n < 0 else rows[i : i + 1]
-            for i, n in enumerate(node)
-        ]
-        rows = sp.csr_array(sp.vstack(parts))
     return rows @ transform
 
 
@@ -51,8 +51,10 @@ def _nodes_at(structure: MeshedFrame, xyz: FloatArray) -> IntArray:
     return np.where(sure, there.argmax(axis=1), -1)
 
 
-def _between_nodes(structure: MeshedFrame, sensors: Sensors, i: int) -> SparseArray:
-    """Return the reading of a sensor from node displacements, sparse (1, 6 n_nodes)."""
-    place = locate(structure.frame, sensors.xyz[i])
-    point = point_rows(structure.frame, structure.mesh, structure.properties, place)
-    return sp.csr_array(sensors.axes[i : i + 1]) @ point
+def _between_nodes(
+    structure: MeshedFrame, axis: FloatArray, xyz: FloatArray
+) -> tuple[FloatArray, IntArray]:
+    """Return the reading of a sensor and the node displacements that it is of, (k,) each."""
+    place = locate(structure.frame, xyz)
+    block, columns = point_block(structure.frame, structure.mesh, structure.properties, place)
+    return axis @ block, columns

@@ -98,7 +98,8 @@ class Sensors:
     @property
     def axes(self) -> FloatArray:
         """Return the signed unit vectors in (x, y, z, rx, ry, rz), (n_sensors, 6)."""
-        rows = [axis_of(direction) for direction in self.directions]
+        known = {direction: axis_of(direction) for direction in set(self.directions)}
+        rows = [known[direction] for direction in self.directions]
         return np.array(rows, dtype=float).reshape(-1, 6)
 
 

@@ -223,7 +223,7 @@ def one_case(given: CaseLike, plugins: Plugins) -> Case:
 
 def case_words(words: Iterable[str], plugins: Plugins) -> tuple[str, ...]:
     """Return words for cases that mean the same from any working directory."""
-    known = {*_words(plugins.scenarios)}
+    known = {*case_names(plugins.scenarios)}
     given = tuple(words) or _default_set(plugins.scenarios)
     return tuple(word if word in known else str(Path(word).absolute()) for word in given)
 
@@ -232,7 +232,7 @@ def _default_set(scenarios: Mapping[str, Scenario]) -> tuple[str, ...]:
     return tuple(name for name, scenario in scenarios.items() if scenario.default)
 
 
-def _words(scenarios: Mapping[str, Scenario]) -> list[str]:
+def case_names(scenarios: Mapping[str, Scenario]) -> list[str]:
     """Return every word that stands for cases of scenarios."""
     return [*scenarios, *_groups(scenarios), *scenarios_of(scenarios)]
 
@@ -252,7 +252,7 @@ def _folders(word: str, scenarios: Mapping[str, Scenario]) -> Iterable[tuple[str
         return [(None, path)]
     if "/" in word and word.partition("/")[0] not in {*scenarios, *groups}:
         raise InputError("folder does not exist", file=path, expected="a folder with a case.toml")
-    raise unknown("case", word, _words(scenarios))
+    raise unknown("case", word, case_names(scenarios))
 
 
 def _check_names(cases: Iterable[Case]) -> None:

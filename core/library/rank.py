@@ -22,6 +22,7 @@ from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import check_strategy, chosen
 from femubench.core.plugin.variants import Variant, labelled, strategy_of
 from femubench.core.roles import Strategy
+from femubench.core.run.executor import Executor, executor_of
 from femubench.core.run.frames import modes_frame, results_frame
 from femubench.core.run.recording import Overwrite, Progress
 from femubench.core.run.runner import run_jobs
@@ -29,6 +30,7 @@ from femubench.core.run.starts import Start, Starts
 from femubench.core.run.store import Store
 from femubench.core.schema import records as serial, results
 from femubench.core.score.leaderboard import leaderboard
+from femubench.core.study.skill import skill_by
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -83,6 +85,9 @@ def request_of(run: results.Run) -> Request:
         InputError: when it was not kept, as by earlier versions and by calls from Python.
     """
     kept = run.meta.get("request")
+    if isinstance(kept, Mapping) and "study" in kept:
+        what = f"run {run.meta.get('run')} is a study"
+        raise InputError(what, expected="`bench study FILE`, which goes on where it stopped")
     if not isinstance(kept, Mapping) or not {"cases", "strategies"} <= kept.keys():
         what = f"run {run.meta.get('run')} does not tell what it was asked for"
         raise InputError(what, expected="a run of `bench run` of this version")
@@ -118,6 +123,10 @@ class Run(results.Run):
     def leaderboard(self) -> pd.DataFrame:
         """Return one row a strategy, best first."""
         return leaderboard(self)
+
+    def skill_by(self, *axes: str) -> pd.DataFrame:
+        """Return one row a cell of a study; see `femubench.results.skill_by`."""
+        return skill_by(self, *axes)
 
     def rows(self) -> list[tuple[str, str]]:
         """Return what was run, and who leads."""
@@ -159,12 +168,17 @@ class Plan:
         self,
         jobs: int | None = None,
         store: Store | None = None,
+        executor: Executor | None = None,
         *,
         overwrite: Overwrite | None = None,
         resume: bool = False,
         progress: Progress | None = None,
     ) -> Run:
-        """Run every strategy on every case with every seed; see `rank`."""
+        """Run every strategy on every case with every seed; see `rank`.
+
+        Arguments:
+            executor: what runs the jobs, from `executor_of`; None for `jobs` workers here.
+        """
         if store is not None:
             make_folder(store.folder)
         asked = self.request
@@ -184,6 +198,7 @@ class Plan:
                 run_seed=asked.seed,
                 request=asked.to_json() if self.repeatable else {"nominal": asked.nominal},
                 starts=Starts(self.textbook, asked.nominal, self.classes),
+                executor=executor,
             )
         )
 
@@ -203,6 +218,8 @@ def rank(
     overwrite: Overwrite | None = None,
     resume: bool = False,
     progress: Progress | None = None,
+    scheduler: str | None = None,
+    cluster: str | None = None,
 ) -> Run:
     """Run strategies on cases, each job in a process of its own, and rank them.
 
@@ -210,21 +227,19 @@ def rank(
         cases: names, folders or `Case`s; the default set where there is none.
         strategies: names (``"NAME:OPTION=VALUE"`` with options), ``strategies[NAME](...)``,
             classes or instances, also of a notebook; all that are installed where there is none.
-        seeds: number of draws of measurement noise; None for the data as recorded.
-        seed: the first seed; 0 by default.
-        nominal: the model that all strategies start from: as it was ``drawn``, with what handbooks
-            give (``textbook``), or ``both``, which is the default. Ranks are from the textbook
-            model where that is among them. Errors are measured against the textbook model always.
-        jobs: number of worker processes; None for one a processor.
-        timeout: seconds that a job may take; 600 by default.
-        timeouts: the same for single strategies, by name.
+        seeds, seed: number of draws of noise, None for the data as recorded; the first seed.
+        nominal: the model to start from: as ``drawn``, with handbook values (``textbook``), or
+            ``both``, the default; ranks are from ``textbook`` where it is among them.
+        jobs: number of worker processes, or of Slurm jobs; None for one a processor.
+        timeout, timeouts: seconds that a job may take, 600 by default; of single strategies.
         memory: bytes that a job may take; None for an even share of the machine's.
         store: folder that keeps the results, so that a run can be continued; None for none.
         overwrite: which stored results of the same jobs are computed anew: ``always`` all,
             ``missing`` none, ``failed`` the failures. Default: all, of a resumed run the failures.
-        resume: go on with the last run of these jobs in the store; where neither cases nor
-            strategies are given, with the last run.
+        resume: go on with the last run of these jobs in the store; without cases and strategies,
+            with the last run.
         progress: called with (result, jobs done, jobs in all).
+        scheduler, cluster: ``tcp://HOST:PORT`` of Dask; ``local:N`` or ``slurm:QUEUE`` to start.
 
     Raises:
         InputError: for an unknown name, an option that does not exist, or a faulty case.
@@ -234,10 +249,9 @@ def rank(
         [0.0, -0.15]
     """
     kept = None if store is None else store_in(store)
+    given = cases, strategies, usable_plugins()
     plan = plan_of(
-        cases,
-        strategies,
-        usable_plugins(),
+        *given,
         seeds=seeds,
         seed=seed,
         nominal=nominal,
@@ -246,7 +260,8 @@ def rank(
         memory=memory,
         resumed=kept if resume else None,
     )
-    return plan.run(jobs, kept, overwrite=overwrite, resume=resume, progress=progress)
+    with executor_of(jobs, scheduler, cluster) as where:
+        return plan.run(None, kept, where, overwrite=overwrite, resume=resume, progress=progress)
 
 
 def plan_of(
@@ -274,7 +289,7 @@ def plan_of(
             if value is not None:
                 what = f"--resume alone goes on as before; {name} needs CASE or -s beside it"
                 raise InputError(what)
-        request = request_of(resumed.load())
+        request = request_of(results.Run(resumed.begun(), ()))
         if timeout is not None or timeouts:
             request = replace(request, timeout=timeout or DEFAULT_TIMEOUT, timeouts=timeouts or {})
         request = request if memory is None else replace(request, memory=memory)
@@ -295,8 +310,8 @@ def plan_of(
         ),
         read,
         found,
-        _textbook(read),
-        _classes(plugins),
+        textbook_of(read),
+        classes_of(plugins),
         repeatable=plain and all(isinstance(item, str) for item in wanted),
     )
 
@@ -306,10 +321,10 @@ def repeated(request: Request, plugins: Plugins) -> Plan:
     found = _strategies(request.strategies, plugins)
     _known(request.timeouts, found)
     read = read_cases(request.cases, plugins)
-    return Plan(request, read, found, _textbook(read), _classes(plugins))
+    return Plan(request, read, found, textbook_of(read), classes_of(plugins))
 
 
-def _textbook(cases: Sequence[Case]) -> dict[str, Case]:
+def textbook_of(cases: Sequence[Case]) -> dict[str, Case]:
     """Return the cases with their textbook models by name, without those that have none.
 
     They are made of this package's own effects: no plugin moves what all are measured against.
@@ -328,7 +343,7 @@ def _textbook(cases: Sequence[Case]) -> dict[str, Case]:
     return found
 
 
-def _classes(plugins: Plugins) -> dict[str, tuple[str, ...]]:
+def classes_of(plugins: Plugins) -> dict[str, tuple[str, ...]]:
     """Return kinds of structure and truth by case."""
     listed = plugins.scenarios.values()
     return {case: scenario.classes for scenario in listed for case in scenario.cases}
@@ -345,7 +360,7 @@ def _strategies(given: Sequence[object], plugins: Plugins) -> list[Strategy]:
     words = [word for word in wanted if isinstance(word, str)]
     chosen("strategy", (word.partition(":")[0] for word in words), plugins.strategies)
     found = [
-        strategy_of(item, plugins.strategies) if isinstance(item, str) else _named(item, plugins)
+        strategy_of(item, plugins.strategies) if isinstance(item, str) else named(item, plugins)
         for item in wanted or plugins.strategies
     ]
     if not found:
@@ -353,7 +368,7 @@ def _strategies(given: Sequence[object], plugins: Plugins) -> list[Strategy]:
     return found
 
 
-def _named(given: object, plugins: Plugins) -> Strategy:
+def named(given: object, plugins: Plugins) -> Strategy:
     """Return a strategy under a name that tells its options where they are not the usual ones."""
     strategy = check_strategy(given.base if isinstance(given, Variant) else given)
     usual = plugins.strategies.get(strategy.name)
@@ -383,15 +398,12 @@ def store_in(folder: Store | str | PathLike[str] | None = None) -> Store:
 def read_run(
     run: results.Run | str | PathLike[str] | None = None,
     store: Store | str | PathLike[str] | None = None,
-    *,
-    lenient: bool = False,
 ) -> Run:
     """Return a run.
 
     Arguments:
         run: a file that ``run --json`` wrote, a run id or its first letters; None for the last.
         store: where runs are kept.
-        lenient: whether lines of the store that cannot be read are left out.
 
     Raises:
         InputError: when there is no such run, or it cannot be read.
@@ -405,4 +417,4 @@ def read_run(
         return Run.of(run)
     if run is not None and os.path.exists(run) and not os.path.isdir(run):
         return Run.of(serial.read_run(Path(run)))
-    return Run.of(store_in(store).load(None if run is None else str(run), lenient=lenient))
+    return Run.of(store_in(store).load(None if run is None else str(run)))

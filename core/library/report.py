@@ -24,6 +24,7 @@ from femubench.core.run.store import Store
 from femubench.core.schema.records import finite, parse_json
 from femubench.core.schema.results import Run
 from femubench.core.score.comparison import Comparison
+from femubench.core.study.axes import StudyAxes
 
 Reportable = Run | Diagnosis | Comparison | Study | Sequence[Study]
 SUFFIXES = {"terminal": ".txt", "markdown": ".md", "html": ".html", "json": ".json"}
@@ -66,7 +67,7 @@ def report(
         found = diagnosis_in(Path(what)) or read_run(what)
     elif what is None or isinstance(what, (str, PathLike)):
         kept = store_in(store)
-        found = read_run(what, kept, lenient=True)
+        found = read_run(what, kept)
     if isinstance(found, Run):
         content = _run_report(found, path, style, kept)
     else:
@@ -197,6 +198,8 @@ def rendered(found: Reporter, run: Run, exhibits: object = None) -> str | bytes:
     Raises:
         PluginError: naming the reporter, whatever it raised.
     """
+    if found.name in ("terminal", "markdown", "html") and StudyAxes.asked(run) is not None:
+        return _study_report(found.name, run)
     as_bytes, with_exhibits = (
         getattr(found, name, None) for name in ("render_bytes", "render_with")
     )
@@ -218,6 +221,14 @@ def rendered(found: Reporter, run: Run, exhibits: object = None) -> str | bytes:
             f"reporter {found.name!r} gave {type(content).__name__}, expected {expected.__name__}"
         )
     return content
+
+
+def _study_report(style: str, run: Run) -> str:
+    """Return a study in a format whose reporter would rank what the study varies."""
+    from femubench.reports.study import study_html, study_markdown, study_text
+
+    writers = {"terminal": study_text, "markdown": study_markdown, "html": study_html}
+    return writers[style](run)
 
 
 def text_of(found: Reporter, content: str | bytes) -> str:

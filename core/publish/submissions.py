@@ -16,13 +16,12 @@ from femubench.core.errors import InputError
 from femubench.core.files import read_text
 from femubench.core.schema.records import (
     LARGEST_RUN,
-    Name,
     Record,
     parse_json,
     result_to_json,
     run_from_json,
 )
-from femubench.core.schema.results import Block, JobResult, Nominal, Run
+from femubench.core.schema.results import Block, JobResult, Name, Nominal, Run
 from femubench.core.score.ranking import rank_results
 from femubench.core.score.scoring import frequency_error
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from femubench.core.schema.records import run_from_json, run_to_json
 from femubench.core.schema.results import BLOCKS, Run
 from femubench.core.score.scoring import frequency_error
+from femubench.core.study.axes import StudyAxes
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,7 +21,8 @@ def results_frame(run: Run) -> pd.DataFrame:
     Columns: case strategy seed nominal status reason seconds; ``used_percent``, ``used_mac`` and
     the same for ``higher`` and ``modified`` (nan where the case has no such block);
     rigid_body_modes rigid_body_modes_expected negative_eigenvalues unphysical parameter_count
-    evaluations score rank.
+    evaluations score rank. Of a study also the values of its axes: ``plain_case`` and
+    ``plain_strategy``, noise, sensors_left_out, and every option as ``STRATEGY.OPTION``.
 
     Examples:
         >>> results.results_frame(run)["status"].tolist()
@@ -28,13 +30,18 @@ def results_frame(run: Run) -> pd.DataFrame:
     """
     import pandas as pd
 
-    rows = []
+    rows, study = [], StudyAxes.of(run) if StudyAxes.asked(run) is not None else None
     for result in run.results:
         row = {name: getattr(result, name) for name in (*_JOB, *_COUNTS)}
         for name, block in result.blocks.items():
             row |= {f"{name}_percent": block.rms_percent, f"{name}_mac": block.mean_mac}
+        if study is not None:
+            place = study.place(result.case, result.strategy, result.nominal)
+            row |= {_PLAIN.get(name, name): value for name, value in place.items()}
         rows.append(row)
-    frame = pd.DataFrame(rows, columns=[*_JOB, *_ERRORS, *_COUNTS])
+    own = [] if study is None else [_PLAIN.get(name, name) for name in study.names]
+    axes = [name for name in own if name not in _JOB]
+    frame = pd.DataFrame(rows, columns=[*_JOB, *axes, *_ERRORS, *_COUNTS])
     whole = {name: "Int64" for name in _COUNTS if name not in ("unphysical", "score")}
     return frame.astype({**whole, **dict.fromkeys(_FLOATS, "float64")})
 
@@ -88,6 +95,7 @@ def _signed(measured: float, predicted: float | None) -> float | None:
 
 
 _JOB = ("case", "strategy", "seed", "nominal", "status", "reason", "seconds")
+_PLAIN = {"case": "plain_case", "strategy": "plain_strategy"}  # without conditions and options
 _COUNTS = (
     *("rigid_body_modes", "rigid_body_modes_expected", "negative_eigenvalues", "unphysical"),
     *("parameter_count", "evaluations", "score", "rank"),

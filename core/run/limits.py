@@ -8,7 +8,7 @@ import psutil
 
 MIB = 2**20
 _SHARE = 0.9  # of the memory that is there, for all workers together
-_LEAST = 512 * MIB
+LEAST = 512 * MIB
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,15 @@ class Limits:
     file: int = 1024 * MIB
 
 
-def memory_share(workers: int) -> int:
-    """Return the bytes that one of several workers may take: an even share of the machine's."""
-    return max(int(_SHARE * psutil.virtual_memory().total / workers), _LEAST)
+def memory_share(workers: int, given: int | None = None) -> int:
+    """Return the bytes that one of several workers may take: an even share of the machine's.
+
+    Arguments:
+        workers: number of them.
+        given: bytes that they have together where that is less than the machine's.
+    """
+    total = psutil.virtual_memory().total if given is None else given
+    return max(int(_SHARE * total / workers), LEAST)
 
 
 def spoken_bytes(count: float) -> str:

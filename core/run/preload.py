@@ -1,16 +1,42 @@
 """Imported once by the process from which workers fork: what every job needs is there at once.
 
-It holds no case and no strategy.
+It holds no case, and of plugins those that come with femubench: what a stranger wrote is imported
+in the process of its own job alone.
 """
 
 from __future__ import annotations
+
+import gc
+from collections.abc import Iterator
+from contextlib import suppress
+from importlib import import_module
+from multiprocessing import popen_forkserver  # noqa: F401 - every worker imports it
+from pkgutil import iter_modules
 
 import scipy.linalg
 import scipy.optimize
 import scipy.sparse.linalg  # noqa: F401 - loaded for its time
 from threadpoolctl import threadpool_limits
 
+import femubench.core.drawing.prediction
+import femubench.core.plugin.variants
 import femubench.core.run.judging
 import femubench.core.run.worker  # noqa: F401 - loaded for its time
 
+_OWN = ("strategies", "effects", "faults")
+
+
+def own_plugins() -> Iterator[str]:
+    """Yield the modules of plugins that come with femubench."""
+    for kind in _OWN:
+        package = import_module(f"femubench.plugins.{kind}")
+        yield from (found.name for found in iter_modules(package.__path__, f"{package.__name__}."))
+
+
+for module in own_plugins():
+    with suppress(Exception):  # a job that needs it says what is wrong with it
+        import_module(module)
 threadpool_limits(1)
+# Else the first search for garbage in a worker writes to, and so copies, every page of the server.
+gc.collect()
+gc.freeze()

@@ -13,6 +13,7 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from functools import cache, lru_cache
 from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,8 @@ from femubench.core.roles import Strategy
 from femubench.core.score.scoring import Reference
 from femubench.core.version import __version__
 
-Stamp = tuple[Path, int, int]  # a file, when it was changed, its size
+Stamp = tuple[str, int, int]  # a file, when it was changed, its size
+_OWN = "femubench"
 
 
 def job_key(case: Case, strategy: str, code: bytes, version: str, seed: int) -> str:
@@ -53,9 +55,40 @@ def strategy_version(strategy: Strategy) -> str:
 
     The digest is there because a package in the making changes and keeps its number.
     """
-    inner = strategy.base if isinstance(strategy, Variant) else strategy
-    top = type(inner).__module__.partition(".")[0]
-    return f"{_number(top)}+{_digest(tuple(_stamps(top, type(inner).__module__)))}"
+    top, module = home_of(strategy)
+    return f"{_number(top)}+{source_digest(top, module)}"
+
+
+def comes_along(strategy: Strategy) -> bool:
+    """Tell whether a strategy is one of those that come with femubench."""
+    return home_of(strategy)[0] == _OWN
+
+
+def home_of(strategy: Strategy) -> tuple[str, str]:
+    """Return the package and the module of a strategy."""
+    module = type(strategy.base if isinstance(strategy, Variant) else strategy).__module__
+    return module.partition(".")[0], module
+
+
+def source_digest(top: str = _OWN, module: str = "") -> str:
+    """Return a digest of the Python files of a package, or of the file of a lone module."""
+    return _digest(tuple(_stamps(top, module)))
+
+
+def package_version(top: str) -> str:
+    """Return the version of an installed package and a digest of its source, without importing it.
+
+    Arguments:
+        top: name of the package, or of a module that is no package.
+    """
+    spec = find_spec(top)
+    if spec is None:
+        return "not installed"
+    folders = spec.submodule_search_locations or ()
+    files = sorted(file for folder in folders for file in _python_files(folder))
+    if spec.origin and not files:
+        files = [spec.origin]
+    return f"{_installed(top, '0')}+{_digest(tuple(map(_stamp, files)))}"
 
 
 @cache
@@ -72,36 +105,42 @@ def _installed(package: str, missing: str) -> str:
 
 def _stamps(top: str, module: str) -> Iterator[Stamp]:
     """Yield the Python files of a package, or the file of a lone module, with time and size."""
-    package = sys.modules.get(top)
-    folders = [Path(folder) for folder in getattr(package, "__path__", ())]
+    folders = getattr(sys.modules.get(top), "__path__", ())
     files = sorted({file for folder in folders for file in _python_files(folder)})
     own = getattr(sys.modules.get(module), "__file__", None)
     if not files and own:
-        files = [Path(own)]
-    for file in files:
-        try:
-            found = file.stat()
-        except OSError:  # a link that leads nowhere is no source
-            yield file, 0, 0
-        else:
-            yield file, found.st_mtime_ns, found.st_size
+        files = [own]
+    yield from map(_stamp, files)
+
+
+def _stamp(file: str) -> Stamp:
+    try:
+        found = os.stat(file)
+    except OSError:  # a link that leads nowhere is no source
+        return file, 0, 0
+    return file, found.st_mtime_ns, found.st_size
 
 
 @lru_cache(maxsize=64)
 def _digest(stamps: tuple[Stamp, ...]) -> str:
     """Return a digest of files; they are read once as long as they stay as they are."""
     found = hashlib.sha256()
-    for file, _, _ in stamps:
+    for name, _, _ in stamps:
+        file = Path(name)
         found.update(file.name.encode() + b"\0")
         with suppress(OSError):
             found.update(file.read_bytes())
     return found.hexdigest()[:12]
 
 
-def _python_files(folder: Path) -> Iterable[Path]:
-    for where, below, names in os.walk(folder, followlinks=True):
-        below[:] = [name for name in below if name != "__pycache__"]
-        yield from (Path(where) / name for name in names if name.endswith(".py"))
+def _python_files(folder: str) -> Iterator[str]:
+    """Yield the paths of the Python files below a folder; strings, since `Path` takes its time."""
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.endswith(".py"):
+                yield entry.path
+            elif entry.name != "__pycache__" and entry.is_dir():
+                yield from _python_files(entry.path)
 
 
 def provenance(meta: Mapping[str, Any], digest: str, version: str, seed: int) -> dict[str, Any]:
@@ -199,9 +238,10 @@ def run_meta(
     }
 
 
-def versions() -> dict[str, str]:
-    """Return the versions of Python and of the packages that results depend on."""
-    installed = {package: _installed(package, "not installed") for package in _PACKAGES}
+def versions(*more: str) -> dict[str, str]:
+    """Return the versions of Python, of the packages that results depend on, and of more."""
+    packages = (*_PACKAGES, *more)
+    installed = {package: _installed(package, "not installed") for package in packages}
     return {"python": platform.python_version(), **installed}
 
 

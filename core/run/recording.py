@@ -4,18 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any, Literal
 
 from femubench.core.drawing.prediction import keep_drawings
-from femubench.core.run.schedule import Show, Slot
+from femubench.core.run.schedule import Show
+from femubench.core.run.slots import Slot
 from femubench.core.run.store import Store
 from femubench.core.schema.results import DONE, JobResult
 
 Progress = Callable[[JobResult, int, int], None]
 Overwrite = Literal["always", "missing", "failed"]
 OVERWRITE: tuple[Overwrite, ...] = ("always", "missing", "failed")
+
+
+@dataclass(frozen=True)
+class Known:
+    """Results that are in the store, by the key of their job.
+
+    Arguments:
+        found: those to keep, of this run or of another.
+        own: those of this run.
+    """
+
+    found: Mapping[str, JobResult] = field(default_factory=dict)
+    own: Mapping[str, JobResult] = field(default_factory=dict)
 
 
 class Results:
@@ -29,7 +43,9 @@ class Results:
         if store is not None:
             # What is drawn of a case starts from the model that makes the ranks, which comes first.
             drawn = {slot.case.name: slot.case for slot in reversed(slots)}
-            keep_drawings(store.exhibits, drawn.values())
+            # Under other conditions nothing of it looks otherwise.
+            own = [case for case in drawn.values() if not case.conditions(0)]
+            keep_drawings(store.exhibits, own)
 
     @property
     def shelf(self) -> Show | None:
@@ -39,11 +55,11 @@ class Results:
     def add(self, index: int, result: JobResult) -> None:
         """Take a result that was just computed."""
         slot = self._slots[index]
-        key, provenance = slot.key, dict(slot.provenance)
+        key, provenance = slot.key, {**slot.provenance, **result.provenance}
         if slot.stale:
             # Workers import a strategy when they need it: this may be the result of either source.
             key, provenance["strategy"] = "", f"{provenance['strategy']}, changed during the run"
-        result = replace(result, key=key, provenance=provenance)
+        result = result.changed(key=key, provenance=provenance)
         if self._store is not None:
             self._store.append(self._run, result)
         self._tell(index, result)
@@ -53,27 +69,22 @@ class Results:
         if self._store is not None and not slot.stale:
             self._store.exhibits.put(slot.key, exhibit)
 
-    def keep(self, known: Mapping[str, JobResult]) -> list[int]:
-        """Take the results that the store has, of this run or of another; return what is missing.
-
-        Arguments:
-            known: by the key of the job.
-        """
+    def keep(self, known: Known) -> list[int]:
+        """Take the results that the store has; return what is missing."""
         missing = []
-        own = store.by_key(self._run) if (store := self._store) and known else {}
         for index, slot in enumerate(self._slots):
-            result, before = known.get(slot.key), own.get(slot.key)
+            result, before = known.found.get(slot.key), known.own.get(slot.key)
             if result is None:
                 missing.append(index)
                 continue
+            there = before is not None and before.status == result.status
             # A model as drawn that has all that handbooks give is one job from either start.
-            result = replace(result, nominal=slot.nominal)
-            if before is not None and before.status == result.status:
-                result = replace(before, nominal=slot.nominal)
-            elif store is not None:
-                store.append(self._run, result)
+            result = (before if before and there else result).changed(nominal=slot.nominal)
+            if self._store is not None and not there:
+                self._store.append(self._run, result)
             self._tell(index, result)
-        return missing
+        # Seed after seed: what is there early says something of every case and strategy.
+        return sorted(missing, key=lambda index: self._slots[index].seed)
 
     def _tell(self, index: int, result: JobResult) -> None:
         self._found[index] = result
@@ -91,22 +102,26 @@ def recorded(
     meta: dict[str, Any],
     overwrite: Overwrite | None,
     resume: bool,
-) -> tuple[dict[str, Any], dict[str, JobResult]]:
+) -> tuple[dict[str, Any], Known]:
     """Begin a run in the store or go on with one; return its meta data and results to keep."""
     if store is None:
-        return meta, {}
+        return meta, Known()
     keep = overwrite or ("failed" if resume else "always")
     before = store.latest_of_plan(meta["plan"]) if resume else None
     if before is not None:
         meta = {**meta, **before, "run": before["run"]}
     stack.enter_context(store.exclusive(meta["run"]))
-    known = {} if keep == "always" else store.by_key()
     if before is None:
-        store.runs()  # what cannot be read is told before there is more of it
         store.begin(meta)
+    if keep == "always":
+        return meta, Known()
+    own = store.by_key(meta["run"])
+    found = store.by_key(but=meta["run"])
+    # A failure is no later result.
+    found |= {key: r for key, r in own.items() if r.status in DONE or key not in found}
     if keep == "failed":
-        known = {key: item for key, item in known.items() if item.status in DONE}
-    return meta, known
+        found = {key: result for key, result in found.items() if result.status in DONE}
+    return meta, Known(found, own)
 
 
 @contextmanager

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from typing import Any
@@ -12,14 +11,15 @@ from threadpoolctl import threadpool_limits
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
 from femubench.core.roles import Strategy
-from femubench.core.run.limits import Limits, memory_share
+from femubench.core.run.executor import Executor, LocalProcesses, worker_count
+from femubench.core.run.limits import Limits
 from femubench.core.run.provenance import plan_digest, run_meta
 from femubench.core.run.recording import Overwrite, Progress, Results, ended, recorded
-from femubench.core.run.schedule import computed, slots_of
+from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
 from femubench.core.schema.results import Run
-from femubench.core.score.scoring import rank_results, reference_of
+from femubench.core.score.scoring import Reference, rank_results, reference_of
 
 _AS_GIVEN = Starts()
 
@@ -40,6 +40,7 @@ def run_jobs(
     run_seed: int = 0,
     request: Mapping[str, Any] | None = None,
     starts: Starts = _AS_GIVEN,
+    executor: Executor | None = None,
 ) -> Run:
     """Run every strategy on every case with every seed, each job in a process of its own.
 
@@ -56,6 +57,7 @@ def run_jobs(
         progress: called with (result, jobs done, jobs in all).
         run_seed, request: seed of the run's own statistics, and what was asked for in plain data.
         starts: the nominal models; the cases as given where it is left out.
+        executor: what runs the jobs, as `executor_of` opens it; None for `jobs` workers here.
 
     Raises:
         InputError: for two of one name, no worker, or a run that another process works on.
@@ -65,37 +67,26 @@ def run_jobs(
         >>> results.run_jobs([case], [nominal]).results[0].status
         'ok'
     """
-    workers = worker_count(jobs)
     _check_names(case=cases, strategy=strategies)
-    share = memory_share(workers) if memory is None else memory
+    place = LocalProcesses(worker_count(jobs)) if executor is None else executor
+    place.admit(strategies, memory)
+    share = place.share if memory is None else memory
     limits = {s.name: Limits((timeouts or {}).get(s.name, timeout), share) for s in strategies}
-    settings: dict[str, Any] = {"seed": run_seed, "jobs": workers, "timeout": timeout}
+    settings: dict[str, Any] = {"seed": run_seed, "jobs": place.workers, "timeout": timeout}
     settings |= {"memory": share, "request": dict(request or {})}
     with threadpool_limits(1), ExitStack() as stack:
-        references = {case.name: reference_of(starts.yardstick(case)) for case in cases}
-        slots = list(slots_of((one for c in cases for one in starts.of(c)), strategies, seeds))
-        settings["plan"] = plan_digest(slot.key for slot in slots)
+        references = _references([starts.yardstick(case) for case in cases])
+        slots = Slots((one for case in cases for one in starts.of(case)), strategies, seeds)
+        settings["plan"] = plan_digest(slots.keys)
         meta = run_meta(cases, strategies, references, seeds, settings, starts.about(cases))
-        slots = [slot.made_by(meta) for slot in slots]
+        slots.meta = meta
         meta, known = recorded(stack, store, meta, overwrite, resume)
         ending = stack.enter_context(ended(store, meta["run"]))
         results = Results(slots, store, meta["run"], progress)
-        for one in computed(slots, results.keep(known), references, limits, workers, results.shelf):
+        wanted = results.keep(known)
+        for one in place.computed(slots, wanted, references, limits, results.shelf):
             results.add(*one)
     return Run({**meta, **ending}, rank_results(results.in_order(), meta["reference"]))
-
-
-def worker_count(jobs: int | None) -> int:
-    """Return the number of worker processes: that of the processors where none is given.
-
-    Raises:
-        InputError: for less than one.
-    """
-    if jobs is None:
-        return len(os.sched_getaffinity(0))
-    if jobs < 1:
-        raise InputError(f"{jobs} worker processes", key="jobs", expected="1 or more")
-    return jobs
 
 
 def _check_names(**given: Sequence[Case] | Sequence[Strategy]) -> None:
@@ -104,3 +95,15 @@ def _check_names(**given: Sequence[Case] | Sequence[Strategy]) -> None:
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise InputError(f"{kind} {twice[0]!r} occurs twice", expected="every name once")
+
+
+def _references(cases: Sequence[Case]) -> dict[str, Reference]:
+    """Return what the model of every case gives, solved once for cases that share it."""
+    solved: dict[tuple[int, int, int], Reference] = {}
+    found = {}
+    for case in cases:
+        same = id(case.model), id(case.measurement), id(case.modifications)
+        if same not in solved:
+            solved[same] = reference_of(case)
+        found[case.name] = solved[same]
+    return found

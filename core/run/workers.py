@@ -26,6 +26,7 @@ from typing import Any, Generic, Literal, TypeVar
 import psutil
 
 from femubench.core.run.limits import Limits, spoken_bytes
+from femubench.core.run.provenance import source_digest
 from femubench.core.run.worker import LENGTH_BYTES, READY, environment, scratch_root, serve
 
 MARK = "FEMUBENCH_WORKERS"
@@ -294,6 +295,7 @@ class Workers(Generic[Key]):
     def open(self) -> Iterator[Workers[Key]]:
         """Start what the workers need, and leave no process and no file behind."""
         self._root = scratch_root()
+        _end_old_server()
         self._mark = _server_mark()
         with adopting(), _server_awake():
             try:
@@ -324,7 +326,7 @@ class Workers(Generic[Key]):
         process = context.Process(target=serve, args=arguments)
         try:
             _server_mark()  # a job may have ended the server
-            with _no_script():
+            with no_script():
                 process.start()
         except (OSError, EOFError) as error:
             for end in (answer, output):
@@ -380,9 +382,10 @@ class Workers(Generic[Key]):
 
 def _server_mark() -> str:
     """Start the server from which workers fork where there is none; return its mark."""
-    global _mark
+    global _mark, _source
     _mark = _mark or secrets.token_hex(8)
     if not alive(_server()):
+        _source = source_digest()
         get_context("forkserver").set_forkserver_preload(["femubench.core.run.preload"])
         with environment(**{MARK: _mark}):
             forkserver.ensure_running()
@@ -390,6 +393,13 @@ def _server_mark() -> str:
 
 
 _mark = ""
+_source = ""  # what the server has loaded
+
+
+def _end_old_server() -> None:
+    """End the server where the source that it has loaded has changed since."""
+    if alive(_server()) and _source != source_digest():
+        forkserver._forkserver._stop()  # type: ignore[attr-defined]
 
 
 @contextmanager
@@ -410,15 +420,24 @@ def _server_awake() -> Iterator[None]:
         watcher.join()
 
 
+_hiding = threading.Lock()
+_hidden: list[ModuleType] = []
+
+
 @contextmanager
-def _no_script() -> Iterator[None]:
+def no_script() -> Iterator[None]:
     """Hide the script or notebook from a worker that starts, which would run it once more."""
-    script = sys.modules["__main__"]
-    sys.modules["__main__"] = ModuleType("__main__")
+    with _hiding:
+        _hidden.append(sys.modules["__main__"])
+        sys.modules["__main__"] = ModuleType("__main__")
     try:
         yield
     finally:
-        sys.modules["__main__"] = script
+        with _hiding:
+            # Blocks of several threads overlap; what the first of them found comes back last.
+            script = _hidden.pop()
+            if not _hidden:
+                sys.modules["__main__"] = script
 
 
 def _wake_server() -> None:

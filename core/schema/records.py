@@ -4,38 +4,46 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, replace
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from femubench.core.errors import InputError
 from femubench.core.files import MIB, read_text
+from femubench.core.schema.details import DETAILS, with_nan
 from femubench.core.schema.results import (
     BLOCKS,
+    LONGEST_TEXT,
     NOMINALS,
     Block,
+    Hertz,
     JobResult,
+    Mac,
+    Name,
     Nominal,
     PairedMode,
+    Percent,
+    PredictedHertz,
+    Rank,
     Run,
+    Score,
+    Seconds,
     Status,
+    StdHertz,
+    Text,
+    Whole,
+    leave_unread,
 )
-from femubench.core.schema.validation import validated
+from femubench.core.schema.validation import validated, wrong_field
 
 LARGEST_RUN = 256 * MIB  # bytes of a file of `bench run --json`
-LARGEST_STORE = 1024 * MIB  # bytes of a store, which holds many runs
 MOST_RESULTS = 100_000
-LONGEST_TEXT = 100_000  # characters of a reason or a traceback
 _MOST_NAMES, _MOST_JOBS = 1_000, 1_000_000
 _DEEPEST = 32
-Name = Annotated[str, Field(max_length=1_000)]
-_Text = Annotated[str, Field(max_length=LONGEST_TEXT)]
-_Whole = Annotated[int, Field(ge=0, lt=2**63)]
-_Percent = Annotated[float, Field(ge=0, le=1e150)]
-_Mac = Annotated[float, Field(ge=-1e-6, le=1 + 1e-6)]
 
 
 class Record(BaseModel):
@@ -46,18 +54,20 @@ class Record(BaseModel):
 
 
 class _ModeRecord(Record):
-    mode: _Whole = 0
-    measured_hz: Annotated[float, Field(ge=1e-45, le=1e30)]
-    # Bounded so that the square of a relative error is a number.
-    predicted_hz: Annotated[float, Field(ge=-1e100, le=1e100)] | None
-    mac: _Mac | None
-    modification: _Text | None = None
-    predicted_std_hz: Annotated[float, Field(ge=0, le=1e100)] | None = None
+    mode: Whole = 0
+    measured_hz: Hertz
+    predicted_hz: PredictedHertz | None
+    mac: Mac | None
+    modification: Text | None = None
+    predicted_std_hz: StdHertz | None = None
+
+
+_MODE = tuple(_ModeRecord.model_fields)
 
 
 class _BlockRecord(Record):
-    rms_percent: _Percent
-    mean_mac: _Mac | None = None
+    rms_percent: Percent
+    mean_mac: Mac | None = None
     modes: list[_ModeRecord]
 
     def block(self) -> Block:
@@ -71,27 +81,27 @@ class ResultRecord(Record):
 
     case: Name
     strategy: Name
-    seed: _Whole
+    seed: Whole
     nominal: Nominal = "drawn"
     status: Status
-    reason: _Text = ""
-    seconds: Annotated[float, Field(ge=0)] = 0.0
+    reason: Text = ""
+    seconds: Seconds = 0.0
     used: _BlockRecord | None = None
     higher: _BlockRecord | None = None
     modified: _BlockRecord | None = None
-    rigid_body_modes: _Whole | None = None
-    rigid_body_modes_expected: _Whole | None = None
-    negative_eigenvalues: _Whole | None = None
-    parameter_count: _Whole | None = None
-    evaluations: _Whole | None = None
-    score: Annotated[float, Field(gt=0, le=1e150)] | None = None
-    rank: Annotated[int, Field(ge=1, lt=2**63)] | None = None
-    parameters: list[dict[Name, _Text | float | None]] = []
+    rigid_body_modes: Whole | None = None
+    rigid_body_modes_expected: Whole | None = None
+    negative_eigenvalues: Whole | None = None
+    parameter_count: Whole | None = None
+    evaluations: Whole | None = None
+    score: Score | None = None
+    rank: Rank | None = None
+    parameters: list[dict[Name, Text | float | None]] = []
     history: list[dict[Name, float | None]] = []
     diagnostics: dict[Name, float | None] = {}
-    traceback: _Text = ""
+    traceback: Text = ""
     key: Name = ""
-    provenance: dict[Name, _Text | int | float | None] = {}
+    provenance: dict[Name, Text | int | float | None] = {}
 
 
 class RunRecord(Record):
@@ -102,7 +112,7 @@ class RunRecord(Record):
 
 
 class _CaseMeta(Record):
-    title: _Text | None = None
+    title: Text | None = None
 
 
 class MetaRecord(BaseModel):
@@ -111,8 +121,8 @@ class MetaRecord(BaseModel):
     model_config = ConfigDict(extra="allow", allow_inf_nan=False, strict=True)
 
     run: Name | None = None
-    seed: _Whole = 0
-    seeds: Annotated[list[_Whole], Field(max_length=MOST_RESULTS)] = []
+    seed: Whole = 0
+    seeds: Annotated[list[Whole], Field(max_length=MOST_RESULTS)] = []
     strategies: Annotated[list[Name], Field(max_length=_MOST_NAMES)] = []
     baseline: Name | None = None
     cases: dict[Name, _CaseMeta] = {}
@@ -122,8 +132,15 @@ class MetaRecord(BaseModel):
     alike: list[Name] | None = None
     drawings: dict[Name, Name] | None = None
     classes: dict[Name, list[Name]] | None = None
-    citations: dict[Name, _Text] | None = None
-    reference: dict[Name, dict[Name, _Percent]] | None = None
+    citations: dict[Name, Text] | None = None
+    reference: dict[Name, dict[Name, Percent]] | None = None
+
+
+_FIGURES = tuple(
+    field.name
+    for field in fields(JobResult)
+    if field.name not in (*DETAILS, "reason", "blocks", "rank")
+)
 
 
 def check_depth(data: object, what: str, **where: Any) -> None:  # noqa: ANN401 - of InputError
@@ -221,15 +238,55 @@ def result_from_json(
     data = validated(ResultRecord, record, file, line, key)
     found = {name: getattr(data, name) for name in BLOCKS}
     plain = data.model_dump(exclude=set(BLOCKS))
-    plain["parameters"] = tuple(
-        {**item, **_numbers(item, ("before", "after"))} for item in data.parameters
-    )
-    plain["history"] = tuple(_numbers(item, item) for item in data.history)
-    plain["diagnostics"] = _numbers(data.diagnostics, data.diagnostics)
-    result = JobResult(**plain)
+    result = JobResult(**{**plain, **with_nan(plain)})
     return replace(
         result, blocks={name: item.block() for name, item in found.items() if item is not None}
     )
+
+
+def result_to_line(result: JobResult) -> tuple[str, str]:
+    """Return the figures of one result and its details, each as a table of compact JSON.
+
+    What has no value is left out.
+    """
+    figures = _fields(result, *_FIGURES)
+    figures = {name: value for name, value in figures.items() if value is not None}
+    figures["reason"] = result.reason[:LONGEST_TEXT]
+    figures["blocks"] = {name: _short_block(block) for name, block in result.blocks.items()}
+    details = _fields(result, *DETAILS)
+    details["traceback"] = result.traceback[-LONGEST_TEXT:]
+    return compact(figures), compact(details)
+
+
+def compact(data: Mapping[str, Any]) -> str:
+    """Return plain data as JSON on one line, in ASCII, with null for what is not finite."""
+    return json.dumps(_encodable(finite(data)), allow_nan=False, separators=(",", ":"))
+
+
+def result_from_line(
+    figures: bytes, details: bytes, *, file: Path | str | None = None, line: int | None = None
+) -> JobResult:
+    """Return the result of which `result_to_line` gave two tables; details are read when asked for.
+
+    Arguments:
+        figures, details: the tables.
+        file, line: where they stand, for the message.
+
+    Raises:
+        InputError: naming the first figure that is wrong.
+    """
+    try:
+        found: JobResult = _line_reader()(figures)
+    except ValidationError as error:
+        raise wrong_field(error, file, line, "result") from error
+    leave_unread(found, details)
+    return found
+
+
+@cache
+def _line_reader() -> Callable[[bytes], JobResult]:
+    # That of the adapter itself takes a tenth longer, for arguments that are not given.
+    return TypeAdapter(JobResult).validator.validate_json
 
 
 def run_to_json(run: Run) -> dict[str, Any]:
@@ -319,12 +376,19 @@ def _encodable(data: Any) -> Any:  # noqa: ANN401 - JSON data of any form
     return [_encodable(value) for value in data] if isinstance(data, list) else data
 
 
-def _numbers(item: Mapping[str, Any], names: Iterable[str]) -> dict[str, Any]:
-    """Return the named figures, nan again where JSON had no word for them."""
-    return {name: math.nan if item.get(name) is None else item[name] for name in names}
+def _short_block(block: Block) -> dict[str, Any]:
+    modes = []
+    for mode in block.modes:
+        told = {**_fields(mode, "modification", "predicted_std_hz")}
+        told = {name: value for name, value in told.items() if value is not None}
+        modes.append(_fields(mode, "number", "measured_hz", "predicted_hz", "mac") | told)
+    return {**_fields(block, "rms_percent", "mean_mac"), "modes": modes}
 
 
 def _block(block: Block) -> dict[str, Any]:
-    plain = ({"mode": mode.number, **vars(mode)} for mode in block.modes)
-    modes = [{name: mode[name] for name in _ModeRecord.model_fields} for mode in plain]
-    return {**vars(block), "modes": modes}
+    modes = [{"mode": mode.number, **_fields(mode, *_MODE[1:])} for mode in block.modes]
+    return {**_fields(block, "rms_percent", "mean_mac"), "modes": modes}
+
+
+def _fields(thing: object, *names: str) -> dict[str, Any]:
+    return {name: getattr(thing, name) for name in names}

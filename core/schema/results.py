@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
+
+from annotated_types import Ge, Gt, Le, Lt, MaxLen
 
 from femubench.core.display import Shown, counted
+from femubench.core.schema.details import DETAILS, decoded
 
 Status = Literal["ok", "failed", "timeout", "crashed", "diverged", "not-applicable"]
 STATUSES: tuple[Status, ...] = get_args(Status)
@@ -19,8 +22,25 @@ UNSEEN = ("higher", "modified")  # what no strategy is given
 Nominal = Literal["drawn", "textbook"]
 NOMINALS: tuple[Nominal, ...] = get_args(Nominal)
 
+# The bounds of what is read; within them all figures of a run can be computed.
+LONGEST_TEXT = 100_000  # characters of a reason or a traceback
+Name = Annotated[str, MaxLen(1_000)]
+Text = Annotated[str, MaxLen(LONGEST_TEXT)]
+Whole = Annotated[int, Ge(0), Lt(2**63)]
+Hertz = Annotated[float, Ge(1e-45), Le(1e30)]
+# Bounded so that the square of a relative error is a number.
+PredictedHertz = Annotated[float, Ge(-1e100), Le(1e100)]
+StdHertz = Annotated[float, Ge(0), Le(1e100)]
+Percent = Annotated[float, Ge(0), Le(1e150)]
+Mac = Annotated[float, Ge(-1e-6), Le(1 + 1e-6)]
+Seconds = Annotated[float, Ge(0)]
+Score = Annotated[float, Gt(0), Le(1e150)]
+Rank = Annotated[int, Ge(1), Lt(2**63)]
+_READING = {"extra": "ignore", "allow_inf_nan": False}
+_UNREAD = "_unread"
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, slots=True)
 class PairedMode:
     """One measured mode and the model's mode that was paired with it by shape.
 
@@ -35,15 +55,17 @@ class PairedMode:
             own error of measurement included; None where the strategy does not say.
     """
 
-    number: int
-    measured_hz: float
-    predicted_hz: float | None
-    mac: float | None
-    modification: str | None = None
-    predicted_std_hz: float | None = None
+    __pydantic_config__: ClassVar = _READING
+
+    number: Whole
+    measured_hz: Hertz
+    predicted_hz: PredictedHertz | None
+    mac: Mac | None
+    modification: Text | None = None
+    predicted_std_hz: StdHertz | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Block:
     """The error of one set of modes: used, higher or modified.
 
@@ -54,8 +76,10 @@ class Block:
         modes: the pairs.
     """
 
-    rms_percent: float
-    mean_mac: float | None
+    __pydantic_config__: ClassVar = _READING
+
+    rms_percent: Percent
+    mean_mac: Mac | None
     modes: tuple[PairedMode, ...]
 
 
@@ -85,27 +109,45 @@ class JobResult:
             has all that handbooks give.
     """
 
-    case: str
-    strategy: str
-    seed: int
+    __pydantic_config__: ClassVar = _READING
+
+    case: Name
+    strategy: Name
+    seed: Whole
     status: Status
-    reason: str = ""
-    seconds: float = 0.0
+    reason: Text = ""
+    seconds: Seconds = 0.0
     blocks: Mapping[str, Block] = field(default_factory=dict)
-    rigid_body_modes: int | None = None
-    rigid_body_modes_expected: int | None = None
-    negative_eigenvalues: int | None = None
-    parameter_count: int | None = None
-    evaluations: int | None = None
-    score: float | None = None
-    rank: int | None = None
-    parameters: tuple[Mapping[str, Any], ...] = ()
-    history: tuple[Mapping[str, float], ...] = ()
+    rigid_body_modes: Whole | None = None
+    rigid_body_modes_expected: Whole | None = None
+    negative_eigenvalues: Whole | None = None
+    parameter_count: Whole | None = None
+    evaluations: Whole | None = None
+    score: Score | None = None
+    rank: Rank | None = None
+    # By factories, so that the class has no attributes of these names: see `__getattr__`.
+    parameters: tuple[Mapping[str, Any], ...] = field(default_factory=tuple)
+    history: tuple[Mapping[str, float], ...] = field(default_factory=tuple)
     diagnostics: Mapping[str, float] = field(default_factory=dict)
-    traceback: str = ""
-    key: str = ""
+    traceback: str = field(default_factory=str)
+    key: Name = ""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     nominal: Nominal = "drawn"
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name):  # noqa: ANN001, ANN204 - checkers know the fields
+            """Decode the details of a stored result when the first of them is asked for."""
+            own = vars(self)
+            if name not in DETAILS or _UNREAD not in own:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            for detail, value in decoded(own[_UNREAD]).items():
+                own.setdefault(detail, value)
+            return own[name]
+
+    def changed(self, **fields: object) -> JobResult:
+        """Return this result with other figures; details that are not decoded stay so."""
+        return _made(vars(self) | fields)
 
     @property
     def rigid_modes_lost(self) -> int:
@@ -116,6 +158,24 @@ class JobResult:
     def unphysical(self) -> bool:
         """Tell whether rigid-body modes were lost or eigenvalues are negative."""
         return self.status == "ok" and bool(self.rigid_modes_lost or self.negative_eigenvalues)
+
+
+def leave_unread(result: JobResult, details: bytes) -> None:
+    """Let a result that nobody else has yet decode its details when they are asked for.
+
+    Arguments:
+        details: text of a table of JSON; see `decoded`.
+    """
+    own = vars(result)
+    for name in DETAILS:
+        del own[name]
+    own[_UNREAD] = details
+
+
+def _made(fields: Mapping[str, object]) -> JobResult:
+    made = object.__new__(JobResult)
+    vars(made).update(fields)
+    return made
 
 
 @dataclass(frozen=True, repr=False)

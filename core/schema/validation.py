@@ -27,7 +27,17 @@ def validated(
     try:
         return kind.model_validate(record)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        path = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in first["loc"])
-        place = (key + path).lstrip(".") or None
-        raise InputError(first["msg"], file=file, line=line, key=place) from error
+        raise wrong_field(error, file, line, key) from error
+
+
+def wrong_field(
+    error: ValidationError, file: Path | str | None, line: int | None, key: str
+) -> InputError:
+    """Return the error that names the first field that is wrong.
+
+    Arguments:
+        file, line, key: where the data stand.
+    """
+    first = error.errors(include_url=False)[0]
+    path = "".join(f"[{p}]" if isinstance(p, int) else f".{p}" for p in first["loc"])
+    return InputError(first["msg"], file=file, line=line, key=(key + path).lstrip(".") or None)

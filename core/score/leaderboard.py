@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from femubench.core.garbage import uncollected
 from femubench.core.schema.results import BLOCKS, UNSEEN, JobResult, Run
 from femubench.core.score import predictive
 from femubench.core.score.counting import (
@@ -121,6 +123,7 @@ def interval_kind(run: Run) -> str:
     return _Grid.of(run).interval
 
 
+@uncollected()
 def leaderboard(run: Run, floor_percent: float = OFFSET_PERCENT) -> pd.DataFrame:
     """Return one row a strategy, best first: physical, then unphysical, then without any model.
 
@@ -149,10 +152,27 @@ def leaderboard(run: Run, floor_percent: float = OFFSET_PERCENT) -> pd.DataFrame
     import pandas as pd
 
     table = _Table.of(run, floor_percent)
-    scored = rank_results(run.ranked, run.meta.get("reference") or None, run.meta.get("baseline"))
-    rows = [_row(name, [r for r in scored if r.strategy == name], table) for name in table.names]
+    scored = run.ranked
+    if any(block == WHOLE for _, block in table.grid.weights):
+        reference = run.meta.get("reference") or None
+        scored = rank_results(scored, reference, run.meta.get("baseline"))
+    own: dict[str, list[JobResult]] = {name: [] for name in table.names}
+    for result in scored:
+        own[result.strategy].append(result)
+    rows = [_row(name, results, table) for name, results in own.items()]
     listed = [{**row, "rank": rank} for rank, row in ranked(rows, _order)]
     return pd.DataFrame(listed, columns=list(COLUMNS))
+
+
+def row_of(run: Run, strategy: str) -> dict[str, Any]:
+    """Return the row of one strategy on a leaderboard, without its rank; results have scores.
+
+    Arguments:
+        run: as for `leaderboard`.
+        strategy: its name.
+    """
+    found = [result for result in run.ranked if result.strategy == strategy]
+    return _row(strategy, found, _Table.of(run, OFFSET_PERCENT))
 
 
 def ranks_by_floor(run: Run) -> dict[str, tuple[int, ...]]:
@@ -245,6 +265,9 @@ def _row(strategy: str, results: Sequence[JobResult], table: _Table) -> dict[str
         else _over_seeds(left, strategy, table.seed)
     )
     fine = [result for result in results if result.status == "ok"]
+    by_case: dict[str, list[JobResult]] = {}
+    for result in fine:
+        by_case.setdefault(result.case, []).append(result)
     return {
         "strategy": strategy,
         "skill": 1.0 - float(np.median(left)),
@@ -256,13 +279,13 @@ def _row(strategy: str, results: Sequence[JobResult], table: _Table) -> dict[str
             table.floor_percent,
         ),
         "skill_tests": _skill(table.tests, results, table.floor_percent),
-        **{f"{block}_percent": _median(fine, _error_in(block)) for block in BLOCKS},
+        **{f"{block}_percent": _median(by_case, _error_in(block)) for block in BLOCKS},
         **predictive.scores(fine, grid.structures),
         "rigid_modes_lost": sum(result.rigid_modes_lost for result in fine),
         "negative_eigenvalues": sum(result.negative_eigenvalues or 0 for result in fine),
-        "parameters": _median(fine, lambda result: result.parameter_count),
-        "evaluations": _median(fine, lambda result: result.evaluations),
-        "seconds": _median(fine, lambda result: result.seconds),
+        "parameters": _median(by_case, attrgetter("parameter_count")),
+        "evaluations": _median(by_case, attrgetter("evaluations")),
+        "seconds": _median(by_case, attrgetter("seconds")),
         "ok": len(fine),
         "not_applicable": sum(result.status == "not-applicable" for result in results),
         "total": len(grid.cases) * len(grid.seeds),
@@ -293,11 +316,10 @@ def _error_in(block: str) -> Callable[[JobResult], float | None]:
     return lambda result: result.blocks[block].rms_percent if block in result.blocks else None
 
 
-def _median(results: Sequence[JobResult], value: Callable[[JobResult], float | None]) -> float:
+def _median(
+    by_case: Mapping[str, Sequence[JobResult]], value: Callable[[JobResult], float | None]
+) -> float:
     """Return the median over cases of the median over seeds; nan where nothing has the value."""
-    by_case: dict[str, list[float]] = {}
-    for result in results:
-        number = value(result)
-        if number is not None:
-            by_case.setdefault(result.case, []).append(float(number))
-    return float(np.median([np.median(n) for n in by_case.values()])) if by_case else float("nan")
+    found = ([n for n in map(value, results) if n is not None] for results in by_case.values())
+    medians = [np.median(np.array(numbers, dtype=float)) for numbers in found if numbers]
+    return float(np.median(medians)) if medians else float("nan")

@@ -11,11 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from scipy.special import ndtr
 
-from femubench.core.schema.results import UNSEEN, JobResult, PairedMode
+from femubench.core.schema.results import UNSEEN, JobResult
 from femubench.core.typing import BoolArray, FloatArray, IntArray
 
 COLUMNS = ("coverage90", "crps_percent", "log_score")
@@ -56,16 +57,20 @@ class Forecasts:
             structures: by case; one that is not named is a structure of its own.
             blocks: those of them whose modes are taken.
         """
-        rows, places = [], []
+        hertz: list[tuple[float, float | None, float | None]] = []
+        counts, told, places = [], [], []
         for result in results:
             unseen = {name: b.modes for name, b in result.blocks.items() if name in UNSEEN}
-            stated = any(m.predicted_std_hz is not None for modes in unseen.values() for m in modes)
-            modes = [mode for name in blocks for mode in unseen.get(name, ())]
-            rows += [(*_percent(mode), float(stated)) for mode in modes]
-            places += [structures.get(result.case, result.case)] * len(modes)
-        error, std, told = np.array(rows).reshape(-1, 3).T
+            stated = any(std is not None for m in unseen.values() for std in map(_STD, m))
+            own = [mode for name in blocks for mode in unseen.get(name, ())]
+            hertz += map(_HERTZ, own)
+            counts.append(len(own))
+            told.append(stated)
+            places.append(structures.get(result.case, result.case))
+        error, std = _percent(np.array(hertz, dtype=float).reshape(-1, 3).T)
         place = np.unique(np.array(places, dtype=str), return_inverse=True)[1]
-        return cls(error, std, told > 0.0, np.asarray(place, dtype=np.int64))
+        stated_of, structure = np.array(told, dtype=bool), np.asarray(place, dtype=np.int64)
+        return cls(error, std, np.repeat(stated_of, counts), np.repeat(structure, counts))
 
     @property
     def weight(self) -> FloatArray:
@@ -148,10 +153,17 @@ def log_score(error: FloatArray, std: FloatArray) -> FloatArray:
     return np.asarray(-np.log((1.0 - ANYTHING) * density + ANYTHING / (2.0 * LOST_PERCENT)))
 
 
-def _percent(mode: PairedMode) -> tuple[float, float]:
-    """Return error and std of a mode in percent of the measured frequency."""
-    if mode.predicted_hz is None or mode.predicted_hz <= 0.0:
-        return LOST_PERCENT, np.nan
-    std = np.nan if mode.predicted_std_hz is None else mode.predicted_std_hz
-    error = 100.0 * (mode.predicted_hz / mode.measured_hz - 1.0)
-    return error, 100.0 * std / mode.measured_hz
+_STD = attrgetter("predicted_std_hz")
+_HERTZ = attrgetter("measured_hz", "predicted_hz", "predicted_std_hz")
+
+
+def _percent(hertz: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return errors and std of modes in percent of the measured frequencies.
+
+    Arguments:
+        hertz: measured and predicted frequency and std, nan where there is none, (3, n).
+    """
+    measured, predicted, std = hertz
+    there = predicted > 0.0
+    error = np.where(there, 100.0 * (predicted / measured - 1.0), LOST_PERCENT)
+    return error, np.where(there, 100.0 * std / measured, np.nan)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeVar
 
 import numpy as np
 
+from femubench.core.garbage import uncollected
 from femubench.core.schema.results import JobResult, Nominal
 from femubench.core.score.counting import WHOLE, counted_blocks
 
@@ -104,6 +104,7 @@ def ranked(
     return [(rank, item) for rank, _, item in sorted(found, key=lambda entry: entry[:2])]
 
 
+@uncollected()
 def rank_results(
     results: Iterable[JobResult],
     reference: Mapping[str, Mapping[str, float]] | None = None,
@@ -126,34 +127,66 @@ def rank_results(
         [(2.97, 2), (0.53, 1)]
     """
     listed = tuple(results)
+    scores = _scores(listed, reference, baseline)
+    groups: dict[tuple[str, int, Nominal], list[int]] = {}
+    for place, result in enumerate(listed):
+        groups.setdefault(_group(result), []).append(place)
+    ranks = [0] * len(listed)
+    for group in groups.values():
+        for rank, place in ranked(group, lambda at: _order(listed[at], scores[at])):
+            ranks[place] = rank
+    return tuple(
+        result.changed(score=score, rank=rank)
+        for result, score, rank in zip(listed, scores, ranks, strict=True)
+    )
+
+
+def _scores(
+    results: Sequence[JobResult],
+    reference: Mapping[str, Mapping[str, float]] | None,
+    baseline: str | None,
+) -> list[float]:
+    """Return the scores of results; arguments as for `rank_results`."""
+    if reference is not None:
+        return _scores_against(results, reference)
     given = {
         _group(item): {name: block.rms_percent for name, block in item.blocks.items()}
-        for item in listed
-        if reference is None and item.strategy == baseline
+        for item in results
+        if item.strategy == baseline
     }
-    groups: dict[tuple[str, int, Nominal], list[JobResult]] = {}
-    scored = []
-    for result in listed:
-        job, score = _group(result), result.score
-        if reference is not None:
-            score = score_of(result, reference.get(result.case, {}))
-        elif score is None:
-            score = score_of(result, given.get(job, {}))
-        scored.append(replace(result, score=score))
-        groups.setdefault(job, []).append(scored[-1])
-    ranks = {
-        (*job, result.strategy): rank
-        for job, group in groups.items()
-        for rank, result in ranked(group, _order)
-    }
-    return tuple(replace(r, rank=ranks[*_group(r), r.strategy]) for r in scored)
+    return [
+        score_of(item, given.get(_group(item), {})) if item.score is None else item.score
+        for item in results
+    ]
+
+
+def _scores_against(
+    results: Sequence[JobResult], reference: Mapping[str, Mapping[str, float]]
+) -> list[float]:
+    """Return what `score_of` gives for each result, many at a time."""
+    scores = [SCORE_OF_FAILURE] * len(results)
+    blocks = {case: counted_blocks(errors) for case, errors in reference.items()}
+    by_count: dict[int, tuple[list[int], list[list[float]]]] = {}
+    for place, result in enumerate(results):
+        errors = reference.get(result.case) or {}
+        if result.status == "not-applicable":
+            scores[place] = SCORE_OF_NOTHING_DONE
+        elif result.status == "ok" and errors:
+            row = [score_in(result, name, errors) for name in blocks[result.case]]
+            places, rows = by_count.setdefault(len(row), ([], []))
+            places.append(place)
+            rows.append(row)
+    for count, (places, rows) in by_count.items():
+        means = np.exp(np.log(np.array(rows)).sum(axis=1) / count)
+        for place, mean in zip(places, means.tolist(), strict=True):
+            scores[place] = mean
+    return scores
 
 
 def _group(result: JobResult) -> tuple[str, int, Nominal]:
     return result.case, result.seed, result.nominal
 
 
-def _order(result: JobResult) -> tuple[tuple[bool, bool], float, str]:
-    assert result.score is not None
+def _order(result: JobResult, score: float) -> tuple[tuple[bool, bool], float, str]:
     nothing = result.status not in ("ok", "not-applicable")
-    return (nothing, result.unphysical), result.score, result.strategy
+    return (nothing, result.unphysical), score, result.strategy

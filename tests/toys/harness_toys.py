@@ -371,6 +371,7 @@ class Spy(Strategy):
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator
     ) -> UpdateResult:
+        gc.unfreeze()  # what the server has kept from the search for garbage is looked into too
         found = search([model, measurement, rng, *gc.get_objects()], self.hashes)
         return UpdateResult(model, diagnostics=found)
 
@@ -454,3 +455,35 @@ def search(roots: list[object], hashes: frozenset[str]) -> dict[str, float]:
 
 def cannot_start(*_: object) -> None:
     os._exit(3)
+
+
+@dataclass(frozen=True)
+class Told(Strategy):
+    """Leaves the model as it is, draws a number, and tells in a file that it was run."""
+
+    name: ClassVar[str] = "told"
+    citation: ClassVar[str] = "none"
+    file: str = ""
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        descriptor = os.open(self.file, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o600)
+        os.write(descriptor, b"run\n")
+        os.close(descriptor)
+        return UpdateResult(model, diagnostics={"rng": rng.random()})
+
+
+class Murderous(Strategy):
+    """Ends whatever started the process that its own was forked from."""
+
+    name = "murderous"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        server = Path(f"/proc/{os.getppid()}/stat").read_text().rpartition(")")[2].split()
+        os.kill(int(server[1]), signal.SIGKILL)
+        signal.pause()
+        return UpdateResult(model)

@@ -1,0 +1,148 @@
+"""What a run costs beside its eigenvalue solutions, and what a job costs that does nothing.
+
+    python benchmarks/run_cost.py [CASE ...] [-s STRATEGY ...]
+
+Without cases the default set, without strategies all but `diagnosed`, whose search has a benchmark
+of its own. Prints the processor time of the run in this process, in the server of its workers and
+in the workers, against that of its eigenvalue solutions: each job is run once more in this process,
+its solutions of the whole model are counted, and each counts as much as the nominal model's takes
+alone. Then the same of jobs of `unchanged`, by job.
+"""
+
+from __future__ import annotations
+
+import argparse
+import pickle
+import statistics
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from multiprocessing import forkserver
+from unittest.mock import Mock, patch
+
+import psutil
+from threadpoolctl import threadpool_limits
+
+from femubench.core.case.case import Case
+from femubench.core.library.cases import usable_plugins
+from femubench.core.library.rank import Plan, plan_of
+from femubench.core.modal import eigen
+from femubench.core.run.jobs import execute
+from femubench.core.run.schedule import slots_of
+from femubench.core.run.starts import Starts
+from femubench.core.run.store import Store
+
+REPEATS = 5
+NULL_JOBS = 60
+FIVE, THIRTY = 5.0, 30.0  # times its eigenvalue solutions, ms a job: what is asked for
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Processor time of a run in s, and its wall time.
+
+    Arguments:
+        jobs: of the run.
+        parent: of the process that asks for it.
+        server: from which workers fork, without its start.
+        workers: all of them, strategies and judges.
+        wall: from the first job to the last.
+    """
+
+    jobs: int
+    parent: float
+    server: float
+    workers: float
+    wall: float
+
+    @property
+    def whole(self) -> float:
+        """Return all of it."""
+        return self.parent + self.server + self.workers
+
+
+def run_cost(plan: Plan, workers: int = 1) -> Cost:
+    """Run a plan in workers, the server started before, and return what it cost."""
+    with tempfile.TemporaryDirectory() as folder:
+        before, clock = _times(), time.perf_counter()
+        run = plan.run(workers, Store(folder))
+        wall, after = time.perf_counter() - clock, _times()
+    parent, server, below = (b - a for a, b in zip(before, after, strict=True))
+    return Cost(len(run.results), parent, server, below, wall)
+
+
+def _times() -> tuple[float, float, float]:
+    """Return the processor time of this process, the server and its workers so far."""
+    found = psutil.Process(forkserver._forkserver._forkserver_pid).cpu_times()  # type: ignore[attr-defined]
+    below = found.children_user + found.children_system
+    return time.process_time(), found.user + found.system, below
+
+
+def start_server() -> None:
+    """Start the process from which workers fork: it is started once a session."""
+    plan_of("frame", "unchanged", usable_plugins(), nominal="drawn").run(1)
+
+
+def solutions(plan: Plan) -> tuple[int, float]:
+    """Return how many eigenvalue solutions of whole models a plan takes, and their time in s.
+
+    A solution in a reduced basis counts for nothing.
+    """
+    starts = Starts(plan.textbook, plan.request.nominal, plan.classes)
+    cases = [one for case in plan.cases for one in starts.of(case)]
+    count, seconds, solve = 0, 0.0, Mock(wraps=eigen.solve_dense)
+    with threadpool_limits(1), patch.object(eigen, "solve_dense", solve):
+        alone = {(nominal, case.name): solution_time(case) for nominal, case in cases}
+        for slot in slots_of(cases, plan.strategies, tuple(plan.request.all_seeds)):
+            solve.reset_mock()
+            if slot.job is not None:
+                execute(slot.job)
+            count += solve.call_count
+            seconds += solve.call_count * alone[slot.nominal, slot.case.name]
+    return count, seconds
+
+
+def solution_time(case: Case) -> float:
+    """Return the processor time of one eigenvalue solution of a nominal model in s."""
+    found = []
+    for _ in range(REPEATS):
+        model = pickle.loads(pickle.dumps(case.model))
+        start = time.process_time()
+        eigen.solve_modes(model)
+        found.append(time.process_time() - start)
+    return min(found)
+
+
+def null_job(jobs: int = NULL_JOBS, workers: int = 1) -> Cost:
+    """Return what a run costs whose strategy does nothing, without pictures: seeds on `frame`."""
+    plan = plan_of("frame", "unchanged", usable_plugins(), seeds=jobs, nominal="drawn")
+    return run_cost(plan, workers)
+
+
+def main(words: Sequence[str] | None = None) -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("cases", nargs="*")
+    parser.add_argument("-s", "--strategies", nargs="*", default=[])
+    asked = parser.parse_args(words)
+    plugins = usable_plugins()
+    chosen = asked.strategies or [name for name in plugins.strategies if name != "diagnosed"]
+    start_server()
+    costs = [null_job() for _ in range(3)]
+    for name in ("parent", "server", "workers", "whole", "wall"):
+        least = min(getattr(cost, name) / cost.jobs for cost in costs)
+        print(f"null job, {name:8}{1000.0 * least:8.1f} ms")
+    spread = statistics.pstdev(1000.0 * cost.whole / cost.jobs for cost in costs)
+    print(f"asked for {THIRTY:g} ms; repetitions differ by {spread:.1f} ms")
+    plan = plan_of(asked.cases, chosen, plugins)
+    cost = run_cost(plan)
+    count, seconds = solutions(plan)
+    print(f"{cost.jobs} jobs, {count} eigenvalue solutions of {seconds:.1f} s together")
+    for name in ("parent", "server", "workers", "whole", "wall"):
+        value = getattr(cost, name)
+        print(f"run, {name:8}{value:8.1f} s {value / seconds:6.1f} solutions (asked: {FIVE:g})")
+
+
+if __name__ == "__main__":
+    main()

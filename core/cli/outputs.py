@@ -1,0 +1,51 @@
+"""The files that a run is written to, and what is shown at its end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from femubench.core.errors import InputError, PluginError
+from femubench.core.files import write_atomically
+
+if TYPE_CHECKING:
+    from femubench.core.plugin.loader import Plugins
+    from femubench.core.roles import Reporter
+    from femubench.core.schema.results import Run
+
+
+def outputs_of(
+    plugins: Plugins, json_file: Path | None, csv_file: Path | None, report_file: Path | None
+) -> dict[Path, Reporter]:
+    """Return who writes which file."""
+    from femubench.core.library.report import reporter, reporter_for
+
+    outputs: dict[Path, Reporter] = {}
+    for path, name in ((json_file, "json"), (csv_file, "csv"), (report_file, None)):
+        if path is None:
+            continue
+        if path in outputs:
+            raise InputError("is to hold two outputs", file=path, expected="a file for each")
+        outputs[path] = reporter(plugins, name) if name else reporter_for(plugins, path)
+    return outputs
+
+
+def finish(
+    run: Run, exhibits: object, outputs: dict[Path, Reporter], screen: Reporter | None
+) -> None:
+    """Write the files, then show the ranking and where the files are."""
+    from femubench.core.library.report import rendered, text_of
+
+    written, broken = [], None
+    for path, writer in outputs.items():
+        try:
+            write_atomically(path, rendered(writer, run, exhibits))
+            written.append(f"{writer.name}: {path}")
+        except PluginError as fault:
+            broken = fault
+    if screen is not None:
+        click.echo("\n".join(["", text_of(screen, rendered(screen, run)), *written]))
+    if broken is not None:
+        raise broken

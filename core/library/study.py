@@ -1,0 +1,294 @@
+"""Studies: strategies under conditions that vary, one run: what ``bench study`` does."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from os import PathLike
+from pathlib import Path
+
+from femubench.core.case.case import Case
+from femubench.core.errors import InputError
+from femubench.core.files import make_folder
+from femubench.core.library.cases import case_names, read_cases, usable_plugins
+from femubench.core.library.rank import (
+    DEFAULT_TIMEOUT,
+    Run,
+    classes_of,
+    store_in,
+    textbook_of,
+)
+from femubench.core.plugin.loader import Plugins
+from femubench.core.plugin.validation import chosen, unknown
+from femubench.core.plugin.variants import Variant
+from femubench.core.roles import Strategy
+from femubench.core.run.executor import Executor, executor_of
+from femubench.core.run.recording import Overwrite, Progress
+from femubench.core.run.runner import run_jobs
+from femubench.core.run.slots import Slots
+from femubench.core.run.starts import Start, Starts
+from femubench.core.run.store import Store
+from femubench.core.schema.records import MOST_RESULTS
+from femubench.core.schema.results import DONE, NOMINALS, Nominal
+from femubench.core.score.scoring import reference_of
+from femubench.core.study.axes import Choice, Setting, StudyAxes
+from femubench.core.study.conditions import varied
+from femubench.core.study.estimate import Forecast, forecast
+from femubench.core.study.study_file import StudyFile, grid, read_study
+
+
+@dataclass(frozen=True)
+class StudyPlan:
+    """A study with all that its words stand for.
+
+    Arguments:
+        axes: where its jobs stand.
+        cases: under every condition.
+        strategies: with every combination of options.
+        seeds: of the noise.
+        starts: the models that strategies start from.
+        seed: of the statistics.
+    """
+
+    axes: StudyAxes
+    cases: Sequence[Case]
+    strategies: Sequence[Strategy]
+    seeds: Sequence[int]
+    starts: Starts
+    seed: int
+
+    @property
+    def models(self) -> Iterator[tuple[Nominal, Case]]:
+        """Yield every case under every condition with every nominal model."""
+        return (start for case in self.cases for start in self.starts.of(case))
+
+    @property
+    def cells(self) -> int:
+        """Return the number of rows of `skill_by`, which takes cases and seeds together."""
+        conditions = len(self.axes.values("noise")) * len(self.axes.values("sensors_left_out"))
+        return conditions * len(self.axes.nominals) * len(self.strategies)
+
+    @property
+    def jobs(self) -> int:
+        """Return the number of jobs."""
+        return sum(1 for _ in self.models) * len(self.strategies) * len(self.seeds)
+
+    def forecast(self, store: Store | None = None) -> Forecast:
+        """Return how many jobs are left and what they take; runs none of them.
+
+        Arguments:
+            store: whose results are done, and tell how long such jobs take.
+        """
+        known = {} if store is None else store.by_key()
+        left = [
+            (slot.case.name, slot.strategy)
+            for slot in Slots(self.models, self.strategies, self.seeds)
+            if slot.key not in known or known[slot.key].status not in DONE
+        ]
+        judging = {}
+        for case in self.cases:
+            origin = self.axes.cases[case.name].case
+            if origin not in judging:
+                start = time.process_time()
+                reference_of(self.starts.yardstick(case))
+                judging[origin] = time.process_time() - start
+        seconds, longest, strange = forecast(left, self.axes, known.values(), judging)
+        return Forecast(self.jobs, self.jobs - len(left), seconds, longest, strange)
+
+    def run(
+        self,
+        executor: Executor,
+        store: Store | None = None,
+        *,
+        timeout: float | None = None,
+        timeouts: Mapping[str, float] | None = None,
+        memory: int | None = None,
+        overwrite: Overwrite | None = None,
+        progress: Progress | None = None,
+    ) -> Run:
+        """Run what the store does not have, seed after seed; see `study`.
+
+        Arguments:
+            executor: what runs the jobs, from `executor_of`.
+        """
+        if store is not None:
+            make_folder(store.folder)
+        bases = {name: choice.strategy for name, choice in self.axes.strategies.items()}
+        limits = dict(timeouts or {})
+        chosen("strategy to limit", limits, [*bases, *bases.values()])
+        own = {name: limits.get(name, limits.get(base)) for name, base in bases.items()}
+        return Run.of(
+            run_jobs(
+                self.cases,
+                self.strategies,
+                seeds=self.seeds,
+                timeout=DEFAULT_TIMEOUT if timeout is None else timeout,
+                timeouts={name: limit for name, limit in own.items() if limit is not None},
+                memory=memory,
+                store=store,
+                overwrite=overwrite,
+                resume=store is not None,
+                progress=progress,
+                run_seed=self.seed,
+                request={"study": self.axes.to_json()},
+                starts=self.starts,
+                executor=executor,
+            )
+        )
+
+
+def study(
+    file: str | PathLike[str],
+    *,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    cluster: str | None = None,
+    timeout: float | None = None,
+    timeouts: Mapping[str, float] | None = None,
+    memory: int | None = None,
+    store: Store | str | PathLike[str] | None = None,
+    overwrite: Overwrite | None = None,
+    progress: Progress | None = None,
+) -> Run:
+    """Run a study: strategies with grids of options under conditions that vary.
+
+    Its `skill_by` gives the skill by axes as a table, and `femubench.plot.heat_map` draws it.
+
+    Arguments:
+        file: a study file; see docs/studies.md.
+        jobs: number of worker processes; None for one a processor.
+        scheduler, cluster: where the jobs run instead, as in `femubench.rank`.
+        timeout: seconds that a job may take; 600 by default.
+        timeouts: the same for single strategies, by name, with or without options.
+        memory: bytes that a job may take; None for an even share of the machine's.
+        store: folder that keeps the results; a study goes on where it stopped. None for none.
+        overwrite: which stored results of the same jobs are computed anew: ``always`` all,
+            ``missing`` none, ``failed`` (the default) the failures.
+        progress: called with (result, jobs done, jobs in all).
+
+    Raises:
+        InputError: for a wrong key, an unknown name or a faulty case, before anything is run.
+
+    Examples:
+        >>> from pathlib import Path
+        >>> file = Path("study.toml")
+        >>> axes = f'axes = {{cases = ["{case.name}"], noise = [1, 2], seeds = 1}}'
+        >>> _ = file.write_text(f'{axes}\\n[[strategies]]\\nname = "{nominal.name}"')
+        >>> femubench.study(file).skill_by("noise")["jobs"].tolist()
+        [1, 1]
+    """
+    plan = study_plan(read_study(file), usable_plugins())
+    with executor_of(jobs, scheduler, cluster) as executor:
+        return plan.run(
+            executor,
+            None if store is None else store_in(store),
+            timeout=timeout,
+            timeouts=timeouts,
+            memory=memory,
+            overwrite=overwrite,
+            progress=progress,
+        )
+
+
+def study_plan(read: StudyFile, plugins: Plugins) -> StudyPlan:
+    """Return what a study file stands for; nothing has been run when something is wrong with it.
+
+    Raises:
+        InputError: with file, line and key.
+    """
+    strategies, choices = _strategies(read, plugins)
+    axes = read.tables.axes
+    originals = _cases(read, plugins)
+    textbook = textbook_of(originals)
+    cases: list[Case] = []
+    known, settings = dict[str, Case](), dict[str, Setting]()
+    for original in originals:
+        for noise, left_out in product(axes.noise, axes.sensors_left_out):
+            case = varied(original, noise, left_out)
+            settings[case.name] = Setting(original.name, noise, left_out)
+            first = not cases or settings[cases[-1].name].case != original.name
+            cases.append(case if first else replace(case, notes=()))
+            if original.name in textbook:
+                known[case.name] = varied(textbook[original.name], noise, left_out)
+    both = len(axes.nominal) > 1
+    nominal: Start = "both" if both else axes.nominal[0]
+    shown = read.tables.heat_map
+    found = StudyAxes(
+        settings,
+        choices,
+        read.title,
+        None if shown is None else (shown.x, shown.y),
+        tuple(reversed(NOMINALS)) if both else axes.nominal,
+    )
+    _check_heat_map(read, found)
+    kinds = classes_of(plugins)
+    classes = {name: kinds[s.case] for name, s in settings.items() if s.case in kinds}
+    starts = Starts(known, nominal, classes)
+    plan = StudyPlan(found, cases, strategies, read.seeds, starts, read.seed)
+    if plan.jobs > MOST_RESULTS:
+        raise InputError(f"{plan.jobs} jobs", file=read.file, expected=f"at most {MOST_RESULTS}")
+    return plan
+
+
+def _strategies(read: StudyFile, plugins: Plugins) -> tuple[list[Strategy], dict[str, Choice]]:
+    """Return every strategy with every combination of its options, and which one it is."""
+    found: list[Strategy] = []
+    choices: dict[str, Choice] = {}
+    for number, asked in enumerate(read.tables.strategies):
+        with read.at("strategies", number, "name"):
+            chosen("strategy", [asked.name], plugins.strategies)
+        base = plugins.strategies[asked.name]
+        for options in grid(asked.options):
+            with read.at("strategies", number, "options"):
+                variant = Variant(base, asked.name)(**options)
+                if variant.name in choices:
+                    raise InputError(f"{variant.name} stands twice", expected="every one once")
+            # With the options that it has anyway it is the strategy that `bench run` runs.
+            found.append(base if variant.name == base.name else variant)
+            choices[variant.name] = Choice(asked.name, options)
+    return found, choices
+
+
+def _cases(read: StudyFile, plugins: Plugins) -> list[Case]:
+    """Return the cases, each once; folders are those beside the study file."""
+    known = case_names(plugins.scenarios)
+    found: dict[str, Case] = {}
+    for number, word in enumerate(read.tables.axes.cases):
+        with read.at("axes", "cases", number):
+            for case in read_cases(word if word in known else _folder(read, word, known), plugins):
+                same = found.setdefault(case.name, case)
+                if same.folder != case.folder:
+                    what = f"the name {case.name!r} is also that of {same.folder}"
+                    raise InputError(what, expected="a name of its own")
+    for number, left_out in enumerate(read.tables.axes.sensors_left_out):
+        for case in found.values():
+            have = len(case.measurement.sensors)
+            if left_out and left_out >= have:
+                with read.at("axes", "sensors_left_out", number):
+                    what = f"{left_out} sensors left out of {case.name}, which has {have}"
+                    raise InputError(what, expected="fewer than it has")
+    return list(found.values())
+
+
+def _folder(read: StudyFile, word: str, known: Sequence[str]) -> Path:
+    folder = read.file.parent / word
+    if folder.exists():
+        return folder
+    if "/" in word:
+        expected = "a name, or a folder that is found from that of the study file"
+        raise InputError(f"there is no case {word!r}", expected=expected)
+    raise unknown("case", word, known)
+
+
+def _check_heat_map(read: StudyFile, axes: StudyAxes) -> None:
+    shown = read.tables.heat_map
+    if shown is None:
+        return
+    for key, axis in (("x", shown.x), ("y", shown.y)):
+        with read.at("heat_map", key):
+            axes.values(axis)
+    if shown.x == shown.y:
+        with read.at("heat_map", "y"):
+            raise InputError(f"{shown.y!r} is x already", expected="another axis")

@@ -1,0 +1,420 @@
+"""Jobs on a cluster of Dask: a few at a time are on their way, and what arrives is let go there."""
+
+from __future__ import annotations
+
+import logging
+import pickle
+import re
+import secrets
+import shutil
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+from femubench.core.display import counted
+from femubench.core.errors import FemubenchError, InputError, require
+from femubench.core.roles import Strategy
+from femubench.core.run.cluster_worker import (
+    Demand,
+    Errand,
+    UnfitWorker,
+    Yardstick,
+    all_versions,
+    run_errand,
+    unfit,
+)
+from femubench.core.run.jobs import JobOutcome, one_line
+from femubench.core.run.limits import Limits
+from femubench.core.run.provenance import home_of
+from femubench.core.run.schedule import Show, unjudged
+from femubench.core.run.slots import Slot, Start
+from femubench.core.run.workers import no_script
+from femubench.core.schema.results import JobResult
+from femubench.core.score.scoring import Reference
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+    from distributed.deploy.cluster import Cluster
+
+_AHEAD = 2  # jobs on their way a thread, so that none waits for the next one
+_ANSWER = 5.0  # s that a scheduler may take to answer, and its first worker to be there
+_COUNTED = 2.0  # s that a count of threads is good for
+_SLURM_JOBS = 10
+_DASHBOARD = "127.0.0.1:0"
+_LEAST_AHEAD = 4  # jobs on their way while nobody works
+
+
+class DaskWorkers:
+    """The workers of a Dask scheduler, each of which runs one job a thread.
+
+    Arguments:
+        client: connected to the scheduler.
+        where: what a user calls it.
+        waits: whether workers may come later, as those of a queue do.
+    """
+
+    share = None
+
+    def __init__(self, client: Client, where: str, *, waits: bool) -> None:
+        self._client, self._where, self._waits = client, where, waits
+        self._demand = Demand((), (), None)
+
+    @property
+    def workers(self) -> int:
+        """Return the number of threads of all workers that are there."""
+        return sum(self._client.nthreads().values())
+
+    @property
+    def spoken(self) -> str:
+        """Return the number of jobs at a time, and where."""
+        return f"{counted(self.workers, 'worker')} of {self._where}"
+
+    def admit(self, strategies: Sequence[Strategy], memory: int | None) -> None:
+        """Make sure that every worker has the versions that are here, and enough memory and cores.
+
+        Raises:
+            InputError: naming the first one that has not, or where there is none.
+        """
+        if not self._waits:
+            self._meet()
+        homes = {home_of(strategy)[0] for strategy in strategies}
+        packages = tuple(sorted({"femubench", *homes} - {"__main__"}))
+        self._demand = Demand(all_versions(packages), packages, memory)
+        found = self._client.run(unfit, self._demand, on_error="return")
+        for worker, reason in found.items():
+            if reason is not None:
+                text = one_line(reason) if isinstance(reason, Exception) else reason
+                raise _unlike(f"worker {worker}: {text}")
+
+    def _meet(self) -> None:
+        try:
+            self._client.wait_for_workers(1, timeout=_ANSWER)
+        except TimeoutError as error:
+            what = f"the scheduler at {self._where} has no worker"
+            raise InputError(what, expected=f"one or more: dask worker {self._where}") from error
+
+    def computed(
+        self,
+        slots: Sequence[Slot],
+        wanted: Sequence[int],
+        references: Mapping[str, Reference],
+        limits: Mapping[str, Limits],
+        show: Show | None = None,
+    ) -> Iterator[tuple[int, JobResult]]:
+        """Yield the result of every wanted slot as it comes.
+
+        Raises:
+            InputError: where the scheduler is lost, or a worker joined that is not like this
+                machine; results that came before stay.
+        """
+        flight = _Flight(self._client, self._demand, slots, references, limits, show)
+        try:
+            yield from flight.landed(wanted, self._capacity())
+        finally:
+            flight.call_off()
+
+    def _capacity(self) -> Callable[[], int]:
+        """Return what tells how many jobs may be on their way."""
+        counted, threads = -_COUNTED, 0
+
+        def capacity() -> int:
+            nonlocal counted, threads
+            if time.monotonic() - counted > _COUNTED:
+                counted, threads = time.monotonic(), self.workers
+            return max(_AHEAD * threads, _LEAST_AHEAD)
+
+        return capacity
+
+
+def _unlike(what: str) -> InputError:
+    return InputError(what, expected="the same installation, a core and memory a thread")
+
+
+class _Flight:
+    """Jobs on their way to workers and back."""
+
+    def __init__(
+        self,
+        client: Client,
+        demand: Demand,
+        slots: Sequence[Slot],
+        references: Mapping[str, Reference],
+        limits: Mapping[str, Limits],
+        show: Show | None,
+    ) -> None:
+        from distributed import as_completed
+
+        self._client, self._demand, self._slots = client, demand, slots
+        self._references, self._limits, self._show = references, limits, show
+        self._name = f"femubench-{secrets.token_hex(4)}"
+        self._shown = min((slot.seed for slot in slots), default=0)
+        self._number = 0
+        self._places: dict[str, int] = {}
+        # What did not come back is tried once more, last and one at a time.
+        self._again: set[int] = set()
+        self._lonely: list[int] = []
+        self._yardstick: tuple[Start, Future[Yardstick]] | None = None
+        self._coming = as_completed(loop=client.loop, with_results=True, raise_errors=False)
+
+    def landed(
+        self, wanted: Sequence[int], capacity: Callable[[], int]
+    ) -> Iterator[tuple[int, JobResult]]:
+        """Yield results as they arrive; a job is made when there is room for it on the way."""
+        waiting = iter(wanted)
+        while True:
+            room = max(capacity() - len(self._places), 0)
+            for index in islice(waiting, room):
+                yield from self._sent(index)
+            if not self._places:
+                if not self._lonely:
+                    break
+                yield from self._sent(self._lonely.pop())
+            if self._places:
+                future, found = next(self._coming)
+                yield from self._taken(future, found)
+
+    def _sent(self, index: int) -> Iterator[tuple[int, JobResult]]:
+        """Send a job to the cluster, unless it could not be made."""
+        slot = self._slots[index]
+        if isinstance(slot.code, JobOutcome):
+            yield index, self._unjudged(index, slot.code)
+            return
+        shown = self._show is not None and slot.seed == self._shown and not slot.varied
+        limits = self._limits[slot.strategy]
+        errand = Errand(slot.strategy, slot.seed, slot.code, limits, shown)
+        self._number += 1
+        key = f"{self._name}-{self._number}"
+        case = self._case(slot.start)
+        future = self._client.submit(run_errand, case, errand, self._demand, key=key, pure=False)
+        self._places[key] = index
+        self._coming.add(future)
+
+    def _case(self, start: Start) -> Future[Yardstick]:
+        """Return the case on the cluster, to which it goes once.
+
+        It is the result of a task, not scattered data: what a worker takes along as it dies can
+        be made again.
+        """
+        gone = ("error", "cancelled", "lost")
+        known = self._yardstick
+        if known is None or known[0] is not start or known[1].status in gone:
+            self._number += 1
+            pair = start, self._references[start.case.name]
+            data = pickle.dumps(pair, protocol=pickle.HIGHEST_PROTOCOL)
+            key = f"{self._name}-case-{self._number}"
+            known = start, self._client.submit(pickle.loads, data, key=key, pure=False)
+            self._yardstick = known
+        return known[1]
+
+    def _taken(self, future: Future[Any], found: Any) -> Iterator[tuple[int, JobResult]]:  # noqa: ANN401
+        """Yield the result of a job that came back, unless it is tried again."""
+        from distributed.scheduler import KilledWorker
+
+        index, status = self._places.pop(future.key), future.status
+        future.release()
+        if status == "finished":
+            result, exhibit = found
+            if self._show is not None and exhibit is not None:
+                self._show(self._slots[index], exhibit)
+            yield index, result
+            return
+        fault = found[1] if status == "error" else found
+        if isinstance(fault, UnfitWorker):
+            raise _unlike(str(fault))
+        if status != "error" and self._client.status != "running":
+            raise FemubenchError("the scheduler was lost; what was done is kept, for --resume")
+        if index not in self._again:
+            # It may have been on the worker of a job that ended it.
+            self._again.add(index)
+            self._lonely.append(index)
+            return
+        killed = isinstance(fault, KilledWorker)
+        reason = "every worker that ran it died" if killed else one_line(fault)
+        yield index, self._unjudged(index, JobOutcome("crashed", reason))
+
+    def _unjudged(self, index: int, outcome: JobOutcome) -> JobResult:
+        slot = self._slots[index]
+        return unjudged(slot, self._references[slot.case.name], outcome)
+
+    def call_off(self) -> None:
+        """End what is still on its way."""
+        left = list(self._coming.futures)
+        if left and self._client.status == "running":
+            self._client.cancel(left, force=True)
+        self._coming.clear()
+        self._places.clear()
+        self._yardstick = None
+
+
+@contextmanager
+def connected(address: str, jobs: int | None = None) -> Iterator[DaskWorkers]:
+    """Give the workers of a scheduler that runs somewhere.
+
+    Arguments:
+        address: ``tcp://HOST:PORT``, or ``tls://`` with certificates in Dask's configuration.
+        jobs: must be None.
+
+    Raises:
+        InputError: where nobody answers there.
+    """
+    if jobs is not None:
+        what = "the number of jobs at a time is that of the threads of its workers"
+        raise InputError(what, key="scheduler", expected="no --jobs beside it")
+    if not re.fullmatch(r"[a-z]+://[^\s/]+:\d{1,5}", address):
+        expected = "tcp://HOST:PORT"
+        raise InputError(f"{address!r} is no address", key="scheduler", expected=expected)
+    with _quiet(), _client(address) as client:
+        yield DaskWorkers(client, address, waits=False)
+
+
+@contextmanager
+def started(words: str, jobs: int | None = None) -> Iterator[DaskWorkers]:
+    """Give the workers of a cluster that is started here and ended with the block.
+
+    Arguments:
+        words: ``local:N`` or ``slurm:QUEUE``.
+        jobs: number of Slurm jobs; must be None with ``local:N``.
+
+    Raises:
+        InputError: for other words, or where it cannot be started.
+    """
+    rest = words.partition(":")[2]
+    queued = words.startswith("slurm:")
+    if re.fullmatch(r"local:[1-9]\d{0,3}", words):
+        if jobs is not None:
+            what = f"{words} tells the number of workers"
+            raise InputError(what, key="cluster", expected="no --jobs beside it")
+        make, jobs = partial(_local, int(rest)), int(rest)
+    elif queued and re.fullmatch(r"[\w.,-]+", rest):
+        require("dask_jobqueue", "cluster", "--cluster slurm")
+        if shutil.which("sbatch") is None:
+            what = f"{words} needs sbatch, which is not here"
+            raise InputError(what, key="cluster", expected="a machine that submits to Slurm")
+        make, jobs = partial(slurm_cluster, rest), jobs or _SLURM_JOBS
+    else:
+        expected = "local:N, such as local:4, or slurm:QUEUE"
+        raise InputError(f"{words!r} is no cluster", key="cluster", expected=expected)
+    with _quiet(), ExitStack() as stack:
+        try:
+            cluster = stack.enter_context(make())
+        except (OSError, RuntimeError, ValueError, TimeoutError) as error:
+            what = f"{words} cannot be started: {one_line(error)}"
+            raise InputError(what, key="cluster", expected="machines to run on") from error
+        size = {"jobs": jobs} if queued else {"n": jobs}
+        stack.enter_context(_kept(partial(cluster.scale, **size)))
+        client = stack.enter_context(_client(cluster))
+        yield DaskWorkers(client, words, waits=queued)
+
+
+def _local(count: int) -> Cluster:
+    """Start a scheduler in this process and workers beside it, which listen to this machine alone.
+
+    Arguments:
+        count: number of workers.
+    """
+    from distributed import LocalCluster, Nanny
+
+    class SilentNanny(Nanny):  # type: ignore[misc]
+        """Starts its worker, also in place of one that died, without the user's script."""
+
+        async def instantiate(self) -> Any:  # noqa: ANN401 - a distributed.Status
+            with no_script():
+                return await super().instantiate()
+
+    return LocalCluster(
+        n_workers=count,
+        threads_per_worker=1,
+        host="127.0.0.1",
+        worker_class=SilentNanny,
+        dashboard_address=_DASHBOARD,
+        silence_logs=logging.CRITICAL,
+        scheduler_kwargs={"allowed_failures": 1},
+    )
+
+
+def slurm_cluster(queue: str) -> Cluster:
+    """Return a cluster that has no Slurm job yet.
+
+    What ``jobqueue.yaml`` says under ``jobqueue.slurm`` holds; a core and 2 GiB a job where it
+    says nothing.
+
+    Arguments:
+        queue: the partition.
+    """
+    import dask
+    from dask_jobqueue import SLURMCluster
+
+    own = {"cores": 1, "processes": 1, "memory": "2GiB"}
+    missing = {
+        key: value
+        for key, value in own.items()
+        if dask.config.get(f"jobqueue.slurm.{key}", None) is None
+    }
+    known = dask.config.get("jobqueue.slurm.scheduler-options", None) or {}
+    return SLURMCluster(
+        queue=queue,
+        scheduler_options={"dashboard_address": _DASHBOARD, **known},
+        silence_logs=logging.CRITICAL,
+        **missing,
+    )
+
+
+@contextmanager
+def _kept(scale: Callable[[], None]) -> Iterator[None]:
+    """Keep a cluster at its size: a nanny gives up a worker that dies as it starts."""
+    done = threading.Event()
+
+    def tend() -> None:
+        while not done.wait(_COUNTED):
+            scale()
+
+    scale()
+    tender = threading.Thread(target=tend, daemon=True)
+    tender.start()
+    try:
+        yield
+    finally:
+        done.set()
+        tender.join()
+
+
+@contextmanager
+def _client(address: str | Cluster) -> Iterator[Client]:
+    """Give a client of a scheduler.
+
+    Raises:
+        InputError: where nobody answers.
+    """
+    from distributed import Client
+
+    try:
+        client = Client(address, timeout=_ANSWER, set_as_default=False)
+    except (OSError, TimeoutError, ValueError, ImportError) as error:
+        what = f"no scheduler of Dask answers at {address}"
+        raise InputError(what, key="scheduler", expected="one that runs: dask scheduler") from error
+    try:
+        yield client
+    finally:
+        client.close()
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep what Dask mutters of lost workers to itself: a run tells of its jobs, whole or not."""
+    import distributed  # noqa: F401 - sets the levels that are changed here
+
+    logger = logging.getLogger("distributed")
+    before = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        with warnings.catch_warnings():
+            # Versions are compared here, where a difference is an error.
+            warnings.filterwarnings("ignore", module="distributed")
+            yield
+    finally:
+        logger.setLevel(before)

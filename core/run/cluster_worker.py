@@ -1,0 +1,160 @@
+"""What runs in a worker of Dask: one job after the other, each in processes of its own."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from femubench.core.errors import FemubenchError
+from femubench.core.run.jobs import JobOutcome
+from femubench.core.run.limits import LEAST, Limits, memory_share, spoken_bytes
+from femubench.core.run.provenance import blas_name, cpu_name, package_version, versions
+from femubench.core.run.schedule import computed
+from femubench.core.run.slots import Slot, Start
+from femubench.core.run.workers import adopting
+from femubench.core.schema.results import JobResult
+from femubench.core.score.scoring import Reference
+
+
+class UnfitWorker(FemubenchError):  # noqa: N818 - a fact about a machine
+    """A worker on which jobs would end otherwise than here; the text says why."""
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What a worker must have.
+
+    Arguments:
+        versions: names and versions, from `all_versions`.
+        packages: of those, the packages that strategies are imported from.
+        memory: bytes that one job may take; None for a share of what the worker has.
+    """
+
+    versions: tuple[tuple[str, str], ...]
+    packages: tuple[str, ...]
+    memory: int | None
+
+
+@dataclass(frozen=True)
+class Errand:
+    """One job on its way to a worker, without its case.
+
+    Arguments:
+        strategy, seed, code: of the `Slot`.
+        limits: on the job; a worker puts its own share where there is none on memory.
+        shown: whether the exhibit of the result is wanted too.
+    """
+
+    strategy: str
+    seed: int
+    code: bytes | JobOutcome
+    limits: Limits
+    shown: bool
+
+
+Yardstick = tuple[Start, Reference]
+Arrived = tuple[JobResult, Mapping[str, Any] | None]
+
+
+def all_versions(packages: tuple[str, ...]) -> tuple[tuple[str, str], ...]:
+    """Return names and versions of Python, of what results depend on, and of more packages.
+
+    Arguments:
+        packages: names; their version has a digest of their source.
+    """
+    own = {name: package_version(name) for name in packages}
+    return tuple({**versions("distributed"), **own}.items())
+
+
+def unfit(demand: Demand, dask_worker: Any) -> str | None:  # noqa: ANN401 - a distributed.Worker
+    """Return why a worker cannot run the jobs, None where it can.
+
+    Arguments:
+        dask_worker: the worker that this runs in.
+    """
+    found = dict(all_versions(demand.packages))
+    there = [
+        f"{name} {found[name]} there and {version} here"
+        for name, version in demand.versions
+        if found[name] != version
+    ]
+    if there:
+        return ", ".join(there)
+    threads, cores = dask_worker.state.nthreads, len(os.sched_getaffinity(0))
+    if threads > cores:
+        return f"{threads} threads on {cores} cores, and every job takes a core"
+    memory = dask_worker.memory_manager.memory_limit
+    needed = LEAST if demand.memory is None else demand.memory
+    if memory and needed * threads > memory:
+        room = spoken_bytes(memory / threads)
+        return f"{room} of memory a thread, and a job may take {spoken_bytes(needed)}"
+    return None
+
+
+def share_of(dask_worker: Any) -> int:  # noqa: ANN401 - a distributed.Worker
+    """Return the bytes that one of the jobs of a worker may take."""
+    return memory_share(dask_worker.state.nthreads, dask_worker.memory_manager.memory_limit)
+
+
+def run_errand(yardstick: Yardstick, errand: Errand, demand: Demand) -> Arrived:
+    """Return the result of a job and its exhibit.
+
+    Raises:
+        UnfitWorker: where this worker joined late and is not like the others.
+    """
+    from distributed import get_worker
+    from distributed.worker import thread_state
+
+    worker, key = get_worker(), thread_state.key
+    _prepare()
+    reason = _unfit(demand)
+    if reason is not None:
+        raise UnfitWorker(f"worker {worker.address}: {reason}")
+
+    def wanted() -> None:
+        """End a job that nobody waits for any more."""
+        task = worker.state.tasks.get(key)
+        if task is None or task.state == "cancelled" or worker.status.name != "running":
+            raise UnfitWorker(f"worker {worker.address} is closing, or its job was called off")
+
+    start, reference = yardstick
+    name, limits = errand.strategy, errand.limits
+    if limits.memory is None:
+        limits = replace(limits, memory=share_of(worker))
+    slots, references = [Slot(start, name, errand.seed, errand.code)], {start.case.name: reference}
+    exhibits: list[Mapping[str, Any]] = []
+    show = (lambda _, exhibit: exhibits.append(exhibit)) if errand.shown else None
+    ((_, result),) = computed(slots, [0], references, {name: limits}, 1, show, wanted)
+    result = replace(result, provenance={"cpu": cpu_name(), "blas": _blas()})
+    return result, exhibits[0] if exhibits else None
+
+
+_OPEN = ExitStack()
+
+
+@cache
+def _prepare() -> None:
+    """Let this process start processes, and become the parent of what jobs leave behind."""
+    # The nanny of a worker starts it as a daemon, which may have no children.
+    multiprocessing.current_process().daemon = False
+    _OPEN.enter_context(adopting())
+    threadpool_limits(1)
+
+
+@cache
+def _unfit(demand: Demand) -> str | None:
+    from distributed import get_worker
+
+    return unfit(demand, get_worker())
+
+
+@cache
+def _blas() -> str:
+    return blas_name()

@@ -1,0 +1,1 @@
+"""How does skill depend on the conditions?"""

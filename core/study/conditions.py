@@ -1,0 +1,96 @@
+"""A case under other conditions: louder noise, fewer sensors; what it is scored on stays."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from femubench.core.case.case import Case
+from femubench.core.display import counted
+from femubench.core.fem.sensors import Sensors
+from femubench.core.modal.measurement import Measurement
+from femubench.core.typing import IntArray
+
+
+@dataclass(frozen=True, repr=False)
+class VariedCase(Case):
+    """A case of which a strategy is given a noisier or a smaller part.
+
+    Strategies see its `used_measurement`. Scores rest on `measurement` and `modifications`, which
+    are those of the case: skill compares along the axes.
+
+    Arguments:
+        origin: the case as it is, with the same model.
+        noise: factor on all stated standard deviations, and on what is drawn with them.
+        left_out: number of sensors that strategies do not see.
+    """
+
+    origin: Case | None = None
+    noise: float = 1.0
+    left_out: int = 0
+
+    def used_measurement(self, seed: int = 0) -> Measurement:
+        """Return what a strategy may know; the errors have the deviations that it states.
+
+        The same seed draws the same noise for every factor, scaled, and of fewer sensors leaves
+        out the same and more.
+        """
+        assert self.origin is not None
+        louder = _scaled(self.origin.measurement, self.noise)
+        whole = replace(self.origin, measurement=louder).used_measurement(seed)
+        return _at(whole, np.setdiff1d(np.arange(len(whole.sensors)), self._hidden(seed)))
+
+    def conditions(self, seed: int) -> Mapping[str, float | str]:
+        """Return the factor on the noise, and the labels of the sensors left out."""
+        labels = self.measurement.sensors.labels
+        hidden = " ".join(labels[row] for row in self._hidden(seed))
+        return {"noise": self.noise, "sensors_left_out": hidden}
+
+    def _hidden(self, seed: int) -> IntArray:
+        assert self.origin is not None
+        words = [seed, *f"sensors of {self.origin.name}".encode()]
+        order = np.random.default_rng(np.random.SeedSequence(words))
+        drawn = order.permutation(len(self.measurement.sensors))[: self.left_out]
+        return np.asarray(np.sort(drawn))
+
+
+def varied(case: Case, noise: float, left_out: int) -> Case:
+    """Return a case under other conditions; the case itself where they are its own.
+
+    Arguments:
+        noise: factor on the stated standard deviations, > 0.
+        left_out: number of sensors that strategies do not see.
+    """
+    if noise == 1.0 and left_out == 0:
+        return case
+    words = [f"noise {noise:.12g}"] if noise != 1.0 else []
+    words += [f"{counted(left_out, 'sensor')} left out"] if left_out else []
+    digest = hashlib.sha256(f"{', '.join(words)}: {case.digest}".encode()).hexdigest()
+    own = {**vars(case), "name": f"{case.name} ({', '.join(words)})", "digest": digest}
+    # Whose copies they are: of a structure every copy has a share, and not a vote.
+    own["structure"] = case.structure or case.name
+    return VariedCase(**own, origin=case, noise=noise, left_out=left_out)
+
+
+def _scaled(measured: Measurement, factor: float) -> Measurement:
+    return replace(
+        measured,
+        frequency_std=factor * measured.frequency_std,
+        shape_std=factor * measured.shape_std,
+    )
+
+
+def _at(measured: Measurement, rows: IntArray) -> Measurement:
+    """Return the same modes at some of the sensors."""
+    known = measured.sensors
+    fewer = Sensors(
+        tuple(known.labels[row] for row in rows),
+        known.xyz[rows],
+        tuple(known.directions[row] for row in rows),
+    )
+    return replace(
+        measured, sensors=fewer, shapes=measured.shapes[rows], shape_std=measured.shape_std[rows]
+    )

@@ -1,0 +1,105 @@
+"""Skill by axes: every cell is a leaderboard of its own, relative to the textbook models."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+from femubench.core.schema.results import DONE, JobResult, Nominal, Run
+from femubench.core.score.leaderboard import row_of
+from femubench.core.study.axes import StudyAxes, Value
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_Arm = tuple[Nominal, str, str]  # nominal model, case and strategy, as the run names them
+FIGURES = (
+    *("skill", "skill_low", "skill_high", "ok", "failed", "not_applicable", "missing", "jobs"),
+    *("unphysical", "seconds"),
+)
+
+
+def skill_by(run: Run, *axes: str) -> pd.DataFrame:
+    """Return one row a cell: the values of the axes, skill, and how many of its jobs failed.
+
+    The skill of a cell is that of the leaderboard with nothing else on it: cases are taken
+    together with every structure counted once, and so are the values of the axes left out; with
+    several seeds it is the median over them. `skill_low` and `skill_high` are its 95 % interval,
+    over structures where there are six or more, else over seeds. A job that failed or is missing
+    counts ten times the textbook model's error. Of an axis of options there are the cells of its
+    strategy alone, unless ``strategy`` is an axis too: then the others have none there.
+
+    Arguments:
+        run: of a study, or any other.
+        axes: ``noise``, ``sensors_left_out``, ``strategy``, ``STRATEGY.OPTION``, ``case``,
+            ``nominal``; without any, those with more than one value, cases taken together.
+
+    Raises:
+        InputError: for an axis that the run does not have.
+
+    Examples:
+        >>> results.skill_by(run, "strategy")["skill"].round(2).tolist()
+        [-1.97, 0.47]
+    """
+    import pandas as pd
+
+    known = StudyAxes.of(run)
+    chosen = axes or tuple(name for name in known.varied if name != "case") or ("strategy",)
+    for name in chosen:
+        known.values(name)
+    by_arm: dict[_Arm, list[JobResult]] = defaultdict(list)
+    for nominal in known.nominals:
+        for result in run.started_from(nominal):
+            by_arm[nominal, result.case, result.strategy].append(result)
+    rows = [
+        {**dict(zip(chosen, cell, strict=True)), **_figures(run, arms, by_arm)}
+        for cell, arms in _cells(known, chosen).items()
+    ]
+    return pd.DataFrame(rows, columns=[*chosen, *FIGURES])
+
+
+def _cells(axes: StudyAxes, chosen: Sequence[str]) -> dict[tuple[Value, ...], list[_Arm]]:
+    """Return what is in every cell, in the order of the study's values."""
+    found: dict[tuple[Value, ...], list[_Arm]] = defaultdict(list)
+    for nominal, case, strategy in product(axes.nominals, axes.cases, axes.strategies):
+        place = axes.place(case, strategy, nominal)
+        if "strategy" in chosen or all(name in place for name in chosen):
+            found[tuple(place.get(name) for name in chosen)].append((nominal, case, strategy))
+    orders = [{value: i for i, value in enumerate(axes.values(name))} for name in chosen]
+
+    def order(cell: tuple[Value, ...]) -> list[int]:
+        return [places.get(value, -1) for places, value in zip(orders, cell, strict=True)]
+
+    return {cell: found[cell] for cell in sorted(found, key=order)}
+
+
+def _figures(run: Run, arms: Sequence[_Arm], by_arm: dict[_Arm, list[JobResult]]) -> dict[str, Any]:
+    """Return the figures of a cell, whose jobs go as one strategy on cases that are told apart."""
+    structures, reference = run.meta.get("structures") or {}, run.meta.get("reference") or {}
+    names = {arm: f"{number}" for number, arm in enumerate(arms)}
+    results = tuple(
+        result.changed(case=name, strategy="cell", nominal="drawn")
+        for arm, name in names.items()
+        for result in by_arm.get(arm, ())
+    )
+    meta = {
+        "seeds": run.meta.get("seeds", ()),
+        "seed": run.meta.get("seed", 0),
+        "strategies": ["cell"],
+        "structures": {name: structures.get(arm[1], arm[1]) for arm, name in names.items()},
+        "reference": {n: reference[arm[1]] for arm, n in names.items() if arm[1] in reference},
+    }
+    row = row_of(Run(meta, results), "cell")
+    told = {name: row[name] for name in ("skill", "skill_low", "skill_high", "ok", "unphysical")}
+    failed = sum(result.status not in DONE for result in results)
+    jobs = int(row["total"])
+    return {
+        **told,
+        "failed": failed,
+        "not_applicable": row["not_applicable"],
+        "missing": jobs - len(results),
+        "jobs": jobs,
+        "seconds": row["seconds"],
+    }

@@ -1,0 +1,199 @@
+"""A study as a report of any form: skill against two axes, every cell, what failed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Any
+
+from femubench import InputError
+from femubench.plot import heat_map, svg
+from femubench.reports.blocks import (
+    Block,
+    Column,
+    Drawing,
+    Items,
+    Section,
+    Table,
+    to_markdown,
+    to_terminal,
+)
+from femubench.reports.cells import NOTHING, fixed, interval, plain
+from femubench.reports.html import to_html
+from femubench.reports.markdown import escape
+from femubench.reports.summary import header, lead, notes_of, troubles
+from femubench.results import Run, StudyAxes, skill_by
+
+_MOST_ON_SCREEN = 60  # cells, and values along the columns of a table
+_MOST_COLUMNS = 9
+_MOST_FAILURES = 20
+_SHORT = {"sensors_left_out": "left out"}
+_COUNTED = (
+    "A cell is a leaderboard of its own: every structure counts once, a job that failed or is "
+    "missing counts ten times the error of the textbook model, and with several seeds skill is "
+    "the median over them. !: a model lost rigid-body modes or has negative eigenvalues."
+)
+_PICTURE = (
+    "White: 0, as the textbook model, which uses no measurement; blue: better, red: worse. "
+    "Hatched: jobs failed or are missing. Grey: not applicable."
+)
+
+
+def study_text(run: Run) -> str:
+    """Return a study as plain text of 80 columns."""
+    return to_terminal(_sections(run, short=True))
+
+
+def study_markdown(run: Run) -> str:
+    """Return a study in GitHub's Markdown."""
+    return f"# {escape(_title(run))}\n\n{to_markdown(_sections(run))}"
+
+
+def study_html(run: Run) -> str:
+    """Return a study as one HTML document that needs nothing besides itself."""
+    title = _title(run)
+    sections = _sections(run, drawing=_drawing(run))
+    return to_html(sections, title=f"femubench: {title}", heading=title)
+
+
+def _title(run: Run) -> str:
+    return plain(StudyAxes.of(run).title) or f"Study {plain(run.meta.get('run', ''))}"
+
+
+def _sections(run: Run, *, short: bool = False, drawing: Block | None = None) -> Iterator[Section]:
+    """Yield the parts of the report.
+
+    Arguments:
+        short: for the screen: without what would fill pages of it.
+        drawing: the heat map, or why there is none.
+    """
+    known = StudyAxes.of(run)
+    x, y = known.pictured
+    yield Section("", [lead(run)])
+    picture = [drawing] if drawing is not None else []
+    yield Section(f"Skill by {x} and {y}", [*picture, _grid(run, known, x, y)])
+    cells = skill_by(run).to_dict("records")
+    title = f"Cells ({len(cells)})"
+    if short and len(cells) > _MOST_ON_SCREEN:
+        said = f"{len(cells)} cells: see the report, or `skill_by` in Python."
+        yield Section(title, [said])
+    else:
+        yield Section(title, [*_cells(cells), _COUNTED])
+    yield from _failures(run, short=short)
+    notes = [("Note", note) for note in notes_of(run)]
+    if notes:
+        yield Section("Notes", [Items(notes)])
+    if not short:
+        yield Section("Study", [_axes(known), Items(list(header(run)))])
+
+
+def _drawing(run: Run) -> Block:
+    known = StudyAxes.of(run)
+    x, y = known.pictured
+    columns, rows = len(known.values(x)), len(known.values(y))
+    size = min(2.6 + 0.75 * max(columns, 5), 12.0), min(1.7 + 0.5 * max(rows, 3), 12.0)
+    title = f"Skill by {x} and {y}"
+    draw = partial(heat_map, run, x, y)
+    try:
+        found = svg(draw, name="heat-map", title=title, caption=_PICTURE, size=size)
+    except InputError as error:
+        return f"No drawing: {error}."
+    return Drawing(title, _PICTURE, found)
+
+
+def _grid(run: Run, known: StudyAxes, x: str, y: str) -> Block:
+    """Return the heat map as numbers, a value of y a row."""
+    columns, rows = known.values(x), known.values(y)
+    if len(columns) > _MOST_COLUMNS:
+        x, y, columns, rows = y, x, rows, columns
+    if len(columns) > _MOST_COLUMNS:
+        return f"{len(columns)} by {len(rows)} values: see the cells."
+    found = {(row[x], row[y]): row for row in skill_by(run, x, y).to_dict("records")}
+    heads = [Column(y, 24, left=True), *(Column(StudyAxes.text_of(v), 7) for v in columns)]
+    table = [
+        [
+            StudyAxes.text_of(r),
+            *(_skill(found[c, r]) if (c, r) in found else NOTHING for c in columns),
+        ]
+        for r in rows
+    ]
+    return Table(
+        heads,
+        table,
+        f"Down: {StudyAxes.title_of(y)}; across: {StudyAxes.title_of(x)}. *: failures.",
+    )
+
+
+def _cells(cells: Sequence[dict[Any, Any]]) -> Iterator[Block]:
+    """Yield every cell with its interval and what of it failed."""
+    names = list(cells[0])
+    axes = names[: names.index("skill")]
+    options = [name for name in axes if "." in name]
+    plain_axes = [name for name in axes if name not in options]
+    lost = any(row["failed"] + row["missing"] for row in cells)
+    heads = [
+        *(Column(_SHORT.get(name, name), 16, left=True, wrap=True) for name in plain_axes),
+        *([Column("options", 14, left=True, wrap=True)] if options else []),
+        Column("skill", 8),
+        Column("95 % interval", 16),
+        *([Column("failed", 14, wrap=True)] if lost else []),
+    ]
+    rows = [
+        [
+            *(StudyAxes.text_of(row[name]) for name in plain_axes),
+            *([_options(row, options)] if options else []),
+            _skill(row),
+            interval(row["skill_low"], row["skill_high"]),
+            *([_lost(row)] if lost else []),
+        ]
+        for row in cells
+    ]
+    yield Table(heads, rows)
+    if not lost:
+        yield "No job failed or is missing."
+
+
+def _options(row: dict[Any, Any], names: Sequence[str]) -> str:
+    """Return the options of a cell's strategy."""
+    told = {name.partition(".")[2]: row[name] for name in names if not _absent(row[name])}
+    return ", ".join(f"{name} {StudyAxes.text_of(v)}" for name, v in told.items()) or NOTHING
+
+
+def _absent(value: object) -> bool:
+    return value is None or value != value
+
+
+def _skill(row: dict[Any, Any]) -> str:
+    marks = ("!" if row["unphysical"] else "") + ("*" if row["failed"] + row["missing"] else "")
+    return marks + ("n/a" if row["not_applicable"] == row["jobs"] else fixed(row["skill"], 3, 6))
+
+
+def _lost(row: dict[Any, Any]) -> str:
+    """Return how many jobs of a cell gave no result, of how many."""
+    parts = [f"{row[name]} {name}" for name in ("failed", "missing") if row[name]]
+    return f"{', '.join(parts)} of {row['jobs']}" if parts else f"0 of {row['jobs']}"
+
+
+def _failures(run: Run, *, short: bool) -> Iterator[Section]:
+    found = troubles(run.results)
+    if not found:
+        return
+    shown = found[:_MOST_FAILURES] if short else found
+    heads = [
+        Column("case", 20, left=True, wrap=True),
+        Column("strategy", 18, left=True, wrap=True),
+        Column("status", 12, left=True),
+        Column("reason", 24, left=True, wrap=True),
+    ]
+    rows = [
+        [t.case, t.strategy, t.status + (f" x{len(t.seeds)}" if t.seeds[1:] else ""), t.reason]
+        for t in shown
+    ]
+    more = [f"... and {len(found) - len(shown)} more."] if len(shown) < len(found) else []
+    yield Section("Failures", [Table(heads, rows), *more])
+
+
+def _axes(known: StudyAxes) -> Items:
+    return Items(
+        [(name, ", ".join(map(StudyAxes.text_of, known.values(name)))) for name in known.names]
+    )
