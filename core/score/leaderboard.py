@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
@@ -255,8 +255,11 @@ def _row(strategy: str, results: Sequence[JobResult], table: _Table) -> dict[str
     )
     fine = [result for result in results if result.status == "ok"]
     by_case: dict[str, list[JobResult]] = {}
+    errors: dict[str, dict[str, list[float]]] = {block: {} for block in BLOCKS}
     for result in fine:
         by_case.setdefault(result.case, []).append(result)
+        for name, block in result.blocks.items():
+            errors[name].setdefault(result.case, []).append(block.rms_percent)
     return {
         "strategy": strategy,
         "skill": 1.0 - float(np.median(left)),
@@ -268,13 +271,13 @@ def _row(strategy: str, results: Sequence[JobResult], table: _Table) -> dict[str
             table.floor_percent,
         ),
         "skill_tests": _skill(table.tests, results, table.floor_percent),
-        **{f"{block}_percent": _median(by_case, _error_in(block)) for block in BLOCKS},
+        **{f"{block}_percent": _median(found.values()) for block, found in errors.items()},
         **predictive.scores(fine, grid.structures),
         "rigid_modes_lost": sum(result.rigid_modes_lost for result in fine),
         "negative_eigenvalues": sum(result.negative_eigenvalues or 0 for result in fine),
-        "parameters": _median(by_case, attrgetter("parameter_count")),
-        "evaluations": _median(by_case, attrgetter("evaluations")),
-        "seconds": _median(by_case, attrgetter("seconds")),
+        "parameters": _median_of("parameter_count", by_case),
+        "evaluations": _median_of("evaluations", by_case),
+        "seconds": _median_of("seconds", by_case),
         "ok": len(fine),
         "not_applicable": sum(result.status == "not-applicable" for result in results),
         "total": len(grid.cases) * len(grid.seeds),
@@ -301,14 +304,12 @@ def _over_seeds(left: FloatArray, strategy: str, seed: int) -> tuple[float, floa
     return float(found.confidence_interval.low), float(found.confidence_interval.high)
 
 
-def _error_in(block: str) -> Callable[[JobResult], float | None]:
-    return lambda result: result.blocks[block].rms_percent if block in result.blocks else None
+def _median_of(name: str, by_case: Mapping[str, Sequence[JobResult]]) -> float:
+    value = attrgetter(name)
+    return _median([n for n in map(value, r) if n is not None] for r in by_case.values())
 
 
-def _median(
-    by_case: Mapping[str, Sequence[JobResult]], value: Callable[[JobResult], float | None]
-) -> float:
+def _median(by_case: Iterable[Sequence[float]]) -> float:
     """Return the median over cases of the median over seeds; nan where nothing has the value."""
-    found = ([n for n in map(value, results) if n is not None] for results in by_case.values())
-    medians = [np.median(np.array(numbers, dtype=float)) for numbers in found if numbers]
+    medians = [np.median(np.array(numbers, dtype=float)) for numbers in by_case if numbers]
     return float(np.median(medians)) if medians else float("nan")
