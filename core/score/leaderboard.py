@@ -6,7 +6,6 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -254,12 +253,9 @@ def _row(strategy: str, results: Sequence[JobResult], table: _Table) -> dict[str
         else _over_seeds(left, strategy, table.seed)
     )
     fine = [result for result in results if result.status == "ok"]
-    by_case: dict[str, list[JobResult]] = {}
-    errors: dict[str, dict[str, list[float]]] = {block: {} for block in BLOCKS}
-    for result in fine:
-        by_case.setdefault(result.case, []).append(result)
-        for name, block in result.blocks.items():
-            errors[name].setdefault(result.case, []).append(block.rms_percent)
+    figures = _by_case(fine)
+    lost = sum(result.rigid_modes_lost for result in fine)
+    negative = sum(result.negative_eigenvalues or 0 for result in fine)
     return {
         "strategy": strategy,
         "skill": 1.0 - float(np.median(left)),
@@ -271,17 +267,17 @@ def _row(strategy: str, results: Sequence[JobResult], table: _Table) -> dict[str
             table.floor_percent,
         ),
         "skill_tests": _skill(table.tests, results, table.floor_percent),
-        **{f"{block}_percent": _median(found.values()) for block, found in errors.items()},
+        **{f"{block}_percent": _median(figures[block]) for block in BLOCKS},
         **predictive.scores(fine, grid.structures),
-        "rigid_modes_lost": sum(result.rigid_modes_lost for result in fine),
-        "negative_eigenvalues": sum(result.negative_eigenvalues or 0 for result in fine),
-        "parameters": _median_of("parameter_count", by_case),
-        "evaluations": _median_of("evaluations", by_case),
-        "seconds": _median_of("seconds", by_case),
+        "rigid_modes_lost": lost,
+        "negative_eigenvalues": negative,
+        "parameters": _median(figures["parameter_count"]),
+        "evaluations": _median(figures["evaluations"]),
+        "seconds": _median(figures["seconds"]),
         "ok": len(fine),
         "not_applicable": sum(result.status == "not-applicable" for result in results),
         "total": len(grid.cases) * len(grid.seeds),
-        "unphysical": any(result.unphysical for result in results),
+        "unphysical": lost + negative > 0,
     }
 
 
@@ -304,12 +300,22 @@ def _over_seeds(left: FloatArray, strategy: str, seed: int) -> tuple[float, floa
     return float(found.confidence_interval.low), float(found.confidence_interval.high)
 
 
-def _median_of(name: str, by_case: Mapping[str, Sequence[JobResult]]) -> float:
-    value = attrgetter(name)
-    return _median([n for n in map(value, r) if n is not None] for r in by_case.values())
+_FIGURES = ("parameter_count", "evaluations", "seconds")
 
 
-def _median(by_case: Iterable[Sequence[float]]) -> float:
+def _by_case(results: Iterable[JobResult]) -> dict[str, dict[str, list[float]]]:
+    """Return errors by block and other figures, each by case, without what has no value."""
+    found: dict[str, dict[str, list[float]]] = {name: {} for name in (*BLOCKS, *_FIGURES)}
+    for result in results:
+        told = [(name, getattr(result, name)) for name in _FIGURES]
+        told += [(name, block.rms_percent) for name, block in result.blocks.items()]
+        for name, value in told:
+            if value is not None:
+                found[name].setdefault(result.case, []).append(value)
+    return found
+
+
+def _median(by_case: Mapping[str, Sequence[float]]) -> float:
     """Return the median over cases of the median over seeds; nan where nothing has the value."""
-    medians = [np.median(np.array(numbers, dtype=float)) for numbers in by_case if numbers]
+    medians = [np.median(np.array(numbers, dtype=float)) for numbers in by_case.values()]
     return float(np.median(medians)) if medians else float("nan")
