@@ -17,7 +17,18 @@ LONGEST_FUNCTION = 60
 
 # The rooms of `core/`: each may import those before it, and nothing after it.
 ROOMS = (
-    *("version", "errors", "typing", "ties", "garbage", "gauss_newton", "files", "display", "roles", "schema"),
+    *(
+        "version",
+        "errors",
+        "typing",
+        "ties",
+        "garbage",
+        "gauss_newton",
+        "files",
+        "display",
+        "roles",
+        "schema",
+    ),
     *("plugin", "fem", "modal", "identify", "case", "update"),
     *("effect", "inference", "look", "advise"),
     *("score", "study", "drawing", "diagnosis", "plot"),

@@ -120,6 +120,19 @@ class TestEveryCommandOfTheReadme:
         with pytest.raises(femubench.InputError, match="'skil>1' is no threshold"):
             femubench.compare(a, b, fail="skil>1")
 
+    def test_store(self) -> None:
+        run = femubench.rank("rod", "unchanged", jobs=2, store="s")
+        assert "1 run, 0 faults" in call("store", "check", "--store", "s").output
+        call("store", "export", "--store", "s", "-o", "out")
+        lines = Path("out", f"{run.meta['run']}.jsonl").read_text().splitlines()
+        kept = [item["result"] for item in map(json.loads, lines) if "result" in item]
+        assert {item["key"] for item in kept} == {result.key for result in run.results}
+        (file,) = Path("s").glob("*.jsonl")
+        file.write_bytes(file.read_bytes().replace(b'"status":"ok"', b'"status":"oj"', 1))
+        assert len(femubench.read_run(store="s").meta["notes"]) == 1
+        call("store", "repair", "--store", "s")
+        assert femubench.read_run(store="s").meta["notes"] == []
+
     def test_publish(self) -> None:
         run = femubench.rank("rod", TWO, jobs=2)
         file = femubench.report(run, "results.json")

@@ -79,7 +79,9 @@ class Results:
                 continue
             there = before is not None and before.status == result.status
             # A model as drawn that has all that handbooks give is one job from either start.
-            result = (before if before and there else result).changed(nominal=slot.nominal)
+            result = before if before and there else result
+            if result.nominal != slot.nominal:
+                result = result.changed(nominal=slot.nominal)
             if self._store is not None and not there:
                 self._store.append(self._run, result)
             self._tell(index, result)

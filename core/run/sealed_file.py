@@ -12,7 +12,6 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from io import BufferedReader
 from pathlib import Path
 
 from femubench.core.files import MIB, open_regular
@@ -20,7 +19,6 @@ from femubench.core.schema.sealing import TAIL, is_whole, sum_of
 
 LARGEST = 4096 * MIB  # bytes of a file, in which there are a million results and more
 _LONGEST_LINE = 64 * MIB
-_BUFFER = MIB
 _SYNCED_WITHIN = 1.0  # s
 
 
@@ -30,7 +28,7 @@ def lines_of(path: Path) -> Iterator[tuple[int, bytes, bool]]:
     Raises:
         InputError: when the file cannot be read.
     """
-    with BufferedReader(open_regular(path, LARGEST).detach(), _BUFFER) as stream:
+    with open_regular(path, LARGEST) as stream:
         number = 0
         while line := stream.readline(_LONGEST_LINE):
             number += 1

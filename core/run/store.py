@@ -26,7 +26,7 @@ from femubench.core.run.stored import (
 )
 from femubench.core.schema.records import check_extent
 from femubench.core.schema.results import DONE, NOMINALS, JobResult, Nominal, Run
-from femubench.core.score.ranking import rank_results
+from femubench.core.score.ranking import scores_and_ranks
 
 _MOST_NOTES = 3
 _SUFFIX = ".jsonl"
@@ -142,8 +142,8 @@ class Store:
         for record in self.records(wanted, faults):
             try:
                 if record.kind == "result":
-                    found = record.result()
-                    results[found.case, found.strategy, found.seed, found.nominal] = found
+                    r = record.result()
+                    results[r.case, r.strategy, r.seed, r.nominal] = r
                 else:
                     meta.update({**record.meta(), "run": wanted})
             except InputError as fault:
@@ -153,7 +153,10 @@ class Store:
         told = meta.get("notes")
         notes = [*(told if isinstance(told, list) else []), *notes_of(faults, self.folder)]
         reference = meta.get("reference") or None
-        return Run({**meta, "notes": notes}, rank_results(listed, reference, meta.get("baseline")))
+        found = scores_and_ranks(listed, reference, meta.get("baseline"))
+        for result, score, rank in zip(listed, *found, strict=True):
+            vars(result).update(score=score, rank=rank)  # nobody else has them yet
+        return Run({**meta, "notes": notes}, tuple(listed))
 
     @uncollected()
     def by_key(self, run_id: str | None = None, *, but: str | None = None) -> dict[str, JobResult]:

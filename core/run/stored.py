@@ -32,7 +32,7 @@ _KINDS = ("run", "result", "end")
 CUT_SHORT = "the last line is cut short"
 # What is asked of many records stands first, where it is found without reading the rest.
 _HEAD = re.compile(
-    rb'\{"schema":2,"record":"(run|result|end)","after":"([0-9a-f]{16}|)",'
+    rb'\{"schema":2,"record":"(run|result|end)","after":"([0-9a-f]{8}|)",'
     rb'(?:"key":("(?:[^"\\]|\\.)*"),"status":"([a-z-]+)",)?'
 )
 _RESULT, _DETAILS = b'"result":', b',"details":'

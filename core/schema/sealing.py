@@ -1,14 +1,18 @@
 """A table of JSON on one line that ends with its own checksum: no changed bit goes unnoticed.
 
-The last entry is ``"sum"``, 16 hexadecimal digits of BLAKE2b over all bytes before it.
+The last entry is ``"sum"``, 8 hexadecimal digits of CRC-32 over all bytes before it.
+
+Source: Koopman (2002), 32-bit cyclic redundancy codes for Internet applications, Proc. Int. Conf.
+Dependable Systems and Networks, 459-468: up to three changed bits of 11 kB are always found, as are
+up to 32 in a row in a line of any length; other damage but for one case in 4e9.
 """
 
 from __future__ import annotations
 
-import hashlib
+import zlib
 
 _BEFORE, _AFTER = b',"sum":"', b'"}'
-_DIGITS = 16
+_DIGITS = 8
 TAIL = len(_BEFORE) + _DIGITS + len(_AFTER)
 
 
@@ -36,4 +40,4 @@ def sum_of(line: bytes) -> bytes:
 
 
 def _sum(body: bytes) -> bytes:
-    return hashlib.blake2b(body, digest_size=_DIGITS // 2).hexdigest().encode()
+    return b"%08x" % zlib.crc32(body)

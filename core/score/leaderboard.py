@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -265,9 +264,9 @@ def _row(strategy: str, results: Sequence[JobResult], table: _Table) -> dict[str
         else _over_seeds(left, strategy, table.seed)
     )
     fine = [result for result in results if result.status == "ok"]
-    by_case: dict[str, list[JobResult]] = {}
-    for result in fine:
-        by_case.setdefault(result.case, []).append(result)
+    figures = _by_case(fine)
+    lost = sum(result.rigid_modes_lost for result in fine)
+    negative = sum(result.negative_eigenvalues or 0 for result in fine)
     return {
         "strategy": strategy,
         "skill": 1.0 - float(np.median(left)),
@@ -279,17 +278,17 @@ def _row(strategy: str, results: Sequence[JobResult], table: _Table) -> dict[str
             table.floor_percent,
         ),
         "skill_tests": _skill(table.tests, results, table.floor_percent),
-        **{f"{block}_percent": _median(by_case, _error_in(block)) for block in BLOCKS},
+        **{f"{block}_percent": _median(figures[block]) for block in BLOCKS},
         **predictive.scores(fine, grid.structures),
-        "rigid_modes_lost": sum(result.rigid_modes_lost for result in fine),
-        "negative_eigenvalues": sum(result.negative_eigenvalues or 0 for result in fine),
-        "parameters": _median(by_case, attrgetter("parameter_count")),
-        "evaluations": _median(by_case, attrgetter("evaluations")),
-        "seconds": _median(by_case, attrgetter("seconds")),
+        "rigid_modes_lost": lost,
+        "negative_eigenvalues": negative,
+        "parameters": _median(figures["parameter_count"]),
+        "evaluations": _median(figures["evaluations"]),
+        "seconds": _median(figures["seconds"]),
         "ok": len(fine),
         "not_applicable": sum(result.status == "not-applicable" for result in results),
         "total": len(grid.cases) * len(grid.seeds),
-        "unphysical": any(result.unphysical for result in results),
+        "unphysical": lost + negative > 0,
     }
 
 
@@ -312,14 +311,22 @@ def _over_seeds(left: FloatArray, strategy: str, seed: int) -> tuple[float, floa
     return float(found.confidence_interval.low), float(found.confidence_interval.high)
 
 
-def _error_in(block: str) -> Callable[[JobResult], float | None]:
-    return lambda result: result.blocks[block].rms_percent if block in result.blocks else None
+_FIGURES = ("parameter_count", "evaluations", "seconds")
 
 
-def _median(
-    by_case: Mapping[str, Sequence[JobResult]], value: Callable[[JobResult], float | None]
-) -> float:
+def _by_case(results: Iterable[JobResult]) -> dict[str, dict[str, list[float]]]:
+    """Return errors by block and other figures, each by case, without what has no value."""
+    found: dict[str, dict[str, list[float]]] = {name: {} for name in (*BLOCKS, *_FIGURES)}
+    for result in results:
+        told = [(name, getattr(result, name)) for name in _FIGURES]
+        told += [(name, block.rms_percent) for name, block in result.blocks.items()]
+        for name, value in told:
+            if value is not None:
+                found[name].setdefault(result.case, []).append(value)
+    return found
+
+
+def _median(by_case: Mapping[str, Sequence[float]]) -> float:
     """Return the median over cases of the median over seeds; nan where nothing has the value."""
-    found = ([n for n in map(value, results) if n is not None] for results in by_case.values())
-    medians = [np.median(np.array(numbers, dtype=float)) for numbers in found if numbers]
+    medians = [np.median(np.array(numbers, dtype=float)) for numbers in by_case.values()]
     return float(np.median(medians)) if medians else float("nan")

@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from femubench.core.garbage import uncollected
-from femubench.core.schema.results import JobResult, Nominal
+from femubench.core.schema.results import DONE, JobResult, Nominal
 from femubench.core.score.counting import WHOLE, counted_blocks
 
 # A block that the nominal model already meets to the last digit must not decide a ranking.
@@ -127,18 +127,44 @@ def rank_results(
         [(2.97, 2), (0.53, 1)]
     """
     listed = tuple(results)
-    scores = _scores(listed, reference, baseline)
-    groups: dict[tuple[str, int, Nominal], list[int]] = {}
-    for place, result in enumerate(listed):
-        groups.setdefault(_group(result), []).append(place)
-    ranks = [0] * len(listed)
-    for group in groups.values():
-        for rank, place in ranked(group, lambda at: _order(listed[at], scores[at])):
-            ranks[place] = rank
+    found = scores_and_ranks(listed, reference, baseline)
     return tuple(
         result.changed(score=score, rank=rank)
-        for result, score, rank in zip(listed, scores, ranks, strict=True)
+        for result, score, rank in zip(listed, *found, strict=True)
     )
+
+
+def scores_and_ranks(
+    results: Sequence[JobResult],
+    reference: Mapping[str, Mapping[str, float]] | None = None,
+    baseline: str | None = None,
+) -> tuple[list[float], list[int]]:
+    """Return the scores and ranks of results; arguments and order as for `rank_results`."""
+    scores = _scores(results, reference, baseline)
+    groups: dict[tuple[str, int, Nominal], int] = {}
+    group = [groups.setdefault(_group(result), len(groups)) for result in results]
+    names = {name: n for n, name in enumerate(sorted({result.strategy for result in results}))}
+    keys = np.array(
+        [
+            (names[r.strategy], score, r.unphysical, r.status not in DONE, place)
+            for r, score, place in zip(results, scores, group, strict=True)
+        ],
+        dtype=float,
+    ).reshape(-1, 5)
+    order = np.lexsort(keys.T)
+    _, score, *tier, place = keys[order].T
+    # As `ranked` does in each group.
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = place[1:] != place[:-1]
+    apart = first.copy()
+    for part in tier:
+        apart[1:] |= part[1:] != part[:-1]
+    apart[1:] |= score[1:] - score[:-1] > TIE * np.abs(score[1:])
+    steps = np.arange(len(order))
+    starts = [np.maximum.accumulate(np.where(new, steps, 0)) for new in (first, apart)]
+    ranks = np.empty(len(order), dtype=int)
+    ranks[order] = 1 + starts[1] - starts[0]
+    return scores, ranks.tolist()
 
 
 def _scores(
@@ -185,8 +211,3 @@ def _scores_against(
 
 def _group(result: JobResult) -> tuple[str, int, Nominal]:
     return result.case, result.seed, result.nominal
-
-
-def _order(result: JobResult, score: float) -> tuple[tuple[bool, bool], float, str]:
-    nothing = result.status not in ("ok", "not-applicable")
-    return (nothing, result.unphysical), score, result.strategy
