@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,6 +34,7 @@ from femubench.plugins.strategies.sparse import Sparse
 from femubench.plugins.strategies.strain_energy import StrainEnergy, energy_change_index
 from femubench.update import (
     element_sets,
+    importing_without,
     l_curve_corner,
     lasso,
     modal_space,
@@ -164,6 +167,20 @@ def test_starts_are_those_of_the_latin_hypercube_of_scipy() -> None:
         theirs = qmc.LatinHypercube(size, rng=np.random.default_rng(count)).random(count)
         ours = _latin_hypercube(count, size, np.random.default_rng(count))
         assert ours == pytest.approx(theirs, rel=1e-15)
+
+
+def test_what_was_hidden_from_an_import_is_there_afterwards(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "some_plots.py").write_text("COLOUR = 'blue'\n")
+    (tmp_path / "some_search.py").write_text(
+        "try:\n    import some_plots\nexcept ImportError:\n    some_plots = None\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    with importing_without("some_plots", "numpy"):
+        assert importlib.import_module("some_search").some_plots is None
+        assert importlib.import_module("numpy") is np  # loaded before: not hidden
+    assert importlib.import_module("some_plots").COLOUR == "blue"
 
 
 def test_slopes_are_those_of_differences_and_few_shapes_give_the_same_frequencies() -> None:
