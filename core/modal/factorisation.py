@@ -11,10 +11,12 @@ from typing import Any, Protocol
 import numpy as np
 import scipy.sparse as sp
 
+from femubench.core.modal.superlu_pivots import pivots
 from femubench.core.typing import FloatArray, SparseArray
 
 # From about so many unknowns on, nested dissection earns its own time on structures in space.
 _DISSECTED = 50_000
+_MISSING = "no scikit-sparse"
 
 
 class Factor(Protocol):
@@ -99,7 +101,7 @@ class LU:
         """Return the number of negative pivots; None where rows were exchanged for stability."""
         if not np.array_equal(self._factor.perm_r, self._factor.perm_c):
             return None
-        return int(np.sum(self._factor.U.diagonal() < 0.0))
+        return int(np.sum(pivots(self._factor) < 0.0))
 
 
 def _indexed(matrix: SparseArray) -> sp.csc_matrix:
@@ -119,10 +121,10 @@ def cholmod_obstacle() -> str | None:
             warnings.simplefilter("ignore")
             import sksparse.cholmod  # noqa: F401
     except ImportError:
-        return "scikit-sparse is not installed"
+        return _MISSING
     if slow := _reference_blas(_loaded_libraries()):
         return (
-            f"it is linked to the reference BLAS {slow}, which is six times slower than OpenBLAS "
+            f"CHOLMOD is linked to the reference BLAS {slow}, six times slower than OpenBLAS "
             "(Debian: apt install libopenblas0)"
         )
     _as_many_threads()
@@ -156,11 +158,14 @@ def _as_many_threads() -> None:
 
 
 def solver_name() -> str:
-    """Return what factorises large models here, and why it is not CHOLMOD where it is not.
-
-    Examples:
-        >>> solver_name().startswith(("CHOLMOD", "SuperLU"))
-        True
-    """
+    """Return what factorises large models here, and why it is not CHOLMOD where it is not."""
     obstacle = cholmod_obstacle()
-    return "CHOLMOD" if obstacle is None else f"SuperLU (no CHOLMOD: {obstacle})"
+    return "CHOLMOD" if obstacle is None else f"SuperLU ({obstacle})"
+
+
+def solver_note() -> tuple[str, ...]:
+    """Return what to tell a user who has installed CHOLMOD in vain."""
+    obstacle = cholmod_obstacle()
+    if obstacle in (None, _MISSING):
+        return ()
+    return (f"models of more than 500 dofs are solved by SuperLU: {obstacle}",)

@@ -6,16 +6,17 @@ import numpy as np
 import scipy.linalg as la
 
 from femubench.core.fem.model import Dofs, Model
+from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.typing import FloatArray
 
 _DEPENDENT = 1e-8  # of the largest: below it a field is a combination of others
 _FLOOR = 1e-14  # of the highest eigenvalue among the fields: below it there is only rounding
 
 
-def softest_smooth_field(
-    model: Model, rigid: FloatArray, weighted: FloatArray
-) -> float | None:
-    """Return the lowest eigenvalue among quadratic fields, in rad^2/s^2: an upper bound.
+def softest_smooth_field(model: Model, rigid: FloatArray, weighted: FloatArray) -> float | None:
+    """Return the lowest eigenvalue among motions as rigid and bent bodies, in rad^2/s^2.
+
+    It is an upper bound of the lowest one that is left once the rigid motions are out.
 
     None where no field moves the structure, as without places of the dofs.
 
@@ -25,8 +26,12 @@ def softest_smooth_field(
 
     Source: Rayleigh and Ritz.
     """
-    fields = _quadratic_fields(model.dofs)
+    if not np.isfinite(model.dofs.xyz).all():
+        return None
+    fields = np.hstack([rigid_body_vectors(model.dofs), _quadratic_fields(model.dofs)])
+    before = np.einsum("ij,ij->j", fields, fields)
     fields -= rigid @ (weighted.T @ fields)
+    fields = fields[:, np.einsum("ij,ij->j", fields, fields) > _DEPENDENT * before]
     mass = fields.T @ model.mass_times(fields)
     stiffness = fields.T @ model.stiffness_times(fields)
     size = np.diagonal(mass).copy()
@@ -47,8 +52,6 @@ def softest_smooth_field(
 
 def _quadratic_fields(dofs: Dofs) -> FloatArray:
     """Return the dofs' part in bending and twist, without these in stretch, (n, p)."""
-    if not np.isfinite(dofs.xyz).all():
-        return np.zeros((len(dofs), 0))
     motions = dofs.motions
     centred = (dofs.xyz - dofs.xyz.mean(axis=0)).T
     x = centred / max(float(np.abs(centred).max()), 1e-12)

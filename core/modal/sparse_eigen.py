@@ -23,6 +23,9 @@ _RIGID_RESIDUAL = 1e-12
 _MODE_RESIDUAL = 1e-6
 _BELOW_SMOOTH = 1e-3  # shift over the softest smooth field's eigenvalue
 _NEGATIVE = 1e-6  # of the highest eigenvalue found: above it a negative one is a zero
+_SPARE = 2  # modes found above those that are wanted
+_ROUNDS = 12
+_SEPARATE = 1e-5  # of an eigenvalue: closer ones are counted as one
 _ROUNDING = 1e-13  # of the largest k/m, below which K - shift M may be indefinite by rounding
 _FLAT = 1e-3  # extent of a planar structure across its plane, over its size
 
@@ -144,8 +147,8 @@ def _free_rigid_modes(model: Model) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class _Rigid:
-    """Mass-orthonormal rigid-body modes, to be kept out of motions and forces.
+class _Known:
+    """Mass-orthonormal modes that are known, to be kept out of motions and forces.
 
     Arguments:
         modes: (n, r).
@@ -155,6 +158,9 @@ class _Rigid:
     modes: FloatArray
     weighted: FloatArray
 
+    def with_more(self, shapes: FloatArray, weighted: FloatArray) -> _Known:
+        return _Known(np.hstack([self.modes, shapes]), np.hstack([self.weighted, weighted]))
+
     def out_of(self, motion: FloatArray) -> FloatArray:
         return motion - self.modes @ (self.weighted.T @ motion)
 
@@ -162,7 +168,11 @@ class _Rigid:
         return force - self.weighted @ (self.modes.T @ force)
 
 
-def _below_elastic(model: Model, rigid: _Rigid) -> tuple[ShiftedModel, FloatArray]:
+def _random(model: Model, seed: int) -> FloatArray:
+    return np.random.default_rng(seed).standard_normal(model.size)
+
+
+def _below_elastic(model: Model, rigid: _Known) -> tuple[ShiftedModel, FloatArray]:
     """Return a factorisation shifted below the first elastic eigenvalue, and a start for Lanczos.
 
     The softest smooth field is stiffer than the first mode, on frames up to a few hundred times:
@@ -178,9 +188,8 @@ def _below_elastic(model: Model, rigid: _Rigid) -> tuple[ShiftedModel, FloatArra
     smooth = softest_smooth_field(model, rigid.modes, rigid.weighted)
     guess = 1e-8 * float(np.median(scale)) if smooth is None else _BELOW_SMOOTH * smooth
     shifted = ShiftedModel(model, -max(guess, _ROUNDING * float(scale.max())))
-    random = np.random.default_rng(0).standard_normal(model.size)
-    for _ in range(12):
-        start = random
+    for _ in range(_ROUNDS):
+        start = _random(model, 0)
         for _ in range(2):
             start = rigid.out_of(shifted.solve(rigid.out_of_force(model.mass_times(start))))
             start /= la.norm(start)
@@ -205,17 +214,21 @@ def lowest_eigenpairs(model: Model, count: int) -> tuple[FloatArray, FloatArray]
     """
     modes = _free_rigid_modes(model)
     free = modes.shape[1]
-    rigid = _Rigid(modes, model.mass_times(modes))
+    rigid = _Known(modes, model.mass_times(modes))
     shifted, start = _below_elastic(model, rigid)
-    wanted = max(count - free, 1)
-    extra = 2
-    for _ in range(4):
-        ask = min(wanted + extra, model.size - free - 1)
-        eigenvalues, shapes = _shift_invert(shifted, rigid, ask, start)
+    ask = min(max(count - free, 1) + _SPARE, model.size - free - 1)
+    eigenvalues, shapes = _shift_invert(shifted, rigid, ask, start)
+    for number in range(1, _ROUNDS):
         missed = _missed(shifted, eigenvalues, free)
         if missed <= 0:
             break
-        extra += missed + 4
+        # One start leads to one direction of a repeated eigenvalue: another is needed for the next.
+        start = _random(model, number)
+        known = rigid.with_more(shapes, model.mass_times(shapes))
+        more, others = _shift_invert(shifted, known, missed + _SPARE, start)
+        order = np.argsort(np.concatenate([eigenvalues, more]), kind="stable")[: len(eigenvalues)]
+        eigenvalues = np.concatenate([eigenvalues, more])[order]
+        shapes = np.hstack([shapes, others])[:, order]
     else:
         raise ModelError(f"{missed} eigenvalues below {eigenvalues[-1]:.6g} were not found")
     _check(model, eigenvalues, shapes)
@@ -227,12 +240,13 @@ def lowest_eigenpairs(model: Model, count: int) -> tuple[FloatArray, FloatArray]
 
 
 def _shift_invert(
-    shifted: ShiftedModel, rigid: _Rigid, count: int, start: FloatArray
+    shifted: ShiftedModel, known: _Known, count: int, start: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
+    """Return so many eigenpairs above the shift, the lowest, and all below it; known ones aside."""
     model, size = shifted.model, shifted.model.size
 
     def operate(force: FloatArray) -> FloatArray:
-        return rigid.out_of(shifted.solve(rigid.out_of_force(force)))
+        return known.out_of(shifted.solve(known.out_of_force(force)))
 
     inverse = LinearOperator((size, size), matvec=operate, dtype=float)
     mass = LinearOperator((size, size), matvec=model.mass_times, dtype=float)
@@ -240,34 +254,41 @@ def _shift_invert(
     below = shifted.eigenvalues_below()
     if below is None:
         raise ModelError("negative eigenvalues cannot be counted: the factors were pivoted")
+    rayleigh = np.einsum("ij,ij->j", known.modes, model.stiffness_times(known.modes))
+    below -= int(np.sum(rayleigh < shifted.shift))
+    count = min(count, size - known.modes.shape[1] - 1)
+    first = operate(model.mass_times(start))
     pieces = []
     for which, k in (("LA", count), ("SA", below)):
         if k > 0:
             pieces.append(
                 eigsh(stiffness, k=k, M=mass, sigma=shifted.shift, OPinv=inverse,
-                      which=which, v0=start, tol=0.0)
+                      which=which, v0=first, tol=0.0)
             )  # fmt: skip
     eigenvalues = np.concatenate([values for values, _ in pieces])
     shapes = np.hstack([vectors for _, vectors in pieces])
     order = np.argsort(eigenvalues)
-    shapes = shapes[:, order]
-    return eigenvalues[order], mass_normalised(model, shapes)
+    return eigenvalues[order], mass_normalised(model, shapes[:, order])
 
 
 def _missed(shifted: ShiftedModel, eigenvalues: FloatArray, rigid: int) -> int:
-    """Return how many eigenvalues lie below the widest gap near the end of the list, unfound."""
+    """Return how many eigenvalues lie below the widest gap near the end of the list, unfound.
+
+    A list that ends within a repeated eigenvalue is counted up to just below this one.
+    """
+    top = float(eigenvalues[-1])
     last = max(len(eigenvalues) - 3, 0)
     gaps = np.diff(eigenvalues[last:])
-    if len(gaps) == 0:
-        return 0
-    at = last + int(np.argmax(gaps))
-    found = rigid + at + 1
-    for share in (0.5, 0.4, 0.6):
-        middle = eigenvalues[at] + share * (eigenvalues[at + 1] - eigenvalues[at])
-        below = shifted.moved(float(middle)).eigenvalues_below(found)
+    shifts = [top - share * _SEPARATE * abs(top) for share in (1.0, 0.5, 2.0)]
+    if gaps.max(initial=0.0) > _SEPARATE * abs(top):
+        lower = eigenvalues[last + int(np.argmax(gaps))]
+        shifts = [float(lower + share * gaps.max()) for share in (0.5, 0.4, 0.6)]
+    for shift in shifts:
+        found = rigid + int(np.sum(eigenvalues < shift))
+        below = shifted.moved(shift).eigenvalues_below(found)
         if below is not None:
             return below - found
-    raise ModelError(f"eigenvalues below {eigenvalues[at + 1]:.6g} cannot be counted")
+    raise ModelError(f"eigenvalues below {top:.6g} cannot be counted")
 
 
 def _check(model: Model, eigenvalues: FloatArray, shapes: FloatArray) -> None:
