@@ -1,4 +1,4 @@
-"""Both back ends of the sparse solver: how often they factorise, what they hold, what they count."""
+"""Both back ends of the sparse solver: how often they factorise, what they hold and count."""
 
 from __future__ import annotations
 
@@ -102,8 +102,8 @@ class Spy:
         self.most_held = 0
         start, factorise = LU.__init__, Cholesky.factorise
 
-        def counted_start(factor: LU, matrix: sp.csc_array) -> None:
-            start(factor, matrix)
+        def counted_start(factor: LU, matrix: sp.csc_array, *, pivot: float = 0.0) -> None:
+            start(factor, matrix, pivot=pivot)
             self.made.append(True)
             self.held.add(factor)
             self.most_held = max(self.most_held, len(self.held))

@@ -31,7 +31,8 @@ HEAVY = {
 }
 # Imported under a name of its own, as the package that brings it documents.
 PART_OF = {"pydantic_core": "pydantic", "markupsafe": "jinja2", "pyoma2": "pyoma_2"} | {
-    "ansys": "ansys_mapdl_reader"
+    "ansys": "ansys_mapdl_reader",
+    "sksparse": "scikit_sparse",
 }
 RUN = """
 import sys

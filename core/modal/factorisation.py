@@ -1,4 +1,4 @@
-"""Symmetric sparse matrices, factorised: by CHOLMOD where it is installed and fast, else SuperLU."""
+"""Symmetric sparse matrices, factorised by SuperLU, or by CHOLMOD where it is there and fast."""
 
 from __future__ import annotations
 
@@ -74,7 +74,11 @@ class Cholesky:
 
 
 class LU:
-    """L U of any symmetric matrix by SuperLU, pivots taken from the diagonal as they come.
+    """L U of any symmetric matrix by SuperLU.
+
+    Arguments:
+        matrix: symmetric, sparse, (n, n).
+        pivot: share of the largest entry of its column below which a diagonal entry is no pivot.
 
     Raises:
         RuntimeError: when the matrix is singular.
@@ -82,13 +86,13 @@ class LU:
     Source: Li (2005), SuperLU; symmetric mode with minimum degree on the pattern.
     """
 
-    def __init__(self, matrix: SparseArray) -> None:
+    def __init__(self, matrix: SparseArray, *, pivot: float = 0.0) -> None:
         from scipy.sparse.linalg import splu
 
         self._factor = splu(
             sp.csc_matrix(matrix),
             permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
+            diag_pivot_thresh=pivot,
             options={"SymmetricMode": True},
         )
 

@@ -15,6 +15,7 @@ _TRIES = 4
 _HELD = 4.0  # stiffness over shift times mass from which on a dof needs no spring of its own
 _MOST_LOOSE = 200
 _AT_ONCE = 4_000_000  # entries of right sides solved at once
+_BLOCK = 32  # columns at once from which more gain nothing
 _CHOICE = 8  # nodes to choose from for every one chosen
 
 
@@ -74,7 +75,7 @@ def _without(cholesky: Cholesky, pins: IntArray, root: FloatArray, change: Chang
     if change is not None:
         basis = sp.hstack([basis, sp.csc_array(change[0])], format="csc")
         values = np.concatenate([values, change[1]])
-    width = max(_AT_ONCE // size, 4)
+    width = min(max(_AT_ONCE // size, 4), _BLOCK)
     blocks = (basis[:, i : i + width].toarray() for i in range(0, len(values), width))
     # A pin is felt along its path in the elimination tree alone: the rest of a column is zero.
     half = sp.hstack([sp.csc_array(cholesky.half(block)) for block in blocks], format="csc")
