@@ -134,9 +134,9 @@ def test_inertia_counts_the_eigenvalues_below_a_shift(portal: FrameBuilder) -> N
         expected = solve_modes(candidate).eigenvalues
         for upper in (8, 10, 15, 40):
             middle = float(0.5 * (expected[upper - 1] + expected[upper]))
-            count = ShiftedModel(candidate, middle).eigenvalues_below
+            count = ShiftedModel(candidate, middle).eigenvalues_below()
             assert count in (None, upper)
-        assert ShiftedModel(candidate, -1e10).eigenvalues_below == 0
+        assert ShiftedModel(candidate, -1e10).eigenvalues_below() == 0
 
 
 def test_solve_is_the_inverse(portal: FrameBuilder) -> None:

@@ -7,7 +7,6 @@ from itertools import product
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import splu
 
 from femubench.core import roles
 from femubench.core.effect.change import (
@@ -20,6 +19,7 @@ from femubench.core.effect.change import (
 )
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model, common_dofs
+from femubench.core.modal.factorisation import LU
 from femubench.core.roles import Effect, EffectParameter
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
@@ -117,7 +117,7 @@ def _condensed(
     if len(rest) == 0:
         return sp.csr_array(pick.T @ mass @ pick), sp.csr_array(pick.T @ k @ pick)
     inner, cross = k[rest][:, rest], k[rest][:, keep]
-    follow = -sp.csr_array(splu(sp.csc_matrix(inner)).solve(cross.toarray()))
+    follow = -sp.csr_array(LU(inner, pivot=0.01).solve(cross.toarray()))
     place = sp.csr_array(
         (np.ones(len(rest)), (rest, np.arange(len(rest)))), shape=(k.shape[0], len(rest))
     )

@@ -43,7 +43,8 @@ class Dofs:
         """Return the unit motion of every dof in (x, y, z, rx, ry, rz), (n, 6)."""
         if self.axes is not None:
             return self.axes
-        return np.eye(6)[[DIRECTIONS.index(name) for name in self.direction]]
+        number = {name: i for i, name in enumerate(DIRECTIONS)}
+        return np.eye(6)[[number[name] for name in self.direction]]
 
 
 @dataclass(frozen=True)

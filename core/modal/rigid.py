@@ -38,19 +38,8 @@ def _motions(dofs: Dofs) -> Callable[[FloatArray, FloatArray], FloatArray]:
     size = max(float(np.abs(dofs.xyz - centre).max()), 1e-12)
 
     def motion(xyz: FloatArray, axes: FloatArray) -> FloatArray:
-        x, y, z = ((xyz - centre) / size).T
-        zero, one = np.zeros_like(x), np.ones_like(x)
-        table = np.array(
-            [
-                (one, zero, zero, zero, z, -y),
-                (zero, one, zero, -z, zero, x),
-                (zero, zero, one, y, -x, zero),
-                (zero, zero, zero, one / size, zero, zero),
-                (zero, zero, zero, zero, one / size, zero),
-                (zero, zero, zero, zero, zero, one / size),
-            ]
-        )  # direction, motion, dof
-        return np.asarray(np.einsum("nd,dmn->nm", axes, table))
+        shifts, turns = axes[:, :3], axes[:, 3:]
+        return np.hstack([shifts, np.cross((xyz - centre) / size, shifts) + turns / size])
 
     return motion
 

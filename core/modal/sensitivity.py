@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import splu
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
 from femubench.core.fem.model_parameters import MatrixSlopes, matrix_slopes
 from femubench.core.fem.parameters import Parameter
 from femubench.core.modal.eigen import Modes
+from femubench.core.modal.factorisation import LU
 from femubench.core.typing import FloatArray, IntArray
 
 _REPEATED = 1e-8
@@ -117,7 +117,7 @@ def _nelson(model: Model, modes: Modes, index: int, change: MatrixSlopes) -> Flo
     )
     zero = np.zeros((cluster.shape[1], change.count))
     try:
-        solved = splu(sp.csc_matrix(dynamic)).solve(np.vstack([right, zero]))
+        solved = LU(dynamic, pivot=0.01).solve(np.vstack([right, zero]))
     except RuntimeError as error:
         raise ModelError(f"mode {index + 1}: shape sensitivities have no solution") from error
     particular = np.asarray(solved[: model.size])

@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
-from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import LowRank, Model
+from femubench.core.modal.factorisation import LU, Cholesky, Factor, cholmod_obstacle
 from femubench.core.modal.generalised_mass import mass_normalised
+from femubench.core.modal.inertia import Change, negative_after, negative_by_cholesky
 from femubench.core.modal.rigid import rigid_modes_of
-from femubench.core.typing import FloatArray
+from femubench.core.modal.smooth_fields import softest_smooth_field
+from femubench.core.typing import FloatArray, SparseArray
 
 _RIGID_RESIDUAL = 1e-12
 _MODE_RESIDUAL = 1e-6
+_BELOW_SMOOTH = 1e-3  # shift over the softest smooth field's eigenvalue
+_NEGATIVE = 1e-6  # of the highest eigenvalue found: above it a negative one is a zero
+_SPARE = 2  # modes found above those that are wanted
+_ROUNDS = 12
+_SEPARATE = 1e-5  # of an eigenvalue: closer ones are counted as one
+_ROUNDING = 1e-13  # of the largest k/m, below which K - shift M may be indefinite by rounding
+_FLAT = 1e-3  # extent of a planar structure across its plane, over its size
 
 
 @dataclass(frozen=True)
@@ -27,28 +37,52 @@ class ShiftedModel:
     Arguments:
         model: any model.
         shift: in rad^2/s^2; negative for models whose K is singular.
+        spent: of the same model at another shift: its analysis and memory serve again.
     """
 
     model: Model
     shift: float
+    spent: Cholesky | None = field(default=None, repr=False, compare=False)
+
+    def moved(self, shift: float) -> ShiftedModel:
+        """Return the model at another shift; the factors of this one go, for their memory.
+
+        This one may be used again once the other is not: it is factorised anew.
+        """
+        for kept in ("_factor", "_woodbury"):
+            self.__dict__.pop(kept, None)
+        return ShiftedModel(self.model, shift, self._cholesky)
+
+    @property
+    def _matrix(self) -> SparseArray:
+        return sp.csc_array(self.model.stiffness - self.shift * self.model.mass)
 
     @cached_property
-    def _factor(self) -> SuperLU:
-        matrix = sp.csc_matrix(self.model.stiffness - self.shift * self.model.mass)
+    def _cholesky(self) -> Cholesky | None:
+        """Return what K - shift M is to be factorised by; None where CHOLMOD is not used."""
+        if self.spent is not None or cholmod_obstacle() is not None:
+            return self.spent
+        stiffness, mass = self.model.stiffness, self.model.mass
+        extent = np.ptp(self.model.dofs.xyz, axis=0)
+        return Cholesky(
+            abs(stiffness) + abs(mass) + sp.eye_array(self.model.size),
+            spatial=bool(extent.min() > _FLAT * extent.max()),
+        )
+
+    @cached_property
+    def _factor(self) -> Factor:
+        # Above the lowest eigenvalue there is no Cholesky factorisation.
+        if self.shift <= 0.0 and (cholesky := self._cholesky) and cholesky.factorise(self._matrix):
+            return cholesky
         try:
-            return splu(
-                matrix,
-                permc_spec="MMD_AT_PLUS_A",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True},
-            )
+            return LU(self._matrix)
         except RuntimeError as error:
             raise ModelError(
                 "K - shift M is singular: a degree of freedom has neither mass nor stiffness"
             ) from error
 
     @cached_property
-    def _change(self) -> tuple[FloatArray, FloatArray] | None:
+    def _change(self) -> Change | None:
         """Return (basis, eigenvalues) of the low-rank part of K - shift M, full rank."""
         parts: list[tuple[LowRank, float]] = []
         if self.model.stiffness_change is not None:
@@ -73,27 +107,30 @@ class ShiftedModel:
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return (K - shift M)^-1 @ right, (n,) or (n, m)."""
-        answer: FloatArray = self._factor.solve(np.ascontiguousarray(right))
+        answer = self._factor.solve(right)
         if self._woodbury is None or self._change is None:
             return answer
         solved, capacitance = self._woodbury
         correction = la.solve(capacitance, self._change[0].T @ answer, assume_a="sym")
         return np.asarray(answer - solved @ correction)
 
-    @cached_property
-    def eigenvalues_below(self) -> int | None:
+    def eigenvalues_below(self, about: int = 8) -> int | None:
         """Return how many eigenvalues lie below the shift (Sylvester's law of inertia).
 
         None where the factorisation pivoted off the diagonal, so that its signs mean nothing.
+
+        Arguments:
+            about: how many are expected; a bad guess costs time alone.
         """
-        if not np.array_equal(self._factor.perm_r, self._factor.perm_c):
-            return None
-        below = int(np.sum(self._factor.U.diagonal() < 0.0))
-        if self._woodbury is None or self._change is None:
+        if self.shift > 0.0 and "_factor" not in self.__dict__ and self._cholesky is not None:
+            matrix, change = self._matrix, self._change
+            found = negative_by_cholesky(self._cholesky, matrix, change, self.model, about)
+            if found is not None:
+                return found
+        below = self._factor.negative
+        if below is None or self._woodbury is None or self._change is None:
             return below
-        # neg(A + U C U') = neg(A) + neg(C) - neg(C^-1 + U' A^-1 U), Haynsworth (1968).
-        inner = la.eigvalsh(self._woodbury[1])
-        return below + int(np.sum(self._change[1] < 0.0)) - int(np.sum(inner < 0.0))
+        return negative_after(below, self._change[1], self._woodbury[1])
 
 
 def _free_rigid_modes(model: Model) -> FloatArray:
@@ -109,44 +146,64 @@ def _free_rigid_modes(model: Model) -> FloatArray:
     return np.asarray(la.solve_triangular(la.cholesky(gram, lower=True), rigid.T, lower=True).T)
 
 
-def _project(model: Model, rigid: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Return the vectors without their rigid-body part."""
-    return vectors - rigid @ (rigid.T @ model.mass_times(vectors))
+@dataclass(frozen=True)
+class _Known:
+    """Mass-orthonormal modes that are known, to be kept out of motions and forces.
+
+    Arguments:
+        modes: (n, r).
+        weighted: mass times modes, (n, r).
+    """
+
+    modes: FloatArray
+    weighted: FloatArray
+
+    def with_more(self, shapes: FloatArray, weighted: FloatArray) -> _Known:
+        return _Known(np.hstack([self.modes, shapes]), np.hstack([self.weighted, weighted]))
+
+    def out_of(self, motion: FloatArray) -> FloatArray:
+        return motion - self.modes @ (self.weighted.T @ motion)
+
+    def out_of_force(self, force: FloatArray) -> FloatArray:
+        return force - self.weighted @ (self.modes.T @ force)
 
 
-def _first_elastic(model: Model, rigid: FloatArray) -> tuple[float, ShiftedModel]:
-    """Return an estimate of the first elastic eigenvalue and a factorisation shifted below it.
+def _random(model: Model, seed: int) -> FloatArray:
+    return np.random.default_rng(seed).standard_normal(model.size)
 
-    A start that is too large makes the estimate too large as well, never too small, so the shift
-    is lowered until estimate and shift agree.
+
+def _below_elastic(model: Model, rigid: _Known) -> tuple[ShiftedModel, FloatArray]:
+    """Return a factorisation shifted below the first elastic eigenvalue, and a start for Lanczos.
+
+    The softest smooth field is stiffer than the first mode, on frames up to a few hundred times:
+    the shift lies as far below it. A shift that is too low costs nothing, one that is too high
+    iterations; where two steps of inverse iteration find a softer motion than the shift, that
+    alone is worth another factorisation.
     """
     m, k = model.mass.diagonal(), model.stiffness.diagonal()
     carrying = (m > 0.0) & (k > 0.0)
     if not carrying.any():
         raise ModelError("no degree of freedom has both mass and stiffness")
-    shift = 1e-8 * float(np.median(k[carrying] / m[carrying]))
-    start = np.random.default_rng(0).standard_normal((model.size, 4))
-    estimate = shift
-    for _ in range(12):
-        shifted = ShiftedModel(model, -shift)
-        vectors = start
-        for _ in range(4):
-            vectors = _project(model, rigid, shifted.solve(model.mass_times(vectors)))
-            vectors, _ = la.qr(vectors, mode="economic")
-        gram = vectors.T @ model.mass_times(vectors)
-        energy = vectors.T @ model.stiffness_times(vectors)
-        values = la.eigvals(la.solve(gram, energy)).real
-        estimate = float(np.min(values[values > 0.0], initial=np.inf))
-        if not np.isfinite(estimate):
-            return shift, shifted
-        if 0.01 * estimate <= shift <= estimate:
+    scale = k[carrying] / m[carrying]
+    smooth = softest_smooth_field(model, rigid.modes, rigid.weighted)
+    guess = 1e-8 * float(np.median(scale)) if smooth is None else _BELOW_SMOOTH * smooth
+    shifted = ShiftedModel(model, -max(guess, _ROUNDING * float(scale.max())))
+    for _ in range(_ROUNDS):
+        start = _random(model, 0)
+        for _ in range(2):
+            start = rigid.out_of(shifted.solve(rigid.out_of_force(model.mass_times(start))))
+            start /= la.norm(start)
+        quotient = start @ model.stiffness_times(start) / (start @ model.mass_times(start))
+        if not 0.0 < quotient < -shifted.shift:
             break
-        shift = 0.1 * estimate
-    return estimate, shifted
+        shifted = shifted.moved(-0.01 * float(quotient))
+    return shifted, start
 
 
 def lowest_eigenpairs(model: Model, count: int) -> tuple[FloatArray, FloatArray]:
     """Return the lowest eigenpairs, every negative eigenvalue among them.
+
+    One factorisation below the spectrum serves the iteration, a second one the proof.
 
     Arguments:
         model: a model with more dofs than modes wanted.
@@ -155,79 +212,92 @@ def lowest_eigenpairs(model: Model, count: int) -> tuple[FloatArray, FloatArray]
     Raises:
         ModelError: when a residual is too large or modes are missed.
     """
-    rigid = _free_rigid_modes(model)
-    _, shifted = _first_elastic(model, rigid)
-    wanted = max(count - rigid.shape[1], 1)
-    extra = 2
-    for _ in range(4):
-        ask = min(wanted + extra, model.size - rigid.shape[1] - 1)
-        eigenvalues, shapes = _shift_invert(shifted, rigid, ask)
-        missed = _missed(model, eigenvalues, rigid.shape[1], wanted)
+    modes = _free_rigid_modes(model)
+    free = modes.shape[1]
+    rigid = _Known(modes, model.mass_times(modes))
+    shifted, start = _below_elastic(model, rigid)
+    ask = min(max(count - free, 1) + _SPARE, model.size - free - 1)
+    eigenvalues, shapes = _shift_invert(shifted, rigid, ask, start)
+    for number in range(1, _ROUNDS):
+        missed = _missed(shifted, eigenvalues, free)
         if missed <= 0:
             break
-        extra += missed + 4
+        # One start leads to one direction of a repeated eigenvalue: another is needed for the next.
+        start = _random(model, number)
+        known = rigid.with_more(shapes, model.mass_times(shapes))
+        more, others = _shift_invert(shifted, known, missed + _SPARE, start)
+        order = np.argsort(np.concatenate([eigenvalues, more]), kind="stable")[: len(eigenvalues)]
+        eigenvalues = np.concatenate([eigenvalues, more])[order]
+        shapes = np.hstack([shapes, others])[:, order]
     else:
         raise ModelError(f"{missed} eigenvalues below {eigenvalues[-1]:.6g} were not found")
     _check(model, eigenvalues, shapes)
-    energy = np.einsum("ij,ij->j", rigid, model.stiffness_times(rigid))
+    energy = np.einsum("ij,ij->j", modes, model.stiffness_times(modes))
     values = np.concatenate([energy, eigenvalues])
     order = np.argsort(values, kind="stable")
-    keep = order[: count + int(np.sum(eigenvalues < -1e-3 * abs(shifted.shift)))]
-    return values[keep], np.hstack([rigid, shapes])[:, keep]
+    keep = order[: count + int(np.sum(eigenvalues < -_NEGATIVE * eigenvalues[-1]))]
+    return values[keep], np.hstack([modes, shapes])[:, keep]
 
 
 def _shift_invert(
-    shifted: ShiftedModel, rigid: FloatArray, count: int
+    shifted: ShiftedModel, known: _Known, count: int, start: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
+    """Return so many eigenpairs above the shift, the lowest, and all below it; known ones aside."""
     model, size = shifted.model, shifted.model.size
 
-    def operate(vector: FloatArray) -> FloatArray:
-        return _project(model, rigid, shifted.solve(_strip(vector)))
-
-    def _strip(vector: FloatArray) -> FloatArray:
-        return vector - model.mass_times(rigid @ (rigid.T @ vector))
+    def operate(force: FloatArray) -> FloatArray:
+        return known.out_of(shifted.solve(known.out_of_force(force)))
 
     inverse = LinearOperator((size, size), matvec=operate, dtype=float)
     mass = LinearOperator((size, size), matvec=model.mass_times, dtype=float)
     stiffness = LinearOperator((size, size), matvec=model.stiffness_times, dtype=float)
-    start = operate(model.mass_times(np.random.default_rng(1).standard_normal(size)))
-    below = shifted.eigenvalues_below
+    below = shifted.eigenvalues_below()
     if below is None:
         raise ModelError("negative eigenvalues cannot be counted: the factors were pivoted")
+    rayleigh = np.einsum("ij,ij->j", known.modes, model.stiffness_times(known.modes))
+    below -= int(np.sum(rayleigh < shifted.shift))
+    count = min(count, size - known.modes.shape[1] - 1)
+    first = operate(model.mass_times(start))
     pieces = []
     for which, k in (("LA", count), ("SA", below)):
         if k > 0:
             pieces.append(
                 eigsh(stiffness, k=k, M=mass, sigma=shifted.shift, OPinv=inverse,
-                      which=which, v0=start, tol=0.0)
+                      which=which, v0=first, tol=0.0)
             )  # fmt: skip
     eigenvalues = np.concatenate([values for values, _ in pieces])
     shapes = np.hstack([vectors for _, vectors in pieces])
     order = np.argsort(eigenvalues)
-    shapes = shapes[:, order]
-    return eigenvalues[order], mass_normalised(model, shapes)
+    return eigenvalues[order], mass_normalised(model, shapes[:, order])
 
 
-def _missed(model: Model, eigenvalues: FloatArray, rigid: int, wanted: int) -> int:
-    """Return how many eigenvalues lie below the widest gap near the end of the list, unfound."""
+def _missed(shifted: ShiftedModel, eigenvalues: FloatArray, rigid: int) -> int:
+    """Return how many eigenvalues lie below the widest gap near the end of the list, unfound.
+
+    A list that ends within a repeated eigenvalue is counted up to just below this one.
+    """
+    top = float(eigenvalues[-1])
     last = max(len(eigenvalues) - 3, 0)
     gaps = np.diff(eigenvalues[last:])
-    if len(gaps) == 0:
-        return 0
-    at = last + int(np.argmax(gaps))
-    for share in (0.5, 0.4, 0.6):
-        shift = eigenvalues[at] + share * (eigenvalues[at + 1] - eigenvalues[at])
-        below = ShiftedModel(model, float(shift)).eigenvalues_below
+    shifts = [top - share * _SEPARATE * abs(top) for share in (1.0, 0.5, 2.0)]
+    if gaps.max(initial=0.0) > _SEPARATE * abs(top):
+        lower = eigenvalues[last + int(np.argmax(gaps))]
+        shifts = [float(lower + share * gaps.max()) for share in (0.5, 0.4, 0.6)]
+    for shift in shifts:
+        found = rigid + int(np.sum(eigenvalues < shift))
+        below = shifted.moved(shift).eigenvalues_below(found)
         if below is not None:
-            return below - rigid - (at + 1)
-    raise ModelError(f"eigenvalues below {eigenvalues[at + 1]:.6g} cannot be counted")
+            return below - found
+    raise ModelError(f"eigenvalues below {top:.6g} cannot be counted")
 
 
 def _check(model: Model, eigenvalues: FloatArray, shapes: FloatArray) -> None:
-    force = model.stiffness_times(shapes)
-    inertia = model.mass_times(shapes) * eigenvalues
-    scale = np.linalg.norm(np.abs(model.stiffness) @ np.abs(shapes), axis=0)
-    residual = np.linalg.norm(force - inertia, axis=0) / scale
+    size = abs(model.stiffness)
+    residual = np.empty(len(eigenvalues))
+    for i, (eigenvalue, shape) in enumerate(zip(eigenvalues, shapes.T, strict=True)):
+        force = model.stiffness_times(shape)
+        residual[i] = la.norm(force - eigenvalue * model.mass_times(shape))
+        residual[i] /= la.norm(size @ np.abs(shape))
     if residual.max(initial=0.0) > _MODE_RESIDUAL:
         worst = int(residual.argmax())
         raise ModelError(f"mode {worst + 1} has a residual of {residual[worst]:.2g}")

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from femubench.core.case.case import Case
+from femubench.core.modal.factorisation import solver_name, solver_note
 from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Strategy
 from femubench.core.score.scoring import Reference
@@ -224,11 +225,15 @@ def run_meta(
             "platform": platform.platform(),
             "cpu": cpu_name(),
             "cpu_count": os.cpu_count(),
+            "solver": solver_name(),
             "blas": blas_name(),
         },
         "git_commit": git_commit(),
         "structures": {case.name: case.structure or case.name for case in cases},
-        "notes": [f"{case.name}: {note.rstrip('.')}" for case in cases for note in case.notes],
+        "notes": [
+            *(f"{case.name}: {note.rstrip('.')}" for case in cases for note in case.notes),
+            *solver_note(),
+        ],
         "cases": {case.name: {"title": case.title, "digest": case.digest} for case in cases},
         **about,
         "strategies": [strategy.name for strategy in strategies],

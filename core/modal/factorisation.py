@@ -1,0 +1,175 @@
+"""Symmetric sparse matrices, factorised by SuperLU, or by CHOLMOD where it is there and fast."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from functools import cache
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench.core.modal.superlu_pivots import pivots
+from femubench.core.typing import FloatArray, SparseArray
+
+# From about so many unknowns on, nested dissection earns its own time on structures in space.
+_DISSECTED = 50_000
+_MISSING = "no scikit-sparse"
+
+
+class Factor(Protocol):
+    """A factorised symmetric matrix."""
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return the inverse times one or several right sides, (n,) or (n, m)."""
+        ...
+
+    @property
+    def negative(self) -> int | None:
+        """Return the number of negative pivots; None where rows were exchanged for stability."""
+        ...
+
+
+class Cholesky:
+    """L L' of positive definite matrices of one pattern, by CHOLMOD.
+
+    Arguments:
+        pattern: a symmetric matrix that has an entry wherever any of them has one.
+        spatial: whether the structure fills space, so that nested dissection orders it best.
+
+    Source: Chen, Davis, Hager & Rajamanickam (2008), CHOLMOD.
+    """
+
+    negative = 0
+
+    def __init__(self, pattern: SparseArray, *, spatial: bool = False) -> None:
+        from sksparse.cholmod import analyze
+
+        self.size = pattern.shape[0]
+        order = "metis" if spatial and self.size >= _DISSECTED else "amd"
+        self._factor: Any = analyze(
+            _indexed(pattern), mode="supernodal", ordering_method=order, use_long=False
+        )
+
+    def factorise(self, matrix: SparseArray) -> bool:
+        """Put another matrix into the place of the last; False where it is not definite."""
+        from sksparse.cholmod import CholmodNotPositiveDefiniteError
+
+        try:
+            self._factor.cholesky_inplace(_indexed(matrix))
+        except CholmodNotPositiveDefiniteError:
+            return False
+        return True
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return the inverse times one or several right sides, (n,) or (n, m)."""
+        return np.asarray(self._factor(right))
+
+    def half(self, right: FloatArray) -> FloatArray:
+        """Return L^-1 right with the rows of L in its own order, so that half' half = solve."""
+        permuted = self._factor.apply_P(right)
+        return np.asarray(self._factor.solve_L(permuted, use_LDLt_decomposition=False))
+
+
+class LU:
+    """L U of any symmetric matrix by SuperLU.
+
+    Arguments:
+        matrix: symmetric, sparse, (n, n).
+        pivot: share of the largest entry of its column below which a diagonal entry is no pivot.
+
+    Raises:
+        RuntimeError: when the matrix is singular.
+
+    Source: Li (2005), SuperLU; symmetric mode with minimum degree on the pattern.
+    """
+
+    def __init__(self, matrix: SparseArray, *, pivot: float = 0.0) -> None:
+        from scipy.sparse.linalg import splu
+
+        self._factor = splu(
+            sp.csc_matrix(matrix),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=pivot,
+            options={"SymmetricMode": True},
+        )
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return the inverse times one or several right sides, (n,) or (n, m)."""
+        return np.asarray(self._factor.solve(np.ascontiguousarray(right)))
+
+    @property
+    def negative(self) -> int | None:
+        """Return the number of negative pivots; None where rows were exchanged for stability."""
+        if not np.array_equal(self._factor.perm_r, self._factor.perm_c):
+            return None
+        return int(np.sum(pivots(self._factor) < 0.0))
+
+
+def _indexed(matrix: SparseArray) -> sp.csc_matrix:
+    """Return a matrix as CHOLMOD reads it: columns, sorted, with indices of 32 bits."""
+    found = sp.csc_matrix(matrix)
+    found.sort_indices()
+    found.indices = found.indices.astype(np.int32, copy=False)
+    found.indptr = found.indptr.astype(np.int32, copy=False)
+    return found
+
+
+@cache
+def cholmod_obstacle() -> str | None:
+    """Return why CHOLMOD is not used; None where it is."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            import sksparse.cholmod  # noqa: F401
+    except ImportError:
+        return _MISSING
+    if slow := _reference_blas(_loaded_libraries()):
+        return (
+            f"CHOLMOD is linked to the reference BLAS {slow}, six times slower than OpenBLAS "
+            "(Debian: apt install libopenblas0)"
+        )
+    _as_many_threads()
+    return None
+
+
+def _loaded_libraries() -> list[str]:
+    try:
+        lines = Path("/proc/self/maps").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return []
+    return sorted({line.split(maxsplit=5)[5] for line in lines if line.count("/")})
+
+
+def _reference_blas(libraries: list[str]) -> str | None:
+    """Return the BLAS among loaded libraries that nobody made fast."""
+    tuned = re.compile("openblas|mkl|blis|atlas|armpl|nvpl")
+    for path in libraries:
+        if re.match(r"lib(ref)?blas\.", Path(path).name) and not tuned.search(path):
+            return path
+    return None
+
+
+def _as_many_threads() -> None:
+    """Give the BLAS that came with CHOLMOD no more threads than that of NumPy may use."""
+    from threadpoolctl import threadpool_info, threadpool_limits
+
+    pools = [pool for pool in threadpool_info() if pool["user_api"] == "blas"]
+    if pools:
+        threadpool_limits(min(pool["num_threads"] for pool in pools), "blas")
+
+
+def solver_name() -> str:
+    """Return what factorises large models here, and why it is not CHOLMOD where it is not."""
+    obstacle = cholmod_obstacle()
+    return "CHOLMOD" if obstacle is None else f"SuperLU ({obstacle})"
+
+
+def solver_note() -> tuple[str, ...]:
+    """Return what to tell a user who has installed CHOLMOD in vain."""
+    obstacle = cholmod_obstacle()
+    if obstacle in (None, _MISSING):
+        return ()
+    return (f"models of more than 500 dofs are solved by SuperLU: {obstacle}",)

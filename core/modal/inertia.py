@@ -1,0 +1,113 @@
+"""How many negative eigenvalues a symmetric matrix has, proved by a Cholesky factorisation."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as la
+import scipy.sparse as sp
+
+from femubench.core.fem.model import Model
+from femubench.core.modal.factorisation import Cholesky
+from femubench.core.typing import FloatArray, IntArray, SparseArray
+
+Change = tuple[FloatArray, FloatArray]  # (basis, eigenvalues): basis @ diag(eigenvalues) @ basis'
+_TRIES = 4
+_HELD = 4.0  # stiffness over shift times mass from which on a dof needs no spring of its own
+_MOST_LOOSE = 200
+_AT_ONCE = 4_000_000  # entries of right sides solved at once
+_BLOCK = 32  # columns at once from which more gain nothing
+_CHOICE = 8  # nodes to choose from for every one chosen
+
+
+def negative_by_cholesky(
+    cholesky: Cholesky, matrix: SparseArray, change: Change | None, model: Model, about: int
+) -> int | None:
+    """Return the number of negative eigenvalues of matrix + change; None where pins do not help.
+
+    Springs at some nodes, as stiff as the structure there, make the matrix definite: that its
+    Cholesky factorisation exists proves it, without the growth of an unpivoted L D L'. Taking
+    them out again is a change of low rank, whose inertia is that of a small dense matrix.
+
+    Arguments:
+        cholesky: analysed for the pattern of the matrix; holds the pinned matrix afterwards.
+        matrix: K - shift M, sparse.
+        change: its part of low rank.
+        model: where its nodes are.
+        about: how many negative eigenvalues there should be.
+
+    Source: Haynsworth (1968); pins raise eigenvalues past as many others at most, Weyl (1912).
+    """
+    size = np.abs(model.stiffness.diagonal())
+    heavy = np.maximum(size - matrix.diagonal(), 0.0)  # shift times mass
+    loose = np.flatnonzero((size < _HELD * heavy) & (heavy > 0.0))
+    if len(loose) > _MOST_LOOSE:
+        return None
+    size = size + _HELD * heavy
+    for attempt in range(_TRIES):
+        pins = np.union1d(_pins(model, (2 * about + 4) << attempt), loose)
+        pins = pins[size[pins] > 0.0]
+        spring = np.zeros(model.size)
+        spring[pins] = size[pins]
+        if cholesky.factorise(sp.csc_array(matrix + sp.diags_array(spring))):
+            return _without(cholesky, pins, np.sqrt(size[pins]), change)
+    return None
+
+
+def negative_after(negative: int, values: FloatArray, capacitance: FloatArray) -> int:
+    """Return the number of negative eigenvalues of A + U C U'.
+
+    Arguments:
+        negative: of A.
+        values: the diagonal of C, (p,).
+        capacitance: C^-1 + U' A^-1 U, (p, p).
+
+    Source: Haynsworth (1968).
+    """
+    inner = la.eigvalsh(capacitance)
+    return negative + int(np.sum(values < 0.0)) - int(np.sum(inner < 0.0))
+
+
+def _without(cholesky: Cholesky, pins: IntArray, root: FloatArray, change: Change | None) -> int:
+    """Return the number of negative eigenvalues once the springs are out and the change is in."""
+    count, size = len(pins), cholesky.size
+    basis = sp.csc_array((root, (pins, np.arange(count))), shape=(size, count))
+    values = np.full(count, -1.0)
+    if change is not None:
+        basis = sp.hstack([basis, sp.csc_array(change[0])], format="csc")
+        values = np.concatenate([values, change[1]])
+    width = min(max(_AT_ONCE // size, 4), _BLOCK)
+    blocks = (basis[:, i : i + width].toarray() for i in range(0, len(values), width))
+    # A pin is felt along its path in the elimination tree alone: the rest of a column is zero.
+    half = sp.hstack([sp.csc_array(cholesky.half(block)) for block in blocks], format="csc")
+    gram = (half.T @ half).toarray()
+    return negative_after(0, values, np.diag(1.0 / values) + gram)
+
+
+def _pins(model: Model, count: int) -> IntArray:
+    """Return the translations of so many joints that lie as far from each other as they can.
+
+    A joint, where many elements meet, takes more of the structure along than a node within a
+    member does: the most coupled nodes are chosen from.
+    """
+    translates = np.abs(model.dofs.motions[:, :3]).max(axis=1) > 0.5
+    dofs = np.flatnonzero(translates if translates.any() else ~translates)
+    nodes, first = np.unique(model.dofs.node[dofs], return_index=True)
+    entries = np.diff(sp.csc_array(model.stiffness).indptr)[dofs[first]]
+    count = min(count, len(nodes))
+    at_least = np.sort(entries)[-min(_CHOICE * count, len(nodes))]
+    nodes, first = nodes[entries >= at_least], first[entries >= at_least]
+    chosen = nodes[_scattered(model.dofs.xyz[dofs[first]], count)]
+    return np.asarray(dofs[np.isin(model.dofs.node[dofs], chosen)])
+
+
+def _scattered(xyz: FloatArray, count: int) -> IntArray:
+    """Return points that lie far apart, (count,): each is the farthest from those before it."""
+    if not np.isfinite(xyz).all():
+        return np.linspace(0, len(xyz) - 1, count).astype(np.int64)
+    chosen = [int(np.square(xyz - xyz.mean(axis=0)).sum(axis=1).argmax())]
+    distance = np.full(len(xyz), np.inf)
+    while len(chosen) < count:
+        distance = np.minimum(distance, np.square(xyz - xyz[chosen[-1]]).sum(axis=1))
+        distance[chosen] = -1.0
+        chosen.append(int(distance.argmax()))
+    return np.array(chosen)
