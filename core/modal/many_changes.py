@@ -104,23 +104,32 @@ class ManyChanges:
     known_to: float = KNOWN_TO
 
     def after(
-        self, masses: Sequence[PointMass], springs: Sequence[GroundSpring], count: int
+        self,
+        masses: Sequence[PointMass],
+        springs: Sequence[GroundSpring],
+        count: int,
+        hertz: float = 0.0,
     ) -> Modes:
         """Return the lowest modes of the model with attachments, on the dofs of `Model.attach`.
 
         Arguments:
             masses, springs: of this change.
             count: number of modes, rigid ones included; negative ones come on top.
+            hertz: a frequency that the highest of them exceeds, where the modes at hand tell.
 
         Raises:
             ModelError: when an attachment lies off the structure.
         """
-        return self.proven(masses, springs, count) or solve_modes(
+        return self.proven(masses, springs, count, hertz) or solve_modes(
             self.model.attach(masses, springs), count
         )
 
     def proven(
-        self, masses: Sequence[PointMass], springs: Sequence[GroundSpring], count: int
+        self,
+        masses: Sequence[PointMass],
+        springs: Sequence[GroundSpring],
+        count: int,
+        hertz: float = 0.0,
     ) -> Modes | None:
         """Return the modes as in `after`; None where so few modes and steps do not prove them."""
         attached = self.model.attached(masses, springs)
@@ -134,7 +143,7 @@ class ManyChanges:
         space = None
         for _ in range(_MOST_STEPS):
             space = self._space(place.old, space)
-            found = self._ritz(place, space, free, count)
+            found = self._ritz(place, space, free, count, (2.0 * np.pi * hertz) ** 2)
             if found is not None:
                 return found
         return None
@@ -217,7 +226,9 @@ class ManyChanges:
             [*previous.moments, _symmetric(side[-count:]), corner],
         )
 
-    def _ritz(self, place: _Place, space: _Space, free: _Motions, count: int) -> Modes | None:
+    def _ritz(
+        self, place: _Place, space: _Space, free: _Motions, count: int, above: float
+    ) -> Modes | None:
         """Return the modes in a space of shapes; None where they are not proven."""
         count_evaluation()
         m, new = len(self.modes), place.new
@@ -236,6 +247,7 @@ class ManyChanges:
             _symmetric(stiffness + at.T @ place.stiffness @ at),
         )
         wanted = count + int(np.sum(values < -_NOISE * self._first))
+        wanted = max(wanted, int(np.searchsorted(values, above)) + 1 if above else 0)
         if wanted > len(values) or values[wanted - 1] >= _INSIDE * self.modes.eigenvalues[-1]:
             return None
         if not self._is_proven(place, space, values, wanted):
