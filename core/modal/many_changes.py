@@ -246,7 +246,7 @@ class ManyChanges:
             _symmetric(mass + at.T @ place.mass @ at),
             _symmetric(stiffness + at.T @ place.stiffness @ at),
         )
-        wanted = count + int(np.sum(values < -_NOISE * self._first))
+        wanted = count + int(np.sum(values < -_ZERO * self._first))
         wanted = max(wanted, int(np.searchsorted(values, above)) + 1 if above else 0)
         if wanted > len(values) or values[wanted - 1] >= _INSIDE * self.modes.eigenvalues[-1]:
             return None
