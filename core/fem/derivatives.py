@@ -197,6 +197,38 @@ class Derivatives:
             stiffness += self.springs @ (slip * (self.spring_rows @ right))
         return stiffness.T, mass.T
 
+    def inner(self, left: FloatArray, right: FloatArray) -> FloatArray:
+        """Return left' dK/dp right of every parameter, (n_parameters, m_left, m_right)."""
+        u = (self.gather @ left).reshape(-1, 12, left.shape[1])
+        v = (self.gather @ right).reshape(-1, 12, right.shape[1])
+        found = np.zeros((self.count, left.shape[1], right.shape[1]))
+        for part in self.parts:
+            if part.stiffness is not None:
+                force = part.stiffness @ v
+                for i in range(left.shape[1]):  # all at once are as many as elements times m^2
+                    found[:, i] += part.incidence @ np.einsum("ei,eim->em", u[:, :, i], force)
+        if self.spring_rows.shape[0]:
+            slips = (self.spring_rows @ left)[:, :, None] * (self.spring_rows @ right)[:, None]
+            found += (self.springs @ slips.reshape(len(slips), -1)).reshape(found.shape)
+        return found
+
+    def combined(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return the sum of weights[p] dK/dp @ vector, (n, k).
+
+        Arguments:
+            vector: on the free dofs, (n,).
+            weights: (n_parameters, k).
+        """
+        local = (self.gather @ vector).reshape(-1, 12, 1)
+        result = self.spring_rows.T @ (
+            (self.spring_rows @ vector)[:, None] * (self.springs.T @ weights)
+        )
+        for part in self.parts:
+            if part.stiffness is not None:
+                force = (part.stiffness @ local) * (part.incidence.T @ weights)[:, None]
+                result = result + self.gather.T @ force.reshape(-1, weights.shape[1])
+        return np.asarray(result)
+
     def products(self, vector: FloatArray, eigenvalue: float) -> FloatArray:
         """Return (dK/dp - eigenvalue dM/dp) @ vector for every parameter, (n, n_parameters)."""
         local = (self.gather @ vector).reshape(-1, 12, 1)

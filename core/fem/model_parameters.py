@@ -26,6 +26,14 @@ class MatrixSlopes(Protocol):
         """Return left_j' dK/dp right_j and the same for dM, two arrays (m, n_parameters)."""
         ...
 
+    def inner(self, left: FloatArray, right: FloatArray) -> FloatArray:
+        """Return left' dK/dp right of every parameter, (n_parameters, m_left, m_right)."""
+        ...
+
+    def combined(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return the sum of weights[p] dK/dp @ vector, (n, k), of weights (n_parameters, k)."""
+        ...
+
     def products(self, vector: FloatArray, eigenvalue: float) -> FloatArray:
         """Return (dK/dp - eigenvalue dM/dp) @ vector for every parameter, (n, n_parameters)."""
         ...
