@@ -7,7 +7,7 @@ from femubench.core.modal.expansion import expand_by_dynamics, expand_by_rotatio
 from femubench.core.modal.frf import FrequencyResponses, receptance
 from femubench.core.modal.generalised_mass import mass_normalised
 from femubench.core.modal.group_prior import group_prior_std, support_groups
-from femubench.core.modal.many_changes import ManyChanges, many_changes, modes_of_changes
+from femubench.core.modal.many_changes import modes_of_changes
 from femubench.core.modal.pairing import Pairing, pair_measured, pair_modes
 from femubench.core.modal.rigid import rigid_body_vectors, rigid_modes_of
 from femubench.core.modal.sensitivity import (
@@ -19,7 +19,6 @@ from femubench.core.modal.signals import TimeSignals
 
 __all__ = [
     "FrequencyResponses",
-    "ManyChanges",
     "Pairing",
     "TimeSignals",
     "auto_mac",
@@ -30,7 +29,6 @@ __all__ = [
     "frequency_sensitivities",
     "group_prior_std",
     "mac",
-    "many_changes",
     "mass_normalised",
     "modal_scale_factor",
     "modes_of_changes",
