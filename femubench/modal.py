@@ -7,6 +7,7 @@ from femubench.core.modal.expansion import expand_by_dynamics, expand_by_rotatio
 from femubench.core.modal.frf import FrequencyResponses, receptance
 from femubench.core.modal.generalised_mass import mass_normalised
 from femubench.core.modal.group_prior import group_prior_std, support_groups
+from femubench.core.modal.many_changes import modes_of_changes
 from femubench.core.modal.pairing import Pairing, pair_measured, pair_modes
 from femubench.core.modal.rigid import rigid_body_vectors, rigid_modes_of
 from femubench.core.modal.sensitivity import (
@@ -30,6 +31,7 @@ __all__ = [
     "mac",
     "mass_normalised",
     "modal_scale_factor",
+    "modes_of_changes",
     "pair_measured",
     "pair_modes",
     "real_modes",

@@ -32,7 +32,11 @@ from femubench.core.update.factor_strategy import FactorStrategy
 from femubench.core.update.l_curve import l_curve_corner, tikhonov
 from femubench.core.update.lasso import lasso
 from femubench.core.update.lean_import import importing_without
-from femubench.core.update.low_rank import total_change, with_measured_frequencies
+from femubench.core.update.low_rank import (
+    total_change,
+    with_measured_frequencies,
+    with_stiffness_step,
+)
 from femubench.core.update.modal_space import (
     ModalFit,
     ModalSpace,
@@ -122,5 +126,6 @@ __all__ = [
     "update_entries",
     "with_joint_springs",
     "with_measured_frequencies",
+    "with_stiffness_step",
     "with_rigid_ends",
 ]

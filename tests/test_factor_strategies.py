@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from scipy.stats import qmc
 
 import femubench
@@ -267,11 +268,18 @@ def test_parts_make_the_stiffness_and_sets_name_what_the_frame_has() -> None:
     frame = frame_of_five()
     model = Model.of(frame)
     parts = stiffness_parts(model, "members")
-    whole = sum(part.toarray() for part in parts.matrices)
+    every = np.eye(model.size)
+    matrices = parts.energies(every, every)
+    np.testing.assert_allclose(
+        parts.slopes.combined(every[:, 3], np.diag([1.0, 2.0, 3.0, 4.0, 5.0])),
+        np.array([(p + 1.0) * part[:, 3] for p, part in enumerate(matrices)]).T,
+        atol=1e-12 * np.abs(matrices).max(),
+    )
+    whole = matrices.sum(axis=0)
     stiffness = model.stiffness.toarray()
     assert np.abs(whole - stiffness).max() < 1e-9 * np.abs(stiffness).max()
     factors = np.array([0.5, 1.0, 2.0, 1.5, 0.8])
-    summed = sum(f * part.toarray() for f, part in zip(factors, parts.matrices, strict=True))
+    summed = np.tensordot(factors, matrices, axes=1)
     assert np.abs(parts.at(factors).stiffness - summed).max() < 1e-9 * np.abs(stiffness).max()
     assert len(stiffness_parts(model, "elements")) == 10
     ring = MemberSet("ring", ("m-AB", "m-BC", "m-CD", "m-DA"))
@@ -289,7 +297,8 @@ def test_parts_make_the_stiffness_and_sets_name_what_the_frame_has() -> None:
 def test_groups_of_matrices_have_factors_too() -> None:
     model, measurement = planted(frame_of_five(), "m-CD", 6)
     parts = stiffness_parts(model, "members")
-    groups = {"mast": parts.matrices[4], "back": parts.matrices[2]}
+    energies = parts.energies(np.eye(model.size), np.eye(model.size))
+    groups = {"mast": sp.csc_array(energies[4]), "back": sp.csc_array(energies[2])}
     matrices = replace(model, structure=None, groups=groups)
     wanted = {"stiffness group:mast": 1.0, "stiffness group:back": FACTOR}
     for strategy in (Eigensensitivity(), Eigensensitivity(parameters="groups"), Sparse()):

@@ -68,7 +68,9 @@ def grouped(frame: Frame) -> Model:
     model = Model.of(frame)
     structure = model.frame_structure
     names = [found.name for found in frame.sets]
-    parts = dict(zip(names, stiffness_parts(model, "sets").matrices, strict=True))
+    factors = stiffness_parts(model, "sets").parameters
+    twice = [structure.with_values([factor], [2.0]).matrices()[1] for factor in factors]
+    parts = {n: m - structure.matrices()[1] for n, m in zip(names, twice, strict=True)}
     for name, springs in (("foot", frame.springs[:2]), ("head", frame.springs[2:])):
         parts[name] = structure.attached((), springs)[1]
     used, node = np.unique(model.dofs.node, return_inverse=True)

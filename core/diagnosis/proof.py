@@ -25,7 +25,7 @@ from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import Gain
 from femubench.core.schema.results import Block
-from femubench.core.score.scoring import frequency_error, modified_modes
+from femubench.core.score.scoring import frequency_error, many_modifications, modified_modes
 from femubench.core.typing import BoolArray, FloatArray
 
 # Below this many deviations unseen data cannot tell one model from another.
@@ -213,13 +213,18 @@ def modified(
         scatter: relative standard deviation of a frequency by ordinary tolerances.
         neighbours: the model with the causes off by one deviation in independent directions.
     """
+    models = (case.model, extended, *neighbours)
+    for model in models:
+        many = many_modifications(model, case.modifications)
+        for change in case.modifications:
+            modified_modes(model, change, many=many)
     before, after, std = [], [], []
     for change in case.modifications:
         m = change.measurement
         predicted = np.array(
             [
                 [mode.predicted_hz or np.nan for mode in modified_modes(model, change)]
-                for model in (case.model, extended, *neighbours)
+                for model in models
             ]
         )
         pairs = zip((case.model, extended), predicted, strict=False)

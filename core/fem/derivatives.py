@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -17,38 +17,97 @@ from femubench.core.typing import FloatArray, IntArray, SparseArray
 # Young's modulus is in GA too, which the elements know by its inverse.
 _DIVIDED = {"E": ("flex_y", "flex_z")}
 _STEP = 1e-30
+_SPRING, _RIGID, _KEPT = "spring", "rigid", "touched"
+_MASS = ("rhoA", "rhoJp", "density", "rotary")
+_BOTH = ("EI", "shear")  # the shape of a shear-flexible element, and with it its mass
 
 
-def _targets(structure: MeshedFrame, parameter: Parameter) -> list[tuple[str, IntArray]]:
-    """Return (property, element indices) pairs; springs come under the property ``spring``."""
-    if parameter.quantity == "spring":
-        return [("spring", _lookup(structure.spring_index, parameter))]
-    if parameter.quantity == "rigid":
-        ends = structure.element_ends
-        found = [ends.get(place) for place in parameter.places]
-        if None in found:
-            raise ModelError(f"{parameter.name}: no member end {parameter.places}")
-        pairs = [pair for pair in found if pair is not None]
-        return [
-            (f"rigid_{end + 1}", np.array([e for e, k in pairs if k == end], dtype=np.int64))
-            for end in (0, 1)
-            if any(k == end for _, k in pairs)
-        ]
-    index = _lookup(structure.label_index, parameter)
-    return [(name, index) for name in QUANTITIES[parameter.quantity]]
+@dataclass(frozen=True)
+class Touched:
+    """Which elements, springs or ends the parameters of one kind touch, in their order.
+
+    Arguments:
+        kind: a quantity that is a factor, ``spring``, or the property of a rigid end.
+        rows: elements or springs, (n_pairs,).
+        columns: the parameter of every row, (n_pairs,).
+    """
+
+    kind: str
+    rows: IntArray
+    columns: IntArray
+
+    def incidence(self, rows: int, parameters: int) -> SparseArray:
+        """Return 1 where a parameter touches a row, sparse (n_parameters, rows)."""
+        ones = np.ones(len(self.rows))
+        return sp.csr_array((ones, (self.columns, self.rows)), shape=(parameters, rows))
+
+    @property
+    def is_factor(self) -> bool:
+        """Tell whether the parameters multiply what is there."""
+        return self.kind in QUANTITIES and self.kind != _SPRING
+
+    @property
+    def slopes(self) -> tuple[tuple[str, float], ...]:
+        """Return the properties that grow with a factor, and with which power of it."""
+        divided = _DIVIDED.get(self.kind, ())
+        names = QUANTITIES.get(self.kind, ())
+        return tuple((name, -1.0 if name in divided else 1.0) for name in names)
 
 
-def _exponent(parameter: Parameter, name: str) -> float:
-    """Return the power of a factor with which a property grows."""
-    return -1.0 if name in _DIVIDED.get(parameter.quantity, ()) else 1.0
+def touched(structure: MeshedFrame, parameters: Sequence[Parameter]) -> tuple[Touched, ...]:
+    """Return what parameters touch, kind by kind; those of the last call are kept.
+
+    Raises:
+        ModelError: when there is no such place.
+    """
+    wanted = tuple(parameters)
+    kept = structure.kept.get(_KEPT)
+    if kept is None or kept[0] != wanted:
+        kept = structure.kept[_KEPT] = (wanted, _resolved(structure, wanted))
+    found: tuple[Touched, ...] = kept[1]
+    return found
 
 
-def _lookup(positions: Mapping[str, IntArray], parameter: Parameter) -> IntArray:
-    missing = [place for place in parameter.places if place not in positions]
-    if missing:
-        raise ModelError(f"{parameter.name}: there is no place {missing[0]!r}")
-    found = [positions[place] for place in dict.fromkeys(parameter.places)]
-    return np.concatenate(found) if found else np.zeros(0, dtype=np.int64)
+def _resolved(structure: MeshedFrame, parameters: Sequence[Parameter]) -> tuple[Touched, ...]:
+    kinds: dict[str, list[int]] = {}
+    for p, parameter in enumerate(parameters):
+        kinds.setdefault(parameter.quantity, []).append(p)
+    found = []
+    for kind, numbers in kinds.items():
+        if kind == _RIGID:
+            found += _rigid_ends(structure, parameters, numbers)
+            continue
+        positions = structure.spring_index if kind == _SPRING else structure.label_index
+        pairs = [(p, place) for p in numbers for place in _places(parameters[p])]
+        try:
+            rows = [positions[place] for _, place in pairs]
+        except KeyError:
+            p, place = next(pair for pair in pairs if pair[1] not in positions)
+            raise ModelError(f"{parameters[p].name}: there is no place {place!r}") from None
+        columns = np.repeat([p for p, _ in pairs], [len(index) for index in rows])
+        every = np.concatenate(rows) if rows else np.zeros(0, dtype=np.int64)
+        found.append(Touched(kind, every, columns.astype(np.int64)))
+    return tuple(found)
+
+
+def _places(parameter: Parameter) -> Iterable[str]:
+    places = parameter.places
+    return places if len(places) < 2 else dict.fromkeys(places)
+
+
+def _rigid_ends(
+    structure: MeshedFrame, parameters: Sequence[Parameter], numbers: Sequence[int]
+) -> list[Touched]:
+    ends = structure.element_ends
+    found: tuple[list[tuple[int, int]], list[tuple[int, int]]] = ([], [])
+    for p in numbers:
+        for place in _places(parameters[p]):
+            if place not in ends:
+                raise ModelError(f"{parameters[p].name}: no member end {place!r}")
+            element, end = ends[place]
+            found[end].append((element, p))
+    tables = [np.array(pairs, dtype=np.int64).reshape(-1, 2) for pairs in found]
+    return [Touched(f"{_RIGID}_{k + 1}", *table.T) for k, table in enumerate(tables) if len(table)]
 
 
 def present_value(structure: MeshedFrame, parameter: Parameter) -> float:
@@ -56,8 +115,10 @@ def present_value(structure: MeshedFrame, parameter: Parameter) -> float:
     if parameter.is_factor:
         return 1.0
     values = [
-        structure.springs[index] if name == "spring" else getattr(structure.properties, name)[index]
-        for name, index in _targets(structure, parameter)
+        structure.springs[part.rows]
+        if part.kind == _SPRING
+        else getattr(structure.properties, part.kind)[part.rows]
+        for part in touched(structure, [parameter])
     ]
     return float(np.concatenate(values).mean())
 
@@ -66,17 +127,34 @@ def apply_values(
     structure: MeshedFrame, parameters: Sequence[Parameter], values: Sequence[float] | FloatArray
 ) -> tuple[BeamProperties, FloatArray]:
     """Return element properties and joint springs with the parameters set to the values."""
+    given = np.asarray(values, dtype=float)
+    if len(given) != len(parameters):
+        raise ValueError(f"{len(parameters)} parameters have {len(given)} values")
     arrays = {f.name: getattr(structure.properties, f.name).copy() for f in fields(BeamProperties)}
-    springs = structure.springs.copy()
-    for parameter, value in zip(parameters, values, strict=True):
-        for name, index in _targets(structure, parameter):
-            if name == "spring":
-                springs[index] = value
-            elif parameter.is_factor:
-                arrays[name][index] *= value ** _exponent(parameter, name)
-            else:
-                arrays[name][index] = value
+    arrays[_SPRING] = structure.springs.copy()
+    for part in touched(structure, parameters):
+        value = given[part.columns]
+        if not part.is_factor:
+            arrays[part.kind][part.rows] = value
+        for name, exponent in part.slopes:
+            np.multiply.at(arrays[name], part.rows, value**exponent)
+    springs = arrays.pop(_SPRING)
     return BeamProperties(**arrays), springs
+
+
+@dataclass(frozen=True)
+class ElementSlopes:
+    """How the element matrices move with the parameters of one kind.
+
+    Arguments:
+        incidence: 1 where a parameter touches an element, sparse (n_parameters, n_elements).
+        stiffness, mass: of every element by a parameter that touches it, (n_elements, 12, 12);
+            None where there is none.
+    """
+
+    incidence: SparseArray
+    stiffness: FloatArray | None
+    mass: FloatArray | None
 
 
 @dataclass(frozen=True)
@@ -84,21 +162,21 @@ class Derivatives:
     """dK/dp and dM/dp of several parameters, element by element, never as global matrices.
 
     Arguments:
-        stiffness, mass: from a property to the element derivatives, (n_elements, 12, 12).
-        weights: from a property to (n_elements, n_parameters), sparse: d property / d parameter.
+        parts: one a kind of parameter.
         gather: local displacements from free dofs, (12 n_elements, n).
         spring_rows: relative displacements of the joint springs, (n_springs, n).
-        spring_weights: d stiffness / d parameter, (n_springs, n_parameters).
-        count: number of parameters.
+        springs: 1 where a parameter is a spring's stiffness, sparse (n_parameters, n_springs).
     """
 
-    stiffness: dict[str, FloatArray]
-    mass: dict[str, FloatArray]
-    weights: dict[str, SparseArray]
+    parts: tuple[ElementSlopes, ...]
     gather: SparseArray
     spring_rows: SparseArray
-    spring_weights: SparseArray
-    count: int
+    springs: SparseArray
+
+    @property
+    def count(self) -> int:
+        """Return the number of parameters."""
+        return int(self.springs.shape[0])
 
     def quadratic(self, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return left_j' dK/dp right_j and the same for dM, two arrays (m, n_parameters).
@@ -108,43 +186,91 @@ class Derivatives:
         """
         m = left.shape[1]
         u = (self.gather @ left).reshape(-1, 12, m)
-        v = (self.gather @ right).reshape(-1, 12, m)
-        stiffness, mass = np.zeros((m, self.count)), np.zeros((m, self.count))
-        for name, weight in self.weights.items():
-            for batch, total in ((self.stiffness, stiffness), (self.mass, mass)):
-                if name in batch:
-                    energy = np.einsum("eim,eim->me", u, batch[name] @ v)
-                    total += (weight.T @ energy.T).T
-        slip = (self.spring_rows @ left) * (self.spring_rows @ right)
-        return stiffness + (self.spring_weights.T @ slip).T, mass
+        v = u if right is left else (self.gather @ right).reshape(-1, 12, m)
+        stiffness, mass = np.zeros((self.count, m)), np.zeros((self.count, m))
+        for part in self.parts:
+            for batch, total in ((part.stiffness, stiffness), (part.mass, mass)):
+                if batch is not None:
+                    total += part.incidence @ np.einsum("eim,eim->em", u, batch @ v)
+        if self.spring_rows.shape[0]:
+            slip = self.spring_rows @ left
+            stiffness += self.springs @ (slip * (self.spring_rows @ right))
+        return stiffness.T, mass.T
+
+    def inner(self, left: FloatArray, right: FloatArray) -> FloatArray:
+        """Return left' dK/dp right of every parameter, (n_parameters, m_left, m_right)."""
+        u = (self.gather @ left).reshape(-1, 12, left.shape[1])
+        v = (self.gather @ right).reshape(-1, 12, right.shape[1])
+        found = np.zeros((self.count, left.shape[1], right.shape[1]))
+        for part in self.parts:
+            if part.stiffness is not None:
+                force = part.stiffness @ v
+                for i in range(left.shape[1]):  # all at once are as many as elements times m^2
+                    found[:, i] += part.incidence @ np.einsum("ei,eim->em", u[:, :, i], force)
+        if self.spring_rows.shape[0]:
+            slips = (self.spring_rows @ left)[:, :, None] * (self.spring_rows @ right)[:, None]
+            found += (self.springs @ slips.reshape(len(slips), -1)).reshape(found.shape)
+        return found
+
+    def combined(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return the sum of weights[p] dK/dp @ vector, (n, k).
+
+        Arguments:
+            vector: on the free dofs, (n,).
+            weights: (n_parameters, k).
+        """
+        local = (self.gather @ vector).reshape(-1, 12, 1)
+        result = self.spring_rows.T @ (
+            (self.spring_rows @ vector)[:, None] * (self.springs.T @ weights)
+        )
+        for part in self.parts:
+            if part.stiffness is not None:
+                force = (part.stiffness @ local) * (part.incidence.T @ weights)[:, None]
+                result = result + self.gather.T @ force.reshape(-1, weights.shape[1])
+        return np.asarray(result)
 
     def products(self, vector: FloatArray, eigenvalue: float) -> FloatArray:
         """Return (dK/dp - eigenvalue dM/dp) @ vector for every parameter, (n, n_parameters)."""
         local = (self.gather @ vector).reshape(-1, 12, 1)
         result = np.zeros((len(vector), self.count))
-        for name, weight in self.weights.items():
+        for part in self.parts:
             force = np.zeros(local.shape)
-            if name in self.stiffness:
-                force += self.stiffness[name] @ local
-            if name in self.mass:
-                force -= eigenvalue * (self.mass[name] @ local)
-            spread = sp.csr_array(sp.kron(weight, np.ones((12, 1)))).multiply(force.reshape(-1, 1))
-            result += (self.gather.T @ sp.csr_array(spread)).toarray()
-        slip = (self.spring_rows @ vector)[:, None]
-        tension = sp.csr_array(self.spring_weights.multiply(slip))
-        result += (self.spring_rows.T @ tension).toarray()
+            if part.stiffness is not None:
+                force += part.stiffness @ local
+            if part.mass is not None:
+                force -= eigenvalue * (part.mass @ local)
+            pairs = sp.coo_array(part.incidence)
+            rows = (12 * pairs.col[:, None] + np.arange(12)).ravel()
+            spread = sp.csr_array(
+                (force[pairs.col].ravel(), (rows, np.repeat(pairs.row, 12))),
+                shape=(self.gather.shape[0], self.count),
+            )
+            result += (self.gather.T @ spread).toarray()
+        if self.spring_rows.shape[0]:
+            tension = self.springs.multiply(self.spring_rows @ vector)
+            result += (self.spring_rows.T @ sp.csr_array(tension).T).toarray()
         return result
 
 
-def _element_derivatives(
-    properties: BeamProperties, name: str
+def _slopes(
+    properties: BeamProperties, part: Touched
 ) -> tuple[FloatArray | None, FloatArray | None]:
-    """Return dk/d property and dm/d property by the complex step (Squire & Trapp 1998)."""
-    value = getattr(properties, name)
-    step = _STEP * max(float(np.abs(value).max(initial=0.0)), 1e-30)
-    stepped = replace(properties, **{name: value + 1j * step})
-    k, m = (f(stepped).imag / step for f in (stiffness_matrices, mass_matrices))
-    return (k if k.any() else None), (m if m.any() else None)
+    """Return dk/dp and dm/dp by the complex step (Squire & Trapp 1998).
+
+    A factor on E leaves the shape of every element, and so its mass, as it is.
+    """
+    if part.is_factor:
+        values = {
+            name: getattr(properties, name) * (1.0 + 1j * exponent * _STEP)
+            for name, exponent in part.slopes
+        }
+    else:
+        values = {part.kind: getattr(properties, part.kind) + 1j * _STEP}
+    stepped = replace(properties, **values)
+    shear = part.kind in _BOTH and properties.shear_shape.any()
+    k = None if part.kind in _MASS else stiffness_matrices(stepped).imag / _STEP
+    m = mass_matrices(stepped).imag / _STEP if part.kind in _MASS or shear else None
+    return k, m
 
 
 def derivatives(structure: MeshedFrame, parameters: Sequence[Parameter]) -> Derivatives:
@@ -152,41 +278,28 @@ def derivatives(structure: MeshedFrame, parameters: Sequence[Parameter]) -> Deri
 
     Factors are differentiated with respect to the factor at its present value 1, rigid lengths and
     springs with respect to their value.
+
+    Raises:
+        ModelError: when there is no such place.
     """
-    entries: dict[str, list[tuple[IntArray, FloatArray, int]]] = {}
-    for p, parameter in enumerate(parameters):
-        for name, index in _targets(structure, parameter):
-            slope = np.ones(len(index))
-            if parameter.is_factor:
-                present = getattr(structure.properties, name)[index]
-                slope = _exponent(parameter, name) * present
-            if slope.any():
-                entries.setdefault(name, []).append((index, slope, p))
     count, size = len(parameters), len(structure.properties)
+    springs = sp.csr_array((count, len(structure.springs)))
+    parts = []
+    for part in touched(structure, parameters):
+        if part.kind == _SPRING:
+            springs = part.incidence(len(structure.springs), count)
+        else:
+            slopes = _slopes(structure.properties, part)
+            parts.append(ElementSlopes(part.incidence(size, count), *slopes))
+    return Derivatives(tuple(parts), structure.gather, structure.spring_rows, springs)
 
-    def weights(name: str, rows: int) -> SparseArray:
-        listed = entries.get(name, [])
-        if not listed:
-            return sp.csr_array((rows, count))
-        index = np.concatenate([i for i, _, _ in listed])
-        data = np.concatenate([d for _, d, _ in listed])
-        column = np.concatenate([np.full(len(i), p) for i, _, p in listed])
-        return sp.csr_array((data, (index, column)), shape=(rows, count))
 
-    names = [name for name in entries if name != "spring"]
-    stiffness, mass = {}, {}
-    for name in names:
-        k, m = _element_derivatives(structure.properties, name)
-        if k is not None:
-            stiffness[name] = k
-        if m is not None:
-            mass[name] = m
-    return Derivatives(
-        stiffness,
-        mass,
-        {name: weights(name, size) for name in names},
-        structure.gather,
-        structure.spring_rows,
-        weights("spring", len(structure.springs)),
-        count,
-    )
+def element_masses(structure: MeshedFrame, parameters: Sequence[Parameter]) -> FloatArray:
+    """Return d mass / d factor about the present value in kg, (n_parameters,)."""
+    p = structure.properties
+    mass = p.rhoA * (p.length - p.rigid_mass_1 - p.rigid_mass_2)
+    result = np.zeros(len(parameters))
+    for part in touched(structure, parameters):
+        if part.kind in ("rhoA", "density"):
+            result += part.incidence(len(p), len(parameters)) @ mass
+    return result

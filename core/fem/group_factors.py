@@ -128,6 +128,18 @@ class GroupDerivatives:
             found[matrix][:, p] = np.einsum("nm,nm->m", left, part @ right)
         return found["stiffness"], found["mass"]
 
+    def inner(self, left: FloatArray, right: FloatArray) -> FloatArray:
+        """Return left' dK/dp right of every parameter, (n_parameters, m_left, m_right)."""
+        found = np.zeros((self.count, left.shape[1], right.shape[1]))
+        for p, (matrix, part) in enumerate(self.parts):
+            if matrix == "stiffness":
+                found[p] = left.T @ (part @ right)
+        return found
+
+    def combined(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return the sum of weights[p] dK/dp @ vector, (n, k), of weights (n_parameters, k)."""
+        return self.products(vector, 0.0) @ weights
+
     def products(self, vector: FloatArray, eigenvalue: float) -> FloatArray:
         """Return (dK/dp - eigenvalue dM/dp) @ vector for every parameter, (n, n_parameters)."""
         result = np.zeros((self.size, self.count))

@@ -26,7 +26,7 @@ ON_MEMBER = 1e-6  # m, how far from the axis a sensor may lie
 SAME_STATION = 1e-9
 # An attachment nearer than this share of an element to a node splits nothing: the piece would be so
 # stiff that its rounding errors outweigh what the finer mesh gains (both 1e-7 of a frequency here).
-_SHORTEST_PIECE = 2e-3
+SHORTEST_PIECE = 2e-3
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ class _Builder:
         grid = _stations([low, *regular, high], self.held.get(member.name, []), ON_MEMBER / length)
         stiff = [self.rigid_length(member, end) / length for end in (0, 1)]
         splits = [s for s in self.splits.get(member.name, []) if stiff[0] < s < 1.0 - stiff[1]]
-        inner = _stations(grid, splits, _SHORTEST_PIECE / member.elements)[1:-1]
+        inner = _stations(grid, splits, SHORTEST_PIECE / member.elements)[1:-1]
         start = self.xyz[self.joint_index[member.ends[0]]]
         nodes = [first, *(self.node(start + axes[0] * length * s) for s in inner), last]
         bounds = np.concatenate([[low], inner, [high]])

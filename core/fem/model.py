@@ -12,6 +12,8 @@ import scipy.sparse as sp
 
 from femubench.core.display import Shown, counted
 from femubench.core.errors import ModelError, NotApplicable
+from femubench.core.fem.assembly import prune
+from femubench.core.fem.attaching import MatrixChange, attach, grown
 from femubench.core.fem.frame import Frame, GroundSpring, PointMass
 from femubench.core.fem.sensors import DIRECTIONS, Sensors
 from femubench.core.fem.structure import Structure
@@ -121,10 +123,9 @@ class Model(Shown):
         """
         structure = Structure.build(source) if isinstance(source, Frame) else source
         mass, stiffness = structure.matrices()
-        kinematics = structure.kinematics
-        xyz = structure.mesh.xyz[kinematics.node]
-        dofs = Dofs(kinematics.node, kinematics.direction, xyz, kinematics.axes)
-        return cls(mass, stiffness, dofs, structure, structure, free=structure.frame.free)
+        return cls(
+            mass, stiffness, _dofs(structure), structure, structure, free=structure.frame.free
+        )
 
     def rows(self) -> list[tuple[str, str]]:
         """Return what it is a model of, its mass and what of it is not in the matrices."""
@@ -192,19 +193,54 @@ class Model(Shown):
     def attach(self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]) -> Model:
         """Return the model with further masses and springs to ground.
 
-        A frame is meshed anew, so that an attachment between nodes splits its element; what an
-        update changed in the matrices is carried over to the dofs that were there before.
+        An attachment between nodes splits its element, whose new dofs come last; what an update
+        changed in the matrices is carried over to the dofs that were there before.
 
         Raises:
             ModelError: when an attachment lies off the structure.
         """
-        if self.structure is None:
-            mass, stiffness = self.geometry.attached(masses, springs)
-            return replace(self, mass=self.mass + mass, stiffness=self.stiffness + stiffness)
-        frame = self.structure.frame.with_attachments(tuple(masses), tuple(springs))
-        new = Model.of(self.structure.rebuilt(frame))
-        old_mass, old_stiffness = self.structure.matrices()
-        keep = common_dofs(self.structure, new.frame_structure)
+        found = self.attached(masses, springs)
+        if found is None:
+            return self._meshed_anew(masses, springs)
+        structure, change = found
+        size = change.mass.shape[0]
+        mass, stiffness = grown(self.mass, size), grown(self.stiffness, size)
+        if structure is None or size == self.size:
+            moved = {"mass": mass + change.mass, "stiffness": stiffness + change.stiffness}
+        else:
+            moved = {"mass": prune(mass + change.mass)}
+            moved["stiffness"] = prune(stiffness + change.stiffness)
+        if structure is None:
+            return replace(self, **moved)
+        return replace(
+            self,
+            **moved,
+            dofs=_dofs(structure),
+            geometry=structure,
+            structure=structure,
+            mass_change=_spread_low_rank(self.mass_change, np.arange(self.size), size),
+            stiffness_change=_spread_low_rank(self.stiffness_change, np.arange(self.size), size),
+        )
+
+    def attached(
+        self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]
+    ) -> tuple[Structure | None, MatrixChange] | None:
+        """Return the structure with attachments and what they add; None where no change is local.
+
+        Raises:
+            ModelError: when an attachment lies off the structure.
+        """
+        if self.structure is not None:
+            return attach(self.structure, masses, springs)
+        mass, stiffness = self.geometry.attached(masses, springs)
+        return None, MatrixChange(mass, stiffness, stiffness)
+
+    def _meshed_anew(self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]) -> Model:
+        structure = self.frame_structure
+        frame = structure.frame.with_attachments(tuple(masses), tuple(springs))
+        new = Model.of(structure.rebuilt(frame))
+        old_mass, old_stiffness = structure.matrices()
+        keep = common_dofs(structure, new.frame_structure)
         return replace(
             new,
             mass=new.mass + _spread(self.mass - old_mass, keep, new.size),
@@ -212,6 +248,12 @@ class Model(Shown):
             mass_change=_spread_low_rank(self.mass_change, keep, new.size),
             stiffness_change=_spread_low_rank(self.stiffness_change, keep, new.size),
         )
+
+
+def _dofs(structure: Structure) -> Dofs:
+    kinematics = structure.kinematics
+    xyz = structure.mesh.xyz[kinematics.node]
+    return Dofs(kinematics.node, kinematics.direction, xyz, kinematics.axes)
 
 
 def differ(first: Model, second: Model) -> bool:

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from femubench.core.fem.derivatives import derivatives
+from femubench.core.fem.derivatives import derivatives, element_masses
 from femubench.core.fem.group_factors import group_derivatives, with_group_factors
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Parameter
@@ -24,6 +24,14 @@ class MatrixSlopes(Protocol):
 
     def quadratic(self, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return left_j' dK/dp right_j and the same for dM, two arrays (m, n_parameters)."""
+        ...
+
+    def inner(self, left: FloatArray, right: FloatArray) -> FloatArray:
+        """Return left' dK/dp right of every parameter, (n_parameters, m_left, m_right)."""
+        ...
+
+    def combined(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return the sum of weights[p] dK/dp @ vector, (n, k), of weights (n_parameters, k)."""
         ...
 
     def products(self, vector: FloatArray, eigenvalue: float) -> FloatArray:
@@ -68,17 +76,7 @@ def updated_mass(model: Model) -> float:
 def mass_slopes(model: Model, parameters: Sequence[Parameter]) -> FloatArray:
     """Return d total mass / d factor about the present value in kg, (n_parameters,)."""
     if model.structure is not None:
-        return np.array([_element_masses(model, parameter) for parameter in parameters])
+        return element_masses(model.structure, parameters)
     shift = model.dofs.motions[:, :3]
     heaviest = int(np.einsum("nd,nd->d", shift, model.mass_times(shift)).argmax())
     return group_derivatives(model, parameters).masses(shift[:, heaviest])
-
-
-def _element_masses(model: Model, parameter: Parameter) -> float:
-    structure = model.frame_structure
-    if parameter.quantity not in ("rhoA", "density"):
-        return 0.0
-    p = structure.properties
-    mass = p.rhoA * (p.length - p.rigid_mass_1 - p.rigid_mass_2)
-    elements = [structure.label_index[place] for place in dict.fromkeys(parameter.places)]
-    return float(mass[np.concatenate(elements)].sum())

@@ -22,6 +22,7 @@ DENSE_LIMIT = 500
 _RIGID_SHARE = 0.9
 _ROUNDOFF = 32.0 * np.finfo(float).eps
 _ZERO = 1e-6  # of the first elastic eigenvalue
+_LOWEST = "lowest modes"
 
 
 @dataclass(eq=False)
@@ -214,6 +215,9 @@ def solve_modes(model: Model, count: int | None = None) -> Modes:
         >>> print(femubench.solve_modes(model).elastic.natural_frequencies[:3].round(1))
         [255.8 277.7 581.3]
     """
+    known = _kept_modes(model, 20 if count is None else count)
+    if known is not None:
+        return known
     count_evaluation()
     if model.size <= DENSE_LIMIT:
         mass, stiffness = dense_matrices(model)
@@ -286,6 +290,28 @@ def once_for(model: Model, key: Hashable, make: Callable[[], _Kept]) -> _Kept:
 
 def _forget(kept: dict[int, Any], number: int, _: object) -> None:
     kept.pop(number, None)
+
+
+def keep_modes(model: Model, modes: Modes) -> None:
+    """Keep the lowest modes of a large model, which follow without a solution, as long as it.
+
+    Arguments:
+        model: with more dofs than are solved densely.
+        modes: all of them from the lowest one on.
+    """
+    once_for(model, _LOWEST, lambda: modes)
+
+
+def _kept_modes(model: Model, count: int) -> Modes | None:
+    """Return so many modes and the negative ones, where they were kept."""
+    entry = _kept.get(id(model))
+    if model.size <= DENSE_LIMIT or entry is None or entry[0]() is not model:
+        return None
+    modes: Modes | None = entry[1].get(_LOWEST)
+    if modes is None:
+        return None
+    wanted = count + int(np.sum(modes.eigenvalues < -zero_tolerance(modes)))
+    return modes.take(np.arange(wanted)) if wanted <= len(modes) else None
 
 
 def modes_of(model: Model, count: int | None = None) -> Modes:

@@ -67,6 +67,20 @@ def rigid_modes_of(model: Model) -> FloatArray:
     return _orthonormal(candidates, candidates.T @ model.mass_times(candidates))
 
 
+def rigid_continuation(
+    dofs: Dofs, rigid: FloatArray
+) -> Callable[[FloatArray, FloatArray], FloatArray]:
+    """Return how rigid-body motions move further dofs, from their positions (k, 3) and axes (k, 6).
+
+    Arguments:
+        dofs: where the motions are known.
+        rigid: combinations of motions of a rigid body, (n, r).
+    """
+    motion = _motions(dofs)
+    combined = la.lstsq(motion(dofs.xyz, dofs.motions), rigid)[0]
+    return lambda xyz, axes: np.asarray(motion(xyz, axes) @ combined)
+
+
 def _without_energy(model: Model, vectors: FloatArray) -> FloatArray:
     """Return the combinations of motions that cost no strain energy but rounding."""
     vectors = _orthonormal(vectors, vectors.T @ (model.mass @ vectors))

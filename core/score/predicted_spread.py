@@ -11,7 +11,7 @@ from femubench.core.modal.eigen import Modes
 from femubench.core.modal.neighbour_modes import followed_frequencies
 from femubench.core.typing import FloatArray, IntArray
 
-_MORE = 8  # modes above the highest one that is wanted, which samples may mix with it
+MORE = 8  # modes above the highest one that is wanted, which samples may mix with it
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Spread:
         paired = (index >= 0) & (own > 0.0)
         variance = np.square(self.discrepancy_std * own) + np.square(np.nan_to_num(measured_std))
         if self.samples and paired.any():
-            kept = modes.take(np.arange(min(int(index.max()) + 1 + _MORE, len(modes))))
+            kept = modes.take(np.arange(min(int(index.max()) + 1 + MORE, len(modes))))
             found = [followed_frequencies(sample, kept)[index[paired]] for sample in self.samples]
             variance[paired] += np.mean(np.square(found - own[paired]), axis=0)
         std = np.sqrt(variance)

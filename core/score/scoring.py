@@ -22,12 +22,13 @@ from femubench.core.modal.eigen import (
     solve_modes,
     zero_tolerance,
 )
+from femubench.core.modal.many_changes import ManyChanges
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import LEAST_SENSORS, WINDOW, pair_measured
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.schema.results import Block, PairedMode
 from femubench.core.score.leaderboard import leaderboard
-from femubench.core.score.predicted_spread import Spread
+from femubench.core.score.predicted_spread import MORE, Spread
 from femubench.core.score.ranking import rank_results, score_of
 from femubench.core.typing import FloatArray
 
@@ -115,24 +116,52 @@ def predict_block(
 
 
 def modified_modes(
-    model: Model, change: Modification, spread: Spread | None = None
+    model: Model,
+    change: Modification,
+    spread: Spread | None = None,
+    many: ManyChanges | None = None,
 ) -> tuple[PairedMode, ...]:
     """Return what a model predicts of a modified structure, computed once for this very model.
 
     Arguments:
         spread: of the model before the change; None where there is none.
+        many: of this model, where it is at hand; else the modified one is solved by itself.
 
     Raises:
         ModelError: when the modified model has no modes or a sensor lies off the structure.
     """
 
     def make() -> tuple[Modification, Spread | None, tuple[PairedMode, ...]]:
-        changed = model.attach(change.masses, change.springs)
+        changed, modes = model.attach(change.masses, change.springs), None
+        if many is not None:
+            count, top = len(change.measurement) + MORE, _highest((change.measurement,))
+            modes = many.proven(change.masses, change.springs, count, top)
+        if modes is None:
+            modes = _modes_for(changed, (change.measurement,))
         # With change and spread, so that nothing else gets their numbers as long as this is kept.
-        modes, moved = _modes_for(changed, (change.measurement,)), spread and spread.after(changed)
+        moved = spread and spread.after(changed)
         return change, spread, _predict(changed, modes, change.measurement, change.name, moved)
 
     return once_for(model, ("modified", id(change), id(spread)), make)[2]
+
+
+def many_modifications(
+    model: Model, changes: Sequence[Modification], modes: Modes | None = None
+) -> ManyChanges | None:
+    """Return what gives the modes of a model after its modifications; None where it is small.
+
+    Arguments:
+        changes: to come, each on the model as it is.
+        modes: of the model, where they are at hand; without them two changes have to pay for them.
+
+    Raises:
+        ModelError: when the model has no modes.
+    """
+    if model.size <= DENSE_LIMIT or len(changes) < (2 if modes is None else 1):
+        return None
+    if modes is None:
+        modes = _modes_for(model, [change.measurement for change in changes])
+    return ManyChanges(model, modes)
 
 
 def score_model(case: Case, model: Model) -> dict[str, Block]:
@@ -189,14 +218,18 @@ def _modes_for(model: Model, measurements: Sequence[Measurement]) -> Modes:
     """Return all modes of a small model, of a large one those that could find a partner."""
     if model.size <= DENSE_LIMIT:
         return modes_of(model)
-    measured = np.concatenate([item.frequencies for item in measurements])
-    top = WINDOW * float(measured.max(initial=0.0))
-    count, limit = enough_modes(model, len(measured)) or model.size, model.size // 2
+    top, most = _highest(measurements), max(len(item) for item in measurements)
+    count, limit = enough_modes(model, most) or model.size, model.size // 2
     modes = solve_modes(model, min(count, limit))
     while modes.natural_frequencies[-1] < top and count < limit:
         count = min(2 * count, limit)
         modes = solve_modes(model, count)
     return modes
+
+
+def _highest(measurements: Sequence[Measurement]) -> float:
+    """Return the frequency in Hz up to which a mode could be the partner of a measured one."""
+    return WINDOW * max(float(item.frequencies.max(initial=0.0)) for item in measurements)
 
 
 def _predict(
@@ -245,11 +278,14 @@ def _blocks(
     pairs = _predict(model, modes, tested, None, spread)
     shaped = _with_shape(tested)
     first, changes = len(case.used), case.modifications
+    many = many_modifications(model, changes, modes)
     parts = {
         "used": (pairs[:first], shaped[:first]),
         "higher": (pairs[first:], shaped[first:]),
         "modified": (  # every mode of every change counts alike
-            tuple(pair for change in changes for pair in modified_modes(model, change, spread)),
+            tuple(
+                pair for change in changes for pair in modified_modes(model, change, spread, many)
+            ),
             [flag for change in changes for flag in _with_shape(change.measurement)],
         ),
     }

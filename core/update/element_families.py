@@ -266,8 +266,7 @@ class GroupFamily(Family):
 
     def forces(self, shapes: FloatArray) -> list[SparseArray]:
         """Return, for each shape, what a unit of every unknown adds, sparse (n, n_unknowns)."""
-        products = np.array([part @ shapes for part in self.parts.matrices])  # p, n, m
-        return [sp.csr_array(products[:, :, j].T) for j in range(shapes.shape[1])]
+        return [sp.csr_array(self.parts.slopes.products(shape, 0.0)) for shape in shapes.T]
 
 
 def group_family(model: Model) -> GroupFamily:

@@ -9,11 +9,13 @@ import numpy as np
 import scipy.linalg as la
 
 from femubench.core.fem.model import LowRank, Model
+from femubench.core.modal.eigen import DENSE_LIMIT, Modes, keep_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.update.promise import check_used_modes
 from femubench.core.update.quasi import partners_of
 
 _NEGLIGIBLE = 1e-14
+_OUTSIDE = 1e-10  # of a change, what rounding leaves outside the space it acts in
 
 
 def total_change(parts: Sequence[LowRank | None]) -> LowRank | None:
@@ -35,6 +37,47 @@ def total_change(parts: Sequence[LowRank | None]) -> LowRank | None:
     values, turn = la.eigh(0.5 * (core + core.T))
     keep = np.abs(values) > _NEGLIGIBLE * np.abs(values).max(initial=0.0)
     return LowRank(q @ turn[:, keep], np.diag(values[keep]))
+
+
+def with_stiffness_step(model: Model, modes: Modes, step: LowRank) -> Model:
+    """Return the model with one more low-rank change of its stiffness.
+
+    A large model whose change moves nothing but the given modes is not solved again: it keeps the
+    modes that follow from these.
+
+    Arguments:
+        model: before the change.
+        modes: its lowest ones, none missed.
+        step: of the stiffness.
+
+    Examples:
+        >>> softer = fem.LowRank(model.mass @ modes.shapes[:, 3:4], np.array([[-1e5]]))
+        >>> changed = update.with_stiffness_step(model, modes, softer)
+        >>> gap = femubench.solve_modes(changed).eigenvalues[3] - modes.eigenvalues[3]
+        >>> round(float(gap))
+        -100000
+    """
+    changed = replace(model, stiffness_change=total_change([model.stiffness_change, step]))
+    if model.size > DENSE_LIMIT:
+        after = _modes_after(model, modes, step)
+        if after is not None:
+            keep_modes(changed, after)
+    return changed
+
+
+def _modes_after(model: Model, modes: Modes, step: LowRank) -> Modes | None:
+    """Return the modes after a change in their space; None where it moves others, or one past."""
+    gain = modes.shapes.T @ step.basis
+    rest = step.basis - model.mass_times(modes.shapes @ gain)
+    if np.any(la.norm(rest, axis=0) > _OUTSIDE * la.norm(step.basis, axis=0)):
+        return None
+    inner = gain @ step.core @ gain.T
+    values, turn = la.eigh(np.diag(modes.eigenvalues) + 0.5 * (inner + inner.T))
+    if values[-1] > (1.0 + _OUTSIDE) * modes.eigenvalues[-1]:
+        return None
+    rigid = np.square(turn[modes.rigid]).sum(axis=0) > 0.5
+    still = rigid & (np.abs(values) <= _OUTSIDE * np.abs(values[-1]))
+    return Modes(np.where(still, 0.0, values), modes.shapes @ turn, np.asarray(rigid))
 
 
 def with_measured_frequencies(model: Model, measurement: Measurement) -> Model:
@@ -65,6 +108,6 @@ def with_measured_frequencies(model: Model, measurement: Measurement) -> Model:
     shapes, wanted = modes.shapes[:, partner[found]], measurement.eigenvalues[found]
     core = np.diag(wanted - modes.eigenvalues[partner[found]])
     change = LowRank(model.mass_times(shapes), core)
-    met = replace(model, stiffness_change=total_change([model.stiffness_change, change]))
+    met = with_stiffness_step(model, modes, change)
     check_used_modes(met, shapes, wanted)
     return met

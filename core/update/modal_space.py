@@ -32,6 +32,7 @@ _DEPENDENT = 1e-8
 _LONGEST = 0.5  # step of ln theta
 _HALVINGS = 6
 _EVALUATIONS, _TOLERANCE = 30, 1e-6
+_MOST_FORCES = 4_000_000  # numbers, 32 MB
 _INSIDE = 0.999  # a start at a bound could not leave it
 _LARGEST_LOG = np.log(5.0)  # a factor beyond 1/5 .. 5 is no error of a stiffness,
 _WIDER = 3.0  # but of a support, whose bounds are so many times as wide in ln theta at most
@@ -239,8 +240,12 @@ def _few_shapes(
     """Return at most so many shapes, orthonormal with the mass and to the rigid ones, (n, r)."""
     low = modes.elastic.shapes[:, : len(measurement) + _SPARE]
     first = float(modes.elastic.eigenvalues[0])
-    pulled = np.hstack([part @ low[:, : len(measurement) + 2] for part in parts.matrices])
-    answers = ShiftedModel(model, -first).solve(pulled)
+    shifted, moved = ShiftedModel(model, -first), low[:, : len(measurement) + 2].T
+    if moved.size * len(parts) <= _MOST_FORCES:
+        pulled = np.hstack([parts.slopes.products(shape, 0.0) for shape in moved])
+        answers = shifted.solve(pulled)
+    else:
+        answers = _largest_answers(parts, shifted, moved, limit)
     fixed = np.hstack([modes.shapes[:, modes.rigid], low])
     answers = answers - fixed @ (fixed.T @ model.mass_times(answers))
     # The largest by strain energy: what adds flexibility that the low modes lack.
@@ -253,6 +258,29 @@ def _few_shapes(
     values, turn = la.eigh(0.5 * (gram + gram.T))
     keep = values > _DEPENDENT * values[-1]
     return np.asarray(basis @ (turn[:, keep] / np.sqrt(values[keep])))
+
+
+def _largest_answers(
+    parts: StiffnessParts, shifted: ShiftedModel, moved: FloatArray, limit: int
+) -> FloatArray:
+    """Return the largest of too many static answers, (n, limit): subspace iteration.
+
+    Arguments:
+        moved: the shapes, (m, n), that every factor changes the forces of.
+
+    Source: Halko, Martinsson & Tropp (2011), randomised range finder.
+    """
+    weights = np.random.default_rng(2).standard_normal((len(moved), len(parts), limit))
+    for last in (False, False, True):
+        forces = np.zeros((moved.shape[1], limit))
+        for shape, own in zip(moved, weights, strict=True):
+            forces += parts.slopes.combined(shape, own)
+        answers = shifted.solve(forces)
+        if not last:
+            answers = la.qr(answers, mode="economic")[0]
+            products = [parts.slopes.inner(shape[:, None], answers)[:, 0] for shape in moved]
+            weights = np.array(products)
+    return np.asarray(answers)
 
 
 def bounded_fit(space: ModalSpace, start: FloatArray, largest: float) -> tuple[FloatArray, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
@@ -12,11 +13,11 @@ from femubench.core.errors import InputError, NotApplicable
 from femubench.core.fem.group_factors import GROUP, Matrix, group_places
 from femubench.core.fem.joints import all_elements
 from femubench.core.fem.model import Model
-from femubench.core.fem.model_parameters import with_values
+from femubench.core.fem.model_parameters import MatrixSlopes, matrix_slopes, with_values
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.group_prior import STRUCTURE_STD, group_prior_std, support_groups
-from femubench.core.typing import FloatArray, SparseArray
+from femubench.core.typing import FloatArray
 from femubench.core.update.unknowns import Unknown
 
 ParameterSet = Literal["elements", "members", "sections", "materials", "sets", "groups"]
@@ -206,14 +207,12 @@ class StiffnessParts:
     Arguments:
         model: the nominal one, at factors of 1.
         names: of the factors.
-        matrices: the parts K_j, sparse (n, n) each.
         parameters: the factors themselves.
         spread: prior standard deviation of each ln theta, relative to that of a structure, (p,).
     """
 
     model: Model
     names: tuple[str, ...]
-    matrices: tuple[SparseArray, ...]
     parameters: tuple[Parameter, ...]
     spread: FloatArray
 
@@ -235,14 +234,21 @@ class StiffnessParts:
         return StiffnessParts(
             self.model,
             tuple(self.names[j] for j in chosen),
-            tuple(self.matrices[j] for j in chosen),
             tuple(self.parameters[j] for j in chosen),
             self.spread[list(chosen)],
         )
 
+    @cached_property
+    def slopes(self) -> MatrixSlopes:
+        """Return the parts K_j, which are the slopes of the stiffness by the factors.
+
+        All rigidities of an element grow with E alike, so that the stiffness is linear in them.
+        """
+        return matrix_slopes(self.model, self.parameters)
+
     def energies(self, left: FloatArray, right: FloatArray) -> FloatArray:
         """Return left_i' K_j right_k, (p, m_left, m_right)."""
-        return np.array([left.T @ (part @ right) for part in self.matrices])
+        return self.slopes.inner(left, right)
 
 
 def stiffness_parts(model: Model, word: str) -> StiffnessParts:
@@ -269,8 +275,5 @@ def stiffness_parts(model: Model, word: str) -> StiffnessParts:
     if structure is None:
         std = [group_prior_std(model, name) for name in model.groups]
         spread = np.array(std) / STRUCTURE_STD
-        return StiffnessParts(model, names, tuple(model.groups.values()), parameters, spread)
-    nominal = structure.matrices()[1]
-    # All rigidities of an element grow with E alike, so the stiffness is linear in the factor.
-    parts = [structure.with_values([p], [2.0]).matrices()[1] - nominal for p in parameters]
-    return StiffnessParts(model, names, tuple(parts), parameters, np.ones(len(names)))
+        return StiffnessParts(model, names, parameters, spread)
+    return StiffnessParts(model, names, parameters, np.ones(len(names)))

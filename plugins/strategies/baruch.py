@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
@@ -15,7 +14,7 @@ from femubench.update import (
     check_used_modes,
     force_scale,
     quasi_measured_modes,
-    total_change,
+    with_stiffness_step,
 )
 
 # Of eps |K| |phi|: what the modes of the model leave of K phi - lambda M phi by rounding.
@@ -83,12 +82,12 @@ class Baruch(Strategy):
         while True:
             quasi = quasi_measured_modes(current, measurement)
             step = stiffness_change(current, quasi)
-            change = total_change([current.stiffness_change, step])
-            current = replace(current, stiffness_change=change)
+            current = with_stiffness_step(current, quasi.modes, step)
             history.append({"largest_eigenvalue_change": float(np.abs(np.diag(step.core)).max())})
             if len(history) == ITERATIONS:
                 break
         found = check_used_modes(current, quasi.shapes, quasi.eigenvalues)
+        change = current.stiffness_change
         rank = 0 if change is None else len(change.core)
         return UpdateResult(
             current,
