@@ -318,7 +318,8 @@ class Frame:
     def member_ends(self) -> IntArray:
         """Return the joint numbers of every member's ends, (n_members, 2)."""
         index = self.joint_index
-        return np.array([[index[name] for name in m.ends] for m in self.members], dtype=np.int64)
+        ends = (index[name] for member in self.members for name in member.ends)
+        return np.fromiter(ends, dtype=np.int64).reshape(-1, 2)
 
     @cached_property
     def _ends(self) -> Mapping[str, tuple[str, ...]]:

@@ -67,14 +67,17 @@ class MeshedFrame:
     @cached_property
     def gather(self) -> SparseArray:
         """Return local element displacements from free dofs, sparse (12 n_elements, n)."""
-        count = len(self.mesh.ends)
-        nodes = (6 * self.mesh.ends[:, :, None] + np.arange(6)).reshape(count, 4, 3)
-        columns = np.broadcast_to(nodes[:, :, None, :], (count, 4, 3, 3))
-        axes = np.broadcast_to(self.mesh.axes[:, None], (count, 4, 3, 3))
-        rows = np.broadcast_to(np.arange(12 * count).reshape(count, 4, 3, 1), (count, 4, 3, 3))
+        mesh, count = self.mesh, len(self.mesh.ends)
+        # Two ends, of each translations and rotations, and the axes that turn what may move there.
+        turns = (mesh.axes[:, None] != 0.0) & self.kinematics.active.reshape(2, 1, 3)
+        turns = np.broadcast_to(turns[:, None], (count, 2, 2, 3, 3))
+        element, entry = np.divmod(np.flatnonzero(turns), 36)
+        node = mesh.ends[element, entry // 18]
+        columns = 6 * node + 3 * (entry // 9 % 2) + entry % 3
+        bounds = np.concatenate([[0], np.cumsum(np.count_nonzero(turns, axis=-1))])
         turn = sp.csr_array(
-            (axes.ravel(), (rows.ravel(), columns.ravel())),
-            shape=(12 * count, 6 * len(self.mesh.xyz)),
+            (mesh.axes.reshape(-1)[9 * element + entry % 9], columns, bounds),
+            shape=(12 * count, 6 * len(mesh.xyz)),
         )
         gather = turn @ self.kinematics.transform
         gather.eliminate_zeros()
