@@ -140,7 +140,7 @@ def _axes(
 
 
 def _norm(vectors: FloatArray) -> FloatArray:
-    return np.sqrt(np.einsum("ij,ij->i", vectors, vectors))
+    return np.sqrt((vectors[:, None] @ vectors[:, :, None]).ravel())
 
 
 @dataclass(frozen=True)
