@@ -26,6 +26,7 @@ from femubench.core.case.faults import (
     line_of,
 )
 from femubench.core.case.files import LARGEST_CASE, CaseFiles
+from femubench.core.case.frame_tables import FrameTables
 from femubench.core.case.frames import FrameSite, Site, attachments, frame_of
 from femubench.core.case.matching import Alignment, Placed, fitted_sensors
 from femubench.core.case.matrices import model_of_matrices, reader_of, reading_with
@@ -41,7 +42,7 @@ from femubench.core.case.modes import (
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.case.repeats import with_covariance, with_repeats
 from femubench.core.case.response_files import read_responses
-from femubench.core.case.schema import CaseSpec, FileSpec, FrameSpec, ModificationSpec, parse_spec
+from femubench.core.case.schema import CaseSpec, FileSpec, FrameSpec, ModificationSpec
 from femubench.core.case.sensors import read_sensors
 from femubench.core.case.tables import read_table
 from femubench.core.errors import InputError, ModelError
@@ -64,7 +65,7 @@ _EXPECTED = {
     "gravity": "a frame in plane or in space that stands or hangs",
     "preloads": "a member of a ring with all constants of its section",
 }
-_MOST_CHANGED = 5_000_000  # every change is built once while the case is read
+_MOST_CHANGED = 50_000_000  # every change is built once while the case is read
 # The look-behind and the possessive plus keep the search linear.
 _LONG_KEY = re.compile(r"""(?<![\w"'.-])(?:["'\w-]++[ \t]*+\.[ \t]*+){50}""")
 _AT_LINE = re.compile(r"\s*\(at line (\d+), column \d+\)")
@@ -94,17 +95,15 @@ def read_case(
         (1, 2, 3)
     """
     files = CaseFiles(Path(folder), links=installed)
-    text = read_text(files.case_file, LARGEST_CASE)
+    text, tables = read_text(files.case_file, LARGEST_CASE), FrameTables(files)
     try:
-        return _Building(files, _parsed(text, files.case_file), readers).case(name)
+        return _Building(files, _parsed(text, tables), readers).case(name)
     except Fault as fault:
-        line = _line(text, fault.path)
+        place = tables.place(fault.path)
+        file, line, key = place or (files.case_file, _line(text, fault.path), dotted(fault.path))
+        expected = fault.expected
         raise InputError(
-            fault.what,
-            file=files.case_file,
-            line=line,
-            key=dotted(fault.path) or None,
-            expected=fault.expected,
+            fault.what, file=file, line=line, key=key or None, expected=expected
         ) from None
 
 
@@ -115,13 +114,14 @@ def _line(text: str, path: KeyPath) -> int | None:
         return None
 
 
-def _parsed(text: str, file: Path) -> CaseSpec:
+def _parsed(text: str, tables: FrameTables) -> CaseSpec:
+    file = tables.files.case_file
     deep = InputError("nested too deeply", file=file, expected="a flat table")
     # The parser takes time with the square of the parts of a dotted key.
     if _LONG_KEY.search(text):
         raise deep
     try:
-        return parse_spec(tomllib.loads(text))
+        return tables.spec(tomllib.loads(text))
     except ValidationError as error:
         raise first_fault(error, CaseSpec) from None
     except RecursionError:

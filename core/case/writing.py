@@ -25,6 +25,7 @@ from femubench.core.case.frame_keys import (
     keys_of,
     known_from,
 )
+from femubench.core.case.frame_tables import MANY
 from femubench.core.case.matrix_files import (
     Files,
     frame_files,
@@ -43,6 +44,7 @@ from femubench.core.case.table_text import (
     common_share,
     covariance_csv,
     modes_csv,
+    part_csv,
     sensors_csv,
     toml_bytes,
 )
@@ -237,6 +239,10 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
         Fault: for what no case folder can say.
     """
     keys, files, modifications = _model_part(case, known)
+    for part in ("joints", "members"):
+        if len(keys.get(part, ())) > MANY:
+            files[f"{part}.csv"] = part_csv(part, keys[part])
+            keys[part] = f"{part}.csv"
     if case.model.free:
         keys = {"kind": keys["kind"], "free": True, **keys}
     share = common_share(_measurements(case), known.shape_std)

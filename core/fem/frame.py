@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from femubench.core.fem.sections import Section
 from femubench.core.typing import FloatArray, IntArray
@@ -313,6 +314,11 @@ class Frame:
     def corners(self) -> FloatArray:
         """Return the positions of the joints in m, (n_joints, 3)."""
         return np.array([joint.xyz for joint in self.joints], dtype=float)
+
+    @cached_property
+    def corner_tree(self) -> cKDTree:
+        """Return where the joints lie, to look points up."""
+        return cKDTree(self.corners)
 
     @cached_property
     def member_ends(self) -> IntArray:

@@ -83,7 +83,8 @@ def _element_at(frame: Frame, mesh: Mesh, place: Place) -> tuple[int, float]:
         raise ModelError(f"there is no member {place.member!r}")
     if not -SAME_STATION <= place.s <= 1.0 + SAME_STATION:
         raise ModelError(f"station {place.s:g} of member {place.member!r} is not within 0..1")
-    rows = np.flatnonzero(mesh.member == frame.member_index[place.member])
+    member = frame.member_index[place.member]
+    rows = np.arange(*np.searchsorted(mesh.member, [member, member + 1]))  # in order of members
     low, high = mesh.stations[rows, 0], mesh.stations[rows, 1]
     gap = np.maximum(low - place.s, place.s - high)
     return int(rows[gap.argmin()]), place.s
@@ -188,9 +189,9 @@ def _tie(
 
 def _support_node(frame: Frame, mesh: Mesh, place: Place) -> int | None:
     """Return the node that a support holds; the mesh is split there."""
-    member = next((member for member in frame.members if member.name == place.member), None)
-    if member is None:
+    if place.member not in frame.member_index:
         return node_at(frame, mesh, place)
+    member = frame.members[frame.member_index[place.member]]
     return node_at(frame, mesh, place, ON_MEMBER / member_axes(frame, member)[1])
 
 

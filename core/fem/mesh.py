@@ -5,9 +5,11 @@ from __future__ import annotations
 import bisect
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import (
@@ -70,6 +72,11 @@ class Mesh:
     arm_factor: FloatArray
     connections: tuple[Connection, ...]
     oscillators: IntArray
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """Return where the nodes lie, oscillators left out."""
+        return cKDTree(self.xyz[: len(self.xyz) - len(self.oscillators)])
 
     def node_keys(self, joints: int) -> list[tuple[int, int, bool]]:
         """Return a name of every node that stays the same when other elements are split.
@@ -397,10 +404,11 @@ def nearest_place(frame: Frame, xyz: FloatArray) -> tuple[str, FloatArray]:
 def _foot(frame: Frame, xyz: FloatArray) -> tuple[Place, FloatArray, float]:
     """Return the place nearest to a point, where it is and how far away in m."""
     corners, ends = frame.corners, frame.member_ends
-    distance = np.linalg.norm(corners - xyz, axis=1)
-    nearest = int(distance.argmin())
-    if distance[nearest] <= ON_MEMBER:
-        return Place(joint=frame.joints[nearest].name), corners[nearest], float(distance[nearest])
+    near = frame.corner_tree.query_ball_point(xyz, ON_MEMBER, return_sorted=True)
+    if near:
+        distance = np.linalg.norm(corners[near] - xyz, axis=1)
+        nearest = near[int(distance.argmin())]
+        return Place(joint=frame.joints[nearest].name), corners[nearest], float(distance.min())
     start, along = corners[ends[:, 0]], corners[ends[:, 1]] - corners[ends[:, 0]]
     s = np.einsum("ij,ij->i", xyz - start, along) / np.einsum("ij,ij->i", along, along)
     foot = start + np.clip(s, 0.0, 1.0)[:, None] * along
