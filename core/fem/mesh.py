@@ -29,7 +29,7 @@ ON_MEMBER = 1e-6  # m, how far from the axis a sensor may lie
 SAME_STATION = 1e-9
 # An attachment nearer than this share of an element to a node splits nothing: the piece would be so
 # stiff that its rounding errors outweigh what the finer mesh gains (both 1e-7 of a frequency here).
-_SHORTEST_PIECE = 2e-3
+SHORTEST_PIECE = 2e-3
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,8 @@ class Mesh:
 
     @cached_property
     def tree(self) -> cKDTree:
-        """Return where the nodes lie, oscillators left out."""
-        return cKDTree(self.xyz[: len(self.xyz) - len(self.oscillators)])
+        """Return where the nodes lie, to look points up."""
+        return cKDTree(self.xyz)
 
     def node_keys(self, joints: int) -> list[tuple[int, int, bool]]:
         """Return a name of every node that stays the same when other elements are split.
@@ -236,7 +236,7 @@ class _Attached:
         grid = _stations([low, *regular, high], self.held.get(member.name, []), ON_MEMBER / length)
         stiff = [self.rigid_length(member, end) / length for end in (0, 1)]
         splits = [s for s in self.splits.get(member.name, []) if stiff[0] < s < 1.0 - stiff[1]]
-        inner = _stations(grid, splits, _SHORTEST_PIECE / member.elements)[1:-1]
+        inner = _stations(grid, splits, SHORTEST_PIECE / member.elements)[1:-1]
         start = self.frame.corners[self.frame.member_ends[m, 0]]
         nodes = [first, *(self.node(start + self.axes[m, 0] * length * s) for s in inner), last]
         for (a, b), (s0, s1) in zip(pairwise(nodes), pairwise([low, *inner, high]), strict=True):

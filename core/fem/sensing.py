@@ -42,7 +42,9 @@ def _nodes_at(structure: MeshedFrame, xyz: FloatArray) -> IntArray:
     At a flexible connection several nodes lie at one point, of which only the joint is sure.
     """
     joints = len(structure.frame.joints)
-    near = structure.mesh.tree.query_ball_point(xyz, SAME_STATION, return_sorted=True)
+    hung = set(structure.mesh.oscillators.tolist())
+    found = structure.mesh.tree.query_ball_point(xyz, SAME_STATION, return_sorted=True)
+    near = [[node for node in at if node not in hung] for at in found]
     # Joints are the first nodes, and of what is there the first one.
     return np.array([at[0] if at and (len(at) == 1 or at[0] < joints) else -1 for at in near])
 
