@@ -100,14 +100,13 @@ def plan_assembly(gather: SparseArray, order: int) -> AssemblyPlan:
         target[start : start + count * width].reshape(count, width)
         for start, (count, width) in zip(stops, sizes, strict=False)
     )
-    off = np.flatnonzero(rows != columns)
-    whole = np.concatenate([rows, columns[off]]), np.concatenate([columns, rows[off]])
-    source = np.concatenate([np.arange(len(rows)), off])
-    turn = _by_column(*whole, size)
-    indptr = np.concatenate([[0], np.cumsum(np.bincount(whole[1], minlength=size))])
-    kind = np.int32 if len(turn) <= np.iinfo(np.int32).max else np.int64
-    source, indices, indptr = (v.astype(kind) for v in (source[turn], whole[0][turn], indptr))
-    return AssemblyPlan(order, g.data, batches, targets, source, indices, indptr)
+    off = np.flatnonzero(rows != columns).astype(target.dtype)
+    source = np.concatenate([np.arange(len(rows), dtype=target.dtype), off])
+    rows, columns = np.concatenate([rows, columns[off]]), np.concatenate([columns, rows[off]])
+    turn = _by_column(rows, columns, size)
+    indptr = np.zeros(size + 1, dtype=target.dtype)
+    np.cumsum(np.bincount(columns, minlength=size), out=indptr[1:])
+    return AssemblyPlan(order, g.data, batches, targets, source[turn], rows[turn], indptr)
 
 
 def _batches(gather: SparseArray, order: int) -> Iterator[_Batch]:
@@ -142,8 +141,10 @@ def _distinct(rows: IntArray, columns: IntArray, size: int) -> tuple[IntArray, I
     rows, columns = rows[turn], columns[turn]
     new = np.ones(len(turn), dtype=bool)
     new[1:] = (rows[1:] != rows[:-1]) | (columns[1:] != columns[:-1])
+    number = np.cumsum(new, dtype=turn.dtype)
+    number -= 1
     place = np.empty_like(turn)
-    place[turn] = np.cumsum(new) - 1
+    place[turn] = number
     return rows[new], columns[new], place
 
 
@@ -155,8 +156,9 @@ def _by_column(rows: IntArray, columns: IntArray, size: int) -> IntArray:
 
 def _stable_order(keys: IntArray, size: int) -> IntArray:
     """Return the stable order of numbers below `size`, in linear time: one is a matrix's row."""
-    one = np.ones(len(keys), dtype=np.int8)
-    rows = sp.csr_array((one, keys, np.arange(len(keys) + 1)), shape=(len(keys), size))
+    one, count = np.ones(len(keys), dtype=np.int8), len(keys)
+    bounds = np.arange(count + 1, dtype=np.int32 if 2 * count < 2**31 else np.int64)
+    rows = sp.csr_array((one, keys, bounds), shape=(count, size))
     return np.asarray(rows.tocsc().indices)
 
 

@@ -229,8 +229,12 @@ def _assemble_transform(
 ) -> Kinematics:
     size = 6 * len(mesh.xyz)
     flat = np.flatnonzero(free.ravel())
-    node = [*(flat // 6), *(n for n, basis, _ in own for _ in range(basis.shape[1]))]
-    direction = [*(DIRECTIONS[i % 6] for i in flat), *(d for _, _, labels in own for d in labels)]
+    apart = [(n, DIRECTIONS.index(label)) for n, _, labels in own for label in labels]
+    further = np.array(apart, dtype=np.int64).reshape(-1, 2)
+    node, direction = (
+        np.concatenate(pair).astype(np.int64)
+        for pair in zip(divmod(flat, 6), further.T, strict=True)
+    )
     count = len(node)
     rows, cols, data = [flat], [np.arange(len(flat))], [np.ones(len(flat))]
     position = len(flat)
@@ -258,12 +262,15 @@ def _assemble_transform(
         transform = transform + pick @ transform[6 * base : 6 * base + 6]
     transform.eliminate_zeros()
     axes = np.vstack([np.eye(6)[flat % 6], *(basis.T for _, basis, _ in own)])
-    order = np.lexsort((np.array([DIRECTIONS.index(d) for d in direction]), np.array(node)))
+    if len(further):
+        order = np.lexsort((direction, node))
+        node, direction, axes = node[order], direction[order], axes[order]
+        transform = transform[:, order].tocsr()
     return Kinematics(
-        transform=transform[:, order].tocsr(),
-        node=np.array(node, dtype=np.int64)[order],
-        direction=tuple(direction[i] for i in order),
-        axes=axes[order],
+        transform=transform,
+        node=node,
+        direction=tuple(map(DIRECTIONS.__getitem__, direction.tolist())),
+        axes=axes,
         active=active,
         unused=unused,
         bodies=np.zeros((0, 2), dtype=np.int64) if tie is None else tie.bodies,
