@@ -470,10 +470,11 @@ def _free_directions(pattern: EntryPattern, model: Model, rigid: FloatArray) -> 
     """
     most = MOST_RIGID_UNKNOWNS if rigid.shape[1] else MOST_UNKNOWNS
     if len(pattern) > most:
-        kept = " and rigid-body modes kept" if rigid.shape[1] else ""
+        why = "the factor of their equations takes some gigabytes"
+        if rigid.shape[1]:
+            why = "the directions that keep the rigid-body modes fill a dense matrix"
         raise NotApplicable(
-            f"the stiffness has {len(pattern)} non-zero entries; with the pattern{kept}, "
-            f"at most {most} can be solved for"
+            f"the stiffness has {len(pattern)} non-zero entries, and {why} beyond {most}"
         )
     if rigid.shape[1] == 0 and len(pattern) > DENSE_UNKNOWNS:
         return None
