@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -91,9 +91,7 @@ def plan_assembly(gather: SparseArray, order: int) -> AssemblyPlan:
     """
     g, size = sp.csr_array(gather), gather.shape[1]
     batches = tuple(_batches(g, order))
-    none = np.zeros(0, dtype=np.int32)
-    pairs = ([none, *(b.dofs[:, b.triangle[k]].ravel() for b in batches)] for k in (0, 1))
-    rows, columns, target = _distinct(*(np.concatenate(part) for part in pairs), size)
+    rows, columns, target = _distinct(_pair_side(batches, 0), _pair_side(batches, 1), size)
     sizes = [(len(b.elements), len(b.triangle[0])) for b in batches]
     stops = np.cumsum([0, *(count * width for count, width in sizes)])
     targets = tuple(
@@ -107,6 +105,12 @@ def plan_assembly(gather: SparseArray, order: int) -> AssemblyPlan:
     indptr = np.zeros(size + 1, dtype=target.dtype)
     np.cumsum(np.bincount(columns, minlength=size), out=indptr[1:])
     return AssemblyPlan(order, g.data, batches, targets, source[turn], rows[turn], indptr)
+
+
+def _pair_side(batches: Sequence[_Batch], side: int) -> IntArray:
+    """Return the row or the column of every entry of all upper triangles, batch by batch."""
+    parts = [batch.dofs[:, batch.triangle[side]].ravel() for batch in batches]
+    return np.concatenate([np.zeros(0, dtype=np.int32), *parts])
 
 
 def _batches(gather: SparseArray, order: int) -> Iterator[_Batch]:

@@ -189,9 +189,10 @@ def _tie(
 
 def _support_node(frame: Frame, mesh: Mesh, place: Place) -> int | None:
     """Return the node that a support holds; the mesh is split there."""
-    if place.member not in frame.member_index:
+    number = frame.member_index.get(place.member or "")
+    if number is None:
         return node_at(frame, mesh, place)
-    member = frame.members[frame.member_index[place.member]]
+    member = frame.members[number]
     return node_at(frame, mesh, place, ON_MEMBER / member_axes(frame, member)[1])
 
 
