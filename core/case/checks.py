@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Sequence
 import numpy as np
 
 from femubench.core.case.faults import Fault, KeyPath
-from femubench.core.case.schema import FrameSpec, JointSpringSpec, RigidEndSpec
+from femubench.core.case.schema import MOST_ELEMENTS, FrameSpec, JointSpringSpec, RigidEndSpec
 from femubench.core.fem.frame import ACTIVE, Plane
 from femubench.core.fem.mesh import ON_MEMBER
 from femubench.core.fem.nominal import MAY_VANISH
@@ -15,7 +15,6 @@ from femubench.core.typing import FloatArray
 
 FREE_YET_HELD = "the structure hangs free, yet supports hold it"
 NOT_HELD = "free = false, or no supports"
-_MOST_ELEMENTS = 100_000
 # A planar frame moves its masses in its own directions, so that an offset along it does nothing.
 _NORMAL: dict[Plane, str] = {"in-plane": "y", "out-of-plane": "z"}
 
@@ -203,9 +202,9 @@ def _check_members(model: FrameSpec) -> None:
         if member.up is not None:
             _check_up(model, i, places[member.ends[1]] - places[member.ends[0]])
         elements += member.elements
-        if elements > _MOST_ELEMENTS:
-            what, path = f"more than {_MOST_ELEMENTS} elements", ("members", i, "elements")
-            raise Fault(path, what, f"fewer elements, {_MOST_ELEMENTS} in all at most")
+        if elements > MOST_ELEMENTS:
+            what, path = f"more than {MOST_ELEMENTS} elements", ("members", i, "elements")
+            raise Fault(path, what, f"fewer elements, {MOST_ELEMENTS} in all at most")
 
 
 def _check_up(model: FrameSpec, i: int, along: FloatArray) -> None:

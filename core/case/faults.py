@@ -91,7 +91,11 @@ def first_fault(error: ValidationError, schema: type[BaseModel]) -> Fault:
     if path[-1] == "[key]":
         return Fault(path[:-1], f"{shown(found['input'])} is not allowed as a name", expected)
     kind, value = found["type"], found["input"]
-    if kind in ("too_short", "too_long") or (kind == "missing" and isinstance(path[-1], int)):
+    context: Mapping[str, Any] = found.get("ctx", {})
+    if kind == "too_long":
+        most = f"{context.get('max_length')} at most"
+        return Fault(path, f"{context.get('actual_length') or 'too many'} entries", most)
+    if kind == "too_short" or (kind == "missing" and isinstance(path[-1], int)):
         whole = path[:-1] if kind == "missing" else path
         return Fault(whole, "wrong number of entries", expected)
     if kind == "missing":
@@ -104,7 +108,6 @@ def first_fault(error: ValidationError, schema: type[BaseModel]) -> Fault:
         what = "missing key" if kind == "union_tag_not_found" else f"unknown kind {_tag(value)}"
         return Fault(("model", "kind"), what, "'frame', 'matrices' or 'file'")
     if kind == "misfit":
-        context: Mapping[str, Any] = found.get("ctx", {})
         return Fault(path, context["what"], context["expected"])
     return Fault(path, f"{shown(value)} is not allowed", expected)
 

@@ -12,9 +12,10 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from femubench.core.case.faults import Fault
-from femubench.core.case.files import LARGEST_TEXT
+from femubench.core.case.files import LARGEST_TEXT, CaseFiles
+from femubench.core.case.frame_tables import FrameTables
 from femubench.core.case.frames import CONSTANTS, section_of
-from femubench.core.case.schema import FrameSpec, MaterialSpec, MemberSpec, SectionSpec, parse_spec
+from femubench.core.case.schema import FrameSpec, MaterialSpec, MemberSpec, SectionSpec
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Factor, Frame, Member, Place, Plane, RigidEnd
 from femubench.core.fem.nominal import MAY_VANISH
@@ -51,8 +52,9 @@ class Known:
 def known_from(file: Path) -> Known:
     """Return what a `case.toml` says; nothing where it is not there or not a case."""
     try:
-        spec = parse_spec(tomllib.loads(read_text(file, LARGEST_TEXT)))
-    except (InputError, ValueError, RecursionError):  # not TOML, or not the keys of a case
+        data = tomllib.loads(read_text(file, LARGEST_TEXT))
+        spec = FrameTables(CaseFiles(file.parent)).spec(data)
+    except (InputError, Fault, ValueError, RecursionError):  # not TOML, or not the keys of a case
         return Known()
     share = spec.measurement.shape_std
     if not isinstance(spec.model, FrameSpec):

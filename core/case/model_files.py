@@ -16,6 +16,7 @@ import scipy.sparse as sp
 
 from femubench.core.case.faults import Fault, at_key
 from femubench.core.case.files import CASE_FILE, LARGEST_CASE, CaseFiles
+from femubench.core.case.frame_tables import FrameTables
 from femubench.core.case.matrices import (
     checked,
     is_matrix_market,
@@ -31,7 +32,7 @@ from femubench.core.case.nodes import (
     read_dofs,
     read_nodes,
 )
-from femubench.core.case.schema import FileSpec, FrameSpec, LengthUnit, parse_spec
+from femubench.core.case.schema import FileSpec, FrameSpec, LengthUnit
 from femubench.core.case.tables import read_table
 from femubench.core.case.units import from_si, in_si
 from femubench.core.errors import InputError
@@ -290,7 +291,8 @@ def _multiplied_out(model: Model) -> Model:
 
 def files_of(folder: Path) -> tuple[ModelFiles, LengthUnit] | None:
     """Return the files of the model of a case, and their unit; None where it has no such files."""
-    spec = parse_spec(tomllib.loads(read_text(folder / CASE_FILE, LARGEST_CASE))).model
+    data = tomllib.loads(read_text(folder / CASE_FILE, LARGEST_CASE))
+    spec = FrameTables(CaseFiles(folder)).spec(data).model
     if isinstance(spec, FrameSpec):
         return None
     parts = (spec.file, spec.mass) if isinstance(spec, FileSpec) else (spec.stiffness, spec.mass)

@@ -15,6 +15,7 @@ from femubench.core.case.checks import FREE_YET_HELD, NOT_HELD, check_unique
 from femubench.core.case.deviations import with_floor
 from femubench.core.case.faults import Fault, KeyPath, at_key
 from femubench.core.case.files import LARGEST_CASE, CaseFiles
+from femubench.core.case.frame_tables import FrameTables
 from femubench.core.case.frames import FrameSite, Site, attachments, frame_of
 from femubench.core.case.matching import Alignment, Placed, fitted_sensors
 from femubench.core.case.matrices import model_of_matrices, reader_of, reading_with
@@ -34,7 +35,7 @@ from femubench.core.case.schema import CaseSpec, FileSpec, FrameSpec, Modificati
 from femubench.core.case.sensors import read_sensors
 from femubench.core.case.tables import read_table
 from femubench.core.case.toml_text import located, spec_of
-from femubench.core.errors import ModelError
+from femubench.core.errors import InputError, ModelError
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
@@ -54,7 +55,7 @@ _EXPECTED = {
     "gravity": "a frame in plane or in space that stands or hangs",
     "preloads": "a member of a ring with all constants of its section",
 }
-_MOST_CHANGED = 5_000_000  # every change is built once while the case is read
+_MOST_CHANGED = 50_000_000  # every change is built once while the case is read
 
 
 def read_case(
@@ -81,12 +82,18 @@ def read_case(
         (1, 2, 3)
     """
     files = CaseFiles(Path(folder), links=installed)
-    text = read_text(files.case_file, LARGEST_CASE)
+    text, tables = read_text(files.case_file, LARGEST_CASE), FrameTables(files)
     try:
-        spec = spec_of(text, files.case_file, CaseSpec)
+        spec = spec_of(text, files.case_file, CaseSpec, tables.spec)
         return _Building(files, spec, readers).case(name)
     except Fault as fault:
-        raise located(fault, text, files.case_file) from None
+        place = tables.place(fault.path)
+        if place is None:
+            raise located(fault, text, files.case_file) from None
+        file, line, key = place
+        raise InputError(
+            fault.what, file=file, line=line, key=key, expected=fault.expected
+        ) from None
 
 
 @dataclass

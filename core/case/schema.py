@@ -159,7 +159,8 @@ class OscillatorSpec(Table):
     crosswise: bool = Field(True, strict=True, description="true or false")
 
 
-_MOST = 20_000  # entries of a list whose work grows with its length
+_MOST = 20_000  # entries of a list each of which costs time of its own
+MOST_ELEMENTS = 1_000_000  # of a frame, which then takes 2 GB before any mode is sought
 
 
 def _tables(key: str, max_length: int | None = None) -> Any:  # noqa: ANN401 - as `Field` has it
@@ -295,11 +296,11 @@ class FrameSpec(Table):
     free: bool = Field(False, strict=True, description="true or false")
     materials: dict[Name, MaterialSpec] = Field(description="tables [model.materials.NAME]")
     sections: dict[Name, SectionSpec] = Field(description="tables [model.sections.NAME]")
-    joints: Annotated[Many[JointSpec], Field(min_length=2, max_length=20_000)] = Field(
-        description="tables [[model.joints]], two at least"
+    joints: Annotated[Many[JointSpec], Field(min_length=2, max_length=MOST_ELEMENTS)] = Field(
+        description="tables [[model.joints]], two at least, or the name of a CSV file with them"
     )
-    members: Annotated[Many[MemberSpec], Field(min_length=1, max_length=20_000)] = Field(
-        description="tables [[model.members]], one at least"
+    members: Annotated[Many[MemberSpec], Field(min_length=1, max_length=MOST_ELEMENTS)] = Field(
+        description="tables [[model.members]], one at least, or the name of a CSV file with them"
     )
     masses: Many[MassSpec] = _tables("model.masses", max_length=_MOST)
     springs: Many[SpringSpec] = _tables("model.springs", max_length=_MOST)

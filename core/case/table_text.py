@@ -14,6 +14,7 @@ import tomlkit
 from tomlkit.items import Item, Table
 
 from femubench.core.case.frame_keys import Keys
+from femubench.core.case.frame_tables import KEYS, columns_of
 from femubench.core.case.modes import with_default_std
 from femubench.core.case.schema import LARGEST, SMALLEST
 from femubench.core.case.tables import RESERVED
@@ -36,6 +37,33 @@ def csv_bytes(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
     writer.writerow(header)
     writer.writerows(rows)
     return text.getvalue().encode()
+
+
+def part_csv(part: str, entries: Sequence[Keys]) -> bytes:
+    """Return the table of joints or members.
+
+    Arguments:
+        part: ``joints`` or ``members``.
+        entries: each as it would stand in `case.toml`.
+    """
+    used = {key for entry in entries for key in entry}
+    keys = [key for key in KEYS[part] if key in used]
+    rows = (
+        [
+            number(cell) if isinstance(cell, float) else cell
+            for key in keys
+            for cell in _spread(key, entry.get(key, ""))
+        ]
+        for entry in entries
+    )
+    return csv_bytes([column for key in keys for column in columns_of(key)], rows)
+
+
+def _spread(key: str, value: Any) -> Sequence[Any]:  # noqa: ANN401 - what TOML can hold
+    width = len(columns_of(key))
+    if width == 1:
+        return [value]
+    return value or [""] * width
 
 
 def sensors_csv(sensors: Sensors) -> bytes:

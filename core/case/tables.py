@@ -127,13 +127,20 @@ def _shown(cell: str) -> str:
     return repr(cell if len(cell) <= 40 else cell[:37] + "...")
 
 
-@dataclass(frozen=True)
-class Table:
-    """A CSV file: its column names and its rows."""
+def plain_number(cell: str) -> float | str:
+    """Return the number of a cell, or the cell itself where it is none."""
+    return float(cell) if len(cell) <= _LONGEST_NUMBER and _NUMBER.fullmatch(cell) else cell
 
+
+def whole_number(cell: str) -> int | str:
+    """Return the whole number of a cell, or the cell itself where it is none."""
+    return int(cell) if _WHOLE.fullmatch(cell) else cell
+
+
+@dataclass(frozen=True)
+class _Headed:
     file: Path
     columns: tuple[str, ...]
-    rows: tuple[Row, ...]
 
     def check_columns(self, required: tuple[str, ...], known: Collection[str] = ()) -> None:
         """Check that the required columns are there and no others but the known ones."""
@@ -148,14 +155,44 @@ class Table:
                 raise InputError(what, file=self.file, line=1, key=key, expected=listed)
 
 
+@dataclass(frozen=True)
+class Table(_Headed):
+    """A CSV file: its column names and its rows."""
+
+    rows: tuple[Row, ...]
+
+
+@dataclass(frozen=True)
+class Cells(_Headed):
+    """A CSV file as texts: its column names, and line and cells of every row."""
+
+    lines: tuple[int, ...]
+    cells: tuple[list[str], ...]
+
+
 def read_table(file: Path) -> Table:
     """Return the content of a CSV file whose first row names the columns.
 
     Raises:
         InputError: for a ragged row, a column without name or named twice, a broken quotation.
     """
+    plain = read_cells(file)
+    rows = (
+        Row(file, line, dict(zip(plain.columns, cells, strict=True)))
+        for line, cells in zip(plain.lines, plain.cells, strict=True)
+    )
+    return Table(file, plain.columns, tuple(rows))
+
+
+def read_cells(file: Path) -> Cells:
+    """Return the same as texts, for tables of a million rows.
+
+    Raises:
+        InputError: as `read_table`.
+    """
     reader = csv.reader(StringIO(read_text(file, LARGEST_TEXT)), skipinitialspace=True)
-    rows: list[Row] = []
+    lines: list[int] = []
+    rows: list[list[str]] = []
     columns: tuple[str, ...] = ()
     try:
         for cells in reader:
@@ -171,7 +208,8 @@ def read_table(file: Path) -> Table:
                 what = f"{len(cells)} cells"
                 expected = f"{len(columns)} as in the first row"
                 raise InputError(what, file=file, line=reader.line_num, expected=expected)
-            rows.append(Row(file, reader.line_num, dict(zip(columns, cells, strict=True))))
+            lines.append(reader.line_num)
+            rows.append(cells)
             if len(rows) > _MOST_ROWS:
                 raise InputError("too many rows", file=file, expected=f"at most {_MOST_ROWS}")
             if len(rows) * len(columns) > _MOST_CELLS:
@@ -182,7 +220,7 @@ def read_table(file: Path) -> Table:
         raise InputError(what, file=file, line=reader.line_num, expected=expected) from None
     if not columns:
         raise InputError("empty file", file=file, expected="a row of column names")
-    return Table(file, columns, tuple(rows))
+    return Cells(file, columns, tuple(lines), tuple(rows))
 
 
 def _header(file: Path, line: int, cells: list[str]) -> tuple[str, ...]:

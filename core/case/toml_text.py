@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
@@ -18,12 +19,18 @@ _LONG_KEY = re.compile(r"""(?<![\w"'.-])(?:["'\w-]++[ \t]*+\.[ \t]*+){50}""")
 _AT_LINE = re.compile(r"\s*\(at line (\d+), column \d+\)")
 
 
-def spec_of(text: str, file: Path, schema: type[_Spec]) -> _Spec:
+def spec_of(
+    text: str,
+    file: Path,
+    schema: type[_Spec],
+    parse: Callable[[Mapping[str, Any]], _Spec] | None = None,
+) -> _Spec:
     """Return the content of a TOML text as typed tables.
 
     Arguments:
         file: that it stands in, for messages.
         schema: its tables; unknown keys are errors.
+        parse: turns plain tables into these; the schema's own way where left out.
 
     Raises:
         Fault: at the first key that is wrong.
@@ -34,7 +41,7 @@ def spec_of(text: str, file: Path, schema: type[_Spec]) -> _Spec:
     if _LONG_KEY.search(text):
         raise deep
     try:
-        return schema.model_validate(tomllib.loads(text))
+        return (parse or schema.model_validate)(tomllib.loads(text))
     except ValidationError as error:
         raise first_fault(error, schema) from None
     except RecursionError:

@@ -25,6 +25,7 @@ from femubench.core.case.frame_keys import (
     keys_of,
     known_from,
 )
+from femubench.core.case.frame_tables import MANY
 from femubench.core.case.matrix_files import (
     Files,
     frame_files,
@@ -43,6 +44,7 @@ from femubench.core.case.table_text import (
     common_share,
     covariance_csv,
     modes_csv,
+    part_csv,
     sensors_csv,
     toml_bytes,
 )
@@ -237,6 +239,7 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
         Fault: for what no case folder can say.
     """
     keys, files, modifications = _model_part(case, known)
+    _into_tables(keys, files)
     if case.model.free:
         keys = {"kind": keys["kind"], "free": True, **keys}
     share = common_share(_measurements(case), known.shape_std)
@@ -282,6 +285,14 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
     if own:
         content["diagnosis"] = own
     return {CASE_FILE: toml_bytes(content, comment), **files}
+
+
+def _into_tables(keys: Keys, files: Files) -> None:
+    """Move long lists of joints and members from the keys of a model to files of their own."""
+    for part in ("joints", "members"):
+        if len(keys.get(part, ())) > MANY:
+            files[f"{part}.csv"] = part_csv(part, keys[part])
+            keys[part] = f"{part}.csv"
 
 
 def _settings(case: Case) -> Keys:

@@ -186,12 +186,7 @@ def joint_types(frame: Frame) -> Mapping[str, tuple[str, ...]]:
         >>> dict(effect.joint_types(frame))
         {'L': ('J1', 'J3', 'J7', 'J9'), 'T': ('J5', 'J11')}
     """
-    types: dict[str, tuple[str, ...]] = {}
-    for name in joints_with_members(frame):
-        kind = frame.joint(name).type
-        if kind:
-            types[kind] = (*types.get(kind, ()), name)
-    return types
+    return frame.joint_types
 
 
 def type_place(frame: Frame, type: str) -> str:
@@ -256,7 +251,7 @@ def branch_places(frame: Frame) -> tuple[str, ...]:
     return tuple(
         type_place(frame, group.type) + _BRANCH
         for group in joint_groups(frame)
-        if group.role == "branch" and len(group.ends) > 1 and joint_types(frame).get(group.type)
+        if group.role == "branch" and len(group.ends) > 1 and group.type in joint_types(frame)
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,31 +10,76 @@ import scipy.sparse as sp
 
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
+AT_ONCE = 4096  # elements whose dense matrices are held at a time, 5 MB each kind
+
+
+@dataclass(frozen=True)
+class _Batch:
+    """Elements that move with equally many dofs c.
+
+    Arguments:
+        elements: their numbers, (m,).
+        entries: of the data of `gather`, those of these elements, (k,).
+        place: where such an entry stands in the dense (m, r, c) rows of these elements, (k,).
+        dofs: with which they move, ascending, (m, c).
+    """
+
+    elements: IntArray
+    entries: IntArray
+    place: IntArray
+    dofs: IntArray
+
+    @property
+    def triangle(self) -> tuple[IntArray, IntArray]:
+        """Return rows and columns of the upper triangle of a (c, c) matrix."""
+        return np.triu_indices(self.dofs.shape[1])
+
 
 @dataclass(frozen=True)
 class AssemblyPlan:
-    """The place of every entry of every element matrix in the global sparse matrix.
+    """The place of every entry of every symmetric element matrix in the global sparse matrix.
 
     Arguments:
-        size: number of dofs n.
-        source: flat index into the (n_elements, r, r) batch, (n_entries,).
-        weight: factor of that entry, (n_entries,).
-        target: position in the sparse data, (n_entries,).
+        order: local dofs r of an element.
+        weights: the data of `gather`.
+        batches: the elements, some thousand at a time.
+        targets: of every batch, where the upper triangles of its elements stand in that of the
+            whole, (m, c (c + 1) / 2).
+        source: where a sparse entry stands in the upper triangle of the whole, (n_entries,).
         indices, indptr: the compressed column pattern.
     """
 
-    size: int
+    order: int
+    weights: FloatArray
+    batches: tuple[_Batch, ...]
+    targets: tuple[IntArray, ...]
     source: IntArray
-    weight: FloatArray
-    target: IntArray
     indices: IntArray
     indptr: IntArray
 
     def assemble(self, matrices: FloatArray) -> SparseArray:
-        """Return the sum of G_e' k_e G_e over all elements as a sparse matrix, (n, n)."""
-        values = matrices.reshape(-1)[self.source] * self.weight
-        data = np.bincount(self.target, weights=values, minlength=len(self.indices))
-        return sp.csc_array((data, self.indices, self.indptr), shape=(self.size, self.size))
+        """Return the sum of G_e' k_e G_e over all elements as a sparse matrix, (n, n).
+
+        Arguments:
+            matrices: symmetric, (n_elements, r, r).
+        """
+        return self.assemble_from(matrices.__getitem__)
+
+    def assemble_from(self, matrices: Callable[[IntArray], FloatArray]) -> SparseArray:
+        """Return the same of matrices that are made some thousand at a time.
+
+        Arguments:
+            matrices: from numbers of elements (m,) to their symmetric matrices, (m, r, r).
+        """
+        size = len(self.indptr) - 1
+        total = np.zeros(int(self.source.max(initial=-1)) + 1)
+        for batch, target in zip(self.batches, self.targets, strict=True):
+            rows = np.zeros((len(batch.elements), self.order, batch.dofs.shape[1]))
+            rows.reshape(-1)[batch.place] = self.weights[batch.entries]
+            whole = np.swapaxes(rows, 1, 2) @ (matrices(batch.elements) @ rows)
+            i, j = batch.triangle
+            np.add.at(total, target, whole[:, i, j])
+        return sp.csc_array((total[self.source], self.indices, self.indptr), shape=(size, size))
 
 
 def plan_assembly(gather: SparseArray, order: int) -> AssemblyPlan:
@@ -43,26 +89,81 @@ def plan_assembly(gather: SparseArray, order: int) -> AssemblyPlan:
         gather: sparse, (n_elements * order, n).
         order: local dofs of an element.
     """
-    size = gather.shape[1]
-    g = sp.coo_array(gather)
-    element, local = np.divmod(g.row.astype(np.int64), order)
-    by_element = np.argsort(element, kind="stable")
-    element, local = element[by_element], local[by_element]
-    column, weight = g.col.astype(np.int64)[by_element], g.data[by_element]
-    counts = np.bincount(element, minlength=gather.shape[0] // order)
-    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    left, right = [], []
-    for count in np.unique(counts[counts > 0]):
-        entries = starts[counts == count][:, None] + np.arange(count)
-        left.append(np.repeat(entries, count, axis=1).ravel())
-        right.append(np.tile(entries, count).ravel())
-    i = np.concatenate(left) if left else np.zeros(0, dtype=np.int64)
-    j = np.concatenate(right) if right else np.zeros(0, dtype=np.int64)
-    source = (element[i] * order + local[i]) * order + local[j]
-    pattern, target = np.unique(column[j] * size + column[i], return_inverse=True)
-    columns, rows = np.divmod(pattern, size)
-    indptr = np.concatenate([[0], np.cumsum(np.bincount(columns, minlength=size))])
-    return AssemblyPlan(size, source, weight[i] * weight[j], target, rows, indptr)
+    g, size = sp.csr_array(gather), gather.shape[1]
+    batches = tuple(_batches(g, order))
+    rows, columns, target = _distinct(_pair_side(batches, 0), _pair_side(batches, 1), size)
+    sizes = [(len(b.elements), len(b.triangle[0])) for b in batches]
+    stops = np.cumsum([0, *(count * width for count, width in sizes)])
+    targets = tuple(
+        target[start : start + count * width].reshape(count, width)
+        for start, (count, width) in zip(stops, sizes, strict=False)
+    )
+    off = np.flatnonzero(rows != columns).astype(target.dtype)
+    source = np.concatenate([np.arange(len(rows), dtype=target.dtype), off])
+    rows, columns = np.concatenate([rows, columns[off]]), np.concatenate([columns, rows[off]])
+    turn = _by_column(rows, columns, size)
+    indptr = np.zeros(size + 1, dtype=target.dtype)
+    np.cumsum(np.bincount(columns, minlength=size), out=indptr[1:])
+    return AssemblyPlan(order, g.data, batches, targets, source[turn], rows[turn], indptr)
+
+
+def _pair_side(batches: Sequence[_Batch], side: int) -> IntArray:
+    """Return the row or the column of every entry of all upper triangles, batch by batch."""
+    parts = [batch.dofs[:, batch.triangle[side]].ravel() for batch in batches]
+    return np.concatenate([np.zeros(0, dtype=np.int32), *parts])
+
+
+def _batches(gather: SparseArray, order: int) -> Iterator[_Batch]:
+    """Yield the elements in their order, those of one batch with equally many dofs."""
+    size, elements = gather.shape[1], gather.shape[0] // order
+    for start in range(0, elements, AT_ONCE):
+        stop = min(start + AT_ONCE, elements)
+        bounds = gather.indptr[start * order : stop * order + 1]
+        row = np.repeat(np.arange((stop - start) * order), np.diff(bounds))
+        element, column = row // order, gather.indices[bounds[0] : bounds[-1]]
+        keys, place = np.unique(element * np.int64(size) + column, return_inverse=True)
+        owner, dof = np.divmod(keys, size)
+        counts = np.bincount(owner, minlength=stop - start)
+        first = np.cumsum(counts) - counts
+        for count in np.unique(counts[counts > 0]):
+            own = np.flatnonzero(counts == count)
+            number = np.cumsum(counts == count) - 1
+            entries = np.flatnonzero(counts[element] == count)
+            e = element[entries]
+            local = number[e] * order + row[entries] % order
+            yield _Batch(
+                elements=own + start,
+                entries=(entries + bounds[0]).astype(np.int32),
+                place=(local * count + place[entries] - first[e]).astype(np.int32),
+                dofs=dof[first[own][:, None] + np.arange(count)].astype(np.int32),
+            )
+
+
+def _distinct(rows: IntArray, columns: IntArray, size: int) -> tuple[IntArray, IntArray, IntArray]:
+    """Return every pair once, column by column, and where each given pair is among these."""
+    turn = _by_column(rows, columns, size)
+    rows, columns = rows[turn], columns[turn]
+    new = np.ones(len(turn), dtype=bool)
+    new[1:] = (rows[1:] != rows[:-1]) | (columns[1:] != columns[:-1])
+    number = np.cumsum(new, dtype=turn.dtype)
+    number -= 1
+    place = np.empty_like(turn)
+    place[turn] = number
+    return rows[new], columns[new], place
+
+
+def _by_column(rows: IntArray, columns: IntArray, size: int) -> IntArray:
+    """Return the order by columns, and in every column by rows."""
+    turn = _stable_order(rows, size)
+    return np.asarray(turn[_stable_order(columns[turn], size)])
+
+
+def _stable_order(keys: IntArray, size: int) -> IntArray:
+    """Return the stable order of numbers below `size`, in linear time: one is a matrix's row."""
+    one, count = np.ones(len(keys), dtype=np.int8), len(keys)
+    bounds = np.arange(count + 1, dtype=np.int32 if 2 * count < 2**31 else np.int64)
+    rows = sp.csr_array((one, keys, bounds), shape=(count, size))
+    return np.asarray(rows.tocsc().indices)
 
 
 def prune(matrix: SparseArray, reference: SparseArray | None = None) -> SparseArray:
@@ -73,7 +174,9 @@ def prune(matrix: SparseArray, reference: SparseArray | None = None) -> SparseAr
         reference: what sets the scale of a row; the matrix's own diagonal by default.
     """
     scale = np.sqrt(np.abs((matrix if reference is None else reference).diagonal()))
-    entries = sp.coo_array(matrix)
-    keep = np.abs(entries.data) > 1e-13 * scale[entries.row] * scale[entries.col]
-    kept = (entries.data[keep], (entries.row[keep], entries.col[keep]))
-    return sp.csc_array(kept, shape=matrix.shape)
+    whole = sp.csc_array(matrix)
+    whole.sum_duplicates()
+    column = np.repeat(np.arange(whole.shape[1]), np.diff(whole.indptr))
+    keep = np.abs(whole.data) > 1e-13 * scale[whole.indices] * scale[column]
+    bounds = np.concatenate([[0], np.cumsum(keep)])[whole.indptr].astype(whole.indptr.dtype)
+    return sp.csc_array((whole.data[keep], whole.indices[keep], bounds), shape=whole.shape)

@@ -12,7 +12,8 @@ from femubench.core.typing import SparseArray
 
 def elastic_stiffness(structure: MeshedFrame) -> SparseArray:
     """Return the stiffness without preloads and oscillators, (n, n)."""
-    stiffness = structure.plan.assemble(stiffness_matrices(structure.properties))
+    properties = structure.properties
+    stiffness = structure.plan.assemble_from(lambda e: stiffness_matrices(properties.take(e)))
     if len(structure.springs):
         rows = structure.spring_rows
         stiffness = stiffness + rows.T @ sp.diags_array(structure.springs) @ rows

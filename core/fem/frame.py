@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from femubench.core.fem.sections import Section
 from femubench.core.typing import FloatArray, IntArray
@@ -315,10 +316,16 @@ class Frame:
         return np.array([joint.xyz for joint in self.joints], dtype=float)
 
     @cached_property
+    def corner_tree(self) -> cKDTree:
+        """Return where the joints lie, to look points up."""
+        return cKDTree(self.corners)
+
+    @cached_property
     def member_ends(self) -> IntArray:
         """Return the joint numbers of every member's ends, (n_members, 2)."""
         index = self.joint_index
-        return np.array([[index[name] for name in m.ends] for m in self.members], dtype=np.int64)
+        ends = (index[name] for member in self.members for name in member.ends)
+        return np.fromiter(ends, dtype=np.int64).reshape(-1, 2)
 
     @cached_property
     def _ends(self) -> Mapping[str, tuple[str, ...]]:
@@ -327,6 +334,15 @@ class Frame:
             for joint in dict.fromkeys(member.ends):
                 ends.setdefault(joint, []).append(member.name)
         return {joint: tuple(members) for joint, members in ends.items()}
+
+    @cached_property
+    def joint_types(self) -> Mapping[str, tuple[str, ...]]:
+        """Return from joint types to their joints; free ends and untyped joints are left out."""
+        types: dict[str, list[str]] = {}
+        for joint in self.joints:
+            if joint.type and len(self.ends_at(joint.name)) > 1:
+                types.setdefault(joint.type, []).append(joint.name)
+        return {kind: tuple(names) for kind, names in types.items()}
 
     def joint(self, name: str) -> Joint:
         """Return the joint of that name; raises KeyError."""

@@ -229,8 +229,9 @@ def available_length(structure: Structure, end: str) -> float:
         >>> round(update.available_length(structure, "rung-middle@J5"), 4)
         0.0629
     """
-    element = structure.element_ends[end][0]
-    both = sum(index == element for index, _ in structure.element_ends.values())
+    element, name = structure.element_ends[end][0], end.rpartition("@")[0]
+    joints = structure.frame.members[structure.frame.member_index[name]].ends
+    both = sum(structure.element_ends[f"{name}@{joint}"][0] == element for joint in joints)
     return _LARGEST_SHARE * _element_length(structure, end) / both
 
 
@@ -246,10 +247,9 @@ def spring_estimates(frame: Frame, ends: tuple[str, ...]) -> dict[str, float]:
         >>> list(update.spring_estimates(frame, ("rung-middle@J5",)))
         ['z', 'rx', 'ry']
     """
-    members = {member.name: member for member in frame.members}
     rows = []
     for end in ends:
-        member = members[end.rpartition("@")[0]]
+        member = frame.members[frame.member_index[end.rpartition("@")[0]]]
         s, m = member.section, member.material
         length = member_axes(frame, member)[1] / member.elements
         rows.append(

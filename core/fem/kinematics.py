@@ -83,7 +83,8 @@ def _element_at(frame: Frame, mesh: Mesh, place: Place) -> tuple[int, float]:
         raise ModelError(f"there is no member {place.member!r}")
     if not -SAME_STATION <= place.s <= 1.0 + SAME_STATION:
         raise ModelError(f"station {place.s:g} of member {place.member!r} is not within 0..1")
-    rows = np.flatnonzero(mesh.member == frame.member_index[place.member])
+    member = frame.member_index[place.member]
+    rows = np.arange(*np.searchsorted(mesh.member, [member, member + 1]))  # in order of members
     low, high = mesh.stations[rows, 0], mesh.stations[rows, 1]
     gap = np.maximum(low - place.s, place.s - high)
     return int(rows[gap.argmin()]), place.s
@@ -195,9 +196,10 @@ def _tie(
 
 def _support_node(frame: Frame, mesh: Mesh, place: Place) -> int | None:
     """Return the node that a support holds; the mesh is split there."""
-    member = next((member for member in frame.members if member.name == place.member), None)
-    if member is None:
+    number = frame.member_index.get(place.member or "")
+    if number is None:
         return node_at(frame, mesh, place)
+    member = frame.members[number]
     return node_at(frame, mesh, place, ON_MEMBER / member_axes(frame, member)[1])
 
 
@@ -235,8 +237,12 @@ def _assemble_transform(
 ) -> Kinematics:
     size = 6 * len(mesh.xyz)
     flat = np.flatnonzero(free.ravel())
-    node = [*(flat // 6), *(n for n, basis, _ in own for _ in range(basis.shape[1]))]
-    direction = [*(DIRECTIONS[i % 6] for i in flat), *(d for _, _, labels in own for d in labels)]
+    apart = [(n, DIRECTIONS.index(label)) for n, _, labels in own for label in labels]
+    further = np.array(apart, dtype=np.int64).reshape(-1, 2)
+    node, direction = (
+        np.concatenate(pair).astype(np.int64)
+        for pair in zip(divmod(flat, 6), further.T, strict=True)
+    )
     count = len(node)
     rows, cols, data = [flat], [np.arange(len(flat))], [np.ones(len(flat))]
     position = len(flat)
@@ -264,12 +270,15 @@ def _assemble_transform(
         transform = transform + pick @ transform[6 * base : 6 * base + 6]
     transform.eliminate_zeros()
     axes = np.vstack([np.eye(6)[flat % 6], *(basis.T for _, basis, _ in own)])
-    order = np.lexsort((np.array([DIRECTIONS.index(d) for d in direction]), np.array(node)))
+    if len(further):
+        order = np.lexsort((direction, node))
+        node, direction, axes = node[order], direction[order], axes[order]
+        transform = transform[:, order].tocsr()
     return Kinematics(
-        transform=transform[:, order].tocsr(),
-        node=np.array(node, dtype=np.int64)[order],
-        direction=tuple(direction[i] for i in order),
-        axes=axes[order],
+        transform=transform,
+        node=node,
+        direction=tuple(map(DIRECTIONS.__getitem__, direction.tolist())),
+        axes=axes,
         active=active,
         unused=unused,
         bodies=np.zeros((0, 2), dtype=np.int64) if tie is None else tie.bodies,

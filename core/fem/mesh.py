@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import bisect
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import (
@@ -17,10 +19,11 @@ from femubench.core.fem.frame import (
     Member,
     Oscillator,
     Place,
+    Plane,
     PointMass,
     RigidEnd,
 )
-from femubench.core.typing import FloatArray, IntArray
+from femubench.core.typing import BoolArray, FloatArray, IntArray
 
 ON_MEMBER = 1e-6  # m, how far from the axis a sensor may lie
 SAME_STATION = 1e-9
@@ -70,6 +73,11 @@ class Mesh:
     connections: tuple[Connection, ...]
     oscillators: IntArray
 
+    @cached_property
+    def tree(self) -> cKDTree:
+        """Return where the nodes lie, to look points up."""
+        return cKDTree(self.xyz)
+
     def node_keys(self, joints: int) -> list[tuple[int, int, bool]]:
         """Return a name of every node that stays the same when other elements are split.
 
@@ -100,65 +108,106 @@ def member_axes(frame: Frame, member: Member) -> tuple[FloatArray, float]:
         >>> round(fem.member_axes(frame, frame.members[0])[1], 4)
         0.2794
     """
-    start, stop = (np.array(frame.joint(name).xyz) for name in member.ends)
-    length = float(np.linalg.norm(stop - start))
-    if length < ON_MEMBER:
-        raise ModelError(f"member {member.name!r} has length zero", member)
-    normal = {"out-of-plane": 2, "in-plane": 1}.get(frame.plane)
-    if normal is not None and abs(stop[normal] - start[normal]) > ON_MEMBER:
-        raise ModelError(f"member {member.name!r} leaves the plane of the frame", member)
-    x = (stop - start) / length
-    if frame.plane == "out-of-plane":
-        return np.array([x, np.cross([0.0, 0.0, 1.0], x), [0.0, 0.0, 1.0]]), length
-    if frame.plane == "in-plane":
-        return np.array([x, [0.0, 1.0, 0.0], np.cross(x, [0.0, 1.0, 0.0])]), length
-    vertical = bool(np.hypot(x[0], x[1]) < 1e-9)
-    default = (1.0, 0.0, 0.0) if vertical else (0.0, 0.0, 1.0)
-    y = np.cross(np.array(member.up if member.up is not None else default), x)
-    if np.linalg.norm(y) < 1e-9:
-        raise ModelError(f"member {member.name!r}: `up` lies along the member", member)
-    y /= np.linalg.norm(y)
-    return np.array([x, y, np.cross(x, y)]), length
+    ends = np.array([[frame.joint(name).xyz for name in member.ends]], dtype=float)
+    axes, lengths = _axes(frame.plane, [member], ends)
+    return axes[0], float(lengths[0])
 
 
-class _Builder:
-    """Collects nodes and elements member by member."""
+def _axes(
+    plane: Plane, members: Sequence[Member], ends: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the local axes (rows) and the lengths of members whose ends lie there, (n, 2, 3)."""
 
-    def __init__(self, frame: Frame) -> None:
-        self.frame = frame
-        self.joint_index = {joint.name: i for i, joint in enumerate(frame.joints)}
-        self.xyz: list[FloatArray] = [np.array(joint.xyz, dtype=float) for joint in frame.joints]
-        self.rows: list[tuple[int, int, int, int, float, float, float]] = []
-        self.rigid: dict[tuple[int, int], RigidEnd] = {}
-        self.axes: list[FloatArray] = []
-        self.connections: list[Connection] = []
+    def refuse(wrong: BoolArray, what: str) -> None:
+        if wrong.any():
+            member = members[int(wrong.argmax())]
+            raise ModelError(f"member {member.name!r}{what}", member)
+
+    along = ends[:, 1] - ends[:, 0]
+    length = _norm(along)
+    refuse(length < ON_MEMBER, " has length zero")
+    normal = {"out-of-plane": 2, "in-plane": 1}.get(plane)
+    x = along / np.maximum(length, ON_MEMBER)[:, None]
+    if normal is not None:
+        refuse(np.abs(along[:, normal]) > ON_MEMBER, " leaves the plane of the frame")
+        third = np.broadcast_to(np.eye(3)[normal], x.shape)
+        turned = np.cross(third, x) if plane == "out-of-plane" else np.cross(x, third)
+        rows = (x, turned, third) if plane == "out-of-plane" else (x, third, turned)
+        return np.stack(rows, axis=1), length
+    vertical = np.hypot(x[:, 0], x[:, 1]) < 1e-9
+    up = np.where(vertical[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+    for i, member in enumerate(members):
+        if member.up is not None:
+            up[i] = member.up
+    y = np.cross(up, x)
+    size = _norm(y)
+    refuse(size < 1e-9, ": `up` lies along the member")
+    y /= size[:, None]
+    return np.stack([x, y, np.cross(x, y)], axis=1), length
+
+
+def _norm(vectors: FloatArray) -> FloatArray:
+    return np.sqrt((vectors[:, None] @ vectors[:, :, None]).ravel())
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """The mesh of one member at which something is attached; its own nodes count from -1 down.
+
+    Arguments:
+        xyz: of its own nodes in m, (k, 3).
+        rows: two nodes, number, two stations and arm factor of every element, (r, 6).
+        connections: its joint springs.
+        arms: how many massless arms stand before the elements.
+    """
+
+    xyz: FloatArray
+    rows: FloatArray
+    connections: tuple[Connection, ...]
+    arms: int
+
+
+class _Attached:
+    """The members at which joint springs, masses, springs or supports are, meshed one by one."""
+
+    def __init__(self, frame: Frame, axes: FloatArray, length: FloatArray) -> None:
+        self.frame, self.axes, self.length = frame, axes, length
         self.springs = {(s.member, s.joint): s for s in frame.joint_springs}
         self.rigid_ends = {(r.member, r.joint): r for r in frame.rigid_ends}
         self.held = _places([item.at for item in frame.supports])
         attached: tuple[PointMass | GroundSpring | Oscillator, ...]
         attached = (*frame.masses, *frame.springs, *frame.oscillators)
         self.splits = _places([item.at for item in attached])
+        self.xyz: list[FloatArray] = []
+        self.rows: list[tuple[int, int, int, float, float, float]] = []
+        self.connections: list[Connection] = []
+
+    @property
+    def members(self) -> list[int]:
+        """Return the numbers of these members, ascending."""
+        names = {*(member for member, _ in self.springs), *self.held, *self.splits}
+        return sorted(self.frame.member_index[name] for name in names & {*self.frame.member_index})
 
     def node(self, xyz: FloatArray) -> int:
         self.xyz.append(xyz)
-        return len(self.xyz) - 1
+        return -len(self.xyz)
 
-    def connect(self, m: int, end: int, axes: FloatArray, length: float) -> tuple[int, float]:
+    def connect(self, m: int, end: int) -> tuple[int, float]:
         """Return the node at which the member starts and the length of the arm before it."""
-        member = self.frame.members[m]
-        base = self.joint_index[member.ends[end]]
+        member, axes = self.frame.members[m], self.axes[m]
+        base = int(self.frame.member_ends[m, end])
         spring = self.springs.get((member.name, member.ends[end]))
         if spring is None:
             return base, 0.0
         arm = axes[0] * spring.arm * (1.0 if end == 0 else -1.0)
-        face = self.xyz[base] + arm
+        face = self.frame.corners[base] + arm
         if spring.arm_factor is not None and spring.arm > 0.0:
             tip = self.node(face)
             number = 1 if end == 0 else member.elements
-            station = spring.arm / length
+            station = spring.arm / float(self.length[m])
             ends = (base, tip) if end == 0 else (tip, base)
             stations = (0.0, station) if end == 0 else (1.0 - station, 1.0)
-            self.rows.append((*ends, m, number, *stations, spring.arm_factor))
+            self.rows.append((*ends, number, *stations, spring.arm_factor))
             base, arm = tip, np.zeros(3)
         node = self.node(face)
         self.connections.append(Connection(spring, base, node, arm, axes))
@@ -169,12 +218,13 @@ class _Builder:
         spec = self.rigid_ends.get((member.name, member.ends[end]))
         return 0.0 if spec is None else max(spec.stiffness_length, spec.mass_length)
 
-    def member(self, m: int) -> None:
-        member = self.frame.members[m]
-        axes, length = member_axes(self.frame, member)
-        self.axes.append(axes)
-        first, arm_1 = self.connect(m, 0, axes, length)
-        last, arm_2 = self.connect(m, 1, axes, length)
+    def piece(self, m: int) -> _Piece:
+        """Return the mesh of a member."""
+        self.xyz, self.rows, self.connections = [], [], []
+        member, length = self.frame.members[m], float(self.length[m])
+        first, arm_1 = self.connect(m, 0)
+        last, arm_2 = self.connect(m, 1)
+        arms = len(self.rows)
         low, high = arm_1 / length, 1.0 - arm_2 / length
         regular = np.linspace(0.0, 1.0, member.elements + 1)[1:-1]
         if high <= low or (len(regular) and (regular[0] <= low or regular[-1] >= high)):
@@ -187,39 +237,101 @@ class _Builder:
         stiff = [self.rigid_length(member, end) / length for end in (0, 1)]
         splits = [s for s in self.splits.get(member.name, []) if stiff[0] < s < 1.0 - stiff[1]]
         inner = _stations(grid, splits, SHORTEST_PIECE / member.elements)[1:-1]
-        start = self.xyz[self.joint_index[member.ends[0]]]
-        nodes = [first, *(self.node(start + axes[0] * length * s) for s in inner), last]
-        bounds = np.concatenate([[low], inner, [high]])
-        for (a, b), (s0, s1) in zip(pairwise(nodes), pairwise(bounds), strict=True):
+        start = self.frame.corners[self.frame.member_ends[m, 0]]
+        nodes = [first, *(self.node(start + self.axes[m, 0] * length * s) for s in inner), last]
+        for (a, b), (s0, s1) in zip(pairwise(nodes), pairwise([low, *inner, high]), strict=True):
             number = min(int((s0 + s1) / 2 * member.elements) + 1, member.elements)
-            self.rows.append((a, b, m, number, s0, s1, np.nan))
-        for end, row in ((0, len(self.rows) - len(nodes) + 1), (1, len(self.rows) - 1)):
-            rigid = self.rigid_ends.get((member.name, member.ends[end]))
-            if rigid is not None:
-                self.rigid[row, end] = rigid
+            self.rows.append((a, b, number, s0, s1, np.nan))
+        rows, xyz = np.array(self.rows), np.array(self.xyz).reshape(-1, 3)
+        return _Piece(xyz, rows, tuple(self.connections), arms)
 
-    def mesh(self) -> Mesh:
-        for m in range(len(self.frame.members)):
-            self.member(m)
-        hung = [self.node(place_xyz(self.frame, item.at)) for item in self.frame.oscillators]
-        table = np.array(self.rows, dtype=float).reshape(-1, 7)
-        member = table[:, 2].astype(np.int64)
-        rigid, rigid_mass = np.zeros((len(table), 2)), np.zeros((len(table), 2))
-        for (row, end), spec in self.rigid.items():
-            rigid[row, end], rigid_mass[row, end] = spec.stiffness_length, spec.mass_length
-        return Mesh(
-            xyz=np.array(self.xyz).reshape(-1, 3),
-            ends=table[:, :2].astype(np.int64),
-            axes=np.array(self.axes).reshape(-1, 3, 3)[member],
-            member=member,
-            number=table[:, 3].astype(np.int64),
-            stations=table[:, 4:6],
-            rigid=rigid,
-            rigid_mass=rigid_mass,
-            arm_factor=table[:, 6],
-            connections=tuple(self.connections),
-            oscillators=np.array(hung, dtype=np.int64),
-        )
+
+def build_mesh(frame: Frame) -> Mesh:
+    """Return the mesh of a frame; an attachment between nodes splits the element there.
+
+    Raises:
+        ModelError: for a member without length, an arm longer than its element, or a joint spring
+            or rigid end at no member end.
+    """
+    _check_ends(frame)
+    corners, joints = frame.corners.reshape(-1, 3), frame.member_ends
+    axes, length = _axes(frame.plane, frame.members, corners[joints])
+    attached = _Attached(frame, axes, length)
+    pieces = {m: attached.piece(m) for m in attached.members}
+    elements = np.array([member.elements for member in frame.members], dtype=np.int64)
+    rows, nodes = elements.copy(), elements - 1
+    for m, piece in pieces.items():
+        rows[m], nodes[m] = len(piece.rows), len(piece.xyz)
+    row, node = np.cumsum(rows) - rows, len(corners) + np.cumsum(nodes) - nodes
+    inner = _inner_nodes(corners[joints[:, 0]], axes[:, 0] * length[:, None], elements, nodes)
+    hung = [place_xyz(frame, item.at) for item in frame.oscillators]
+    xyz = np.concatenate([corners, inner, np.reshape(hung, (-1, 3))])
+    member = np.repeat(np.arange(len(rows)), rows)
+    ends, stations, number = _regular(member, row, node, joints, elements)
+    arm_factor, connections = np.full(len(member), np.nan), list[Connection]()
+    for m, piece in pieces.items():
+        own, table = slice(row[m], row[m] + rows[m]), piece.rows
+        ends[own] = _renumbered(table[:, :2].astype(np.int64), node[m])
+        number[own], stations[own], arm_factor[own] = table[:, 2], table[:, 3:5], table[:, 5]
+        xyz[node[m] : node[m] + nodes[m]] = piece.xyz
+        for c in piece.connections:
+            base, hanging = (int(v) for v in _renumbered(np.array([c.base, c.node]), node[m]))
+            connections.append(replace(c, base=base, node=hanging))
+    rigid = np.zeros((2, len(member), 2))
+    for spec in frame.rigid_ends:
+        m = frame.member_index[spec.member]
+        end = frame.members[m].ends.index(spec.joint)
+        place = row[m] + (rows[m] - 1 if end else pieces[m].arms if m in pieces else 0)
+        rigid[:, place, end] = spec.stiffness_length, spec.mass_length
+    return Mesh(
+        xyz=xyz,
+        ends=ends,
+        axes=axes[member],
+        member=member,
+        number=number,
+        stations=stations,
+        rigid=rigid[0],
+        rigid_mass=rigid[1],
+        arm_factor=arm_factor,
+        connections=tuple(connections),
+        oscillators=np.arange(len(xyz) - len(hung), len(xyz)),
+    )
+
+
+def _renumbered(nodes: IntArray, first: int) -> IntArray:
+    """Return the numbers in the whole mesh of joints and of a piece's own nodes."""
+    return np.where(nodes < 0, first + ~nodes, nodes)
+
+
+def _inner_nodes(
+    start: FloatArray, along: FloatArray, elements: IntArray, nodes: IntArray
+) -> FloatArray:
+    """Return where the nodes inside members lie if their elements are equal, (n, 3)."""
+    member = np.repeat(np.arange(len(nodes)), nodes)
+    place = np.arange(len(member)) - (np.cumsum(nodes) - nodes)[member] + 1
+    s = place * (1.0 / elements)[member]
+    return np.asarray(start[member] + along[member] * s[:, None])
+
+
+def _regular(
+    member: IntArray, row: IntArray, node: IntArray, joints: IntArray, elements: IntArray
+) -> tuple[IntArray, FloatArray, IntArray]:
+    """Return ends, stations and number of every element, those of a member being equal.
+
+    Arguments:
+        member: of every element, (n_elements,).
+        row, node: the first element, and the first node inside, of every member, (n_members,).
+        joints: the ends of every member, (n_members, 2).
+        elements: of every member, (n_members,).
+    """
+    k, count = np.arange(len(member)) - row[member], elements[member]
+    last = k >= count - 1
+    first = np.where(k == 0, joints[member, 0], node[member] + k - 1)
+    second = np.where(last, joints[member, 1], node[member] + k)
+    step = (1.0 / elements)[member]
+    stations = np.stack([k * step, np.where(last, 1.0, (k + 1) * step)], axis=1)
+    number = np.minimum((stations.sum(axis=1) / 2 * count).astype(np.int64) + 1, count)
+    return np.stack([first, second], axis=1), stations, number
 
 
 def place_xyz(frame: Frame, place: Place) -> FloatArray:
@@ -248,10 +360,10 @@ def _places(places: Sequence[Place]) -> dict[str, list[float]]:
 
 
 def _check_ends(frame: Frame) -> None:
-    ends = {(member.name, name) for member in frame.members for name in member.ends}
     wanted: tuple[JointSpring | RigidEnd, ...] = (*frame.joint_springs, *frame.rigid_ends)
     for spec in wanted:
-        if (spec.member, spec.joint) not in ends:
+        m = frame.member_index.get(spec.member)
+        if m is None or spec.joint not in frame.members[m].ends:
             raise ModelError(f"there is no member end {spec.member}@{spec.joint}", spec)
 
 
@@ -263,17 +375,6 @@ def _stations(grid: Sequence[float] | FloatArray, new: list[float], apart: float
         if inside and min(abs(s - other) for other in stations) > apart:
             bisect.insort(stations, s)
     return np.array(stations)
-
-
-def build_mesh(frame: Frame) -> Mesh:
-    """Return the mesh of a frame; an attachment between nodes splits the element there.
-
-    Raises:
-        ModelError: for a member without length, an arm longer than its element, or a joint spring
-            or rigid end at no member end.
-    """
-    _check_ends(frame)
-    return _Builder(frame).mesh()
 
 
 def locate(frame: Frame, xyz: FloatArray) -> Place:
@@ -303,10 +404,11 @@ def nearest_place(frame: Frame, xyz: FloatArray) -> tuple[str, FloatArray]:
 def _foot(frame: Frame, xyz: FloatArray) -> tuple[Place, FloatArray, float]:
     """Return the place nearest to a point, where it is and how far away in m."""
     corners, ends = frame.corners, frame.member_ends
-    distance = np.linalg.norm(corners - xyz, axis=1)
-    nearest = int(distance.argmin())
-    if distance[nearest] <= ON_MEMBER:
-        return Place(joint=frame.joints[nearest].name), corners[nearest], float(distance[nearest])
+    near = frame.corner_tree.query_ball_point(xyz, ON_MEMBER, return_sorted=True)
+    if near:
+        distance = np.linalg.norm(corners[near] - xyz, axis=1)
+        nearest = near[int(distance.argmin())]
+        return Place(joint=frame.joints[nearest].name), corners[nearest], float(distance.min())
     start, along = corners[ends[:, 0]], corners[ends[:, 1]] - corners[ends[:, 0]]
     s = np.einsum("ij,ij->i", xyz - start, along) / np.einsum("ij,ij->i", along, along)
     foot = start + np.clip(s, 0.0, 1.0)[:, None] * along

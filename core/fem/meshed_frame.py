@@ -67,14 +67,17 @@ class MeshedFrame:
     @cached_property
     def gather(self) -> SparseArray:
         """Return local element displacements from free dofs, sparse (12 n_elements, n)."""
-        count = len(self.mesh.ends)
-        nodes = (6 * self.mesh.ends[:, :, None] + np.arange(6)).reshape(count, 4, 3)
-        columns = np.broadcast_to(nodes[:, :, None, :], (count, 4, 3, 3))
-        axes = np.broadcast_to(self.mesh.axes[:, None], (count, 4, 3, 3))
-        rows = np.broadcast_to(np.arange(12 * count).reshape(count, 4, 3, 1), (count, 4, 3, 3))
+        mesh, count = self.mesh, len(self.mesh.ends)
+        # Two ends, of each translations and rotations, and the axes that turn what may move there.
+        turns = (mesh.axes[:, None] != 0.0) & self.kinematics.active.reshape(2, 1, 3)
+        turns = np.broadcast_to(turns[:, None], (count, 2, 2, 3, 3))
+        element, entry = np.divmod(np.flatnonzero(turns), 36)
+        node = mesh.ends[element, entry // 18]
+        columns = 6 * node + 3 * (entry // 9 % 2) + entry % 3
+        bounds = np.concatenate([[0], np.cumsum(np.count_nonzero(turns, axis=-1))])
         turn = sp.csr_array(
-            (axes.ravel(), (rows.ravel(), columns.ravel())),
-            shape=(12 * count, 6 * len(self.mesh.xyz)),
+            (mesh.axes.reshape(-1)[9 * element + entry % 9], columns, bounds),
+            shape=(12 * count, 6 * len(mesh.xyz)),
         )
         gather = turn @ self.kinematics.transform
         gather.eliminate_zeros()
@@ -173,25 +176,29 @@ class MeshedFrame:
         self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]
     ) -> tuple[SparseArray, SparseArray]:
         """Return the mass and stiffness that attachments add on the free dofs, (n, n) each."""
-        transform = self.kinematics.transform
-        n = transform.shape[1]
+        n = self.kinematics.transform.shape[1]
         mass, stiffness = sp.csc_array((n, n)), sp.csc_array((n, n))
-        for item in masses:
-            point = point_rows(self.frame, self.mesh, self.properties, item.at)
+        if masses:
             # In a plane a mass acts in the directions of the plane, and in no other.
-            arm = rigid_arm(np.array(item.offset))[:3][self.active_local[:3]]
-            rows = sp.csr_array(arm) @ point @ transform
-            mass = mass + item.mass * (rows.T @ rows)
-        for spring in springs:
-            rows = self._ground_row(spring)
-            stiffness = stiffness + spring.stiffness * (rows.T @ rows)
-        return sp.csc_array(mass), sp.csc_array(stiffness)
+            moves = self.active_local[:3]
+            arms = [sp.csr_array(rigid_arm(np.array(item.offset))[:3][moves]) for item in masses]
+            points = [point_rows(self.frame, self.mesh, self.properties, m.at) for m in masses]
+            pairs = zip(arms, points, strict=True)
+            rows = sp.vstack([arm @ point for arm, point in pairs]) @ self.kinematics.transform
+            each = np.repeat([item.mass for item in masses], np.count_nonzero(moves))
+            mass = sp.csc_array(rows.T @ (sp.diags_array(each) @ rows))
+        if springs:
+            rows = self._ground_rows(springs)
+            each = np.array([spring.stiffness for spring in springs])
+            stiffness = sp.csc_array(rows.T @ (sp.diags_array(each) @ rows))
+        return mass, stiffness
 
-    def _ground_row(self, spring: GroundSpring) -> SparseArray:
-        """Return the elongation of a spring to ground from free dofs, sparse (1, n)."""
-        point = point_rows(self.frame, self.mesh, self.properties, spring.at)
-        row = DIRECTIONS.index(spring.direction.lstrip("+-"))
-        return point[row : row + 1] @ self.kinematics.transform
+    def _ground_rows(self, springs: Sequence[GroundSpring]) -> SparseArray:
+        """Return the elongation of springs to ground from free dofs, sparse (n_springs, n)."""
+        points = [point_rows(self.frame, self.mesh, self.properties, s.at) for s in springs]
+        each = [DIRECTIONS.index(spring.direction.lstrip("+-")) for spring in springs]
+        rows = [point[row : row + 1] for point, row in zip(points, each, strict=True)]
+        return sp.csr_array(sp.vstack(rows)) @ self.kinematics.transform
 
     def held(self, motion: Callable[[FloatArray, FloatArray], FloatArray]) -> FloatArray:
         """Return what supports and springs to ground see of motions of the whole, (m, r).
@@ -208,8 +215,8 @@ class MeshedFrame:
         free[self.mesh.oscillators] = False  # they have dofs of their own and hold nothing
         active = np.setdiff1d(np.flatnonzero(free), self.kinematics.unused)
         all_nodes = motion(xyz[active // 6], np.eye(6)[active % 6])
-        rows = [self._ground_row(spring) for spring in self.frame.springs if spring.stiffness]
-        pulled = [np.asarray(row @ own) for row in rows]
+        springs = [spring for spring in self.frame.springs if spring.stiffness]
+        pulled = [np.asarray(self._ground_rows(springs) @ own)] if springs else []
         return np.vstack([transform[active] @ own - all_nodes, *pulled])
 
     @cached_property

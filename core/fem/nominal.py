@@ -46,7 +46,14 @@ def nominal_properties(frame: Frame, mesh: Mesh) -> BeamProperties:
         ModelError: for a Timoshenko beam without kappa, or an entry at no member.
     """
     arm = np.isfinite(mesh.arm_factor)
-    table = np.array([_constants(frame, member) for member in frame.members])[mesh.member]
+    kinds: dict[tuple[int, int], int] = {}
+    kind = [
+        kinds.setdefault((id(member.section), id(member.material)), len(kinds))
+        for member in frame.members
+    ]
+    first = np.unique(kind, return_index=True)[1]
+    constants = np.array([_constants(frame, frame.members[m]) for m in first])
+    table = constants[np.array(kind, dtype=np.int64)[mesh.member]]
     factor = np.where(arm, mesh.arm_factor, 1.0)[:, None]
     table[:, :4] *= factor
     table[:, 4:6] /= factor

@@ -41,14 +41,12 @@ def _nodes_at(structure: MeshedFrame, xyz: FloatArray) -> IntArray:
 
     At a flexible connection several nodes lie at one point, of which only the joint is sure.
     """
-    mesh = structure.mesh
-    plain = len(mesh.xyz) - len(mesh.oscillators)  # which come last
     joints = len(structure.frame.joints)
-    distance = np.linalg.norm(xyz[:, None] - mesh.xyz[:plain], axis=2)
-    there = distance <= SAME_STATION
-    sure = (there.sum(axis=1) == 1) | there[:, :joints].any(axis=1)
+    hung = set(structure.mesh.oscillators.tolist())
+    found = structure.mesh.tree.query_ball_point(xyz, SAME_STATION, return_sorted=True)
+    near = [[node for node in at if node not in hung] for at in found]
     # Joints are the first nodes, and of what is there the first one.
-    return np.where(sure, there.argmax(axis=1), -1)
+    return np.array([at[0] if at and (len(at) == 1 or at[0] < joints) else -1 for at in near])
 
 
 def _between_nodes(

@@ -71,7 +71,7 @@ class Structure(MeshedFrame):
         Raises:
             ModelError: when a preload has no redundancy to live on, or nothing bears the weight.
         """
-        mass = self.plan.assemble(mass_matrices(self.properties))
+        mass = self.plan.assemble_from(lambda rows: mass_matrices(self.properties.take(rows)))
         if self.frame.masses:
             mass = mass + self.attached(self.frame.masses, ())[0]
         stiffness = elastic_stiffness(self)

@@ -13,7 +13,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from femubench.core.errors import ModelError, NotApplicable, SelfCheckFailed, StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.modal.measurement import Measurement
-from femubench.core.typing import FloatArray, IntArray, SparseArray
+from femubench.core.typing import AnyArray, FloatArray, IntArray, SparseArray
 from femubench.core.update.promise import (
     ALLOWED,
     USED_ERROR,
@@ -110,9 +110,8 @@ class EntryPattern:
 
 
 _RANK = 1e-10
-_REFINEMENTS = 60
-_MET = 1e-13
-_WEAK = 1e-6
+_REFINEMENTS, _GRADIENTS = 8, 30
+_MET, _NEAR = 1e-12, 1e-8
 
 
 @dataclass(frozen=True)
@@ -179,52 +178,94 @@ def least_squares_change(equations: Equations, free: FloatArray) -> tuple[FloatA
 
 
 def smallest_change_sparse(equations: Equations) -> FloatArray:
-    """Return x of many unknowns by one sparse factorisation.
+    """Return x of many unknowns by one sparse factorisation, of as many rows as there are forces.
 
     Where singular values are cut off in the dense case, they are damped here:
-    |fitted x - right|^2 + cutoff^2 |x|^2 is least subject to the exact rows, which the method of
-    multipliers meets to rounding.
+    |fitted x - right|^2 + cutoff^2 |x|^2 is least subject to the exact rows. The normal matrix of
+    the dual problem, fitted fitted' + cutoff^2, has the pattern of K; on fine meshes it is singular
+    but for rounding, so that its factor serves for conjugate gradients in extended precision, and
+    the whole system is refined.
 
     Raises:
         StrategyFailure: when the exact rows cannot be met.
 
-    Source: Tikhonov (1963); Rockafellar (1976), proximal method of multipliers.
+    Source: Tikhonov (1963); Bjorck (1996), Numerical methods for least squares problems, section
+        2.9, for the refinement of the augmented system.
     """
-    exact, weak = sp.csr_array(equations.exact), _WEAK * equations.cutoff**2
-    factor = _factorised(equations, exact, weak)
-    count, rows = exact.shape[1], equations.fitted.shape[0]
-    head = np.concatenate([np.zeros(count), equations.fitted_right])
-    force, previous = np.zeros(exact.shape[0]), np.inf
+    system = _Dual.of(equations)
+    exact, fitted = system.exact, system.fitted
+    across = fitted @ exact.T
+    pulled = np.stack([system.solve(column) for column in across.T], axis=1)
+    inner = (exact @ exact.T - across.T @ pulled).astype(float)
+    change = np.zeros(fitted.shape[1], np.longdouble)
+    force, held = np.zeros(fitted.shape[0], np.longdouble), np.zeros(len(exact), np.longdouble)
+    previous = np.inf
     for _ in range(_REFINEMENTS):
-        solution = factor.solve(np.concatenate([head, equations.exact_right - weak * force]))
-        change, force = solution[:count], solution[count + rows :]
-        missing = float(np.abs(exact @ change - equations.exact_right).max())
-        if missing <= _MET or missing > 0.5 * previous:
+        slack = fitted.T @ force + exact.T @ held - change
+        balance = equations.fitted_right - fitted @ (change + slack) - system.damping * force
+        missing = equations.exact_right - exact @ (change + slack)
+        step = system.solve(balance)
+        more = la.lstsq(inner, (missing - exact @ (fitted.T @ step)).astype(float))[0]
+        step = step - pulled @ more
+        turn = fitted.T @ step + exact.T @ more + slack
+        change, force, held = change + turn, force + step, held + more
+        size = float(np.sqrt(turn @ turn))
+        if size <= _MET * float(np.sqrt(change @ change)) or size > 0.5 * previous:
             break
-        previous = missing
+        previous = size
+    found = np.asarray(change, dtype=float)
+    left = float(np.abs(equations.exact @ found - equations.exact_right).max(initial=0.0))
     # The iteration of the caller removes what is left; this only guards against nonsense.
-    if not missing <= 1e-3 * max(1.0, float(np.abs(equations.exact_right).max())):
-        raise StrategyFailure(f"the orthogonality equations are met to {missing:.2g} only")
-    return np.asarray(change)
+    if not left <= 1e-3 * max(1.0, float(np.abs(equations.exact_right).max(initial=0.0))):
+        raise StrategyFailure(f"the orthogonality equations are met to {left:.2g} only")
+    return found
 
 
-def _factorised(equations: Equations, exact: SparseArray, weak: float) -> SuperLU:
-    """Factorise the equations of the damped problem, exact rows given way by ``weak``."""
-    fitted = equations.fitted
-    system = sp.block_array(
-        [
-            [equations.cutoff**2 * sp.eye_array(fitted.shape[1]), fitted.T, exact.T],
-            [fitted, -sp.eye_array(fitted.shape[0]), None],
-            [exact, None, -weak * sp.eye_array(exact.shape[0])],
-        ]
-    )
-    # Quasidefinite: it has an LDL' factorisation in every symmetric order (Vanderbei 1995).
-    return splu(
-        sp.csc_matrix(system),
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
+@dataclass(frozen=True)
+class _Dual:
+    """The normal matrix of the forces, fitted fitted' + damping, and its factor.
+
+    Arguments:
+        fitted, exact: rows of the equations in extended precision.
+        damping: cutoff^2.
+        factor: of the normal matrix, in double precision.
+    """
+
+    fitted: SparseArray
+    exact: AnyArray
+    damping: float
+    factor: SuperLU
+
+    @classmethod
+    def of(cls, equations: Equations) -> _Dual:
+        """Factorise the normal matrix."""
+        fitted, damping = equations.fitted, equations.cutoff**2
+        normal = fitted @ fitted.T + damping * sp.eye_array(fitted.shape[0])
+        factor = splu(
+            sp.csc_matrix(normal),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+        long = np.longdouble
+        return cls(fitted.astype(long), equations.exact.astype(long), damping, factor)
+
+    def solve(self, right: AnyArray) -> AnyArray:
+        """Return the solution for one right side by conjugate gradients, its factor before them."""
+        found, left = np.zeros_like(right), right
+        way = np.zeros_like(right)
+        gain, first = np.longdouble(1.0), np.longdouble(0.0)
+        for k in range(_GRADIENTS):
+            near = self.factor.solve(left.astype(float)).astype(np.longdouble)
+            old, gain = gain, left @ near
+            first = gain if k == 0 else first
+            if not gain > _NEAR**2 * first:
+                break
+            way = near + (gain / old if k else 0.0) * way
+            pushed = self.fitted @ (self.fitted.T @ way) + self.damping * way
+            length = gain / (way @ pushed)
+            found, left = found + length * way, left - length * pushed
+        return found
 
 
 # A direction in which entries change by 100 % and forces by less than 3 % of the inertia forces
@@ -237,7 +278,7 @@ MOST_ITERATIONS = 40
 # Beyond these numbers of entries: a sparse solution, refusal with and without rigid-body modes.
 DENSE_UNKNOWNS = 1_500
 MOST_RIGID_UNKNOWNS = 2_500
-MOST_UNKNOWNS = 30_000
+MOST_UNKNOWNS = 150_000
 
 
 @dataclass(frozen=True)
@@ -429,10 +470,11 @@ def _free_directions(pattern: EntryPattern, model: Model, rigid: FloatArray) -> 
     """
     most = MOST_RIGID_UNKNOWNS if rigid.shape[1] else MOST_UNKNOWNS
     if len(pattern) > most:
-        kept = " and rigid-body modes kept" if rigid.shape[1] else ""
+        why = "the factor of their equations takes some gigabytes"
+        if rigid.shape[1]:
+            why = "the directions that keep the rigid-body modes fill a dense matrix"
         raise NotApplicable(
-            f"the stiffness has {len(pattern)} non-zero entries; with the pattern{kept}, "
-            f"at most {most} can be solved for"
+            f"the stiffness has {len(pattern)} non-zero entries, and {why} beyond {most}"
         )
     if rigid.shape[1] == 0 and len(pattern) > DENSE_UNKNOWNS:
         return None

@@ -83,8 +83,7 @@ class JointRotation(FrameEffect):
             )
             for name in _parts(structure.frame, place)
         ]
-        longest = _longest(structure, place)
-        if place.endswith(APART) and longest > 1.0:
+        if place.endswith(APART) and (longest := _longest(structure, place)) > 1.0:
             # The textbook has half the depth of the crossing member.
             found.append(EffectParameter(_ARM, "", 0.5, 1.0, 0.0, longest, textbook=1.0))
         return tuple(found)
@@ -100,8 +99,8 @@ class JointRotation(FrameEffect):
         """Return the springs condensed into the end elements."""
         structure = model.frame_structure
         ends, groups = ends_of(structure.frame, place), _parts(structure.frame, place)
-        parts, longest = tuple(groups.values()), _longest(structure, place)
-        if place.endswith(APART) and longest > 1.0:
+        parts = tuple(groups.values())
+        if place.endswith(APART) and (longest := _longest(structure, place)) > 1.0:
             return free_arm_change(model, ends, parts, longest)
         return flexible_ends_change(model, ends, parts)
 
