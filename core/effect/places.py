@@ -186,12 +186,7 @@ def joint_types(frame: Frame) -> Mapping[str, tuple[str, ...]]:
         >>> dict(effect.joint_types(frame))
         {'L': ('J1', 'J3', 'J7', 'J9'), 'T': ('J5', 'J11')}
     """
-    types: dict[str, tuple[str, ...]] = {}
-    for name in joints_with_members(frame):
-        kind = frame.joint(name).type
-        if kind:
-            types[kind] = (*types.get(kind, ()), name)
-    return types
+    return frame.joints_by_type
 
 
 def type_place(frame: Frame, type: str) -> str:

@@ -328,6 +328,15 @@ class Frame:
                 ends.setdefault(joint, []).append(member.name)
         return {joint: tuple(members) for joint, members in ends.items()}
 
+    @cached_property
+    def joints_by_type(self) -> Mapping[str, tuple[str, ...]]:
+        """Return from every joint type to its joints; free ends and joints without are left out."""
+        types: dict[str, list[str]] = {}
+        for joint in self.joints:
+            if joint.type and len(self.ends_at(joint.name)) > 1:
+                types.setdefault(joint.type, []).append(joint.name)
+        return {kind: tuple(names) for kind, names in types.items()}
+
     def joint(self, name: str) -> Joint:
         """Return the joint of that name; raises KeyError."""
         return self._joints[name]

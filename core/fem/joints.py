@@ -229,8 +229,10 @@ def available_length(structure: Structure, end: str) -> float:
         >>> round(update.available_length(structure, "rung-middle@J5"), 4)
         0.0629
     """
-    element = structure.element_ends[end][0]
-    both = sum(index == element for index, _ in structure.element_ends.values())
+    member, element = end.rpartition("@")[0], structure.element_ends[end][0]
+    own = structure.frame.members[structure.frame.member_index[member]]
+    ends = {structure.element_ends[f"{member}@{joint}"] for joint in own.ends}
+    both = sum(index == element for index, _ in ends)
     return _LARGEST_SHARE * _element_length(structure, end) / both
 
 
