@@ -25,8 +25,10 @@ from femubench.core.inference.hypothesis import Hypothesis, hypotheses_of
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.projection import Projection, Projector
 from femubench.core.inference.residuals import Data
-from femubench.core.inference.screening import with_shortlist
+from femubench.core.inference.screening import _pulls, screened, with_shortlist
 from femubench.core.inference.static_response import Basis, LargeProblem, enriched, placed
+from femubench.core.modal import eigen
+from femubench.core.modal.eigen import Modes, modes_of
 from femubench.effect import Effect
 from femubench.fem import Frame
 from femubench.plugins.effects.added_mass import AddedMass
@@ -146,6 +148,91 @@ class TestCoordinates:
             )
             slope = state_at(problem, (part,), 1.5 * step).jacobian[:, 0]
             assert_allclose(slope, (first - second) / step, atol=2e-3 * np.abs(slope).max())
+
+    @pytest.mark.parametrize(
+        ("effect", "place"),
+        [
+            (JointRotation(), "E"),
+            (LocalStiffnessLoss(), "AB/13"),
+            (MemberMass(), "EF"),
+            (AttachedOscillator(), "BE@0.5"),
+            (YoungsModulus(), "all"),
+        ],
+    )
+    def test_a_projection_is_widened_by_what_is_added(
+        self, model: Model, effect: Effect, place: str
+    ) -> None:
+        hypothesis = one(model, effect, place)
+        modes = solve_modes(model, 40).shapes
+        projector, both = Projector(model, modes[:, :30]), Projector(model, modes)
+        widened = projector.widened(projector(hypothesis), modes[:, 30:])
+        factors = hypothesis.typical_factors
+        for mass in (False, True):
+            expected = both(hypothesis).matrix(factors, mass=mass)
+            found = widened.matrix(factors, mass=mass)
+            assert (found is None) == (expected is None)
+            if expected is not None and found is not None:
+                assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+        kept = np.r_[0:20, len(modes.T) : len(modes.T) + hypothesis.change.extra]
+        stiff = widened.matrix(factors, mass=False)
+        if stiff is not None:
+            cut = widened.restricted(kept).matrix(factors, mass=False)
+            assert_allclose(cut, stiff[np.ix_(kept, kept)], atol=1e-9 * np.abs(stiff).max())
+
+    @pytest.mark.parametrize(
+        ("effect", "place"),
+        [(AttachedOscillator(), "BE@0.5"), (JointRotation(), "E"), (AddedMass(), "BC@0.25")],
+    )
+    def test_coordinates_of_many_are_those_of_each(
+        self, model: Model, effect: Effect, place: str
+    ) -> None:
+        """Screened in modes and its own response, as in all that a fit of it has."""
+        hypotheses = (one(model, MemberStiffness(), "AB"), one(model, effect, place))
+        problem = posed_on(model, hypotheses)
+        base = state_at(problem, (), np.zeros(0))
+        parts = [projected(problem, hypothesis) for hypothesis in hypotheses]
+        for part, found in zip(parts, screened(problem, base, parts), strict=True):
+            own, (there,) = enriched(problem, (part,))
+            for x, residual in zip(found.grid, found.residuals, strict=True):
+                exact = state_at(own, (there,), x).residual
+                assert_allclose(residual, exact, atol=1e-2 * max(1.0, np.abs(exact).max()))
+
+    def test_what_follows_a_mode_is_condensed(self, model: Model) -> None:
+        """Forces of an oscillator as of the mass and spring that stand at a point of the model."""
+        hypothesis = one(model, AttachedOscillator(), "BE@0.5")
+        projector = Projector(model, solve_modes(model, 30).shapes)
+        near, values = np.eye(30)[:, 8:13], np.linspace(1.0, 3.0, 5) * 1e6
+        found = _pulls(projector, hypothesis, near, values, weighed=False)
+        part = projector(hypothesis)
+        factors = hypothesis.factors(found.grid)
+        forces = np.tensordot(found.shares, found.forces, axes=1)
+        for g in (0, len(found.grid) // 2, len(found.grid) - 1):
+            stiff, mass = (part.matrix(factors[g], mass=kind) for kind in (False, True))
+            assert stiff is not None
+            assert mass is not None
+            for j, value in enumerate(values):
+                dynamic = stiff - value * mass
+                inner, blunt = dynamic[30, 30], 0.05 * stiff[30, 30]
+                own = inner / (inner**2 + blunt**2)  # 1 / inner, but for a resonance
+                follow = own * (dynamic[30:, :30] @ near[:, j])
+                exact = dynamic[:30, :30] @ near[:, j] - dynamic[:30, 30:] @ follow
+                assert_allclose(forces[g, :, j], exact, atol=1e-9 * np.abs(exact).max())
+
+    def test_a_large_model_is_solved_once_for_fewer_modes(
+        self, model: Model, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        fresh = Model.of(model.frame_structure.frame)
+        asked: list[int | None] = []
+
+        def counted(model: Model, count: int | None = None) -> Modes:
+            asked.append(count)
+            return solve_modes(model, count)
+
+        monkeypatch.setattr(eigen, "solve_modes", counted)
+        many, few, more = (modes_of(fresh, count) for count in (24, 9, 30))
+        assert asked == [24, 30]
+        assert (len(many), len(few), len(more)) == (24, 9, 30)
+        assert_allclose(few.eigenvalues[3:], solve_modes(fresh, 9).eigenvalues[3:], rtol=1e-9)
 
     def test_complete_coordinates_stay_as_they_are(self, ladder: FrameBuilder) -> None:
         small = Model.of(ladder())

@@ -21,6 +21,7 @@ from femubench.core.inference.mesh_error import mesh_bias, mesh_corrections
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.posterior import Explanation, Key, Posterior
 from femubench.core.inference.residuals import Data
+from femubench.core.modal.eigen import once_for
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import Gain
@@ -338,10 +339,16 @@ def extended_by(model: Model, explanation: Explanation, x: FloatArray | None = N
         >>> diagnosis.extended_by(model, examination.best).size == model.size
         True
     """
-    base = extended(model, explanation.base.parts, explanation.base.x)
     parts = explanation.parts
-    own = explanation.fit.state.x if x is None else np.clip(x, *bounds_of(parts))
-    return extended(base, parts, own)
+
+    def made(x: FloatArray) -> Model:
+        return extended(extended(model, explanation.base.parts, explanation.base.x), parts, x)
+
+    if x is not None:
+        return made(np.clip(x, *bounds_of(parts)))
+    # With the explanation, so that nothing else has its number as long as this is kept.
+    key = "extended by", id(explanation)
+    return once_for(model, key, lambda: (explanation, made(explanation.fit.state.x)))[1]
 
 
 def unseen_of(

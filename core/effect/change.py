@@ -40,14 +40,21 @@ class ElementOperator:
     Arguments:
         structure: the nominal frame.
         elements: their rows in its mesh, (k,).
-        blocks: local matrices, (k, 12, 12).
+        blocks: local matrices, (k, 12, 12); terms of one change may share them.
         extra: dofs that the effect adds elsewhere.
+        share: what each block is multiplied by, (k,); None for 1.
     """
 
     structure: Structure
     elements: IntArray
     blocks: FloatArray
     extra: int = 0
+    share: FloatArray | None = None
+
+    @property
+    def matrices(self) -> FloatArray:
+        """Return the local matrices, each times its share, (k, 12, 12)."""
+        return self.blocks if self.share is None else self.share[:, None, None] * self.blocks
 
     @property
     def _rows(self) -> SparseArray:
@@ -60,14 +67,14 @@ class ElementOperator:
         n, m = rows.shape[1], vectors.shape[1]
         local = (rows @ vectors[:n]).reshape(-1, 12, m)
         product = np.zeros(vectors.shape)
-        product[:n] = rows.T @ (self.blocks @ local).reshape(-1, m)
+        product[:n] = rows.T @ (self.matrices @ local).reshape(-1, m)
         return product
 
     def project(self, vectors: FloatArray) -> FloatArray:
         """Return vectors' A vectors, (m, m)."""
         rows = self._rows
         local = np.asarray(rows @ vectors[: rows.shape[1]])
-        force = (self.blocks @ local.reshape(-1, 12, local.shape[1])).reshape(local.shape)
+        force = (self.matrices @ local.reshape(-1, 12, local.shape[1])).reshape(local.shape)
         return np.asarray(local.T @ force)
 
 

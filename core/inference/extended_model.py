@@ -11,7 +11,7 @@ from femubench.core.errors import FemubenchError, ModelError
 from femubench.core.fem.model import Model
 from femubench.core.inference.fit import Fit, Problem, fit, signed_hz
 from femubench.core.inference.projection import Projection
-from femubench.core.modal.eigen import enough_modes, solve_modes
+from femubench.core.modal.eigen import enough_modes, modes_of
 from femubench.core.roles import EffectParameter
 from femubench.core.typing import FloatArray
 
@@ -53,7 +53,7 @@ def raw_residual(problem: Problem, model: Model) -> FloatArray:
         ModelError: when the model has no modes.
     """
     data = problem.data
-    modes = solve_modes(model, enough_modes(model, 2 * len(data.measurement)))
+    modes = modes_of(model, enough_modes(model, 2 * len(data.measurement)))
     order = np.argsort(modes.eigenvalues)
     hertz = signed_hz(modes.eigenvalues[order])[None]
     seen = np.asarray(model.observe(data.measurement.sensors) @ modes.shapes[:, order])[None]

@@ -226,7 +226,7 @@ def _residuals(problem: Problem, projections: Sequence[Projection], top: int) ->
         projections: the hypotheses.
         top: number of modes up to the last one that has a measured partner.
     """
-    space, data = problem.space, problem.data
+    space = problem.space
     low, tracked = min(len(space), top + _KEPT), min(len(space), top + _TRACKED)
     counts = [len(p.hypothesis.grid) for p in projections]
     first = np.concatenate([[0], np.cumsum(counts)])
@@ -242,14 +242,57 @@ def _residuals(problem: Problem, projections: Sequence[Projection], top: int) ->
         rows = np.concatenate([np.arange(first[i], first[i + 1]) for i in members])
         own = [projections[i] for i in members]
         hertz[rows], seen[rows] = _modes(space, own, chosen, low)
-    seen = data.aligned(hertz, seen, space.zero)
-    hertz, seen = data.predicted(hertz, seen, space.zero)
-    partner = data.pair(hertz, seen)
     mass = [space.mass + p.hypothesis.grid_factors @ p.weights for p in projections]
+    return _compared(problem, hertz, seen, np.concatenate(mass))
+
+
+def residuals_at(
+    problem: Problem, projection: Projection, grid: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return where a hypothesis leaves the mass definite, and the residuals there in deviations.
+
+    Arguments:
+        problem: data and modal coordinates, all of which are taken.
+        projection: the hypothesis in them.
+        grid: its coordinates that are tried, (g, k).
+
+    Returns:
+        coordinates (h, k), h <= g, and residuals (h, n_data).
+    """
+    space, rows = problem.space, projection.rows
+    factors = projection.hypothesis.factors(grid)
+    size = len(space) + projection.extra
+    own = np.arange(len(space))
+    stiffness, mass = np.zeros((2, len(grid), size, size))
+    stiffness[:, own, own], mass[:, own, own] = space.eigenvalues, 1.0
+    heavy = projection.core(factors, mass=True)
+    for target, core in ((stiffness, projection.core(factors, mass=False)), (mass, heavy)):
+        if core is not None:
+            target += rows.T @ (core @ rows)
+    count = min(size, space.rigid + 2 * len(problem.data.measurement) + 8)
+    values, vectors = _solve(stiffness, None if heavy is None else mass, count)
+    kept = values[:, 0] < _FAR / 2.0
+    seen = space.padded_readings(size) @ vectors[kept]
+    weight = space.mass + factors[kept] @ projection.weights
+    return grid[kept], _compared(problem, signed_hz(values[kept]), seen, weight)
+
+
+def _compared(
+    problem: Problem, hertz: FloatArray, seen: FloatArray, mass: FloatArray
+) -> FloatArray:
+    """Return the residuals of candidates in deviations of the measurement, (g, n_data).
+
+    Arguments:
+        hertz, seen: their modes, (g, q), and the readings of these, (g, n_sensors, q).
+        mass: of the structure in kg, (g,).
+    """
+    data, zero = problem.data, problem.space.zero
+    seen = data.aligned(hertz, seen, zero)
+    hertz, seen = data.predicted(hertz, seen, zero)
+    partner = data.pair(hertz, seen)
     each = np.arange(len(partner))[:, None]
     paired = np.moveaxis(np.moveaxis(seen, 2, 1)[each, partner], 1, 2)
-    raw = data.residual(hertz[each, partner], paired, np.concatenate(mass))
-    return np.asarray(raw)
+    return np.asarray(data.residual(hertz[each, partner], paired, mass))
 
 
 def _kept(problem: Problem, projections: Sequence[Projection], top: int) -> FloatArray:

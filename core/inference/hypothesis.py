@@ -178,20 +178,15 @@ def finer(hypothesis: Hypothesis, model: Model, effects: Iterable[Effect]) -> li
 def _hypotheses(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ...]:
     found = []
     for effect in effects:
+        each = {p: tuple(effect.parameters(model, p)) for p in dict.fromkeys(effect.places(model))}
         # A rod has no bending stiffness by which a rotational spring could be measured.
-        places = tuple(
-            p for p in dict.fromkeys(effect.places(model)) if _has_scale(model, effect, p)
-        )
-        own = [hypothesis_at(model, effect, place, len(places)) for place in places]
+        places = {p: own for p, own in each.items() if all(one.scale > 0.0 for one in own)}
+        own = [_made(model, effect, p, own, len(places)) for p, own in places.items()]
         if model.free:
             own = [one for one in own if not _holds(model, one)]
             own = [replace(one, places=len(own)) for one in own]
         found += own
     return tuple(found)
-
-
-def _has_scale(model: Model, effect: Effect, place: str) -> bool:
-    return all(parameter.scale > 0.0 for parameter in effect.parameters(model, place))
 
 
 def _holds(model: Model, hypothesis: Hypothesis) -> bool:
@@ -217,11 +212,16 @@ def _rigid_motions(model: Model) -> tuple[FloatArray, float]:
 
 def hypothesis_at(model: Model, effect: Effect, place: str, places: int) -> Hypothesis:
     """Return an effect at one of so many places."""
-    parameters: Sequence[EffectParameter] = tuple(effect.parameters(model, place))
+    return _made(model, effect, place, tuple(effect.parameters(model, place)), places)
+
+
+def _made(
+    model: Model, effect: Effect, place: str, parameters: tuple[EffectParameter, ...], places: int
+) -> Hypothesis:
     change = getattr(effect, "change", None)
     made = (
         change(model, place)
         if callable(change)
         else tabulated_change(effect, model, place, parameters)
     )
-    return Hypothesis(effect, place, tuple(parameters), made, places)
+    return Hypothesis(effect, place, parameters, made, places)

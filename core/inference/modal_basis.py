@@ -190,21 +190,24 @@ def nominal_space(
     return Space(eigenvalues, readings, projections, model.total_mass, int(modes.rigid.sum()))
 
 
-def scatter_terms(structure: Structure, vectors: FloatArray, eigenvalues: FloatArray) -> FloatArray:
-    """Return the modal forces of a relative change of every element's stiffness, then its mass.
+def scatter_terms(
+    structure: Structure, vectors: FloatArray, eigenvalues: FloatArray, elements: IntArray
+) -> FloatArray:
+    """Return the modal forces of a relative change of elements' stiffness, then of their mass.
 
     Arguments:
         structure: the nominal frame.
         vectors: its modes, (n, N).
         eigenvalues: of the modes of interest, which come first among the columns, (q,).
+        elements: which ones, (k,).
 
     Returns:
-        phi_k' (dK - lambda_j dM) phi_j by element and kind, mode j, coordinate k,
-        (2 n_elements, q, N).
+        phi_k' (dK - lambda_j dM) phi_j by element and kind, mode j, coordinate k, (2 k, q, N).
     """
-    q = len(eigenvalues)
-    local = (structure.gather @ vectors).reshape(-1, 12, vectors.shape[1])
+    q, properties = len(eigenvalues), structure.properties.take(elements)
+    rows = (12 * elements[:, None] + np.arange(12)).ravel()
+    local = (structure.gather[rows] @ vectors).reshape(-1, 12, vectors.shape[1])
     near = local[:, :, :q]
-    stiff = np.swapaxes(stiffness_matrices(structure.properties) @ near, 1, 2) @ local
-    heavy = np.swapaxes(mass_matrices(structure.properties) @ near, 1, 2) @ local
+    stiff = np.swapaxes(stiffness_matrices(properties) @ near, 1, 2) @ local
+    heavy = np.swapaxes(mass_matrices(properties) @ near, 1, 2) @ local
     return np.concatenate([stiff, -eigenvalues[:, None] * heavy])

@@ -51,6 +51,7 @@ _LEAST, _MOST = 0.01, 10.0  # of u
 _UNKNOWN = 1e8  # variance of what is not looked at
 _STEPS, _FEW_STEPS, _SETTLED = 40, 10, 1e-5
 _GENERAL = 20  # elastic modes that a general change couples
+_AT_ONCE = 512  # elements whose scatter is looked at
 _TURNED = 1e-9  # below which a mode has no part in another
 _ENDS = (slice(3, 6), slice(9, 12))  # rotations among the local displacements of an element
 
@@ -102,12 +103,17 @@ def scatter_slopes(problem: Problem, modes: Modes) -> FloatArray:
     # Close modes are turned to the measured ones, and their forces with them.
     turned = nominal.vectors[:, nominal.partner]
     top = int(np.flatnonzero(np.abs(turned).max(axis=1) > _TURNED)[-1]) + 1
-    forces = scatter_terms(structure, shapes, space.eigenvalues[:top])
-    near = np.einsum("piN,im->mNp", forces, turned[:top])
     element = structure.properties
     own = element.rhoA * (element.length - element.rigid_mass_1 - element.rigid_mass_2)
-    masses = np.concatenate([np.zeros(len(element)), own])
-    return nominal.rows(np.swapaxes(near, 0, 1), masses)
+    found = np.zeros((len(problem.data), 2, len(element)))
+    # Some elements at once: with those of a large model the forces would fill the memory.
+    for rows in np.split(np.arange(len(element)), range(_AT_ONCE, len(element), _AT_ONCE)):
+        forces = scatter_terms(structure, shapes, space.eigenvalues[:top], rows)
+        near = np.einsum("piN,im->mNp", forces, turned[:top])
+        masses = np.concatenate([np.zeros(len(rows)), own[rows]])
+        slopes = nominal.rows(np.swapaxes(near, 0, 1), masses)
+        found[:, :, rows] = slopes.reshape(len(slopes), 2, -1)
+    return found.reshape(len(found), -1)
 
 
 def _everything(nominal: State, sign: float, mass: float) -> FloatArray:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from femubench.core.effect.change import ElementOperator, RowOperator, Term
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.inference.hypothesis import Hypothesis
-from femubench.core.typing import BoolArray, FloatArray, IntArray
+from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class Projection:
         cores: symmetric, one a term, (t, p, p).
         is_mass: which of them belong to the mass, (t,).
         weights: by how much each mass term makes the structure heavier in kg, (t,).
+        whole: whether the rows are the coordinates themselves.
     """
 
     hypothesis: Hypothesis
@@ -34,6 +36,7 @@ class Projection:
     cores: FloatArray
     is_mass: BoolArray
     weights: FloatArray
+    whole: bool = False
 
     @property
     def extra(self) -> int:
@@ -57,6 +60,24 @@ class Projection:
         core = self.core(factors, mass=mass)
         return None if core is None else np.asarray(self.rows.T @ (core @ self.rows))
 
+    def turned(self, first: int, turn: FloatArray) -> Projection:
+        """Return the same in coordinates of which some are combinations of those here.
+
+        Arguments:
+            first: of the coordinates that change.
+            turn: the new ones from as many old ones, orthogonal, (r, r).
+        """
+        rows, own = self.rows.copy(), slice(first, first + len(turn))
+        rows[:, own] = rows[:, own] @ turn
+        return replace(self, rows=rows, whole=False)
+
+    def restricted(self, kept: IntArray) -> Projection:
+        """Return the same in some of the coordinates."""
+        if self.whole:
+            cores = self.cores[:, kept[:, None], kept]
+            return replace(self, rows=np.eye(len(kept)), cores=cores)
+        return replace(self, rows=self.rows[:, kept])
+
 
 class Projector:
     """Projects changes on given vectors.
@@ -76,10 +97,14 @@ class Projector:
         else:
             # What cannot move in the plane of the frame has no part in any product.
             self.active = np.flatnonzero(self.structure.active_local)
-            local = (self.structure.gather @ vectors).reshape(-1, 12, vectors.shape[1])
-            self.local = local[:, self.active]
             self.shift = _translation(self.structure)[:, self.active]
             self.unit = shift[:, _direction(self.structure)]
+
+    @cached_property
+    def local(self) -> FloatArray:
+        """Return the displacements of all elements, (n_elements, n_active, N)."""
+        assert self.structure is not None
+        return self._gathered(self.vectors, np.arange(len(self.shift)))
 
     def __call__(self, hypothesis: Hypothesis) -> Projection:
         """Return a hypothesis in the coordinates of the basis."""
@@ -93,27 +118,114 @@ class Projector:
             grown = self._grown(change.extra)
             motion = self._shifted(change.terms, change.extra)
             rows = np.eye(grown.shape[1])
-            cores = np.array([term.operator.project(grown) for term in change.terms])
+            cores = np.array([self._core(term, grown) for term in change.terms])
             weights = np.array([self._weight(term, motion) for term in change.terms])
         known = [
             w if term.weight is None else term.weight
             for w, term in zip(weights, change.terms, strict=True)
         ]
-        return Projection(hypothesis, rows, cores, is_mass, np.where(is_mass, known, 0.0))
+        weights = np.where(is_mass, known, 0.0)
+        return Projection(hypothesis, rows, cores, is_mass, weights, small is None)
+
+    def widened(self, projection: Projection, added: FloatArray) -> Projection:
+        """Return a projection on further vectors besides, which stand behind those of the basis.
+
+        Arguments:
+            projection: on the basis.
+            added: the further vectors, (n, r).
+        """
+        change, known, r = projection.hypothesis.change, self.vectors.shape[1], added.shape[1]
+        if not projection.whole:
+            touched, shared = self._acted_on(change.terms)
+            seen = [np.asarray(rows[:, : len(added)] @ added) for rows in shared.values()]
+            if touched.size:
+                seen.insert(0, self._gathered(added, touched).reshape(-1, r))
+            old = projection.rows
+            rows = np.hstack([old[:, :known], np.vstack(seen), old[:, known:]])
+            return replace(projection, rows=rows)
+        size = known + r + change.extra
+        kept, new = np.delete(np.arange(size), known + np.arange(r)), known + np.arange(r)
+        cores = np.zeros((len(change.terms), size, size))
+        cores[:, kept[:, None], kept] = projection.cores
+        for core, term in zip(cores, change.terms, strict=True):
+            cross, core[np.ix_(new, new)] = self._beside(term, added, change.extra)
+            core[np.ix_(kept, new)], core[np.ix_(new, kept)] = cross, cross.T
+        return replace(projection, rows=np.eye(size), cores=cores)
+
+    def crossed(self, terms: Sequence[Term], near: FloatArray) -> list[FloatArray]:
+        """Return each of some fixed matrices, times some vectors, in the basis, (N, m) each.
+
+        Arguments:
+            terms: that add no dofs.
+            near: combinations of the basis, (N, m).
+        """
+        found, seen = [], {}
+        for term in terms:
+            operator = term.operator
+            if isinstance(operator, ElementOperator):
+                every = np.array_equal(operator.elements, np.arange(len(self.local)))
+                moved = self.local if every else self.local[operator.elements]
+                pulls = (self._blocks(operator) @ (moved @ near)).reshape(-1, near.shape[1])
+                found.append(moved.reshape(len(pulls), -1).T @ pulls)
+            elif isinstance(operator, RowOperator):
+                # Terms of one effect may share their rows.
+                if id(operator.rows) not in seen:
+                    seen[id(operator.rows)] = np.asarray(operator.rows @ self.vectors)
+                rows = seen[id(operator.rows)]
+                found.append(rows.T @ (operator.core @ (rows @ near)))
+            else:
+                found.append(self.vectors.T @ operator.apply(self.vectors @ near))
+        return found
+
+    def _gathered(self, vectors: FloatArray, elements: IntArray) -> FloatArray:
+        """Return the displacements of some elements that can move, (k, n_active, N)."""
+        assert self.structure is not None
+        rows = (12 * elements[:, None] + self.active).ravel()
+        moved = np.asarray(self.structure.gather[rows] @ vectors)
+        return moved.reshape(len(elements), len(self.active), -1)
+
+    def _core(self, term: Term, grown: FloatArray) -> FloatArray:
+        """Return a term on all vectors, (N + extra, N + extra)."""
+        operator = term.operator
+        if not isinstance(operator, ElementOperator):
+            return operator.project(grown)
+        moved = self.local[operator.elements]
+        force = (self._blocks(operator) @ moved).reshape(-1, moved.shape[2])
+        return np.pad(moved.reshape(len(force), -1).T @ force, (0, len(grown) - len(self.vectors)))
+
+    def _beside(self, term: Term, added: FloatArray, extra: int) -> tuple[FloatArray, FloatArray]:
+        """Return a term between all vectors and further ones, and between these alone."""
+        operator, r = term.operator, added.shape[1]
+        if isinstance(operator, ElementOperator):
+            base = self.local[operator.elements].reshape(-1, self.vectors.shape[1])
+            moved = self._gathered(added, operator.elements)
+            force = (self._blocks(operator) @ moved).reshape(-1, r)
+            cross = np.pad(base.T @ force, ((0, extra), (0, 0)))
+            return cross, moved.reshape(-1, r).T @ force
+        grown = np.vstack([added, np.zeros((extra, r))])
+        force = operator.apply(grown)
+        return self._grown(extra).T @ force, grown.T @ force
+
+    def _blocks(self, operator: ElementOperator) -> FloatArray:
+        return operator.matrices[:, self.active[:, None], self.active]
+
+    @staticmethod
+    def _acted_on(terms: Sequence[Term]) -> tuple[IntArray, dict[int, SparseArray]]:
+        """Return the elements, and by their identity the rows, that terms act on."""
+        elements = [t.operator.elements for t in terms if isinstance(t.operator, ElementOperator)]
+        touched = np.unique(np.concatenate(elements)) if elements else np.zeros(0, dtype=np.int64)
+        # Terms of one effect may share their rows.
+        points = (t.operator for t in terms if isinstance(t.operator, RowOperator))
+        return touched, {id(operator.rows): operator.rows for operator in points}
 
     def _small(
         self, terms: Sequence[Term], extra: int
     ) -> tuple[FloatArray, FloatArray, FloatArray] | None:
         """Return rows, cores and the rows' motion in a unit translation; None if too many."""
-        elements = [t.operator.elements for t in terms if isinstance(t.operator, ElementOperator)]
-        points = [t.operator for t in terms if isinstance(t.operator, RowOperator)]
-        if len(elements) + len(points) < len(terms):
+        if not all(isinstance(t.operator, ElementOperator | RowOperator) for t in terms):
             return None
-        touched = np.unique(np.concatenate(elements)) if elements else np.zeros(0, dtype=np.int64)
-        width = len(self.active) if elements else 0
-        last = len(touched) * width
-        # Terms of one effect may share their rows.
-        shared = {id(operator.rows): operator.rows for operator in points}
+        touched, shared = self._acted_on(terms)
+        last = len(touched) * len(self.active) if touched.size else 0
         count = last + sum(rows.shape[0] for rows in shared.values())
         if count > self.vectors.shape[1] + extra:
             return None
@@ -124,7 +236,7 @@ class Projector:
         moved, places = self._shifted(terms, extra), {}
         for key, found in shared.items():
             places[key] = slice(last, last + found.shape[0])
-            rows[places[key]] = found @ self._grown(extra)
+            rows[places[key]] = self._seen(found, extra)
             motion[places[key]] = found @ moved
             last = places[key].stop
         cores = np.zeros((len(terms), count, count))
@@ -142,8 +254,7 @@ class Projector:
         """Return the matrix on the displacements of elements, all of the operator's among them."""
         count, width = len(touched), len(self.active)
         blocks, each = np.zeros((count, width, width)), np.arange(count)
-        own = operator.blocks[:, self.active[:, None], self.active]
-        np.add.at(blocks, np.searchsorted(touched, operator.elements), own)
+        np.add.at(blocks, np.searchsorted(touched, operator.elements), self._blocks(operator))
         whole = np.zeros((count, width, count, width))
         whole[each, :, each] = blocks
         return whole.reshape(count * width, -1)
@@ -161,6 +272,19 @@ class Projector:
         motion[n:] = -np.linalg.solve(pulled[n:, 1:], pulled[n:, 0])
         return motion
 
+    def _seen(self, rows: SparseArray, extra: int) -> FloatArray:
+        """Return displacements in all vectors and in what a change adds, (p, N + extra)."""
+        if not extra:
+            return np.asarray(rows @ self.vectors)
+        # By their few entries: to cut sparse rows in two takes longer than all the rest.
+        entries, (n, known) = rows.tocoo(), self.vectors.shape
+        line, column = entries.coords
+        own = column < n
+        found = np.zeros((rows.shape[0], known + extra))
+        np.add.at(found[:, :known], line[own], entries.data[own, None] * self.vectors[column[own]])
+        np.add.at(found, (line[~own], known + column[~own] - n), entries.data[~own])
+        return found
+
     def _grown(self, extra: int) -> FloatArray:
         """Return vectors with unit vectors of added dofs behind them, (n + extra, N + extra)."""
         if extra not in self.wider:
@@ -176,9 +300,8 @@ class Projector:
             return 0.0
         operator = term.operator
         if isinstance(operator, ElementOperator):
-            own, blocks = self.shift[operator.elements], operator.blocks
-            blocks = blocks[:, self.active[:, None], self.active]
-            return float(np.einsum("ei,eij,ej->", own, blocks, own))
+            own = self.shift[operator.elements]
+            return float(np.einsum("ei,eij,ej->", own, self._blocks(operator), own))
         return float(operator.project(motion[:, None])[0, 0])
 
 

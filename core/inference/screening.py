@@ -11,23 +11,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femubench.core.effect.change import ElementOperator, RowOperator, Term
-from femubench.core.errors import ModelError
-from femubench.core.fem.model import Model
 from femubench.core.inference.fit import Fit, Problem, State, fit, state_at
-from femubench.core.inference.grid_search import Screened, screen
+from femubench.core.inference.grid_search import Screened, residuals_at, screen
 from femubench.core.inference.hypothesis import Hypothesis
 from femubench.core.inference.noise import marginal
 from femubench.core.inference.projection import Projection, Projector
-from femubench.core.inference.static_response import LargeProblem, enriched, magnitudes
-from femubench.core.ties import in_order
+from femubench.core.inference.static_response import LargeProblem, magnitudes
+from femubench.core.ties import in_order, least
 from femubench.core.typing import FloatArray
 
 _MOST, _OF_A_NAME, _PARTNERS = 240, 12, 60
+_NOTHING = 1e-6
+_CHUNK = 512  # forces that are held at once
 _SIZES = (0.12, 0.5, 1.3, 2.6)  # at which each is tried
 _STEPS = 3
-_NOTHING = 1e-6
-_CHUNK = 256  # hypotheses whose forces are held at once
 _SLACK = 0.1  # share of the prior that counts: a ranking by first order must not mind sizes
 _BLUNT = 0.05  # a resonance closer than this share of an eigenvalue is no matter of first order
 
@@ -54,44 +51,44 @@ def with_shortlist(problem: Problem) -> Problem:
     """
     if not isinstance(problem, LargeProblem):
         return problem
-    vectors = problem.common.modes.shapes
-    local = _Local(problem.model, vectors)
-    ranked = list(_ranked(local, state_at(problem, (), np.zeros(0)), problem.hypotheses))
+    projector = problem.common.projector
+    ranked = _ranked(projector, state_at(problem, (), np.zeros(0)), problem.hypotheses)
     chosen = _chosen(ranked, _MOST, _OF_A_NAME)
-    space = replace(problem.space, projections=tuple(local.project(h) for h in chosen))
+    space = replace(problem.space, projections=tuple(projector(h) for h in chosen))
     return replace(problem, space=space)
 
 
 def screened(problem: Problem, base: State, projections: Sequence[Projection]) -> list[Screened]:
     """Return the atlas; of a large model, each hypothesis in coordinates of its own."""
-    if not isinstance(problem, LargeProblem):
+    if not isinstance(problem, LargeProblem) or not projections:
         return screen(problem, base, projections)
-    tried = (_tried(problem, projection) for projection in projections)
+    spaces = problem.common.first_response(problem.space, projections)
+    tried = (
+        _tried(replace(problem, space=own), projection)
+        for own, projection in zip(spaces, projections, strict=True)
+    )
     return [item for item in tried if item is not None]
 
 
-def _tried(problem: LargeProblem, projection: Projection) -> Screened | None:
+def _tried(own: Problem, projection: Projection) -> Screened | None:
     """Return a hypothesis at a few magnitudes, and where some steps from the best one lead.
 
     None where it makes the mass indefinite at all of them.
+
+    Arguments:
+        own: the data in coordinates of its own.
+        projection: the hypothesis in those that it shares.
     """
-    own, parts = enriched(problem, (projection,), rounds=1)
-    points, states = [], []
-    for x in magnitudes(projection.hypothesis, _SIZES):
-        try:
-            states.append(state_at(own, parts, x))
-        except ModelError:
-            continue
-        points.append(x)
-    if not states:
+    parts = own.space.projections
+    grid, raw = residuals_at(own, parts[0], magnitudes(projection.hypothesis, _SIZES))
+    if not len(grid):
         return None
-    best = in_order(states, lambda state: state.cost)[0]
-    found = fit(own, parts, best.x, steps=_STEPS)
+    residuals = own.noise.residual(raw + own.offset)
+    best = least(np.square(residuals).sum(axis=1) + np.square(grid).sum(axis=1))
+    found = fit(own, parts, grid[best], steps=_STEPS)
     assert found is not None
-    residuals = np.array([state.residual for state in states])
     state = found.state
-    evidence = found.log_evidence
-    return Screened(projection, np.array(points), residuals, state.x, state.cost, evidence)
+    return Screened(projection, grid, residuals, state.x, state.cost, found.log_evidence)
 
 
 def beside(problem: Problem, seed: Fit) -> Problem:
@@ -105,14 +102,15 @@ def beside(problem: Problem, seed: Fit) -> Problem:
     if not isinstance(problem, LargeProblem):
         space = problem.space.rebased(seed.parts, state.x)
         return replace(problem, space=space, offset=state.problem.offset)
-    space, vectors = problem.common.enriched(problem.space, seed.parts)
+    found = problem.common.enriched(problem.space, seed.parts)
+    space = found.space
     own = replace(problem, space=space, offset=state.problem.offset)
     there = state_at(own, space.projections, state.x)
     taken = {id(part.hypothesis) for part in seed.parts}
     free = [h for h in problem.hypotheses if id(h) not in taken]
-    local = _Local(problem.model, vectors)
-    ranked = list(_ranked(local, there, free))
-    partners = tuple(local.project(h) for h in _chosen(ranked, _PARTNERS, 3))
+    projector = Projector(problem.model, found.vectors)
+    ranked = _ranked(projector, there, free)
+    partners = tuple(projector(h) for h in _chosen(ranked, _PARTNERS, 3))
     rebased = replace(space, projections=partners).rebased(space.projections, state.x)
     return replace(own, space=rebased)
 
@@ -134,49 +132,65 @@ def _chosen(ranked: Sequence[Ranked], most: int, of_a_name: int) -> list[Hypothe
     return list(found.values())
 
 
-def _ranked(local: _Local, state: State, hypotheses: Sequence[Hypothesis]) -> Iterator[Ranked]:
-    """Yield every hypothesis by first order about a state.
+def _ranked(projector: Projector, state: State, hypotheses: Sequence[Hypothesis]) -> list[Ranked]:
+    """Return every hypothesis by first order about a state.
 
     Arguments:
-        local: the coordinates of the state.
+        projector: on the motions of the coordinates of the state, without those that its causes
+            have added, (n, N).
         state: of the model with or without causes.
         hypotheses: of the same model.
     """
+    count = projector.vectors.shape[1]
+    near, values = state.vectors[:count, state.partner], state.eigenvalues[state.partner]
+    weighed = state.problem.data.mass is not None
+    found: list[Ranked] = []
+    waiting: list[tuple[Hypothesis, _Pulls]] = []
+    many = 0
+    for hypothesis in hypotheses:
+        pulls = _pulls(projector, hypothesis, near, values, weighed)
+        waiting.append((hypothesis, pulls))
+        many += len(pulls.masses)
+        if many >= _CHUNK or hypothesis is hypotheses[-1]:
+            found += _gains(state, waiting)
+            waiting, many = [], 0
+    return found
+
+
+def _gains(state: State, some: Sequence[tuple[Hypothesis, _Pulls]]) -> Iterator[Ranked]:
+    """Yield hypotheses with what their forces do to the data."""
     residual = marginal(state.residual, state.jacobian)
-    for start in range(0, len(hypotheses), _CHUNK):
-        chunk = hypotheses[start : start + _CHUNK]
-        grids, factors = zip(*(_directions(hypothesis) for hypothesis in chunk), strict=True)
-        pairs = zip(chunk, factors, strict=True)
-        found = [_first_order(local, state, hypothesis, own) for hypothesis, own in pairs]
-        forces = np.moveaxis(np.concatenate([force for force, _ in found]), 0, 2)
-        slopes = state.rows(forces, np.concatenate([mass for _, mass in found]))
-        moves = marginal(state.problem.noise.whiten(slopes.T), state.jacobian).T
-        size = np.square(moves).sum(axis=0)
-        prior = np.concatenate([np.square(grid).sum(axis=1) for grid in grids])
-        along = np.maximum(residual @ moves, 0.0)
+    forces = np.moveaxis(np.concatenate([pulls.forces for _, pulls in some]), 0, 2)
+    # Coordinates that the causes of the state have added feel nothing.
+    forces = np.pad(forces, ((0, len(state.vectors) - len(forces)), (0, 0), (0, 0)))
+    slopes = state.rows(forces, np.concatenate([pulls.masses for _, pulls in some]))
+    each = marginal(state.problem.noise.whiten(slopes.T), state.jacobian)
+    last = 0
+    for hypothesis, pulls in some:
+        first, last = last, last + len(pulls.masses)
+        moves = pulls.shares @ each[first:last]
+        size, prior = np.square(moves).sum(axis=1), np.square(pulls.grid).sum(axis=1)
+        along = np.maximum(moves @ residual, 0.0)
         gain = np.square(along) / (size + _SLACK * prior + 1e-30)
         visible = np.sqrt(size / (prior + 1e-30))
-        ends = np.cumsum([len(grid) for grid in grids])[:-1]
-        both = zip(chunk, np.split(gain, ends), np.split(visible, ends), strict=True)
-        for hypothesis, own, seen in both:
-            yield Ranked(hypothesis, float(own.max()), float(seen.max()))
+        yield Ranked(hypothesis, float(gain.max()), float(visible.max()))
 
 
-class _Local:
-    """The coordinates of a state, and how elements move with them.
+@dataclass(frozen=True)
+class _Pulls:
+    """What a hypothesis exerts on the measured modes, as sums of a few fixed forces.
 
     Arguments:
-        model: large.
-        vectors: motions of the coordinates, (n, N).
+        grid: coordinates that are tried, (g, k).
+        shares: of the forces there, (g, d).
+        forces: on the coordinates, (d, N, m).
+        masses: by which each makes the structure heavier in kg, (d,).
     """
 
-    def __init__(self, model: Model, vectors: FloatArray) -> None:
-        self.vectors, structure = vectors, model.structure
-        self.project = Projector(model, vectors)
-        self.elements: FloatArray | None = None
-        if structure is not None:
-            gathered = structure.gather @ vectors
-            self.elements = np.asarray(gathered).reshape(-1, 12, vectors.shape[1])
+    grid: FloatArray
+    shares: FloatArray
+    forces: FloatArray
+    masses: FloatArray
 
 
 def _directions(hypothesis: Hypothesis) -> tuple[FloatArray, FloatArray]:
@@ -193,71 +207,63 @@ def _directions(hypothesis: Hypothesis) -> tuple[FloatArray, FloatArray]:
     return np.vstack([grid, grid]), np.vstack([factors, factors - always])
 
 
-def _first_order(
-    local: _Local, state: State, hypothesis: Hypothesis, factors: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return what a hypothesis exerts on the measured modes, (g, N, m), and its mass, (g,).
-
-    N counts the coordinates of the state.
+def _pulls(
+    projector: Projector,
+    hypothesis: Hypothesis,
+    near: FloatArray,
+    values: FloatArray,
+    weighed: bool,
+) -> _Pulls:
+    """Return what a hypothesis exerts on some modes.
 
     Arguments:
-        local: the coordinates of the state.
-        state: where.
+        projector: on the motions of the coordinates.
         hypothesis: an effect at a place.
-        factors: of its terms, (g, n_terms).
+        near, values: the modes in the coordinates, (N, m), and their eigenvalues, (m,).
+        weighed: whether the mass is a datum.
     """
-    change = hypothesis.change
-    count = local.vectors.shape[1]
-    near, values = state.vectors[:count, state.partner], state.eigenvalues[state.partner]
-    heavy = np.array([term.matrix == "mass" for term in change.terms])
-    blocks = np.array([_crossed(local, term, near, change.extra) for term in change.terms])
-    stiff = np.tensordot(factors[:, ~heavy], blocks[~heavy], axes=1)
-    mass = np.tensordot(factors[:, heavy], blocks[heavy], axes=1)
-    weight = np.zeros(len(factors))
-    if state.problem.data.mass is not None:
-        weight = factors @ local.project(hypothesis).weights
-    if change.extra:
-        forces = _condensed(stiff, mass, values, change.extra)
-    else:
-        forces = stiff - mass * values
-    # Coordinates that the causes of the state have added feel nothing.
-    return np.pad(forces, ((0, 0), (0, len(state.vectors) - count), (0, 0))), weight
+    grid, factors = _directions(hypothesis)
+    if hypothesis.change.extra:
+        return _followed(projector(hypothesis), grid, factors, near, values)
+    terms = hypothesis.change.terms
+    heavy = np.array([term.matrix == "mass" for term in terms])
+    forces = np.array(projector.crossed(terms, near))
+    forces *= np.where(heavy[:, None], -values, 1.0)[:, None]
+    weights = projector(hypothesis).weights if weighed else np.zeros(len(terms))
+    return _Pulls(grid, factors, forces, weights)
 
 
-def _condensed(stiff: FloatArray, mass: FloatArray, values: FloatArray, extra: int) -> FloatArray:
-    """Return the forces with what a hypothesis adds following each mode, (g, N, m).
+def _followed(
+    part: Projection, grid: FloatArray, factors: FloatArray, near: FloatArray, values: FloatArray
+) -> _Pulls:
+    """Return what a hypothesis exerts whose added coordinates follow each mode.
 
     Arguments:
-        stiff, mass: (g, N + extra, m + extra).
-        values: eigenvalues of the modes, (m,).
+        part: the hypothesis.
+        grid, factors: as in `_directions`.
+        near, values: as in `_pulls`.
     """
-    m = len(values)
-    dynamic = stiff[..., None] - mass[..., None] * values  # (g, N + extra, m + extra, m)
-    own = np.arange(m)
-    forces = dynamic[:, :, own, own]
-    reach = dynamic[:, :-extra, m:, :]
-    inner = np.moveaxis(dynamic[:, -extra:, m:, :], 3, 1)
+    count, m = near.shape
+    rows, added = part.rows[:, :count], part.rows[:, count:]
+    still = np.zeros((len(grid), len(rows), len(rows)))
+    stiff, mass = (part.core(factors, mass=kind) for kind in (False, True))
+    stiff, mass = still if stiff is None else stiff, still if mass is None else mass
+    dynamic = stiff[:, None] - mass[:, None] * values[:, None, None]  # (g, m, p, p)
+    seen = np.broadcast_to((rows @ near).T[..., None], (len(grid), m, len(rows), 1))
+    inner = added.T @ dynamic @ added
     # Blunted, since at a resonance first order has no end.
-    blunt = _BLUNT * np.abs(stiff[:, -extra:, m:]).max(axis=(1, 2))[:, None, None, None]
+    blunt = _BLUNT * np.abs(added.T @ stiff @ added).max(axis=(1, 2))[:, None, None, None]
     follow = np.linalg.solve(
-        inner @ inner + np.square(blunt) * np.eye(extra),
-        inner @ np.moveaxis(forces[:, -extra:], 2, 1)[..., None],
-    )[..., 0]
-    return np.asarray(forces[:, :-extra] - np.einsum("gnej,gje->gnj", reach, follow))
-
-
-def _crossed(local: _Local, term: Term, near: FloatArray, extra: int) -> FloatArray:
-    """Return a fixed matrix between all coordinates and some modes, (N + extra, m + extra)."""
-    operator = term.operator
-    if isinstance(operator, ElementOperator) and local.elements is not None:
-        moved = local.elements[operator.elements]
-        pulls = (operator.blocks @ (moved @ near)).reshape(-1, near.shape[1])
-        return np.pad(moved.reshape(len(pulls), -1).T @ pulls, (0, extra))
-    if isinstance(operator, RowOperator):
-        n = len(local.vectors)
-        seen = np.asarray(operator.rows[:, :n] @ local.vectors)
-        added = operator.rows[:, n:].toarray()
-        pulls = operator.core @ np.hstack([seen @ near, added])
-        return np.asarray(np.hstack([seen, added]).T @ pulls)
-    shapes = local.vectors @ near
-    return np.pad(local.vectors.T @ operator.apply(shapes), (0, extra))
+        inner @ inner + np.square(blunt) * np.eye(part.extra),
+        inner @ (added.T @ dynamic @ seen),
+    )
+    pulls = (dynamic @ (seen - added @ follow))[..., 0]  # (g, m, p)
+    if m * len(rows) < len(grid):
+        # Each row by itself on each mode by itself: fewer than there are points.
+        apart = np.einsum("pN,jk->jpNk", rows, np.eye(m))
+        forces, shares = apart.reshape(-1, count, m), pulls.reshape(len(grid), -1)
+    else:
+        forces, shares = np.swapaxes(pulls @ rows, 1, 2), np.eye(len(grid))
+    nothing, weight = np.zeros((1, count, m)), (factors @ part.weights)[:, None]
+    masses = np.append(np.zeros(len(forces)), 1.0)
+    return _Pulls(grid, np.hstack([shares, weight]), np.concatenate([forces, nothing]), masses)

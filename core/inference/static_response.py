@@ -11,7 +11,7 @@ Source: MacNeal (1971), residual flexibility; Fox & Kapoor (1968) for the forces
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -36,6 +36,7 @@ _A_MODE, _SPARE = 4, 20  # modes that are solved for every measured one, and bes
 _RIGID, _MISSED = 6, 6
 _SHIFT = 0.5  # of the first elastic eigenvalue, below zero
 _FROM_SENSORS, _FROM_HYPOTHESIS = 40, 64  # vectors at most
+_AT_ONCE = 64  # forces that are solved for at once
 _APART = 1e-10  # squared sine below which a vector lies in the span of the others
 _FELT = 1e-7  # of the largest force
 _FEW_TERMS = 6
@@ -102,6 +103,23 @@ class Basis:
         """Return the mass times all vectors, (n, N)."""
         return self.model.mass_times(self.modes.shapes)
 
+    @cached_property
+    def readings(self) -> FloatArray:
+        """Return the readings of all vectors, (n_sensors, N)."""
+        return np.asarray(self.rows @ self.modes.shapes)
+
+    @cached_property
+    def projector(self) -> Projector:
+        """Return what projects on all vectors."""
+        return Projector(self.model, self.modes.shapes)
+
+    @cached_property
+    def bare(self) -> Basis:
+        """Return the exact modes alone."""
+        e, m = self.exact, self.modes
+        modes = Modes(m.eigenvalues[:e], m.shapes[:, :e], m.rigid[:e])
+        return replace(self, modes=modes)
+
     def response(
         self, forces: FloatArray, most: int, known: FloatArray | None = None
     ) -> FloatArray:
@@ -112,28 +130,39 @@ class Basis:
             most: number of vectors that are kept.
             known: further vectors, orthonormal to the basis, that it has, (n, k).
         """
-        if forces.shape[1] == 0:
-            return forces
+        return self.responses([forces], most, known)[0]
+
+    def responses(
+        self, forces: Sequence[FloatArray], most: int, known: FloatArray | None = None
+    ) -> list[FloatArray]:
+        """Return the `response` to each of several sets of forces, (n, r) each."""
         shapes, momentum = self.modes.shapes[:, : self.exact], self.momentum[:, : self.exact]
-        moved = self.solver.solve(forces - momentum @ (shapes.T @ forces))
+        together = np.hstack(forces)
+        if together.shape[1] == 0:
+            return list(forces)
+        moved = self.solver.solve(together - momentum @ (shapes.T @ together))
         vectors, heavy = self.modes.shapes, self.momentum
         if known is not None and known.shape[1]:
             vectors = np.hstack([vectors, known])
             heavy = np.hstack([heavy, self.model.mass_times(known)])
+        counts = [block.shape[1] for block in forces]
         whole = np.sqrt(np.einsum("ij,ij->j", moved, self.model.mass_times(moved)))
         for _ in range(2):  # the second time what rounding left of the basis
             moved = moved - vectors @ (heavy.T @ moved)
             moved = moved / np.where(whole > 0.0, whole, 1.0)
-            values, turn = la.eigh(moved.T @ self.model.mass_times(moved))
-            kept = np.flatnonzero(values > _APART)[-most:]
-            moved = moved @ (turn[:, kept] / np.sqrt(values[kept]))
+            mass, blocks, last = self.model.mass_times(moved), [], 0
+            for count in counts:
+                own, last = slice(last, last + count), last + count
+                # Not SciPy's, which refuses the empty matrix of what exerts nothing.
+                values, turn = np.linalg.eigh(moved[:, own].T @ mass[:, own])
+                kept = np.flatnonzero(values > _APART)[-most:]
+                blocks.append(moved[:, own] @ (turn[:, kept] / np.sqrt(values[kept])))
+            moved, counts = np.hstack(blocks), [block.shape[1] for block in blocks]
             whole = np.ones(moved.shape[1])
-        return np.asarray(moved)
+        return blocks
 
-    def enriched(
-        self, space: Space, parts: Sequence[Projection], rounds: int = 2
-    ) -> tuple[Space, FloatArray]:
-        """Return coordinates of their own for some hypotheses, and their motions, (n, N + r).
+    def enriched(self, space: Space, parts: Sequence[Projection], rounds: int = 2) -> Coordinates:
+        """Return coordinates of their own for some hypotheses.
 
         Arguments:
             space: the coordinates of the basis.
@@ -141,29 +170,86 @@ class Basis:
             rounds: 1 for the response to what they exert on the modes, 2 for that to what they
                 exert on this response besides, and to its inertia.
         """
-        if not parts:
-            return replace(space, projections=()), self.modes.shapes
         near = self.modes.take(np.arange(self.tracked))
         forces = [exerted(part.hypothesis, near) for part in parts]
-        added = self.response(np.hstack(forces), _FROM_HYPOTHESIS * len(parts))
+        nothing = np.zeros((self.model.size, 0))
+        added = self.response(np.hstack([nothing, *forces]), _FROM_HYPOTHESIS * len(parts))
         if rounds > 1 and added.shape[1]:
             there = Modes(np.full(added.shape[1], near.eigenvalues[-1]), added, near.rigid[:0])
             forces = [exerted(part.hypothesis, there) for part in parts]
             forces.append(self.model.mass_times(added))
             more = self.response(np.hstack(forces), _FROM_HYPOTHESIS * len(parts), added)
             added = np.hstack([added, more])
+        return self.with_motions(space, [self.projector(part.hypothesis) for part in parts], added)
+
+    def first_response(self, space: Space, parts: Sequence[Projection]) -> Iterator[Space]:
+        """Yield coordinates of its own for each of some hypotheses, with it in them.
+
+        They hold the exact modes and the response to what it exerts on these; many are solved at
+        once. Forces at the sensors, which serve those that have none of their own, are left out.
+
+        Arguments:
+            space: the coordinates of the basis.
+            parts: the hypotheses in them.
+        """
+        near, known = self.modes.take(np.arange(self.tracked)), len(self.modes)
+        waiting: list[tuple[Projection, FloatArray]] = []
+        for part in parts:
+            kept = np.delete(np.arange(known + part.extra), np.arange(self.exact, known))
+            waiting.append((part.restricted(kept), exerted(part.hypothesis, near)))
+            if part is parts[-1] or sum(f.shape[1] for _, f in waiting) >= _AT_ONCE:
+                found = self.bare.responses([force for _, force in waiting], _FROM_HYPOTHESIS)
+                for (one, _), added in zip(waiting, found, strict=True):
+                    yield self.bare.with_motions(space, [one], added).space
+                waiting = []
+
+    def with_motions(
+        self, space: Space, parts: Sequence[Projection], added: FloatArray
+    ) -> Coordinates:
+        """Return coordinates for some hypotheses in which the model can move as given besides.
+
+        Arguments:
+            space: any coordinates of the model.
+            parts: the hypotheses in those of the basis.
+            added: motions, orthonormal to the basis, (n, r).
+        """
         old = np.arange(self.exact, len(self.modes))
-        tail = np.hstack([self.modes.shapes[:, old], added])
+        pulled = self.model.stiffness_times(added)
+        cross = np.vstack([self.modes.shapes[:, old].T @ pulled, added.T @ pulled])
         inner = np.diag(np.append(self.modes.eigenvalues[old], np.zeros(added.shape[1])))
-        cross = tail.T @ self.model.stiffness_times(added)
         inner[:, len(old) :], inner[len(old) :, : len(old)] = cross, cross[: len(old)].T
-        values, turn = la.eigh(inner)
-        vectors = np.hstack([self.modes.shapes[:, : self.exact], tail @ turn])
+        values, turn = np.linalg.eigh(inner)
         values = np.concatenate([space.eigenvalues[: self.exact], values])
-        project = Projector(self.model, vectors)
-        own = tuple(project(part.hypothesis) for part in parts)
-        readings = np.asarray(self.rows @ vectors)
-        return replace(space, eigenvalues=values, readings=readings, projections=own), vectors
+        widened = (self.projector.widened(part, added) for part in parts)
+        own = tuple(part.turned(self.exact, turn) for part in widened)
+        readings = np.hstack([self.readings, self.rows @ added])
+        readings[:, self.exact :] = readings[:, self.exact :] @ turn
+        found = replace(space, eigenvalues=values, readings=readings, projections=own)
+        return Coordinates(self, found, added, turn)
+
+
+@dataclass(frozen=True, eq=False)
+class Coordinates:
+    """Coordinates in which some hypotheses act as in the whole model.
+
+    Arguments:
+        basis: of the model.
+        space: the coordinates with the hypotheses in them.
+        added: motions beside those of the basis, (n, r).
+        turn: the last coordinates from the response of the basis and these, orthogonal.
+    """
+
+    basis: Basis
+    space: Space
+    added: FloatArray
+    turn: FloatArray
+
+    @property
+    def vectors(self) -> FloatArray:
+        """Return the motions of all coordinates, (n, N + r)."""
+        shapes, exact = self.basis.modes.shapes, self.basis.exact
+        tail = np.hstack([shapes[:, exact:], self.added])
+        return np.hstack([shapes[:, :exact], tail @ self.turn])
 
 
 def exerted(hypothesis: Hypothesis, near: Modes) -> FloatArray:
@@ -270,7 +356,7 @@ def enriched(
     """
     if not isinstance(problem, LargeProblem) or not parts:
         return problem, tuple(parts)
-    space, _ = problem.common.enriched(problem.space, parts, rounds)
+    space = problem.common.enriched(problem.space, parts, rounds).space
     return replace(problem, space=space), space.projections
 
 

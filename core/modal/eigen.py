@@ -315,7 +315,9 @@ def _kept_modes(model: Model, count: int) -> Modes | None:
 
 
 def modes_of(model: Model, count: int | None = None) -> Modes:
-    """Return the lowest modes of a model as `solve_modes` does, a small one solved only once.
+    """Return the lowest modes of a model as `solve_modes` does, solved only once.
+
+    A large model is solved anew where more of its modes are wanted than ever before.
 
     Arguments:
         model: any model.
@@ -324,7 +326,13 @@ def modes_of(model: Model, count: int | None = None) -> Modes:
     Raises:
         ModelError: when the model has no modes.
     """
-    if model.size > DENSE_LIMIT:
-        return solve_modes(model, count)
-    modes = once_for(model, "modes", lambda: solve_modes(model))
-    return modes if count is None else modes.take(np.arange(min(count, len(modes))))
+    if model.size <= DENSE_LIMIT:
+        modes = once_for(model, "modes", lambda: solve_modes(model))
+        return modes if count is None else modes.take(np.arange(min(count, len(modes))))
+    wanted = 20 if count is None else count
+    kept: dict[str, tuple[int, Modes]] = once_for(model, "modes", dict)
+    if "solved" not in kept or kept["solved"][0] < wanted:
+        kept["solved"] = wanted, solve_modes(model, wanted)
+    known, modes = kept["solved"]
+    negative = max(len(modes) - known, 0)
+    return modes if known == wanted else modes.take(np.arange(min(wanted + negative, len(modes))))

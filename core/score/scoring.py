@@ -19,7 +19,6 @@ from femubench.core.modal.eigen import (
     enough_modes,
     modes_of,
     once_for,
-    solve_modes,
     zero_tolerance,
 )
 from femubench.core.modal.many_changes import ManyChanges
@@ -220,10 +219,10 @@ def _modes_for(model: Model, measurements: Sequence[Measurement]) -> Modes:
         return modes_of(model)
     top, most = _highest(measurements), max(len(item) for item in measurements)
     count, limit = enough_modes(model, most) or model.size, model.size // 2
-    modes = solve_modes(model, min(count, limit))
+    modes = modes_of(model, min(count, limit))
     while modes.natural_frequencies[-1] < top and count < limit:
         count = min(2 * count, limit)
-        modes = solve_modes(model, count)
+        modes = modes_of(model, count)
     return modes
 
 

@@ -22,6 +22,7 @@ from femubench.effect import (
     Term,
     elongation_row,
     member_length,
+    once_for,
     pair_of,
     proportional,
 )
@@ -66,10 +67,7 @@ class BraceSpring(FrameEffect):
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return the stiffness along the line of the joints."""
         frame = model.frame_structure.frame
-        rigidity = [
-            m.material.E * m.section.A / member_length(frame, m.name) for m in frame.members
-        ]
-        scale = _SHARE * float(np.mean(rigidity))
+        scale = once_for(model, "stiffness of a brace", lambda: _SHARE * _rigidity(frame))
         return (EffectParameter("stiffness", "N/m", scale, scaling="exponential", one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
@@ -82,6 +80,12 @@ class BraceSpring(FrameEffect):
         """Return the stiffness matrix of 1 N/m."""
         row = elongation_row(model, pair_of(model.frame_structure.frame, place))
         return proportional(Term("stiffness", RowOperator(row, np.eye(1))))
+
+
+def _rigidity(frame: Frame) -> float:
+    """Return the stiffness of the members along themselves in the mean in N/m."""
+    each = [m.material.E * m.section.A / member_length(frame, m.name) for m in frame.members]
+    return float(np.mean(each))
 
 
 def _bodies(frame: Frame) -> dict[str, int]:

@@ -110,11 +110,11 @@ class ShearDeformation(FrameEffect):
             parts = _parts(whole.take(rows), bending, shear)
             nodes, weights = rate_nodes(phi[rows])
             for node, weight in zip(nodes, weights.T, strict=True):
-                used = np.flatnonzero(weight)
                 for kind, power, blocks in parts:
-                    own = weight[used, None, None] * blocks[used]
-                    if own.any():
-                        terms.append(Term(kind, ElementOperator(structure, rows[used], own)))
+                    if (weight[:, None, None] * blocks).any():
+                        terms.append(
+                            Term(kind, ElementOperator(structure, rows, blocks, share=weight))
+                        )
                         rates.append(float(node))
                         powers.append(power)
         if not terms:
