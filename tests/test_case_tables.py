@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -140,3 +141,9 @@ def test_elements_some_thousand_at_a_time_give_what_single_ones_give() -> None:
     shift = (np.array(structure.kinematics.direction) == "z").astype(float)
     assert shift @ (mass @ shift) == pytest.approx(structure.total_mass, rel=1e-12)
     assert np.abs(stiffness @ shift).max() < 1e-9 * stiffness.diagonal().max()
+
+
+def test_what_is_kept_to_look_points_up_does_not_travel() -> None:
+    model = read_case(CASES / "3d").model
+    model.observe(read_case(CASES / "3d").measurement.sensors)
+    assert b"KDTree" not in pickle.dumps(model)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -314,6 +314,10 @@ class Frame:
     def corners(self) -> FloatArray:
         """Return the positions of the joints in m, (n_joints, 3)."""
         return np.array([joint.xyz for joint in self.joints], dtype=float)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A tree is made again where it is wanted.
+        return {name: value for name, value in vars(self).items() if name != "corner_tree"}
 
     @cached_property
     def corner_tree(self) -> cKDTree:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -72,6 +73,10 @@ class Mesh:
     arm_factor: FloatArray
     connections: tuple[Connection, ...]
     oscillators: IntArray
+
+    def __getstate__(self) -> dict[str, Any]:
+        # A tree is made again where it is wanted.
+        return {name: value for name, value in vars(self).items() if name != "tree"}
 
     @cached_property
     def tree(self) -> cKDTree:
