@@ -408,13 +408,16 @@ def _quiet() -> Iterator[None]:
     """Keep what Dask mutters of lost workers to itself: a run tells of its jobs, whole or not."""
     import distributed  # noqa: F401 - sets the levels that are changed here
 
-    logger = logging.getLogger("distributed")
-    before = logger.level
-    logger.setLevel(logging.CRITICAL)
+    # The second has a level of its own.
+    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
+    before = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL)
     try:
         with warnings.catch_warnings():
             # Versions are compared here, where a difference is an error.
             warnings.filterwarnings("ignore", module="distributed")
             yield
     finally:
-        logger.setLevel(before)
+        for logger, level in zip(loggers, before, strict=True):
+            logger.setLevel(level)
