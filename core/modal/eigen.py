@@ -330,7 +330,7 @@ def modes_of(model: Model, count: int | None = None) -> Modes:
         modes = once_for(model, "modes", lambda: solve_modes(model))
         return modes if count is None else modes.take(np.arange(min(count, len(modes))))
     wanted = 20 if count is None else count
-    kept: dict[str, tuple[int, Modes]] = once_for(model, "modes", dict)
+    kept: dict[str, tuple[int, Modes]] = once_for(model, "lowest modes, solved", dict)
     if "solved" not in kept or kept["solved"][0] < wanted:
         kept["solved"] = wanted, solve_modes(model, wanted)
     known, modes = kept["solved"]

@@ -68,25 +68,33 @@ def run_jobs(
         'ok'
     """
     _check_names(case=cases, strategy=strategies)
-    place = LocalProcesses(worker_count(jobs)) if executor is None else executor
+    place = executor or LocalProcesses(worker_count(jobs))
     place.admit(strategies, memory)
     share = place.share if memory is None else memory
     limits = {s.name: Limits((timeouts or {}).get(s.name, timeout), share) for s in strategies}
-    settings: dict[str, Any] = {"seed": run_seed, "jobs": place.workers, "timeout": timeout}
-    settings |= {"memory": share, "request": dict(request or {})}
+    asked = {"seed": run_seed, "timeout": timeout, "memory": share, "request": dict(request or {})}
     with threadpool_limits(1), ExitStack() as stack:
         references = _references([starts.yardstick(case) for case in cases])
         slots = Slots((one for case in cases for one in starts.of(case)), strategies, seeds)
-        settings["plan"] = plan_digest(slots.keys)
-        meta = run_meta(cases, strategies, references, seeds, settings, starts.about(cases))
-        slots.meta = meta
-        meta, known = recorded(stack, store, meta, overwrite, resume)
+        slots.meta = _meta(cases, slots, references, {**asked, "jobs": place.workers}, starts)
+        meta, known = recorded(stack, store, slots.meta, overwrite, resume)
         ending = stack.enter_context(ended(store, meta["run"]))
         results = Results(slots, store, meta["run"], progress)
-        wanted = results.keep(known)
-        for one in place.computed(slots, wanted, references, limits, results.shelf):
+        for one in place.computed(slots, results.keep(known), references, limits, results.shelf):
             results.add(*one)
     return Run({**meta, **ending}, rank_results(results.in_order(), meta["reference"]))
+
+
+def _meta(
+    cases: Sequence[Case],
+    slots: Slots,
+    references: Mapping[str, Reference],
+    settings: Mapping[str, Any],
+    starts: Starts,
+) -> dict[str, Any]:
+    planned = {**settings, "plan": plan_digest(slots.keys)}
+    who, about = slots.strategies, starts.about(cases)
+    return run_meta(cases, who, references, slots.seeds, planned, about)
 
 
 def _check_names(**given: Sequence[Case] | Sequence[Strategy]) -> None:
