@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -171,13 +172,15 @@ def test_an_interrupted_run_keeps_what_is_done_and_leaves_nothing_behind(tmp_pat
     toys_folder = str(Path(toys.__file__).parent)
     script.write_text(SCRIPT.format(toys=toys_folder, store=str(store.folder)))
     command = [sys.executable, str(script)]
-    with subprocess.Popen(
+    quiet = subprocess.Popen(
         command, env=QUIET, stderr=subprocess.PIPE, text=True, start_new_session=True
-    ) as process:
+    )
+    with quiet as process, ExitStack() as ended:
         below: list[psutil.Process] = []
+        ended.callback(process.kill)  # leaving the block waits for it
         until = time.monotonic() + 120.0
         while process.poll() is None and time.monotonic() < until:
-            if store.path.exists() and store.path.read_text().count('"status": "ok"') == 1:
+            if any('"status":"ok"' in file.read_text() for file in store.files):
                 below = psutil.Process(process.pid).children(recursive=True)
                 # As a terminal does it.
                 os.killpg(process.pid, signal.SIGINT)
