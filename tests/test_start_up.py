@@ -33,6 +33,7 @@ HEAVY = {
 PART_OF = {"pydantic_core": "pydantic", "markupsafe": "jinja2", "pyoma2": "pyoma_2"} | {
     "ansys": "ansys_mapdl_reader",
     "sksparse": "scikit_sparse",
+    "dask": "distributed",
 }
 RUN = """
 import sys
@@ -127,7 +128,7 @@ def test_dependencies_are_what_is_imported() -> None:
     found = {entry for path in FILES for entry in third_party(path)}
     extras = PROJECT["optional-dependencies"]
     needed = names(PROJECT["dependencies"])
-    imported = ("ansys", "cholmod", "hdf5", "identify", "nastran", "parquet", "plot")
+    imported = ("ansys", "cholmod", "cluster", "hdf5", "identify", "nastran", "parquet", "plot")
     optional = names([text for extra in imported for text in extras[extra]])
     # pytest loads the plugin for pytest itself.
     assert {name for name, _ in found} == needed | optional | {"pytest"}
