@@ -347,7 +347,8 @@ def test_a_name_neither_breaks_the_screen_nor_the_document(tmp_path: Path) -> No
 # Only what this program has written itself goes through pickle: see each reason.
 TRUSTED = {
     "core/run/jobs.py": "writes strategies; a worker reads the job that the parent has written",
-    "core/run/schedule.py": "writes jobs for its own workers and cases for the process that judges",
+    "core/run/slots.py": "writes jobs for the program's own workers, and reads nothing",
+    "core/run/schedule.py": "writes cases for the process that judges",
     "core/run/judging.py": "reads the case that the parent has written",
     "core/run/answers.py": "writes a model; reads it by a reader of a few classes alone",
     "core/conformance": "asks whether a strategy can be pickled, which is a rule of the contract",
