@@ -4,36 +4,38 @@
 
 Without cases the default set, without strategies all but `diagnosed`, whose search has a benchmark
 of its own. Prints the processor time of the run in this process, in the server of its workers and
-in the workers, against that of its eigenvalue solutions: each job is run once more in this process,
-its solutions of the whole model are counted, and each counts as much as the nominal model's takes
-alone. Then the same of jobs of `unchanged`, by job.
+in the workers, against that of its eigenvalue solutions: each job is run and judged once more in
+this process, and its solutions of whole models are timed where they are made. Before that the same
+of jobs of `unchanged`, by job.
 """
 
 from __future__ import annotations
 
 import argparse
-import pickle
 import statistics
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from multiprocessing import forkserver
-from unittest.mock import Mock, patch
+from typing import Any
+from unittest.mock import patch
 
 import psutil
 from threadpoolctl import threadpool_limits
 
-from femubench.core.case.case import Case
 from femubench.core.library.cases import usable_plugins
 from femubench.core.library.rank import Plan, plan_of
 from femubench.core.modal import eigen
-from femubench.core.run.jobs import execute
-from femubench.core.run.schedule import slots_of
+from femubench.core.run.answers import packed, unpacked
+from femubench.core.run.jobs import Job, execute
+from femubench.core.run.judging import judged
+from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
+from femubench.core.score.scoring import reference_of
 
-REPEATS = 5
 NULL_JOBS = 60
 FIVE, THIRTY = 5.0, 30.0  # times its eigenvalue solutions, ms a job: what is asked for
 
@@ -84,34 +86,47 @@ def start_server() -> None:
     plan_of("frame", "unchanged", usable_plugins(), nominal="drawn").run(1)
 
 
-def solutions(plan: Plan) -> tuple[int, float]:
-    """Return how many eigenvalue solutions of whole models a plan takes, and their time in s.
+@dataclass
+class Solutions:
+    """Eigenvalue solutions of whole models, and their processor time in s."""
+
+    count: int = 0
+    seconds: float = 0.0
+
+    def timed(self, solve: Callable[..., Any]) -> Callable[..., Any]:
+        """Return a solver that is counted here."""
+
+        def solved(*arguments: Any, **options: Any) -> Any:  # noqa: ANN401 - of any solver
+            start = time.process_time()
+            try:
+                return solve(*arguments, **options)
+            finally:
+                self.count += 1
+                self.seconds += time.process_time() - start
+
+        return solved
+
+
+def solutions(plan: Plan) -> Solutions:
+    """Return the solutions that the strategies of a plan make, and the judging of their models.
 
     A solution in a reduced basis counts for nothing.
     """
-    starts = Starts(plan.textbook, plan.request.nominal, plan.classes)
-    cases = [one for case in plan.cases for one in starts.of(case)]
-    count, seconds, solve = 0, 0.0, Mock(wraps=eigen.solve_dense)
-    with threadpool_limits(1), patch.object(eigen, "solve_dense", solve):
-        alone = {(nominal, case.name): solution_time(case) for nominal, case in cases}
-        for slot in slots_of(cases, plan.strategies, tuple(plan.request.all_seeds)):
-            solve.reset_mock()
-            if slot.job is not None:
-                execute(slot.job)
-            count += solve.call_count
-            seconds += solve.call_count * alone[slot.nominal, slot.case.name]
-    return count, seconds
-
-
-def solution_time(case: Case) -> float:
-    """Return the processor time of one eigenvalue solution of a nominal model in s."""
-    found = []
-    for _ in range(REPEATS):
-        model = pickle.loads(pickle.dumps(case.model))
-        start = time.process_time()
-        eigen.solve_modes(model)
-        found.append(time.process_time() - start)
-    return min(found)
+    starts, found = Starts(plan.textbook, plan.request.nominal, plan.classes), Solutions()
+    references = {case.name: reference_of(starts.yardstick(case)) for case in plan.cases}
+    pairs = (one for case in plan.cases for one in starts.of(case))
+    with ExitStack() as stack:
+        stack.enter_context(threadpool_limits(1))
+        for name in ("solve_dense", "lowest_eigenpairs"):
+            timed = found.timed(getattr(eigen, name))
+            stack.enter_context(patch.object(eigen, name, timed))
+        for slot in Slots(pairs, plan.strategies, tuple(plan.request.all_seeds)):
+            if isinstance(slot.job, Job):
+                # By way of its bytes: the strategy's model has modes that the judge's has not.
+                outcome = unpacked(packed(execute(slot.job)))
+                names = slot.strategy, slot.seed, slot.nominal
+                judged(slot.case, references[slot.case.name], names, outcome)
+    return found
 
 
 def null_job(jobs: int = NULL_JOBS, workers: int = 1) -> Cost:
@@ -137,11 +152,13 @@ def main(words: Sequence[str] | None = None) -> None:
     print(f"asked for {THIRTY:g} ms; repetitions differ by {spread:.1f} ms")
     plan = plan_of(asked.cases, chosen, plugins)
     cost = run_cost(plan)
-    count, seconds = solutions(plan)
-    print(f"{cost.jobs} jobs, {count} eigenvalue solutions of {seconds:.1f} s together")
+    found = solutions(plan)
+    print(f"{cost.jobs} jobs, {found.count} eigenvalue solutions of {found.seconds:.1f} s together")
     for name in ("parent", "server", "workers", "whole", "wall"):
         value = getattr(cost, name)
-        print(f"run, {name:8}{value:8.1f} s {value / seconds:6.1f} solutions (asked: {FIVE:g})")
+        print(
+            f"run, {name:8}{value:8.1f} s {value / found.seconds:6.1f} solutions (asked: {FIVE:g})"
+        )
 
 
 if __name__ == "__main__":

@@ -31,7 +31,6 @@ from femubench.core.update.equation_error import update_by_equation_error
 from femubench.core.update.factor_strategy import FactorStrategy
 from femubench.core.update.l_curve import l_curve_corner, tikhonov
 from femubench.core.update.lasso import lasso
-from femubench.core.update.lean_import import importing_without
 from femubench.core.update.low_rank import (
     total_change,
     with_measured_frequencies,
@@ -107,7 +106,6 @@ __all__ = [
     "half_depth",
     "joint_groups",
     "joint_stiffness",
-    "importing_without",
     "l_curve_corner",
     "lasso",
     "modal_space",

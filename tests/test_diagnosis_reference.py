@@ -85,7 +85,7 @@ def test_the_difference_is_named_where_the_drawing_is_wrong(damaged: tuple[Frame
 
 def test_a_structure_as_it_was_lacks_nothing(damaged: tuple[Frame, Frame]) -> None:
     built, _ = damaged
-    verdicts = [diagnose(case_with(built, seed, built)).verdict for seed in range(2, 8)]
+    verdicts = [diagnose(case_with(built, seed, built)).verdict for seed in range(2, 5)]
     assert verdicts == ["none"] * len(verdicts)
 
 

@@ -7,22 +7,18 @@ test_sweep_noise, docs/diagnosis-sweep.md in test_sweep_diagnosis.
 
 from __future__ import annotations
 
-import json
 import re
 import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
 
 import femubench
 from femubench import Run
-from femubench.core.cli.main import bench
 from femubench.core.library.cases import read_cases
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.schema.results import Nominal
-from femubench.reproduction import VERDICTS
 from femubench.results import JobResult, leaderboard, tell_apart
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -166,17 +162,3 @@ def test_numbers_of_unknowns(run: Run, page: str, count: int) -> None:
     assert len(listed) == count
     for strategy, unknowns in listed:
         assert result(run, "frame", strategy).parameter_count == int(unknowns)
-
-
-def test_the_cells_of_the_papers(tmp_path: Path) -> None:
-    """One sentence on the screen, in README and in docs; JSON counts the same."""
-    file = tmp_path / "cells.json"
-    answer = CliRunner().invoke(bench, ["reproduce", "--json", str(file)])
-    assert answer.exit_code == 0
-    headline = answer.output.partition("\n\n")[0]
-    verdicts = [cell["verdict"] for cell in json.loads(file.read_text(encoding="utf-8"))]
-    assert headline.startswith(f"{verdicts.count('independent')} of {len(verdicts)} printed cells")
-    told = {int(number) for number in re.findall(r"\d+", headline)}
-    assert told == {len(verdicts), *map(verdicts.count, VERDICTS)}
-    for page in ("README.md", "docs/reproduce.md"):
-        assert headline in text_of(page)

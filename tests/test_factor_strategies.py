@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from scipy.stats import qmc
 
 import femubench
 from femubench import InputError, Measurement, Model, NotApplicable, Sensors, Strategy, solve_modes
@@ -29,13 +26,12 @@ from femubench.modal import mac, rigid_modes_of
 from femubench.plugins.strategies.cma_es import CmaEs
 from femubench.plugins.strategies.cross_model import CrossModel
 from femubench.plugins.strategies.eigensensitivity import Eigensensitivity
-from femubench.plugins.strategies.multi_start import MultiStart, _latin_hypercube
+from femubench.plugins.strategies.multi_start import MultiStart
 from femubench.plugins.strategies.secant import Secant
 from femubench.plugins.strategies.sparse import Sparse
 from femubench.plugins.strategies.strain_energy import StrainEnergy, energy_change_index
 from femubench.update import (
     element_sets,
-    importing_without,
     l_curve_corner,
     lasso,
     modal_space,
@@ -161,27 +157,6 @@ def test_searches_repeat_with_the_seed_and_leave_the_random_state_alone() -> Non
         first = factors_of(strategy, model, measurement)
         assert factors_of(strategy, model, measurement) == first
     assert repr(np.random.get_state()) == state  # noqa: NPY002
-
-
-def test_starts_are_those_of_the_latin_hypercube_of_scipy() -> None:
-    for count, size in ((8, 5), (3, 1)):
-        theirs = qmc.LatinHypercube(size, rng=np.random.default_rng(count)).random(count)
-        ours = _latin_hypercube(count, size, np.random.default_rng(count))
-        assert ours == pytest.approx(theirs, rel=1e-15)
-
-
-def test_what_was_hidden_from_an_import_is_there_afterwards(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "some_plots.py").write_text("COLOUR = 'blue'\n")
-    (tmp_path / "some_search.py").write_text(
-        "try:\n    import some_plots\nexcept ImportError:\n    some_plots = None\n"
-    )
-    monkeypatch.syspath_prepend(tmp_path)
-    with importing_without("some_plots", "numpy"):
-        assert importlib.import_module("some_search").some_plots is None
-        assert importlib.import_module("numpy") is np  # loaded before: not hidden
-    assert importlib.import_module("some_plots").COLOUR == "blue"
 
 
 def test_slopes_are_those_of_differences_and_few_shapes_give_the_same_frequencies() -> None:

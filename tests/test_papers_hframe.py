@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import re
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from femubench import Model, read_case
+from femubench.core.library.report import rendering
+from femubench.core.library.reproduce import studies_of
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.variants import strategy_of
 from femubench.papers import study
@@ -18,8 +23,11 @@ from femubench.papers.hframe.physical import physical_model, shape_paired_errors
 from femubench.papers.hframe.rows import FREE_EI, ROWS, at_printed, parameter_values, row_of, run
 from femubench.papers.hframe.shapes import expanded_mac, shape_cells
 from femubench.papers.printed import printed
-from femubench.reproduction import Bars, Cell, Study, Workbench
+from femubench.reproduction import VERDICTS, Bars, Cell, Study, Workbench
 from femubench.scenarios import HERE
+
+sys.path.insert(0, str(Path(__file__).parent))
+from printed_boards import text_of
 
 Cells = dict[tuple[str, str, str], Cell]
 PAIRS = (*((k, k) for k in range(1, 7)), (8, 7))  # the twin's MAC is none of the test's
@@ -300,3 +308,15 @@ def test_the_transcription_contradicts_itself_at_the_misprints_only() -> None:
         for symbol, (before, after) in table["parameters"].items():
             assert table["ratios"][symbol] == pytest.approx(after / before, abs=1e-3)
     assert wrong == [("c", "initial", 1), ("c", "initial", 4), ("d", "initial", 4)]
+
+
+def test_docs_count_the_cells_of_both_papers(done: Study) -> None:
+    """One sentence on the screen, in README and in docs; JSON counts the same."""
+    studies = (*studies_of(("frame",), load_plugins()), done)
+    headline = rendering(studies, "terminal").partition("\n\n")[0]
+    verdicts = [cell["verdict"] for cell in json.loads(rendering(studies, "json"))]
+    assert headline.startswith(f"{verdicts.count('independent')} of {len(verdicts)} printed cells")
+    told = {int(number) for number in re.findall(r"\d+", headline)}
+    assert told == {len(verdicts), *map(verdicts.count, VERDICTS)}
+    for page in ("README.md", "docs/reproduce.md"):
+        assert headline in text_of(page)

@@ -27,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
 
 TOYS = Path(__file__).parent / "toys"
-KILLS, JOBS = 20, 208
+KILLS, JOBS = 8, 104
 CASE = toys.tiny_case()
 
 

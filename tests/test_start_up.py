@@ -33,6 +33,7 @@ HEAVY = {
 PART_OF = {"pydantic_core": "pydantic", "markupsafe": "jinja2", "pyoma2": "pyoma_2"} | {
     "ansys": "ansys_mapdl_reader",
     "sksparse": "scikit_sparse",
+    "dask": "distributed",
 }
 RUN = """
 import sys

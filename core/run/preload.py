@@ -15,7 +15,8 @@ from pkgutil import iter_modules
 
 import scipy.linalg
 import scipy.optimize
-import scipy.sparse.linalg  # noqa: F401 - loaded for its time
+import scipy.sparse.linalg
+import scipy.stats  # noqa: F401 - loaded for its time
 from threadpoolctl import threadpool_limits
 
 import femubench.core.drawing.prediction

@@ -11,7 +11,7 @@ import sys
 import tempfile
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -32,6 +32,7 @@ _THREADS = (
     "NUMEXPR_NUM_THREADS",
 )
 _PR_SET_PDEATHSIG = 1
+_LIBC = ctypes.CDLL(None)
 # Where multiprocessing's server and tracker keep how to reach them.
 _KEPT = ("_forkserver_alive_fd", "_forkserver_address", "_forkserver_pid", "_fd", "_pid")
 
@@ -113,8 +114,7 @@ def _close_all_but(descriptor: int) -> None:
 
 def _end_with_parent() -> None:
     if sys.platform == "linux":
-        with suppress(OSError, AttributeError):
-            ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _set_limits(limits: Limits) -> None:
@@ -123,7 +123,15 @@ def _set_limits(limits: Limits) -> None:
     # Without this the signal would end the process before the write could fail.
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     if limits.memory is not None:
-        _lower(resource.RLIMIT_AS, psutil.Process().memory_info().vms + limits.memory)
+        _lower(resource.RLIMIT_AS, _address_space() + limits.memory)
+
+
+def _address_space() -> int:
+    """Return the bytes of address space of this process; of Linux without what psutil looks up."""
+    if sys.platform != "linux":
+        return int(psutil.Process().memory_info().vms)
+    with open("/proc/self/statm", "rb") as pages:
+        return int(pages.read().split()[0]) * resource.getpagesize()
 
 
 def _lower(what: int, wanted: int) -> None:

@@ -11,7 +11,6 @@ updating.
 
 from __future__ import annotations
 
-import multiprocessing
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -24,7 +23,6 @@ from femubench.core.fem.structure import Structure
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.neighbour_modes import followed_frequencies
 from femubench.core.typing import FloatArray
-from femubench.core.update.lean_import import importing_without
 from femubench.core.update.quadratic_fit import QuadraticFit, coefficients_of
 from femubench.core.update.residuals import Data
 from femubench.core.update.sensitivity_update import Iteration, Point
@@ -274,10 +272,7 @@ def _started(target: Target, fit: QuadraticFit, root: FloatArray, rng: np.random
     Arguments:
         root: of the covariance about the most probable parameters, (p, p).
     """
-    # Nobody but the strategy makes use of it in a worker: neither its files nor its other moves.
-    alone = multiprocessing.parent_process() is not None
-    with importing_without(*(("h5py", "scipy.stats") if alone else ())):
-        import emcee
+    import emcee
 
     size = len(root) + 1
     walkers = max(_WALKERS * size, _FEWEST_WALKERS)

@@ -8,13 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from femubench import Measurement, Model, UpdateResult
-from femubench.update import (
-    FactorStrategy,
-    factor_result,
-    importing_without,
-    modal_space,
-    stiffness_parts,
-)
+from femubench.update import FactorStrategy, factor_result, modal_space, stiffness_parts
 
 
 @dataclass(frozen=True)
@@ -59,10 +53,8 @@ class CmaEs(FactorStrategy):
             NotApplicable: when the model has no such parameters.
             StrategyFailure: when no mode of the model looks like any measured mode.
         """
-        # Here, since it takes longer to import than most updates take, and without what draws and
-        # a rank correlation of which it has its own.
-        with importing_without("matplotlib", "scipy.stats"):
-            import cma
+        # Here, since it loads what draws and takes longer to import than most updates take.
+        import cma
 
         parts = stiffness_parts(model, self.parameters)
         space = modal_space(parts, measurement, shape_weight=self.shape_weight, size=self.basis)

@@ -8,7 +8,6 @@ from typing import ClassVar
 import numpy as np
 
 from femubench import Measurement, Model, UpdateResult
-from femubench.fem import FloatArray
 from femubench.update import (
     FactorStrategy,
     bounded_fit,
@@ -60,10 +59,13 @@ class MultiStart(FactorStrategy):
             NotApplicable: when the model has no such parameters.
             StrategyFailure: when no mode of the model looks like any measured mode.
         """
+        # Here, since no other strategy has to wait for it; workers have it from the start.
+        from scipy.stats.qmc import LatinHypercube
+
         parts = stiffness_parts(model, self.parameters)
         weight, limit = self.shape_weight, float(np.log(self.largest))
         space = modal_space(parts, measurement, shape_weight=weight, size=self.basis)
-        cube = _latin_hypercube(self.starts, len(parts), rng)
+        cube = LatinHypercube(len(parts), rng=rng).random(self.starts)
         starts = [np.zeros(len(parts)), *(limit * (2.0 * cube - 1.0))]
         found = [bounded_fit(space, start, self.largest) for start in starts]
         best = min(found, key=lambda item: item[1])[0]
@@ -73,17 +75,3 @@ class MultiStart(FactorStrategy):
         history = tuple({"cost": float(value)} for value in costs)
         near = float(np.mean(costs <= 1.1 * costs.min()))
         return factor_result(parts, log, history, cost=cost, share_of_starts_at_best=near)
-
-
-def _latin_hypercube(count: int, size: int, rng: np.random.Generator) -> FloatArray:
-    """Return points of the unit cube, one in every slice along every axis, (count, size).
-
-    The draws are those of `scipy.stats.qmc`, which takes longer to import than a small model to
-    be updated.
-
-    Source: McKay, Beckman & Conover (1979), Technometrics 21, 239-245.
-    """
-    own = rng.spawn(1)[0]
-    inside = own.random((count, size))
-    slices = np.transpose([own.permutation(count) for _ in range(size)])
-    return np.asarray((slices + 1.0 - inside) / count)
