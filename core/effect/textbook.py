@@ -14,7 +14,7 @@ def textbook_values(effect: Effect, model: Model) -> dict[str, tuple[float, ...]
     """Return by place the values that an effect gives without any fit.
 
     Arguments:
-        effect: any; one that has to be fitted, or says so by `textbook = False`, gives none.
+        effect: any; one that has to be fitted, or says `handbook = False`, gives none.
         model: as drawn.
 
     Examples:
@@ -22,7 +22,7 @@ def textbook_values(effect: Effect, model: Model) -> dict[str, tuple[float, ...]
         {'all': (-0.2579...,)}
     """
     found: dict[str, tuple[float, ...]] = {}
-    if not getattr(effect, "textbook", True):
+    if not getattr(effect, "handbook", True):
         return found
     for place in effect.places(model):
         values = [item.textbook for item in effect.parameters(model, place)]
