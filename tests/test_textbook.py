@@ -55,7 +55,7 @@ def test_effects_with_textbook_values_say_so() -> None:
     for effect in EFFECTS:
         found = [effect.parameters(model, place) for place in effect.places(model)]
         known = any(p.textbook is not None for parameters in found for p in parameters)
-        assert effect.handbook is known, effect.name
+        assert getattr(effect, "handbook", None) is known, effect.name
 
 
 def test_effects_without_are_not_asked_for_their_places(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -90,8 +90,8 @@ def _cells(xyz: FloatArray) -> IntArray:
 
     def cells(parts: int) -> IntArray:
         place = np.floor((xyz - low) / extent * parts + _SHIFT).astype(np.int64)
-        found: IntArray = np.ravel_multi_index(tuple(place.T), tuple(place.max(axis=0) + 1))
-        return found
+        number = np.ravel_multi_index(tuple(place.T), tuple(place.max(axis=0) + 1))
+        return np.asarray(number, dtype=np.int64)
 
     few, many = 1, _KEPT
     while many - few > 1:
