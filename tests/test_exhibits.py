@@ -5,16 +5,19 @@ from __future__ import annotations
 import base64
 import json
 import os
-from dataclasses import asdict
+import sys
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from femubench.core.case.case import Case
 from femubench.core.case.reader import read_case
-from femubench.core.drawing import wireframe
+from femubench.core.drawing import prediction, thinning, wireframe
 from femubench.core.drawing.element_change import relative_changes
 from femubench.core.drawing.files import FOLDER, Exhibits
 from femubench.core.drawing.prediction import (
@@ -28,6 +31,9 @@ from femubench.core.plugin.loader import load_plugins
 from femubench.core.score.scoring import score_model
 from femubench.core.update.strategy import UpdateResult
 from femubench.scenarios import HERE
+
+sys.path.insert(0, str(Path(__file__).parent))
+from effect_checks import as_matrices
 
 STRATEGIES = load_plugins().strategies
 KEY = "0123456789abcdef"
@@ -152,7 +158,36 @@ def test_what_is_too_large_is_not_drawn(
     cases: dict[str, Case], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(wireframe, "MOST_NODES", 10)
-    assert case_drawing(cases["frame"]) is None
+    case = cases["frame"]
+    assert case_drawing(replace(case, model=as_matrices(case.model))) is None
+
+
+def test_a_large_frame_is_thinned_out(
+    cases: dict[str, Case], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = cases["hframe"]
+    whole, full = case_drawing(case), shown(case, "unchanged")
+    assert whole is not None
+    assert whole["thinned"] is None
+    for module in (thinning, prediction):
+        monkeypatch.setattr(module, "MOST_NODES", 10)
+    monkeypatch.setattr(thinning, "_KEPT", 40)
+    drawn, few = case_drawing(case), shown(case, "unchanged")
+    assert drawn is not None
+    assert drawn["thinned"] == [len(whole["nodes"]), len(whole["elements"])]
+    number = [whole["nodes"].index(node) for node in drawn["nodes"]]
+    assert 20 < len(number) <= 40
+    # It hangs together as the structure does, and moves as it moves there.
+    ends = np.array(drawn["elements"])
+    links = sp.coo_array((np.ones(len(ends)), ends.T), shape=(len(number),) * 2)
+    assert connected_components(links, directed=False)[0] == 1
+    for one, other in zip(full["modes"], few["modes"], strict=True):
+        shape, rough = np.array(one["shape"])[number], np.array(other["shape"])
+        np.testing.assert_allclose(
+            rough / np.abs(rough).max(), shape / np.abs(shape).max(), atol=2e-3
+        )
+    assert few["mac"] == full["mac"]
+    assert few["elements"] is None
 
 
 class TestFiles:

@@ -130,8 +130,8 @@ def test_dependencies_are_what_is_imported() -> None:
     needed = names(PROJECT["dependencies"])
     imported = ("ansys", "cholmod", "cluster", "hdf5", "identify", "nastran", "parquet", "plot")
     optional = names([text for extra in imported for text in extras[extra]])
-    # pytest loads the plugin for pytest itself, and distributed is never without dask.
-    assert {name for name, _ in found} == needed | optional | {"pytest", "dask"}
+    # pytest loads the plugin for pytest itself.
+    assert {name for name, _ in found} == needed | optional | {"pytest"}
     assert not {name for name, at_once in found if at_once} & optional
 
 

@@ -50,6 +50,20 @@ def test_effects_that_need_a_fit_give_nothing() -> None:
     assert textbook_values(named["shear-deformation"], model) == {"all": (1.0,)}
 
 
+def test_effects_with_textbook_values_say_so() -> None:
+    model = femubench.cases["frame"].model
+    for effect in EFFECTS:
+        found = [effect.parameters(model, place) for place in effect.places(model)]
+        known = any(p.textbook is not None for parameters in found for p in parameters)
+        assert getattr(effect, "handbook", None) is known, effect.name
+
+
+def test_effects_without_are_not_asked_for_their_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    offset = next(effect for effect in EFFECTS if effect.name == "joint-offset")
+    monkeypatch.setattr(type(offset), "places", lambda *_: pytest.fail("asked for its places"))
+    assert textbook_values(offset, femubench.cases["frame"].model) == {}
+
+
 def test_matrices_have_no_textbook() -> None:
     model = as_matrices(femubench.cases["frame"].model)
     with pytest.raises(NotApplicable, match="matrices"):

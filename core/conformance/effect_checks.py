@@ -241,7 +241,7 @@ def _hints(effect: Effect) -> str:
     caution = getattr(effect, "caution", "")
     if not isinstance(caution, str) or (caution and caution[-1] not in ".!?"):
         return f"caution is {caution!r}, expected a sentence"
-    for hint in ("softens", "innate"):
+    for hint in ("softens", "innate", "handbook"):
         if not isinstance(given := getattr(effect, hint, False), bool):
             return f"{hint} is {given!r}, expected True or False"
     refined = getattr(effect, "refines", None)
@@ -257,6 +257,9 @@ def _hints(effect: Effect) -> str:
 
 
 def _wordings(effect: Effect, parameters: Sequence[EffectParameter]) -> Iterator[str]:
+    known = all(item.textbook is not None for item in parameters)
+    if known and not getattr(effect, "handbook", True):
+        yield "its parameters have textbook values, expected handbook = True"
     for item in parameters:
         if item.wording not in get_args(Wording):
             yield f"wording {item.wording!r}, expected one of {', '.join(get_args(Wording))}"

@@ -101,6 +101,7 @@ class _Exhibit(_Part):
 class _CaseDrawing(Wireframe):
     measured: tuple[_Measured, ...] = ()
     drive: str | None = None
+    thinned: tuple[int, int] | None = None
     receptance: _Receptance = field(default_factory=_Receptance)
     nominal: _Exhibit | None = None
 

@@ -9,18 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from femubench.core.case.case import Case
+from femubench.core.case.case import Case, Modification
 from femubench.core.drawing.element_change import difference_picture, relative_changes
 from femubench.core.drawing.files import Exhibits
+from femubench.core.drawing.thinning import thinned
 from femubench.core.drawing.wireframe import MOST_NODES, node_positions, to_plain, wireframe_of
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.correlation import mac, modal_scale_factor
-from femubench.core.modal.eigen import Modes, modes_of
+from femubench.core.modal.eigen import Modes, modes_of, once_for
 from femubench.core.modal.frf import modal_sum, receptance
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import Pairing, pair_measured
-from femubench.core.typing import AnyArray, FloatArray
+from femubench.core.typing import AnyArray, FloatArray, IntArray
 
 DIGITS = 4
 _AXES = {"in-plane": ("x", "z"), "out-of-plane": ("z",), "3d": ("x", "y", "z")}
@@ -38,13 +39,16 @@ def case_drawing(case: Case) -> dict[str, Any] | None:
     Arguments:
         case: its nominal model gives the picture.
 
-    Returns None for a model that is too large to draw.
+    A large frame is thinned out, and `thinned` says how many nodes and elements it has. Returns
+    None for large matrices.
     """
-    wireframe = wireframe_of(case)
+    few = thinned(case)
+    wireframe = wireframe_of(case) if few is None else few.wireframe(case)
     if not wireframe.nodes:
         return None
     return {
         **to_plain(wireframe),
+        "thinned": None if few is None else [few.of, few.elements],
         "measured": list(_measured(case)),
         "drive": drive_sensor(case),
     }
@@ -65,12 +69,13 @@ def exhibit_of(
     Raises:
         ModelError: when the model cannot be solved or observed.
     """
-    if len(node_positions(case.model)) > MOST_NODES:
+    few = thinned(case)
+    if few is None and len(node_positions(case.model)) > MOST_NODES:
         return None
-    elements = relative_changes(case.model, model, parameters)
+    elements = None if few is not None else relative_changes(case.model, model, parameters)
     by_entries = elements is None or model.stiffness_change is not None
     return {
-        **_modes(case, model),
+        **_modes(case, model, None if few is None else few.nodes),
         "receptance": receptances(case, model),
         "elements": elements,
         "difference": difference_picture(case.model, model) if by_entries else None,
@@ -93,11 +98,24 @@ def _structures(case: Case, model: Model) -> Iterator[tuple[str, Model, Measurem
     """Yield the structure as tested (``""``) and with every modification, and what was measured."""
     yield "", model, case.measurement.select((*case.used, *case.held_out))
     for change in case.modifications:
-        yield change.name, model.attach(change.masses, change.springs), change.measurement
+        yield change.name, _attached(model, change), change.measurement
 
 
-def _modes(case: Case, model: Model) -> dict[str, Any]:
-    """Return the modes near the measured ones with their shapes, and the MAC matrix."""
+def _attached(model: Model, change: Modification) -> Model:
+    """Return a modified structure, the same one every time, so that it is solved once."""
+
+    def make() -> tuple[Modification, Model]:
+        return change, model.attach(change.masses, change.springs)
+
+    return once_for(model, ("attached", id(change)), make)[1]
+
+
+def _modes(case: Case, model: Model, nodes: IntArray | None = None) -> dict[str, Any]:
+    """Return the modes near the measured ones with their shapes, and the MAC matrix.
+
+    Arguments:
+        nodes: that are drawn; None for all.
+    """
     drawn: list[dict[str, Any]] = []
     likeness: dict[str, Any] = {}
     for name, changed, data in _structures(case, model):
@@ -114,7 +132,7 @@ def _modes(case: Case, model: Model) -> dict[str, Any]:
                 "columns": [float(frequencies[k]) for k in shown],
                 "values": rounded(mac(data.shapes, at_sensors[:, shown])),
             }
-        motion = node_motions(changed, case.model, elastic.shapes[:, shown])
+        motion = node_motions(changed, case.model, elastic.shapes[:, shown], nodes)
         largest = np.abs(motion).max(axis=(0, 1), initial=0.0)
         drawn += [
             {
@@ -278,24 +296,28 @@ def rounded(values: Any) -> Any:  # noqa: ANN401 - arrays of any shape
     return float(f"{number:.{DIGITS}g}") if np.isfinite(number) else None
 
 
-def node_motions(model: Model, nominal: Model, shapes: FloatArray) -> FloatArray:
+def node_motions(
+    model: Model, nominal: Model, shapes: FloatArray, nodes: IntArray | None = None
+) -> FloatArray:
     """Return the displacements of the nodes of a picture, (k, 3, m).
 
     Arguments:
         model: whose shapes they are.
         nominal: whose nodes are drawn.
         shapes: on the dofs of `model`, (n, m).
+        nodes: of a frame, those that are drawn by their numbers, (k,); None for all.
 
     Raises:
         ModelError: when a node lies off the structure of `model`.
     """
     xyz = node_positions(nominal)
+    xyz = xyz if nodes is None else xyz[nodes]
     motion = np.zeros((len(xyz), 3, shapes.shape[1]))
     if nominal.structure is None:
-        nodes = np.unique(nominal.dofs.node)
+        present = np.unique(nominal.dofs.node)
         for row, (node, name) in enumerate(zip(model.dofs.node, model.dofs.direction, strict=True)):
             if name in "xyz":
-                motion[np.searchsorted(nodes, node), "xyz".index(name)] += shapes[row]
+                motion[np.searchsorted(present, node), "xyz".index(name)] += shapes[row]
         return motion
     for name in _AXES[nominal.structure.frame.plane]:
         labels = tuple(str(i) for i in range(len(xyz)))

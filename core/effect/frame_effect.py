@@ -104,6 +104,7 @@ class FrameEffect(Effect):
             level is worth measuring.
         innate: whether it is there from the day that the structure was built, so that it cannot
             be what differs from a reference.
+        handbook: whether handbooks give its values without any fit.
         refines: the slug of an effect of which it tells more at the same place: it is tried where
             that one is likely, and weighed with it.
         reading: the instrument that reads it directly; a proposal of the advice.
@@ -116,6 +117,7 @@ class FrameEffect(Effect):
     caution: ClassVar[str] = ""
     softens: ClassVar[bool] = False
     innate: ClassVar[bool] = False
+    handbook: ClassVar[bool] = False
     refines: ClassVar[str | None] = None
     reading: ClassVar[Reading | None] = None
     sizes: ClassVar[Sequence[Size]] = ()

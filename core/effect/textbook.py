@@ -14,14 +14,16 @@ def textbook_values(effect: Effect, model: Model) -> dict[str, tuple[float, ...]
     """Return by place the values that an effect gives without any fit.
 
     Arguments:
-        effect: any; one that has to be fitted gives none.
+        effect: any; one that has to be fitted, or says `handbook = False`, gives none.
         model: as drawn.
 
     Examples:
         >>> effect.textbook_values(torsion, model)
         {'all': (-0.2579...,)}
     """
-    found = {}
+    found: dict[str, tuple[float, ...]] = {}
+    if not getattr(effect, "handbook", True):
+        return found
     for place in effect.places(model):
         values = [item.textbook for item in effect.parameters(model, place)]
         if values and all(value is not None for value in values):

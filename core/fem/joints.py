@@ -133,11 +133,10 @@ def groups_within(frame: Frame, count: int, *, passing: bool = True) -> tuple[Jo
         >>> [group.name for group in update.groups_within(frame, 3)]
         ['L', 'T through', 'T branch']
     """
-    groups = joint_groups(frame)
-    if not groups:
-        raise NotApplicable("no two members meet in a joint")
     for merged in (False, True):
         groups = joint_groups(frame, merged=merged)
+        if not groups:
+            raise NotApplicable("no two members meet in a joint")
         if sum(passing or group.role != "through" for group in groups) <= count:
             return groups
     return (JointGroup("all", "end", tuple(end for group in groups for end in group.ends)),)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
-from scipy.sparse.linalg import SuperLU, splu
 
 from femubench.core.errors import ModelError, NotApplicable, SelfCheckFailed, StrategyFailure
 from femubench.core.fem.model import Model
+from femubench.core.modal.factorisation import LU, Cholesky, Factor, cholmod_obstacle
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import AnyArray, FloatArray, IntArray, SparseArray
 from femubench.core.update.promise import (
@@ -234,27 +235,22 @@ class _Dual:
     fitted: SparseArray
     exact: AnyArray
     damping: float
-    factor: SuperLU
+    factor: Factor
 
     @classmethod
     def of(cls, equations: Equations) -> _Dual:
         """Factorise the normal matrix."""
         fitted, damping = equations.fitted, equations.cutoff**2
         normal = fitted @ fitted.T + damping * sp.eye_array(fitted.shape[0])
-        factor = splu(
-            sp.csc_matrix(normal),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
         long = np.longdouble
-        return cls(fitted.astype(long), equations.exact.astype(long), damping, factor)
+        return cls(fitted.astype(long), equations.exact.astype(long), damping, _factor(normal))
 
     def solve(self, right: AnyArray) -> AnyArray:
         """Return the solution for one right side by conjugate gradients, its factor before them."""
         found, left = np.zeros_like(right), right
         way = np.zeros_like(right)
-        gain, first = np.longdouble(1.0), np.longdouble(0.0)
+        gain: Any = np.longdouble(1.0)
+        first = gain
         for k in range(_GRADIENTS):
             near = self.factor.solve(left.astype(float)).astype(np.longdouble)
             old, gain = gain, left @ near
@@ -266,6 +262,15 @@ class _Dual:
             length = gain / (way @ pushed)
             found, left = found + length * way, left - length * pushed
         return found
+
+
+def _factor(normal: SparseArray) -> Factor:
+    """Factorise a matrix that is positive definite but for rounding."""
+    if cholmod_obstacle() is None:
+        cholesky = Cholesky(normal)
+        if cholesky.factorise(normal):
+            return cholesky
+    return LU(normal)
 
 
 # A direction in which entries change by 100 % and forces by less than 3 % of the inertia forces

@@ -17,12 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from femubench.core.errors import ModelError, StrategyFailure
+from femubench.core.errors import ModelError, NotApplicable, StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.neighbour_modes import followed_frequencies
 from femubench.core.typing import FloatArray
+from femubench.core.update.dual_least_squares import MANY
 from femubench.core.update.quadratic_fit import QuadraticFit, coefficients_of
 from femubench.core.update.residuals import Data
 from femubench.core.update.sensitivity_update import Iteration, Point
@@ -250,9 +251,12 @@ def most_probable(
         source, unknowns, measurement, discrepancy, options: as for `sample_posterior`.
 
     Raises:
-        NotApplicable: when a frequency has no standard deviation.
+        NotApplicable: when a frequency has no standard deviation, or parameters are too many.
         StrategyFailure: when no measured mode has a partner.
     """
+    if len(unknowns) > MANY:
+        count = f"{len(unknowns)} parameters"
+        raise NotApplicable(f"{count}, and their covariance fills a dense matrix beyond {MANY}")
     whole = measurement.widened(discrepancy.median * measurement.frequencies)
     model = Model.of(source) if isinstance(source, Structure) else source
     iteration = Iteration(
@@ -326,7 +330,7 @@ def _normal_result(
     return UpdateResult(
         model=point.prediction.model,
         parameter_count=len(point.q),
-        parameters=iteration.estimates(point, covariance),
+        parameters=iteration.estimates(point, np.sqrt(np.diagonal(covariance))),
         diagnostics={
             "discrepancy_std": own,
             "steps": steps,

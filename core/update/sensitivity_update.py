@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,15 +14,18 @@ from femubench.core.fem.structure import Structure
 from femubench.core.gauss_newton import bounded_step
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import BoolArray, FloatArray
+from femubench.core.update.dual_least_squares import MANY, DualPosterior, dual_step
 from femubench.core.update.residuals import Data, Prediction, common_rows, predict
 from femubench.core.update.strategy import ParameterEstimate, UpdateResult
-from femubench.core.update.uncertainty import Uncertainty
+from femubench.core.update.uncertainty import Uncertainty, standard_normal
 from femubench.core.update.unknowns import Scaling, Unknown, UpdateOptions
 
 _SMALLEST_STEP = 1e-9
 _ROUNDING = 1e-10  # relative, of a modal quantity: some ten times what linear algebra leaves
 _NO_GAIN = 1e-6
 _PATIENCE = 3
+
+Solve = Callable[[BoolArray], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -72,15 +75,34 @@ class Iteration:
     def step(self, point: Point) -> FloatArray:
         """Return dtheta / |theta| = (s's + beta I + P)^-1 (s'r - P q), limits respected."""
         s, residual = self.system(point)
-        size, weight = len(point.q), np.sqrt(self.scaling.precision)
+        solve = self.dual if len(point.q) > MANY else self.primal
+        low, high = self.scaling.lower, self.scaling.upper
+        return bounded_step(solve(s, residual, point.q), point.q, low, high, self.options.max_step)
+
+    def primal(self, s: FloatArray, residual: FloatArray, q: FloatArray) -> Solve:
+        """Return what solves for the step in the space of the parameters."""
+        size, weight = len(q), np.sqrt(self.scaling.precision)
         rows = np.vstack([s, np.sqrt(self.beta) * np.eye(size), np.diag(weight)])
-        right = np.concatenate([residual, np.zeros(size), -weight * point.q])
+        right = np.concatenate([residual, np.zeros(size), -weight * q])
 
         def solve(free: BoolArray) -> FloatArray:
             return np.asarray(np.linalg.lstsq(rows[:, free], right, rcond=None)[0])
 
-        low, high = self.scaling.lower, self.scaling.upper
-        return bounded_step(solve, point.q, low, high, self.options.max_step)
+        return solve
+
+    def dual(self, s: FloatArray, residual: FloatArray, q: FloatArray) -> Solve:
+        """Return what solves for the step in the space of the data."""
+        weight = self.beta + self.scaling.precision
+        if not (weight > 0.0).all():
+            raise NotApplicable(
+                f"{len(q)} parameters without damping or a prior, expected one of them"
+            )
+        rest = -self.scaling.precision * q / weight
+
+        def solve(free: BoolArray) -> FloatArray:
+            return dual_step(s[:, free], residual, weight[free], rest[free])
+
+        return solve
 
     def gain(self, before: Point, after: Point) -> float:
         """Return the share of the cost that a step took away."""
@@ -155,9 +177,10 @@ class Iteration:
             "cost": point.cost(rows, self.scaling.precision),
             "step": step,
         }
-        values = self.scaling.values(point.q)
-        names = (u.parameter.name for u in self.unknowns)
-        entry.update((name, float(v)) for name, v in zip(names, values, strict=True))
+        if len(self.unknowns) <= MANY:  # nobody follows more, and they are too much to keep
+            values = self.scaling.values(point.q)
+            names = (u.parameter.name for u in self.unknowns)
+            entry.update((name, float(v)) for name, v in zip(names, values, strict=True))
         self.history.append(entry)
 
     def check(self, point: Point) -> None:
@@ -180,10 +203,8 @@ class Iteration:
         except np.linalg.LinAlgError:
             return np.full((s.shape[1], s.shape[1]), np.inf)
 
-    def estimates(
-        self, point: Point, covariance: FloatArray | None
-    ) -> tuple[ParameterEstimate, ...]:
-        """Return the parameters before and after, with deviations where they are known."""
+    def estimates(self, point: Point, std: FloatArray | None) -> tuple[ParameterEstimate, ...]:
+        """Return the parameters before and after, with deviations of q, (p,), where known."""
         values = self.scaling.values(point.q)
         grow = np.where(self.scaling.signed, np.abs(self.scaling.start), values)
         return tuple(
@@ -192,19 +213,35 @@ class Iteration:
                 before=float(unknown.start),
                 after=float(value),
                 unit=unknown.parameter.unit,
-                std=None if covariance is None else float(np.sqrt(covariance[i, i]) * grow[i]),
+                std=None if std is None else float(std[i] * grow[i]),
             )
             for i, (unknown, value) in enumerate(zip(self.unknowns, values, strict=True))
         )
 
-    def uncertainty(self, point: Point, covariance: FloatArray | None) -> Uncertainty | None:
-        """Return models of the posterior; None where some parameter is not determined at all."""
-        if covariance is None or not np.isfinite(covariance).all():
-            return None
+    def known(self, point: Point) -> tuple[FloatArray | None, Uncertainty | None]:
+        """Return the deviations of q, (p,), and models of the posterior, where there are any."""
+        if len(point.q) > MANY:
+            return self.known_of_many(point)
+        covariance = self.covariance(point)
+        if covariance is None:
+            return None, None
+        std = np.sqrt(np.diagonal(covariance))
+        if not np.isfinite(covariance).all():
+            return std, None
         try:
-            return Uncertainty.drawn(self.model_at, point.q, 0.5 * (covariance + covariance.T))
+            even = 0.5 * (covariance + covariance.T)
+            return std, Uncertainty.drawn(self.model_at, point.q, even)
         except StrategyFailure:  # rounding made it no covariance; the model is none the worse
-            return None
+            return std, None
+
+    def known_of_many(self, point: Point) -> tuple[FloatArray | None, Uncertainty | None]:
+        """Return the same without a matrix of the size of the parameters."""
+        precision = self.scaling.precision
+        if not self.data.statistical or not (precision > 0.0).all():
+            return None, None
+        posterior = DualPosterior.of(self.system(point)[0], precision)
+        draws = posterior.draws(standard_normal(len(point.q)))
+        return posterior.std, Uncertainty.of_draws(self.model_at, point.q + draws)
 
 
 def sensitivity_update(
@@ -245,16 +282,16 @@ def sensitivity_update(
     model = Model.of(source) if isinstance(source, Structure) else source
     iteration = Iteration(model, unknowns, data, options)
     point = iteration.run()
-    covariance = iteration.covariance(point)
+    std, uncertainty = iteration.known(point)
     return UpdateResult(
         model=point.prediction.model,
         parameter_count=len(unknowns),
-        parameters=iteration.estimates(point, covariance),
+        parameters=iteration.estimates(point, std),
         history=tuple(iteration.history),
         diagnostics={
             "iterations": float(len(iteration.history) - 1),
             "converged": float(iteration.converged),
             "paired_modes": float((point.prediction.partner >= 0).sum()),
         },
-        uncertainty=iteration.uncertainty(point, covariance),
+        uncertainty=uncertainty,
     )

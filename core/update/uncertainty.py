@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,12 +63,34 @@ class Uncertainty:
             16
         """
         root = _root(np.asarray(covariance, dtype=float), len(mean))
+        draws = mean + standard_normal(root.shape[1]) @ root.T
+        return cls.of_draws(make, draws, discrepancy_std=discrepancy_std)
+
+    @classmethod
+    def of_draws(
+        cls,
+        make: Callable[[FloatArray], Model],
+        draws: FloatArray,
+        *,
+        discrepancy_std: float = 0.0,
+    ) -> Uncertainty:
+        """Return the models of parameters that were drawn, without draws that give none.
+
+        Arguments:
+            make: returns the model of parameters (p,).
+            draws: each as probable as the others, (k, p).
+            discrepancy_std: as in the class.
+
+        Examples:
+            >>> def make(q):
+            ...     return fem.Model.of(structure.with_values([stiffness], np.exp(q)))
+            >>> len(update.Uncertainty.of_draws(make, np.array([[0.0], [0.1]])).samples)
+            2
+        """
         models = []
-        for draw in _normal(root.shape[1]) @ root.T:
-            try:
-                models.append(make(mean + draw))
-            except FemubenchError:
-                continue
+        for draw in draws:
+            with suppress(FemubenchError):
+                models.append(make(draw))
         return cls(tuple(models), discrepancy_std)
 
 
@@ -91,8 +114,8 @@ def _root(covariance: FloatArray, size: int) -> FloatArray:
     return np.asarray(vectors[:, kept] * np.sqrt(values[kept]))
 
 
-def _normal(size: int) -> FloatArray:
-    """Return normal draws whose mean is 0 and whose covariance is 1 where so few can have it."""
+def standard_normal(size: int) -> FloatArray:
+    """Return the same normal draws every time, (k, size); of few sizes exactly of covariance 1."""
     count = int(np.clip(2 * size, _FEWEST, MOST_SAMPLES))
     draws = np.random.default_rng(_SEED).standard_normal((count, size))
     if size >= count:

@@ -30,6 +30,7 @@ class RotaryInertia(FrameEffect):
     name: ClassVar[str] = "rotary-inertia"
     summary: ClassVar[str] = "the cross sections have rotary inertia"
     innate: ClassVar[bool] = True
+    handbook: ClassVar[bool] = True
     sizes: ClassVar[Sequence[Size]] = (Size(0.5, 3.0),)
 
     def places(self, model: Model) -> Sequence[str]:

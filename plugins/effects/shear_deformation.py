@@ -46,6 +46,7 @@ class ShearDeformation(FrameEffect):
     name: ClassVar[str] = "shear-deformation"
     summary: ClassVar[str] = "the members deform in shear"
     innate: ClassVar[bool] = True
+    handbook: ClassVar[bool] = True
     sizes: ClassVar[Sequence[Size]] = (Size(0.5, 3.0),)
 
     def places(self, model: Model) -> Sequence[str]:

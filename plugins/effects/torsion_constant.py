@@ -48,6 +48,7 @@ class TorsionConstant(FrameEffect):
     name: ClassVar[str] = "torsion-constant"
     summary: ClassVar[str] = "the torsion constant is wrong"
     innate: ClassVar[bool] = True
+    handbook: ClassVar[bool] = True
     sizes: ClassVar[Sequence[Size]] = (Size(0.05, 0.40, signed=True),)
 
     def places(self, model: Model) -> Sequence[str]:

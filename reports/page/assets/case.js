@@ -31,7 +31,8 @@
     if (source) facts.push(["Source", source]);
     if (stage) {
       facts.push(["Model", PLANES[stage.plane] ?? stage.plane]);
-      facts.push(["Mesh", `${stage.nodes.length} nodes, ${stage.elements.length} elements, ${stage.members.length} members`]);
+      facts.push(["Mesh", stage.thinned ? `${stage.thinned[0]} nodes, ${stage.thinned[1]} elements; drawings are thinned out to ${stage.nodes.length} nodes`
+        : `${stage.nodes.length} nodes, ${stage.elements.length} elements, ${stage.members.length} members`]);
       const count = (block) => stage.measured.filter((mode) => mode.block === block).length;
       const changed = count("modified") ? `, ${count("modified")} after a design change` : "";
       facts.push(["Measured", `${count("used")} modes used, ${count("higher")} higher ones held out${changed}; ${stage.sensors.length} sensors`]);
@@ -160,6 +161,7 @@
       if (missing) return missing;
       const { elements, difference } = entry.exhibit;
       if (difference) return bench.heat.image({ ...difference, axis: "node", title: `${entry.name}: |K \u2212 K\u2080| between nodes, logarithmic` });
+      if (stage.thinned) return note(`${entry.name}: the model has too many elements to show the change of each.`);
       if (!elements || elements.every((value) => value === null)) return note(`${entry.name}: the change of stiffness cannot be told element by element.`);
       if (elements.every((value) => !value)) return note(`${entry.name}: no element was changed.`);
       return bench.elementMap(stage, elements, top, `${entry.name}: relative change of every element's stiffness, in %`);
