@@ -12,15 +12,17 @@ from femubench import Model
 from femubench.effect import (
     Change,
     EffectParameter,
+    ElementOperator,
     FrameEffect,
     Site,
     Size,
+    Term,
     member_length,
     once_for,
     proportional,
     sparse_term,
 )
-from femubench.fem import Frame, Preload, preload_stiffness, preload_stiffnesses, redundant_members
+from femubench.fem import Frame, Preload, preload_forces, redundant_members, unit_preload_matrices
 
 _SCALE, _BOUND = 0.15, 0.6  # of the Euler load
 _MOST = 60
@@ -64,11 +66,13 @@ class AxialPreload(FrameEffect):
             ModelError: when the frame is not redundant there.
         """
         structure = model.frame_structure
-        members = once_for(model, "preload places", lambda: tuple(self.places(model)))
-        if place not in members:
-            return proportional(sparse_term("stiffness", preload_stiffness(structure, place, 1.0)))
-        matrices = once_for(model, "preloads", lambda: preload_stiffnesses(structure, members))
-        return proportional(sparse_term("stiffness", matrices[members.index(place)]))
+        units = once_for(model, "preload units", lambda: unit_preload_matrices(structure))
+        forces, beside = preload_forces(structure, place)
+        every = np.arange(len(units))
+        terms = [Term("stiffness", ElementOperator(structure, every, units, share=forces))]
+        if beside is not None:
+            terms.append(sparse_term("stiffness", beside))
+        return proportional(*terms)
 
 
 def euler_load(frame: Frame, name: str) -> float:
