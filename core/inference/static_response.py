@@ -11,10 +11,11 @@ Source: MacNeal (1971), residual flexibility; Fox & Kapoor (1968) for the forces
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
+from weakref import WeakValueDictionary
 
 import numpy as np
 import scipy.linalg as la
@@ -27,7 +28,7 @@ from femubench.core.inference.modal_basis import Space, nominal_space
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.projection import Projection, Projector
 from femubench.core.inference.residuals import Data
-from femubench.core.modal.eigen import DENSE_LIMIT, Modes, modes_of
+from femubench.core.modal.eigen import DENSE_LIMIT, Modes, modes_of, once_for
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.sparse_eigen import ShiftedModel
 from femubench.core.typing import FloatArray, SparseArray
@@ -66,9 +67,22 @@ class Basis:
     def of(cls, model: Model, measurement: Measurement) -> Basis:
         """Solve a model for the modes that the diagnosis of a measurement needs.
 
+        What somebody still has is not made again: a factorisation is as large as all the rest.
+
         Raises:
             ModelError: when the model has no modes.
         """
+        kept: WeakValueDictionary[Hashable, Basis]
+        kept = once_for(model, "bases", WeakValueDictionary)
+        sensors = measurement.sensors
+        key = len(measurement), sensors.labels, sensors.directions, sensors.xyz.tobytes()
+        found = kept.get(key)
+        if found is None:
+            kept[key] = found = cls._solved(model, measurement)
+        return found
+
+    @classmethod
+    def _solved(cls, model: Model, measurement: Measurement) -> Basis:
         count = _RIGID + _A_MODE * len(measurement) + _SPARE
         modes = modes_of(model, count if model.size > DENSE_LIMIT else None)
         modes = modes.take(np.argsort(~modes.rigid, kind="stable"))
@@ -255,25 +269,28 @@ class Coordinates:
 def exerted(hypothesis: Hypothesis, near: Modes) -> FloatArray:
     """Return forces that span what a hypothesis exerts on some modes at any magnitude, (n, r)."""
     terms = hypothesis.change.terms
-    blocks = [_range(term, near.shapes, hypothesis.change.extra) for term in terms]
     if len(terms) > _FEW_TERMS:
-        blocks = _at_sizes(hypothesis, near)
+        blocks = list(_at_sizes(hypothesis, near))
+    else:
+        blocks = [_range(term, near.shapes, hypothesis.change.extra) for term in terms]
     sizes = [float(np.linalg.norm(block)) for block in blocks]
     scaled = [block / size for block, size in zip(blocks, sizes, strict=True) if size > 0.0]
     forces = np.zeros((len(near.shapes), 0))
     return _principal(np.hstack(scaled)) if scaled else forces
 
 
-def _at_sizes(hypothesis: Hypothesis, near: Modes) -> list[FloatArray]:
-    """Return the forces at a few magnitudes, where single terms are too many, (n, m) each."""
-    terms = hypothesis.change.terms
-    sign = [1.0 if term.matrix == "stiffness" else -near.eigenvalues for term in terms]
-    pulls = [
-        _applied(term, near.shapes, hypothesis.change.extra) * s
-        for term, s in zip(terms, sign, strict=True)
-    ]
-    together, factors = np.array(pulls), hypothesis.factors(magnitudes(hypothesis))
-    return [np.tensordot(row, together, axes=1) for row in factors]
+def _at_sizes(hypothesis: Hypothesis, near: Modes) -> FloatArray:
+    """Return the forces at a few magnitudes, where single terms are too many, (g, n, m)."""
+    factors = hypothesis.factors(magnitudes(hypothesis))
+    forces = np.zeros((len(factors), *near.shapes.shape))
+    # One term after the other: a hundred of them at once would take a gigabyte.
+    for term, own in zip(hypothesis.change.terms, factors.T, strict=True):
+        pull = _applied(term, near.shapes, hypothesis.change.extra)
+        if term.matrix == "mass":
+            pull = pull * -near.eigenvalues
+        for total, factor in zip(forces, own, strict=True):
+            total += factor * pull
+    return forces
 
 
 def magnitudes(hypothesis: Hypothesis, sizes: Sequence[float] = _SIZES) -> FloatArray:
