@@ -142,7 +142,7 @@ class BeamProperties:
         """Return a batch in which one property is multiplied, one factor an element."""
         return replace(self, **{name: getattr(self, name) * factor})
 
-    def alike(self, *beside: IntArray) -> tuple[IntArray, IntArray]:
+    def alike(self, *beside: FloatArray | IntArray) -> tuple[IntArray, IntArray]:
         """Return one element of every kind, (c,), and the kind of each element, (n,).
 
         Arguments:

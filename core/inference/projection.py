@@ -204,7 +204,7 @@ class Projector:
 
     def _cores(self, terms: Sequence[Term], grown: FloatArray) -> list[FloatArray]:
         """Return terms on all vectors, (N + extra, N + extra) each."""
-        found = self._between(terms, self.local) if self.structure is not None else {}
+        found = self._between(terms, self.local, [self.local]) if self.structure is not None else {}
         more = len(grown) - len(self.vectors)
         return [
             np.pad(found[i], (0, more)) if i in found else term.operator.project(grown)
@@ -219,7 +219,7 @@ class Projector:
         found: dict[int, FloatArray] = {}
         if any(isinstance(term.operator, ElementOperator) for term in terms):
             moved = self._gathered(added, np.arange(len(self.local)))
-            found = self._between(terms, moved, np.concatenate([self.local, moved], axis=2))
+            found = self._between(terms, moved, [self.local, moved])
         grown = np.vstack([added, np.zeros((extra, r))])
         result = []
         for i, term in enumerate(terms):
@@ -232,15 +232,15 @@ class Projector:
         return result
 
     def _between(
-        self, terms: Sequence[Term], right: FloatArray, left: FloatArray | None = None
+        self, terms: Sequence[Term], right: FloatArray, left: Sequence[FloatArray]
     ) -> dict[int, FloatArray]:
         """Return those of some terms that are matrices of elements on motions, (a, b) each.
 
         Arguments:
             terms: any.
-            right, left: displacements of all elements, (n_elements, n_active, b) and (..., a).
+            right: displacements of all elements, (n_elements, n_active, b).
+            left: the same, whose rows stand one after the other in the result, (..., a_i) each.
         """
-        left = right if left is None else left
         groups: dict[tuple[int, int, int], list[int]] = {}
         for i, term in enumerate(terms):
             operator = term.operator
@@ -257,11 +257,15 @@ class Projector:
             found.update(zip(members, forms, strict=True))
         return found
 
-    def _form(self, operator: ElementOperator, left: FloatArray, right: FloatArray) -> FloatArray:
+    def _form(
+        self, operator: ElementOperator, left: Sequence[FloatArray], right: FloatArray
+    ) -> FloatArray:
         every = len(operator.elements) == len(right)
-        near, moved = (x if every else x[operator.elements] for x in (left, right))
-        force = (self._blocks(operator) @ moved).reshape(-1, moved.shape[2])
-        return np.asarray(near.reshape(len(force), -1).T @ force)
+        near, moved = (
+            [x if every else x[operator.elements] for x in some] for some in (left, [right])
+        )
+        force = (self._blocks(operator) @ moved[0]).reshape(-1, right.shape[2])
+        return np.vstack([x.reshape(len(force), -1).T @ force for x in near])
 
     def _blocks(self, operator: ElementOperator) -> FloatArray:
         matrices = operator.matrices
@@ -366,7 +370,10 @@ class Projector:
 
 
 def _by_kinds(
-    operators: Sequence[ElementOperator], left: FloatArray, right: FloatArray, active: IntArray
+    operators: Sequence[ElementOperator],
+    left: Sequence[FloatArray],
+    right: FloatArray,
+    active: IntArray,
 ) -> list[FloatArray] | None:
     """Return element matrices on motions, (a, b) each; None where kinds of elements do not help.
 
@@ -374,7 +381,8 @@ def _by_kinds(
 
     Arguments:
         operators: with the same blocks, elements and kinds.
-        left, right: displacements of all elements, (n_elements, n_active, a or b).
+        left, right: as in `Projector._between`.
+        active: which of an element's dofs the displacements are.
     """
     first, shares = operators[0], [one.share for one in operators]
     kind, elements, blocks = first.kind, first.elements, first.blocks
@@ -391,10 +399,10 @@ def _by_kinds(
         > _EQUAL * np.abs(share).max()
     ):
         return None
-    total = np.zeros((len(operators), left.shape[2], right.shape[2]))
+    total = np.zeros((len(operators), sum(x.shape[2] for x in left), right.shape[2]))
     for i, (k, rows) in enumerate(zip(known, np.split(elements[order], begins[1:]), strict=True)):
-        force = blocks[k][active[:, None], active] @ right[rows]
-        one = left[rows].reshape(-1, left.shape[2]).T @ force.reshape(-1, right.shape[2])
+        force = (blocks[k][active[:, None], active] @ right[rows]).reshape(-1, right.shape[2])
+        one = np.vstack([x[rows].reshape(len(force), -1).T @ force for x in left])
         for own, factor in zip(total, of_kind[:, i], strict=True):
             if factor:
                 own += factor * one

@@ -132,7 +132,12 @@ class Basis:
         """Return the exact modes alone."""
         e, m = self.exact, self.modes
         modes = Modes(m.eigenvalues[:e], m.shapes[:, :e], m.rigid[:e])
-        return replace(self, modes=modes)
+        bare = replace(self, modes=modes)
+        # Views of what is there, in place of copies.
+        bare.__dict__["momentum"] = self.momentum[:, :e]
+        if self.model.structure is not None:
+            bare.projector.__dict__["local"] = self.projector.local[:, :, :e]
+        return bare
 
     def response(
         self, forces: FloatArray, most: int, known: FloatArray | None = None
@@ -154,16 +159,19 @@ class Basis:
         together = np.hstack(forces)
         if together.shape[1] == 0:
             return list(forces)
-        moved = self.solver.solve(together - momentum @ (shapes.T @ together))
-        vectors, heavy = self.modes.shapes, self.momentum
+        together -= momentum @ (shapes.T @ together)
+        moved = self.solver.solve(together)
+        del together
+        there = [(self.modes.shapes, self.momentum)]
         if known is not None and known.shape[1]:
-            vectors = np.hstack([vectors, known])
-            heavy = np.hstack([heavy, self.model.mass_times(known)])
+            there.append((known, self.model.mass_times(known)))
         counts = [block.shape[1] for block in forces]
         whole = np.sqrt(np.einsum("ij,ij->j", moved, self.model.mass_times(moved)))
         for _ in range(2):  # the second time what rounding left of the basis
-            moved = moved - vectors @ (heavy.T @ moved)
-            moved = moved / np.where(whole > 0.0, whole, 1.0)
+            shares = [heavy.T @ moved for _, heavy in there]
+            for (vectors, _), share in zip(there, shares, strict=True):
+                moved -= vectors @ share
+            moved /= np.where(whole > 0.0, whole, 1.0)
             mass, blocks, last = self.model.mass_times(moved), [], 0
             for count in counts:
                 own, last = slice(last, last + count), last + count
@@ -275,8 +283,8 @@ def exerted(hypothesis: Hypothesis, near: Modes) -> FloatArray:
         blocks = [_range(term, near.shapes, hypothesis.change.extra) for term in terms]
     sizes = [float(np.linalg.norm(block)) for block in blocks]
     scaled = [block / size for block, size in zip(blocks, sizes, strict=True) if size > 0.0]
-    forces = np.zeros((len(near.shapes), 0))
-    return _principal(np.hstack(scaled)) if scaled else forces
+    del blocks
+    return _principal(scaled) if scaled else np.zeros((len(near.shapes), 0))
 
 
 def _at_sizes(hypothesis: Hypothesis, near: Modes) -> FloatArray:
@@ -312,19 +320,31 @@ def magnitudes(hypothesis: Hypothesis, sizes: Sequence[float] = _SIZES) -> Float
     return np.array(list(product(*chosen)))
 
 
-def _principal(forces: FloatArray) -> FloatArray:
-    """Return orthonormal forces that span the largest of some, zero where these are, (n, r)."""
-    rows = np.flatnonzero(forces.any(axis=1))
-    local = forces[rows]
-    if local.shape[0] < local.shape[1]:
-        left, size, _ = la.svd(local, full_matrices=False)
+def _principal(blocks: Sequence[FloatArray]) -> FloatArray:
+    """Return orthonormal forces that span the largest of some, zero where these are, (n, r).
+
+    Arguments:
+        blocks: forces, side by side, (n, c_i) each.
+    """
+    count = len(blocks[0])
+    rows = np.flatnonzero(np.any([block.any(axis=1) for block in blocks], axis=0))
+    local = [block if len(rows) == count else block[rows] for block in blocks]
+    if len(rows) < sum(block.shape[1] for block in local):
+        left, size, _ = la.svd(np.hstack(local), full_matrices=False)
+        kept = np.flatnonzero(size > _FELT * size[0])[:_FROM_HYPOTHESIS]
+        own = left[:, kept]
     else:
-        square, turn = la.eigh(local.T @ local)
+        gram = np.vstack([np.hstack([one.T @ other for other in local]) for one in local])
+        square, turn = la.eigh(gram)
         size = np.sqrt(np.maximum(square[::-1], 0.0))
-        left = local @ (turn[:, ::-1] / np.where(size > 0.0, size, 1.0))
-    kept = np.flatnonzero(size > _FELT * size[0])[:_FROM_HYPOTHESIS]
-    result = np.zeros((len(forces), len(kept)))
-    result[rows] = left[:, kept]
+        kept = np.flatnonzero(size > _FELT * size[0])[:_FROM_HYPOTHESIS]
+        turn = turn[:, ::-1][:, kept] / size[kept]
+        last = np.cumsum([block.shape[1] for block in local])[:-1]
+        own = np.zeros((len(rows), len(kept)))
+        for block, part in zip(local, np.split(turn, last), strict=True):
+            own += block @ part
+    result = np.zeros((count, len(kept)))
+    result[rows] = own
     return result
 
 

@@ -22,7 +22,16 @@ from femubench.effect import (
     proportional,
     sparse_term,
 )
-from femubench.fem import Frame, Preload, preload_forces, redundant_members, unit_preload_matrices
+from femubench.fem import (
+    FloatArray,
+    Frame,
+    IntArray,
+    Preload,
+    Structure,
+    preload_forces,
+    redundant_members,
+    unit_preload_matrices,
+)
 
 _SCALE, _BOUND = 0.15, 0.6  # of the Euler load
 _MOST = 60
@@ -66,13 +75,20 @@ class AxialPreload(FrameEffect):
             ModelError: when the frame is not redundant there.
         """
         structure = model.frame_structure
-        units = once_for(model, "preload units", lambda: unit_preload_matrices(structure))
+        units, kind, every = once_for(model, "preload units", lambda: _units(structure))
         forces, beside = preload_forces(structure, place)
-        every = np.arange(len(units))
-        terms = [Term("stiffness", ElementOperator(structure, every, units, share=forces))]
+        operator = ElementOperator(structure, every, units, share=forces, kind=kind)
+        terms = [Term("stiffness", operator)]
         if beside is not None:
             terms.append(sparse_term("stiffness", beside))
         return proportional(*terms)
+
+
+def _units(structure: Structure) -> tuple[FloatArray, IntArray, IntArray]:
+    """Return the unit matrices by kinds of elements, each one's kind, and all elements."""
+    mesh = structure.mesh
+    first, kind = structure.properties.alike(mesh.member, *mesh.rigid.T)
+    return unit_preload_matrices(structure)[first], kind, np.arange(len(kind))
 
 
 def euler_load(frame: Frame, name: str) -> float:
