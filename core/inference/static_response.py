@@ -134,9 +134,9 @@ class Basis:
         modes = Modes(m.eigenvalues[:e], m.shapes[:, :e], m.rigid[:e])
         bare = replace(self, modes=modes)
         # Views of what is there, in place of copies.
-        bare.__dict__["momentum"] = self.momentum[:, :e]
+        vars(bare)["momentum"] = self.momentum[:, :e]
         if self.model.structure is not None:
-            bare.projector.__dict__["local"] = self.projector.local[:, :, :e]
+            bare.projector.local = self.projector.local[:, :, :e]
         return bare
 
     def response(
@@ -280,10 +280,12 @@ def exerted(hypothesis: Hypothesis, near: Modes) -> FloatArray:
     if len(terms) > _FEW_TERMS:
         blocks = list(_at_sizes(hypothesis, near))
     else:
-        blocks = [_range(term, near.shapes, hypothesis.change.extra) for term in terms]
-    sizes = [float(np.linalg.norm(block)) for block in blocks]
-    scaled = [block / size for block, size in zip(blocks, sizes, strict=True) if size > 0.0]
-    del blocks
+        blocks = [_range(term, near.shapes, hypothesis.change.extra).copy() for term in terms]
+    scaled = []
+    for block in blocks:
+        if size := float(np.linalg.norm(block)):
+            block /= size  # in place: they may be the largest arrays of all
+            scaled.append(block)
     return _principal(scaled) if scaled else np.zeros((len(near.shapes), 0))
 
 
