@@ -44,9 +44,10 @@ from femubench.core.fem.model import LowRank
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.preload import (
     gravity_stiffness,
+    preload_forces,
     preload_stiffness,
-    preload_stiffnesses,
     redundant_members,
+    unit_preload_matrices,
 )
 from femubench.core.fem.sections import (
     Section,
@@ -106,13 +107,14 @@ __all__ = [
     "mass_matrices",
     "matrix_model",
     "member_axes",
+    "preload_forces",
     "preload_stiffness",
-    "preload_stiffnesses",
     "rectangular_tube",
     "redundant_members",
     "round_tube",
     "solid_rectangle",
     "stiffness_matrices",
+    "unit_preload_matrices",
     "wall_of",
     "write_matrices",
     "with_group_factors",

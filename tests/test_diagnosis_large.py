@@ -33,11 +33,16 @@ from femubench.effect import Effect
 from femubench.fem import Frame
 from femubench.plugins.effects.added_mass import AddedMass
 from femubench.plugins.effects.attached_oscillator import AttachedOscillator
+from femubench.plugins.effects.axial_preload import AxialPreload
 from femubench.plugins.effects.grounding_spring import GroundingSpring
 from femubench.plugins.effects.joint_offset import JointOffset
 from femubench.plugins.effects.joint_rotation import JointRotation
 from femubench.plugins.effects.local_stiffness_loss import LocalStiffnessLoss
+from femubench.plugins.effects.mass_eccentricity import MassEccentricity
 from femubench.plugins.effects.material import MemberMass, MemberStiffness, YoungsModulus
+from femubench.plugins.effects.shear_deformation import ShearDeformation
+from femubench.plugins.effects.temperature import Temperature
+from femubench.plugins.effects.wall_thickness import WallThickness
 
 FrameBuilder = Callable[..., Frame]
 KNOWN: tuple[Effect, ...] = (AddedMass(), JointRotation(), MemberStiffness(), YoungsModulus())
@@ -243,6 +248,39 @@ class TestCoordinates:
         assert len(problem.space) == small.size
         assert enriched(problem, parts) == (problem, parts)
         assert with_shortlist(problem) is problem
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [ShearDeformation(), WallThickness(), Temperature(), AxialPreload(), MassEccentricity()],
+    ids=lambda effect: effect.name,
+)
+def test_alike_elements_share_matrices_and_act_as_each_alone(model: Model, effect: Effect) -> None:
+    frame = model.frame_structure.frame
+    tube = rectangular_tube(0.06, 0.03, 0.003)
+    members = tuple(replace(member, section=tube) for member in frame.members)
+    model = Model.of(replace(frame, beam="euler-bernoulli", members=members))
+    basis = np.random.default_rng(3).standard_normal((model.size, 5))
+    hypothesis = hypotheses_of(model, [effect])[-1]
+    place, part = hypothesis.place, Projector(model, basis)(hypothesis)
+    values = hypothesis.values(hypothesis.grid)[-1]
+    after = effect.extend(model, place, [float(v) for v in values])
+    for mass, old, new in (
+        (False, model.stiffness, after.stiffness),
+        (True, model.mass, after.mass),
+    ):
+        change = part.matrix(hypothesis.grid_factors[-1], mass=mass)
+        expected = basis.T @ ((new - old) @ basis)
+        if change is None:
+            assert abs(expected).max() <= 1e-12 * abs(basis.T @ (old @ basis)).max()
+        else:
+            assert_allclose(change, expected, rtol=0, atol=2e-6 * abs(expected).max())
+    blocks = {id(t.operator.blocks): t.operator.blocks for t in hypothesis.change.terms}
+    elements = len(model.frame_structure.mesh.ends)
+    # One matrix an element would be as much as an assembled one, for every term of every place.
+    assert all(len(own) <= elements for own in blocks.values())
+    if effect.name in ("shear-deformation", "axial-preload", "wall-thickness"):
+        assert all(len(own) < elements / 4 for own in blocks.values())
 
 
 @pytest.fixture(scope="module")

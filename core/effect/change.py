@@ -40,9 +40,11 @@ class ElementOperator:
     Arguments:
         structure: the nominal frame.
         elements: their rows in its mesh, (k,).
-        blocks: local matrices, (k, 12, 12); terms of one change may share them.
+        blocks: local matrices, (k, 12, 12) or (k, b, 12, 12); terms may share them.
         extra: dofs that the effect adds elsewhere.
-        share: what each block is multiplied by, (k,); None for 1.
+        share: what each block is multiplied by, (k,) or (k, b); None for 1.
+        kind: which of the blocks is an element's, (k,), where elements are alike; None for each
+            its own.
     """
 
     structure: Structure
@@ -50,11 +52,22 @@ class ElementOperator:
     blocks: FloatArray
     extra: int = 0
     share: FloatArray | None = None
+    kind: IntArray | None = None
 
     @property
     def matrices(self) -> FloatArray:
         """Return the local matrices, each times its share, (k, 12, 12)."""
-        return self.blocks if self.share is None else self.share[:, None, None] * self.blocks
+        blocks, share = self.blocks, self.share
+        if blocks.ndim == 3:
+            own = blocks if self.kind is None else blocks[self.kind]
+            return own if share is None else share[:, None, None] * own
+        assert share is not None
+        total = np.zeros((len(share), 12, 12))
+        # One after the other: all of them at once would be as many times the memory.
+        for b, factor in enumerate(share.T):
+            own = blocks[:, b] if self.kind is None else blocks[self.kind, b]
+            total += factor[:, None, None] * own
+        return total
 
     @property
     def _rows(self) -> SparseArray:

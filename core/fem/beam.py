@@ -19,6 +19,7 @@ TWIST = np.array([3, 9])
 BEND_XY = np.array([1, 5, 7, 11])
 BEND_XZ = np.array([2, 4, 8, 10])
 SLOPE_SIGN = np.array([1.0, -1.0, 1.0, -1.0])
+_DIGITS = 12  # in which elements of one kind agree
 _REACH = 0.5 * float(np.sqrt(0.6))
 # Points and weights on 0..1, exact up to the fifth degree.
 GAUSS = ((0.5 - _REACH, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.5 + _REACH, 5.0 / 18.0))
@@ -140,6 +141,19 @@ class BeamProperties:
     def scaled(self, name: str, factor: FloatArray) -> BeamProperties:
         """Return a batch in which one property is multiplied, one factor an element."""
         return replace(self, **{name: getattr(self, name) * factor})
+
+    def alike(self, *beside: FloatArray | IntArray) -> tuple[IntArray, IntArray]:
+        """Return one element of every kind, (c,), and the kind of each element, (n,).
+
+        Arguments:
+            beside: further numbers that are equal within a kind, (n,) each.
+        """
+        table = np.column_stack([*(getattr(self, f.name) for f in fields(self)), *beside])
+        table = table / np.maximum(np.abs(table).max(axis=0, initial=0.0), 1e-300)
+        _, first, kind = np.unique(
+            table.round(_DIGITS), axis=0, return_index=True, return_inverse=True
+        )
+        return first, kind
 
 
 def bending_stiffness(EI: AnyArray, flexibility: AnyArray, L: AnyArray) -> AnyArray:

@@ -14,7 +14,6 @@ Source: strains and rotations of Simo & Vu-Quoc (1986).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -296,9 +295,6 @@ def _loose(structure: MeshedFrame) -> FloatArray:
     return np.asarray(own[:, moving] @ turn[rank:].T)
 
 
-_AT_ONCE = 20000  # elements whose matrices are held, all states together
-
-
 def preload_stiffness(structure: MeshedFrame, member: str, force: float) -> SparseArray:
     """Return the geometric stiffness of one preload on the free dofs, sparse (n, n), N/m, N, N m.
 
@@ -318,25 +314,54 @@ def preload_stiffness(structure: MeshedFrame, member: str, force: float) -> Spar
         >>> fem.preload_stiffness(structure, "rung-middle", 100.0).shape
         (81, 81)
     """
-    return force * preload_stiffnesses(structure, [member])[0]
+    return force * _stiffness(structure, statics_of(structure).state(member))
 
 
-def preload_stiffnesses(structure: MeshedFrame, members: Sequence[str]) -> tuple[SparseArray, ...]:
-    """Return the geometric stiffness of a preload of 1 N in each of some members.
+def preload_forces(structure: MeshedFrame, member: str) -> tuple[FloatArray, SparseArray | None]:
+    """Return the internal forces of a preload of 1 N, and its stiffness beside the elements.
+
+    With `unit_preload_matrices`, they are the `preload_stiffness` with fewer numbers.
 
     Arguments:
         structure: a meshed frame.
-        members: as for `preload_stiffness`; all at once take little more time than one.
+        member: as for `preload_stiffness`.
+
+    Returns:
+        (N, Vy, Vz, T, My, Mz) of every element in N and N m, (n_elements, 6), and the geometric
+        stiffness of joint springs, rigid links and braces, sparse (n, n); None without these.
 
     Raises:
-        ModelError: when a member is unknown or the frame is not redundant there.
+        ModelError: as for `preload_stiffness`.
 
     Examples:
-        >>> unit, _ = fem.preload_stiffnesses(structure, ["rung-middle", "rung-left"])
-        >>> unit.shape
-        (81, 81)
+        >>> forces, beside = fem.preload_forces(structure, "rung-middle")
+        >>> forces.shape[1], beside
+        (6, None)
     """
-    return _stiffnesses(structure, [statics_of(structure).state(member) for member in members])
+    state = statics_of(structure).state(member)
+    return np.hstack([state.force, state.moment]), _beside_elements(structure, state)
+
+
+def unit_preload_matrices(structure: MeshedFrame) -> FloatArray:
+    """Return the local geometric stiffness of the elements by each unit of internal force.
+
+    Arguments:
+        structure: a meshed frame.
+
+    Returns:
+        a matrix each for N, Vy, Vz in 1/m and T, My, Mz in 1/m^2, (n_elements, 6, 12, 12).
+
+    Examples:
+        >>> fem.unit_preload_matrices(structure).shape[1:]
+        (6, 12, 12)
+    """
+    count, nothing = len(structure.mesh.ends), np.zeros((0, 3))
+    found = np.empty((count, 6, 12, 12))
+    for i, unit in enumerate(np.eye(6)):
+        force, moment = np.tile(unit, (count, 1)).reshape(count, 2, 3).swapaxes(0, 1)
+        state = StressState(force, moment, nothing, nothing, nothing, np.zeros(0))
+        found[:, i] = geometric_matrices(structure, state)
+    return found
 
 
 def gravity_stiffness(structure: MeshedFrame) -> SparseArray:
@@ -360,37 +385,28 @@ def gravity_stiffness(structure: MeshedFrame) -> SparseArray:
     """
     if structure.frame.plane == "out-of-plane":
         raise ModelError("out of plane the weight leaves no stress in the plane", "gravity")
-    return _stiffnesses(structure, [statics_of(structure).under_weight(structure.frame)])[0]
+    return _stiffness(structure, statics_of(structure).under_weight(structure.frame))
 
 
-def _stiffnesses(structure: MeshedFrame, states: Sequence[StressState]) -> tuple[SparseArray, ...]:
-    count = len(structure.mesh.ends)
-    together = max(_AT_ONCE // count, 1)
-    found = []
-    for i, state in enumerate(states):
-        if i % together == 0:
-            several = _geometric(structure, states[i : i + together])
-        blocks = several[i % together]
-        total = structure.plan.assemble(blocks.reshape(count, 12, 12))
-        for given, part in (
-            (len(structure.mesh.connections), _connections),
-            (len(structure.kinematics.bodies), _links),
-            (len(structure.frame.braces), _braces),
-        ):
-            if given:
-                rows, forms = part(structure, state)
-                total = total + plan_assembly(rows, forms.shape[1]).assemble(forms)
-        found.append(total)
-    return tuple(found)
+def _stiffness(structure: MeshedFrame, state: StressState) -> SparseArray:
+    total = structure.plan.assemble(geometric_matrices(structure, state))
+    beside = _beside_elements(structure, state)
+    return total if beside is None else total + beside
 
 
-def _geometric(structure: MeshedFrame, states: Sequence[StressState]) -> FloatArray:
-    """Return the geometric matrices of all elements in all states, (n_states, n, 12, 12)."""
-    if not states:
-        return np.zeros((0, len(structure.mesh.ends), 12, 12))
-    force, moment = (np.concatenate([getattr(s, n) for s in states]) for n in ("force", "moment"))
-    together = replace(states[0], force=force, moment=moment)
-    return geometric_matrices(structure, together).reshape(len(states), -1, 12, 12)
+def _beside_elements(structure: MeshedFrame, state: StressState) -> SparseArray | None:
+    """Return the geometric stiffness of all that is no element, sparse (n, n)."""
+    total = None
+    for given, part in (
+        (len(structure.mesh.connections), _connections),
+        (len(structure.kinematics.bodies), _links),
+        (len(structure.frame.braces), _braces),
+    ):
+        if given:
+            rows, forms = part(structure, state)
+            found = plan_assembly(rows, forms.shape[1]).assemble(forms)
+            total = found if total is None else total + found
+    return total
 
 
 def redundant_members(structure: MeshedFrame) -> tuple[str, ...]:
@@ -426,21 +442,18 @@ def _turned(force: FloatArray, line: FloatArray) -> FloatArray:
 
 
 def geometric_matrices(structure: MeshedFrame, state: StressState) -> FloatArray:
-    """Return the local geometric stiffness matrices of the elements, (s n, 12, 12).
+    """Return the local geometric stiffness matrices of the elements, (n, 12, 12).
 
     Arguments:
         structure: a meshed frame of n elements.
-        state: its internal forces; of s states, those of one after the other.
+        state: its internal forces, to which they are proportional.
     """
     mesh, force = structure.mesh, state.force
-    states = len(force) // len(mesh.ends)
     length = np.linalg.norm(mesh.xyz[mesh.ends[:, 1]] - mesh.xyz[mesh.ends[:, 0]], axis=1)
-    length = np.tile(length, states)
-    first, second = np.tile(mesh.rigid, (states, 1)).T
+    first, second = mesh.rigid.T
     L = length - first - second
     sections = [member.section for member in structure.frame.members]
     radius = np.array([section.Jp / section.A for section in sections])[mesh.member]
-    radius = np.tile(radius, states)
     axis = np.broadcast_to([1.0, 0.0, 0.0], force.shape)
     turned = _turned(force, axis)
     total = np.zeros((len(L), 12, 12))

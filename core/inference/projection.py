@@ -14,6 +14,9 @@ from femubench.core.fem.structure import Structure
 from femubench.core.inference.hypothesis import Hypothesis
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
+_MANY = 4  # elements to one kind, from which on these are taken together
+_EQUAL = 1e-9  # of the largest factor
+
 
 @dataclass(frozen=True)
 class Projection:
@@ -90,6 +93,7 @@ class Projector:
     def __init__(self, model: Model, vectors: FloatArray) -> None:
         self.vectors, self.structure = vectors, model.structure
         self.wider: dict[int, FloatArray] = {0: vectors}
+        self._near: tuple[FloatArray, FloatArray] | None = None
         shift = model.dofs.motions[:, :3]
         if self.structure is None:
             carried = np.einsum("nd,nd->d", shift, model.mass_times(shift))
@@ -118,7 +122,7 @@ class Projector:
             grown = self._grown(change.extra)
             motion = self._shifted(change.terms, change.extra)
             rows = np.eye(grown.shape[1])
-            cores = np.array([self._core(term, grown) for term in change.terms])
+            cores = np.array(self._cores(change.terms, grown))
             weights = np.array([self._weight(term, motion) for term in change.terms])
         known = [
             w if term.weight is None else term.weight
@@ -147,9 +151,10 @@ class Projector:
         kept, new = np.delete(np.arange(size), known + np.arange(r)), known + np.arange(r)
         cores = np.zeros((len(change.terms), size, size))
         cores[:, kept[:, None], kept] = projection.cores
-        for core, term in zip(cores, change.terms, strict=True):
-            cross, core[np.ix_(new, new)] = self._beside(term, added, change.extra)
+        found = self._beside(change.terms, added, change.extra)
+        for core, (cross, own) in zip(cores, found, strict=True):
             core[np.ix_(kept, new)], core[np.ix_(new, kept)] = cross, cross.T
+            core[np.ix_(new, new)] = own
         return replace(projection, rows=np.eye(size), cores=cores)
 
     def crossed(self, terms: Sequence[Term], near: FloatArray) -> list[FloatArray]:
@@ -163,10 +168,7 @@ class Projector:
         for term in terms:
             operator = term.operator
             if isinstance(operator, ElementOperator):
-                every = np.array_equal(operator.elements, np.arange(len(self.local)))
-                moved = self.local if every else self.local[operator.elements]
-                pulls = (self._blocks(operator) @ (moved @ near)).reshape(-1, near.shape[1])
-                found.append(moved.reshape(len(pulls), -1).T @ pulls)
+                found.append(self._pulled(operator, near))
             elif isinstance(operator, RowOperator):
                 # Terms of one effect may share their rows.
                 if id(operator.rows) not in seen:
@@ -184,30 +186,92 @@ class Projector:
         moved = np.asarray(self.structure.gather[rows] @ vectors)
         return moved.reshape(len(elements), len(self.active), -1)
 
-    def _core(self, term: Term, grown: FloatArray) -> FloatArray:
-        """Return a term on all vectors, (N + extra, N + extra)."""
-        operator = term.operator
-        if not isinstance(operator, ElementOperator):
-            return operator.project(grown)
-        moved = self.local[operator.elements]
-        force = (self._blocks(operator) @ moved).reshape(-1, moved.shape[2])
-        return np.pad(moved.reshape(len(force), -1).T @ force, (0, len(grown) - len(self.vectors)))
+    def _pulled(self, operator: ElementOperator, near: FloatArray) -> FloatArray:
+        """Return element matrices, times some vectors, in the basis, (N, m)."""
+        m = near.shape[1]
+        if len(operator.elements) < len(self.local) / _MANY:
+            moved = self.local[operator.elements]
+            pulls = (self._blocks(operator) @ (moved @ near)).reshape(-1, m)
+            return np.asarray(moved.reshape(len(pulls), -1).T @ pulls)
+        assert self.structure is not None
+        if self._near is None or self._near[0] is not near:
+            self._near = near, self.local @ near
+        ends = np.zeros((len(self.local), 12, m))
+        moved = self._near[1][operator.elements]
+        ends[operator.elements[:, None], self.active] = self._blocks(operator) @ moved
+        # Fewer dofs than ends of elements.
+        return np.asarray(self.vectors.T @ (self.structure.gather.T @ ends.reshape(-1, m)))
 
-    def _beside(self, term: Term, added: FloatArray, extra: int) -> tuple[FloatArray, FloatArray]:
-        """Return a term between all vectors and further ones, and between these alone."""
-        operator, r = term.operator, added.shape[1]
-        if isinstance(operator, ElementOperator):
-            base = self.local[operator.elements].reshape(-1, self.vectors.shape[1])
-            moved = self._gathered(added, operator.elements)
-            force = (self._blocks(operator) @ moved).reshape(-1, r)
-            cross = np.pad(base.T @ force, ((0, extra), (0, 0)))
-            return cross, moved.reshape(-1, r).T @ force
+    def _cores(self, terms: Sequence[Term], grown: FloatArray) -> list[FloatArray]:
+        """Return terms on all vectors, (N + extra, N + extra) each."""
+        found = self._between(terms, self.local, [self.local]) if self.structure is not None else {}
+        more = len(grown) - len(self.vectors)
+        return [
+            np.pad(found[i], (0, more)) if i in found else term.operator.project(grown)
+            for i, term in enumerate(terms)
+        ]
+
+    def _beside(
+        self, terms: Sequence[Term], added: FloatArray, extra: int
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """Return terms between all vectors and further ones, and between these alone."""
+        r, n_known = added.shape[1], self.vectors.shape[1]
+        found: dict[int, FloatArray] = {}
+        if any(isinstance(term.operator, ElementOperator) for term in terms):
+            moved = self._gathered(added, np.arange(len(self.local)))
+            found = self._between(terms, moved, [self.local, moved])
         grown = np.vstack([added, np.zeros((extra, r))])
-        force = operator.apply(grown)
-        return self._grown(extra).T @ force, grown.T @ force
+        result = []
+        for i, term in enumerate(terms):
+            if i in found:
+                cross = np.pad(found[i][:n_known], ((0, extra), (0, 0)))
+                result.append((cross, found[i][n_known:]))
+            else:
+                force = term.operator.apply(grown)
+                result.append((self._grown(extra).T @ force, grown.T @ force))
+        return result
+
+    def _between(
+        self, terms: Sequence[Term], right: FloatArray, left: Sequence[FloatArray]
+    ) -> dict[int, FloatArray]:
+        """Return those of some terms that are matrices of elements on motions, (a, b) each.
+
+        Arguments:
+            terms: any.
+            right: displacements of all elements, (n_elements, n_active, b).
+            left: the same, whose rows stand one after the other in the result, (..., a_i) each.
+        """
+        groups: dict[tuple[int, int, int], list[int]] = {}
+        for i, term in enumerate(terms):
+            operator = term.operator
+            if isinstance(operator, ElementOperator):
+                key = id(operator.blocks), id(operator.elements), id(operator.kind)
+                groups.setdefault(key, []).append(i)
+        found: dict[int, FloatArray] = {}
+        for members in groups.values():
+            own = [terms[i].operator for i in members]
+            operators = [one for one in own if isinstance(one, ElementOperator)]
+            forms = _by_kinds(operators, left, right, self.active)
+            if forms is None:
+                forms = [self._form(one, left, right) for one in operators]
+            found.update(zip(members, forms, strict=True))
+        return found
+
+    def _form(
+        self, operator: ElementOperator, left: Sequence[FloatArray], right: FloatArray
+    ) -> FloatArray:
+        every = len(operator.elements) == len(right)
+        near, moved = (
+            [x if every else x[operator.elements] for x in some] for some in (left, [right])
+        )
+        force = (self._blocks(operator) @ moved[0]).reshape(-1, right.shape[2])
+        return np.vstack([x.reshape(len(force), -1).T @ force for x in near])
 
     def _blocks(self, operator: ElementOperator) -> FloatArray:
-        return operator.matrices[:, self.active[:, None], self.active]
+        matrices = operator.matrices
+        if len(self.active) == matrices.shape[1]:
+            return matrices
+        return matrices[:, self.active[:, None], self.active]
 
     @staticmethod
     def _acted_on(terms: Sequence[Term]) -> tuple[IntArray, dict[int, SparseArray]]:
@@ -303,6 +367,46 @@ class Projector:
             own = self.shift[operator.elements]
             return float(np.einsum("ei,eij,ej->", own, self._blocks(operator), own))
         return float(operator.project(motion[:, None])[0, 0])
+
+
+def _by_kinds(
+    operators: Sequence[ElementOperator],
+    left: Sequence[FloatArray],
+    right: FloatArray,
+    active: IntArray,
+) -> list[FloatArray] | None:
+    """Return element matrices on motions, (a, b) each; None where kinds of elements do not help.
+
+    What the elements of a kind do together is the same for all operators but for a factor.
+
+    Arguments:
+        operators: with the same blocks, elements and kinds.
+        left, right: as in `Projector._between`.
+        active: which of an element's dofs the displacements are.
+    """
+    first, shares = operators[0], [one.share for one in operators]
+    kind, elements, blocks = first.kind, first.elements, first.blocks
+    if kind is None or blocks.ndim > 3 or len(operators) < 2:
+        return None
+    if len(blocks) > len(elements) / _MANY:
+        return None
+    share = np.array([np.ones(len(elements)) if own is None else own for own in shares])
+    order = np.argsort(kind, kind="stable")
+    known, begins = np.unique(kind[order], return_index=True)
+    of_kind = share[:, order[begins]]
+    if (
+        np.abs(share - of_kind[:, np.searchsorted(known, kind)]).max()
+        > _EQUAL * np.abs(share).max()
+    ):
+        return None
+    total = np.zeros((len(operators), sum(x.shape[2] for x in left), right.shape[2]))
+    for i, (k, rows) in enumerate(zip(known, np.split(elements[order], begins[1:]), strict=True)):
+        force = (blocks[k][active[:, None], active] @ right[rows]).reshape(-1, right.shape[2])
+        one = np.vstack([x[rows].reshape(len(force), -1).T @ force for x in left])
+        for own, factor in zip(total, of_kind[:, i], strict=True):
+            if factor:
+                own += factor * one
+    return list(total)
 
 
 def _direction(structure: Structure) -> int:

@@ -22,7 +22,7 @@ from femubench.core.inference.hypothesis import (
 )
 from femubench.core.inference.posterior import Explanation, by_weight
 from femubench.core.inference.prior import Base, selection_cost, textbook_bases
-from femubench.core.inference.projection import Projection, Projector
+from femubench.core.inference.projection import Projection
 from femubench.core.inference.screening import beside, screened, with_shortlist
 from femubench.core.inference.static_response import Basis, LargeProblem, enriched, placed
 from femubench.core.roles import Effect
@@ -159,9 +159,8 @@ class Search:
         for i, part in enumerate(explanation.parts):
             model = problem.model
             for own in finer(part.hypothesis, model, self.effects):
-                basis = Basis.of(model, problem.data.measurement)
                 parts = list(explanation.parts)
-                parts[i] = Projector(model, basis.modes.shapes)(own)
+                parts[i] = Basis.of(model, problem.data.measurement).projector(own)
                 fitted = _fit_from_grid(problem, parts, i, explanation.fit)
                 if fitted is not None:
                     self.coarse[id(own)] = id(part.hypothesis)

@@ -11,10 +11,11 @@ Source: MacNeal (1971), residual flexibility; Fox & Kapoor (1968) for the forces
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
+from weakref import WeakValueDictionary
 
 import numpy as np
 import scipy.linalg as la
@@ -27,7 +28,7 @@ from femubench.core.inference.modal_basis import Space, nominal_space
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.projection import Projection, Projector
 from femubench.core.inference.residuals import Data
-from femubench.core.modal.eigen import DENSE_LIMIT, Modes, modes_of
+from femubench.core.modal.eigen import DENSE_LIMIT, Modes, modes_of, once_for
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.sparse_eigen import ShiftedModel
 from femubench.core.typing import FloatArray, SparseArray
@@ -66,9 +67,22 @@ class Basis:
     def of(cls, model: Model, measurement: Measurement) -> Basis:
         """Solve a model for the modes that the diagnosis of a measurement needs.
 
+        What somebody still has is not made again: a factorisation is as large as all the rest.
+
         Raises:
             ModelError: when the model has no modes.
         """
+        kept: WeakValueDictionary[Hashable, Basis]
+        kept = once_for(model, "bases", WeakValueDictionary)
+        sensors = measurement.sensors
+        key = len(measurement), sensors.labels, sensors.directions, sensors.xyz.tobytes()
+        found = kept.get(key)
+        if found is None:
+            kept[key] = found = cls._solved(model, measurement)
+        return found
+
+    @classmethod
+    def _solved(cls, model: Model, measurement: Measurement) -> Basis:
         count = _RIGID + _A_MODE * len(measurement) + _SPARE
         modes = modes_of(model, count if model.size > DENSE_LIMIT else None)
         modes = modes.take(np.argsort(~modes.rigid, kind="stable"))
@@ -118,7 +132,12 @@ class Basis:
         """Return the exact modes alone."""
         e, m = self.exact, self.modes
         modes = Modes(m.eigenvalues[:e], m.shapes[:, :e], m.rigid[:e])
-        return replace(self, modes=modes)
+        bare = replace(self, modes=modes)
+        # Views of what is there, in place of copies.
+        vars(bare)["momentum"] = self.momentum[:, :e]
+        if self.model.structure is not None:
+            bare.projector.local = self.projector.local[:, :, :e]
+        return bare
 
     def response(
         self, forces: FloatArray, most: int, known: FloatArray | None = None
@@ -140,16 +159,19 @@ class Basis:
         together = np.hstack(forces)
         if together.shape[1] == 0:
             return list(forces)
-        moved = self.solver.solve(together - momentum @ (shapes.T @ together))
-        vectors, heavy = self.modes.shapes, self.momentum
+        together -= momentum @ (shapes.T @ together)
+        moved = self.solver.solve(together)
+        del together
+        there = [(self.modes.shapes, self.momentum)]
         if known is not None and known.shape[1]:
-            vectors = np.hstack([vectors, known])
-            heavy = np.hstack([heavy, self.model.mass_times(known)])
+            there.append((known, self.model.mass_times(known)))
         counts = [block.shape[1] for block in forces]
         whole = np.sqrt(np.einsum("ij,ij->j", moved, self.model.mass_times(moved)))
         for _ in range(2):  # the second time what rounding left of the basis
-            moved = moved - vectors @ (heavy.T @ moved)
-            moved = moved / np.where(whole > 0.0, whole, 1.0)
+            shares = [heavy.T @ moved for _, heavy in there]
+            for (vectors, _), share in zip(there, shares, strict=True):
+                moved -= vectors @ share
+            moved /= np.where(whole > 0.0, whole, 1.0)
             mass, blocks, last = self.model.mass_times(moved), [], 0
             for count in counts:
                 own, last = slice(last, last + count), last + count
@@ -255,25 +277,30 @@ class Coordinates:
 def exerted(hypothesis: Hypothesis, near: Modes) -> FloatArray:
     """Return forces that span what a hypothesis exerts on some modes at any magnitude, (n, r)."""
     terms = hypothesis.change.terms
-    blocks = [_range(term, near.shapes, hypothesis.change.extra) for term in terms]
     if len(terms) > _FEW_TERMS:
-        blocks = _at_sizes(hypothesis, near)
-    sizes = [float(np.linalg.norm(block)) for block in blocks]
-    scaled = [block / size for block, size in zip(blocks, sizes, strict=True) if size > 0.0]
-    forces = np.zeros((len(near.shapes), 0))
-    return _principal(np.hstack(scaled)) if scaled else forces
+        blocks = list(_at_sizes(hypothesis, near))
+    else:
+        blocks = [_range(term, near.shapes, hypothesis.change.extra).copy() for term in terms]
+    scaled = []
+    for block in blocks:
+        if size := float(np.linalg.norm(block)):
+            block /= size  # in place: they may be the largest arrays of all
+            scaled.append(block)
+    return _principal(scaled) if scaled else np.zeros((len(near.shapes), 0))
 
 
-def _at_sizes(hypothesis: Hypothesis, near: Modes) -> list[FloatArray]:
-    """Return the forces at a few magnitudes, where single terms are too many, (n, m) each."""
-    terms = hypothesis.change.terms
-    sign = [1.0 if term.matrix == "stiffness" else -near.eigenvalues for term in terms]
-    pulls = [
-        _applied(term, near.shapes, hypothesis.change.extra) * s
-        for term, s in zip(terms, sign, strict=True)
-    ]
-    together, factors = np.array(pulls), hypothesis.factors(magnitudes(hypothesis))
-    return [np.tensordot(row, together, axes=1) for row in factors]
+def _at_sizes(hypothesis: Hypothesis, near: Modes) -> FloatArray:
+    """Return the forces at a few magnitudes, where single terms are too many, (g, n, m)."""
+    factors = hypothesis.factors(magnitudes(hypothesis))
+    forces = np.zeros((len(factors), *near.shapes.shape))
+    # One term after the other: a hundred of them at once would take a gigabyte.
+    for term, own in zip(hypothesis.change.terms, factors.T, strict=True):
+        pull = _applied(term, near.shapes, hypothesis.change.extra)
+        if term.matrix == "mass":
+            pull = pull * -near.eigenvalues
+        for total, factor in zip(forces, own, strict=True):
+            total += factor * pull
+    return forces
 
 
 def magnitudes(hypothesis: Hypothesis, sizes: Sequence[float] = _SIZES) -> FloatArray:
@@ -295,19 +322,31 @@ def magnitudes(hypothesis: Hypothesis, sizes: Sequence[float] = _SIZES) -> Float
     return np.array(list(product(*chosen)))
 
 
-def _principal(forces: FloatArray) -> FloatArray:
-    """Return orthonormal forces that span the largest of some, zero where these are, (n, r)."""
-    rows = np.flatnonzero(forces.any(axis=1))
-    local = forces[rows]
-    if local.shape[0] < local.shape[1]:
-        left, size, _ = la.svd(local, full_matrices=False)
+def _principal(blocks: Sequence[FloatArray]) -> FloatArray:
+    """Return orthonormal forces that span the largest of some, zero where these are, (n, r).
+
+    Arguments:
+        blocks: forces, side by side, (n, c_i) each.
+    """
+    count = len(blocks[0])
+    rows = np.flatnonzero(np.any([block.any(axis=1) for block in blocks], axis=0))
+    local = [block if len(rows) == count else block[rows] for block in blocks]
+    if len(rows) < sum(block.shape[1] for block in local):
+        left, size, _ = la.svd(np.hstack(local), full_matrices=False)
+        kept = np.flatnonzero(size > _FELT * size[0])[:_FROM_HYPOTHESIS]
+        own = left[:, kept]
     else:
-        square, turn = la.eigh(local.T @ local)
+        gram = np.vstack([np.hstack([one.T @ other for other in local]) for one in local])
+        square, turn = la.eigh(gram)
         size = np.sqrt(np.maximum(square[::-1], 0.0))
-        left = local @ (turn[:, ::-1] / np.where(size > 0.0, size, 1.0))
-    kept = np.flatnonzero(size > _FELT * size[0])[:_FROM_HYPOTHESIS]
-    result = np.zeros((len(forces), len(kept)))
-    result[rows] = left[:, kept]
+        kept = np.flatnonzero(size > _FELT * size[0])[:_FROM_HYPOTHESIS]
+        turn = turn[:, ::-1][:, kept] / size[kept]
+        last = np.cumsum([block.shape[1] for block in local])[:-1]
+        own = np.zeros((len(rows), len(kept)))
+        for block, part in zip(local, np.split(turn, last), strict=True):
+            own += block @ part
+    result = np.zeros((count, len(kept)))
+    result[rows] = own
     return result
 
 

@@ -12,15 +12,26 @@ from femubench import Model
 from femubench.effect import (
     Change,
     EffectParameter,
+    ElementOperator,
     FrameEffect,
     Site,
     Size,
+    Term,
     member_length,
     once_for,
     proportional,
     sparse_term,
 )
-from femubench.fem import Frame, Preload, preload_stiffness, preload_stiffnesses, redundant_members
+from femubench.fem import (
+    FloatArray,
+    Frame,
+    IntArray,
+    Preload,
+    Structure,
+    preload_forces,
+    redundant_members,
+    unit_preload_matrices,
+)
 
 _SCALE, _BOUND = 0.15, 0.6  # of the Euler load
 _MOST = 60
@@ -64,11 +75,20 @@ class AxialPreload(FrameEffect):
             ModelError: when the frame is not redundant there.
         """
         structure = model.frame_structure
-        members = once_for(model, "preload places", lambda: tuple(self.places(model)))
-        if place not in members:
-            return proportional(sparse_term("stiffness", preload_stiffness(structure, place, 1.0)))
-        matrices = once_for(model, "preloads", lambda: preload_stiffnesses(structure, members))
-        return proportional(sparse_term("stiffness", matrices[members.index(place)]))
+        units, kind, every = once_for(model, "preload units", lambda: _units(structure))
+        forces, beside = preload_forces(structure, place)
+        operator = ElementOperator(structure, every, units, share=forces, kind=kind)
+        terms = [Term("stiffness", operator)]
+        if beside is not None:
+            terms.append(sparse_term("stiffness", beside))
+        return proportional(*terms)
+
+
+def _units(structure: Structure) -> tuple[FloatArray, IntArray, IntArray]:
+    """Return the unit matrices by kinds of elements, each one's kind, and all elements."""
+    mesh = structure.mesh
+    first, kind = structure.properties.alike(mesh.member, *mesh.rigid.T)
+    return unit_preload_matrices(structure)[first], kind, np.arange(len(kind))
 
 
 def euler_load(frame: Frame, name: str) -> float:

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
+import numpy as np
+
 from femubench import Model
 from femubench.effect import (
     Change,
@@ -58,4 +60,5 @@ class LocalStiffnessLoss(FrameEffect):
         whole = once_for(
             model, "element stiffness", lambda: stiffness_matrices(structure.properties)
         )
-        return proportional(Term("stiffness", ElementOperator(structure, rows, -whole[rows])))
+        lost = ElementOperator(structure, rows, whole, share=-np.ones(len(rows)), kind=rows)
+        return proportional(Term("stiffness", lost))

@@ -20,7 +20,15 @@ from femubench.effect import (
     elements_of,
     once_for,
 )
-from femubench.fem import Eccentricity, Frame, Section, eccentric_mass_parts
+from femubench.fem import (
+    Eccentricity,
+    FloatArray,
+    Frame,
+    IntArray,
+    Section,
+    Structure,
+    eccentric_mass_parts,
+)
 
 _SCALE, _BOUND = 0.15, 1.0  # of the size of the section
 
@@ -58,19 +66,22 @@ class MassEccentricity(FrameEffect):
         structure = model.frame_structure
         axis = axis_of(structure.frame)
         elements = elements_of(structure, place)
-        properties = structure.properties.take(elements)
-        whole = once_for(
-            model, "eccentric mass", lambda: eccentric_mass_parts(structure.properties)
-        )
-        parts = {name: blocks[elements] for name, blocks in whole.items()}
-        own, other = properties.ecc_y[:, None, None], properties.ecc_z[:, None, None]
+        parts, kind = once_for(model, "eccentric mass", lambda: _parts(structure, axis))
+        own, other = structure.properties.ecc_y[elements], structure.properties.ecc_z[elements]
         own, other = (own, other) if axis == "y" else (other, own)
-        linear = parts[axis] + 2.0 * own * parts[2 * axis] + other * parts["yz"]
-        terms = tuple(
-            Term("mass", ElementOperator(structure, elements, blocks))
-            for blocks in (linear, parts[2 * axis])
-        )
+        share = np.column_stack([np.ones(len(own)), 2.0 * own, other])
+        known = kind[elements]
+        linear = ElementOperator(structure, elements, parts, share=share, kind=known)
+        square = ElementOperator(structure, elements, parts[:, 1], kind=known)
+        terms = Term("mass", linear), Term("mass", square)
         return Change(terms, lambda values: np.column_stack([values[:, 0], values[:, 0] ** 2]))
+
+
+def _parts(structure: Structure, axis: Literal["y", "z"]) -> tuple[FloatArray, IntArray]:
+    """Return what is linear, quadratic and mixed by kinds of elements, and each one's kind."""
+    first, kind = structure.properties.alike()
+    found = eccentric_mass_parts(structure.properties.take(first))
+    return np.stack([found[name] for name in (axis, 2 * axis, "yz")], axis=1), kind
 
 
 def axis_of(frame: Frame) -> Literal["y", "z"]:

@@ -96,7 +96,7 @@ class MaterialEffect(FrameEffect):
             rows = elements_of(structure, place, arms=True)
             matrices = stiffness_matrices if self.constant == "E" else mass_matrices
             whole = once_for(model, f"element {kind}", partial(matrices, structure.properties))
-            return proportional(Term(kind, ElementOperator(structure, rows, whole[rows])))
+            return proportional(Term(kind, ElementOperator(structure, rows, whole, kind=rows)))
         parts = [group_matrix(model, kind, place)]
         low_rank = model.stiffness_change if self.constant == "E" else model.mass_change
         if low_rank is not None and place == "all":

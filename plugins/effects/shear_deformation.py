@@ -108,14 +108,14 @@ class ShearDeformation(FrameEffect):
             rows = np.flatnonzero(phi)
             if not len(rows):
                 continue
-            parts = _parts(whole.take(rows), bending, shear)
+            first, kind = whole.take(rows).alike()
+            parts = _parts(whole.take(rows[first]), bending, shear)
             nodes, weights = rate_nodes(phi[rows])
             for node, weight in zip(nodes, weights.T, strict=True):
-                for kind, power, blocks in parts:
-                    if (weight[:, None, None] * blocks).any():
-                        terms.append(
-                            Term(kind, ElementOperator(structure, rows, blocks, share=weight))
-                        )
+                for matrix, power, blocks in parts:
+                    if (weight[first, None, None] * blocks).any():
+                        operator = ElementOperator(structure, rows, blocks, share=weight, kind=kind)
+                        terms.append(Term(matrix, operator))
                         rates.append(float(node))
                         powers.append(power)
         if not terms:

@@ -81,14 +81,14 @@ class Temperature(FrameEffect):
         whole = once_for(
             model, "element stiffness", lambda: stiffness_matrices(structure.properties)
         )
-        blocks = whole[rows] * slopes[mesh.member[rows]][:, None, None]
-        even = Term("stiffness", ElementOperator(structure, rows, blocks))
+        own = slopes[mesh.member[rows]]
+        even = Term("stiffness", ElementOperator(structure, rows, whole, share=own, kind=rows))
         if place == "all":
             return proportional(even)
         known = _shares(frame, place)
         pairs = zip(mesh.member[rows], mesh.number[rows], strict=True)
         shares = np.array([known[int(m)][int(k) - 1] for m, k in pairs])
-        along = ElementOperator(structure, rows, blocks * shares[:, None, None])
+        along = ElementOperator(structure, rows, whole, share=own * shares, kind=rows)
         return Change((even, Term("stiffness", along)), lambda values: values)
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import ClassVar
+from functools import partial
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from femubench.effect import (
     elements_of,
     member_labels,
     members_of,
+    once_for,
     set_places,
 )
 from femubench.fem import (
@@ -30,6 +32,7 @@ from femubench.fem import (
     IntArray,
     Member,
     Section,
+    Structure,
     mass_matrices,
     rectangular_tube,
     round_tube,
@@ -38,6 +41,7 @@ from femubench.fem import (
 )
 
 _SCALE, _MOST, _NODES = 0.1, 0.9, 9
+_MATRICES: tuple[Literal["stiffness", "mass"], ...] = ("stiffness", "mass")
 # What grows with which constant of the section.
 _GROWS = {
     "EA": "A",
@@ -94,25 +98,55 @@ class WallThickness(FrameEffect):
     def change(self, model: Model, place: str) -> Change:
         """Return the matrices of the elements, interpolated between Chebyshev points."""
         structure = model.frame_structure
-        bound = _bound(structure.frame, place)
+        frame, names = structure.frame, members_of(structure.frame, place)
+        bound = _bound(frame, place)
         nodes = chebyshev_nodes(-bound, bound, _NODES)
         rows = elements_of(structure, place, arms=True)
-        own, frame = structure.properties.take(rows), structure.frame
-        index = {frame.member_index[name]: i for i, name in enumerate(members_of(frame, place))}
-        which = np.array([index[int(m)] for m in structure.mesh.member[rows]])
-        members = [frame.members[m] for m in index]
-        still = stiffness_matrices(own), mass_matrices(own)
-        terms = []
-        for node in nodes:
-            other = _scaled(own, members, which, 1.0 + float(node))
-            stiffness, mass = stiffness_matrices(other) - still[0], mass_matrices(other) - still[1]
-            terms.append(Term("stiffness", ElementOperator(structure, rows, stiffness)))
-            terms.append(Term("mass", ElementOperator(structure, rows, mass)))
+        walls = partial(_walls, structure, bound)
+        # Members of one section are as thick as each other; what mixes them has its own nodes.
+        alone = all(_bound(frame, name) == bound for name in names)
+        matrices, kind = once_for(model, ("walls", bound), walls) if alone else walls(names)
+        terms = [
+            Term(matrix, ElementOperator(structure, rows, blocks, kind=kind[rows]))
+            for pair in matrices
+            for matrix, blocks in zip(_MATRICES, pair, strict=True)
+        ]
 
         def coefficients(values: FloatArray) -> FloatArray:
             return np.repeat(barycentric(nodes, values[:, 0]), 2, axis=1)
 
         return Change(tuple(terms), coefficients)
+
+
+def _walls(
+    structure: Structure, bound: float, names: Sequence[str] = ()
+) -> tuple[FloatArray, IntArray]:
+    """Return what other walls change in stiffness and mass, by kinds of elements.
+
+    Arguments:
+        structure: a meshed frame.
+        bound: the largest relative change.
+        names: of members; those with just this bound where there are none.
+
+    Returns:
+        matrices (n_nodes, 2, c, 12, 12) and the kind of each element, (n_elements,).
+    """
+    frame = structure.frame
+    names = names or [m.name for m in frame.members if _own_bound(m.section) == bound]
+    index = {frame.member_index[name]: i for i, name in enumerate(names)}
+    rows = np.flatnonzero(np.isin(structure.mesh.member, list(index)))
+    members = [frame.members[m] for m in index]
+    first, own_kind = structure.properties.take(rows).alike(structure.mesh.member[rows])
+    own = structure.properties.take(rows[first])
+    which = np.array([index[int(m)] for m in structure.mesh.member[rows[first]]])
+    still = np.array([stiffness_matrices(own), mass_matrices(own)])
+    found = []
+    for node in chebyshev_nodes(-bound, bound, _NODES):
+        other = _scaled(own, members, which, 1.0 + float(node))
+        found.append(np.array([stiffness_matrices(other), mass_matrices(other)]) - still)
+    kind = np.zeros(len(structure.mesh.member), dtype=np.int64)
+    kind[rows] = own_kind
+    return np.array(found), kind
 
 
 def _wall(section: Section) -> float | None:
@@ -172,10 +206,11 @@ def _ratio(old: float, new: float) -> float:
 
 def _bound(frame: Frame, place: str) -> float:
     """Return the largest relative change for which there is still a wall and still a hole."""
-    sections = [
-        frame.members[frame.member_index[name]].section for name in members_of(frame, place)
-    ]
-    rooms = [
-        0.5 * min(s.width or 0.0, s.height or 0.0) / (_wall(s) or np.inf) - 1.0 for s in sections
-    ]
-    return float(min(_MOST, *(0.99 * room for room in rooms)))
+    names = members_of(frame, place)
+    return min(_own_bound(frame.members[frame.member_index[name]].section) for name in names)
+
+
+def _own_bound(section: Section) -> float:
+    """Return the same of one section; that of no tube does not matter."""
+    room = 0.5 * min(section.width or 0.0, section.height or 0.0) / (_wall(section) or np.inf) - 1.0
+    return float(min(_MOST, 0.99 * room))
