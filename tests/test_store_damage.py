@@ -20,8 +20,9 @@ from femubench.core.errors import InputError
 from femubench.core.run import sealed_file
 from femubench.core.run.store import Store
 from femubench.core.run.upkeep import exported, faults_of, repair
+from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.records import run_from_json
-from femubench.core.schema.results import Block, JobResult, PairedMode, Run
+from femubench.core.schema.results import Block, JobResult, Run
 
 FLIPS = 300
 RUN = "20260101T000000Z-000000"
@@ -282,10 +283,16 @@ def test_a_folder_that_may_not_be_written_is_read(tmp_path: Path) -> None:
 
 def test_details_are_read_when_they_are_asked_for(tmp_path: Path) -> None:
     result = stored(tmp_path).load().results[0]
-    assert "history" not in vars(result)
+    for asked in ("history", "modes"):
+        with pytest.raises(AttributeError):  # not there, and not decoded
+            object.__getattribute__(result.blocks["used"] if asked == "modes" else result, asked)
     assert result.changed(rank=9).history == RESULTS[0].history
-    assert "history" not in vars(result)
-    assert result.provenance == RESULTS[0].provenance
+    assert result.changed(history=()).history == ()
+    assert result.changed(history=()).provenance == RESULTS[0].provenance
+    with pytest.raises(AttributeError):
+        object.__getattribute__(result, "history")
+    assert result.blocks == RESULTS[0].blocks
+    assert result == RESULTS[0].changed(rank=result.rank)
     with pytest.raises(AttributeError):
         _ = result.histories  # type: ignore[attr-defined]
 
