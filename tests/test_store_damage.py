@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -199,7 +200,7 @@ for _ in sys.argv[2::2]:
 
 def test_processes_write_and_some_are_killed(tmp_path: Path) -> None:
     store, draw = Store(tmp_path), random.Random(3)
-    counts = {"steady": 400, **dict.fromkeys(("killed-0", "killed-1", "killed-2"), 10**6)}
+    counts = {"steady": 400, **dict.fromkeys(("killed-0", "killed-1", "killed-2"), 10**4)}
     words = [word for run, count in counts.items() for word in (run, str(count))]
     command = [sys.executable, "-c", _WRITERS, str(tmp_path), *words]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as writers:
@@ -207,7 +208,8 @@ def test_processes_write_and_some_are_killed(tmp_path: Path) -> None:
         for run, pid in (writers.stdout.readline().split() for _ in counts):
             if run != "steady":
                 threading.Event().wait(draw.uniform(0.0, 0.05))
-                os.kill(int(pid), signal.SIGKILL)
+                with suppress(ProcessLookupError):  # it was faster
+                    os.kill(int(pid), signal.SIGKILL)
         assert writers.wait(60) == 0
     assert [item.seed for item in store.load("steady").results] == [*range(400)]
     assert faults_of(store) == [] or all("cut short" in str(f) for f in faults_of(store))

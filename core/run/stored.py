@@ -33,7 +33,7 @@ CUT_SHORT = "the last line is cut short"
 # What is asked of many records stands first, where it is found without reading the rest.
 _HEAD = re.compile(
     rb'\{"schema":2,"record":"(run|result|end)","after":"([0-9a-f]{8}|)",'
-    rb'(?:"key":("(?:[^"\\]|\\.)*"),"status":"([a-z-]+)",)?'
+    rb'(?:"key":("[^"\\]*(?:\\.[^"\\]*)*"),"status":"([a-z-]+)",)?'
 )
 _RESULT, _MODES, _DETAILS = b'"result":', b',"modes":{', b',"details":'
 
@@ -82,8 +82,8 @@ class Record:
         text = self._text
         start = text.index(_RESULT) + len(_RESULT)
         # A quote within a text of JSON has a backslash before it: these are found nowhere else.
-        end = text.index(_DETAILS, start)
-        middle = text.find(_MODES, start, end)
+        middle = text.find(_MODES, start)
+        end = text.index(_DETAILS, max(start, middle))
         modes = None if middle < 0 else text[middle + len(_MODES) - 1 : end]
         figures = text[start : end if modes is None else middle]
         details = text[end + len(_DETAILS) : -TAIL]

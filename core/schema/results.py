@@ -127,7 +127,7 @@ class JobResult(_Stored):
             """Decode the details of a stored result when the first of them is asked for."""
             if name not in DETAILS:
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-            for detail, value in decoded(self._unread).items():
+            for detail, value in decoded(self._unread[0]).items():
                 if not _is_there(self, detail):
                     _set(self, detail, value)
             return getattr(self, name)
@@ -151,6 +151,7 @@ class JobResult(_Stored):
         return self.status == "ok" and bool(self.rigid_modes_lost or self.negative_eigenvalues)
 
 
+_NOTHING = b"", None, None
 _PARTS = ("_unread", *(field.name for field in fields_of(JobResult)))
 
 
@@ -171,7 +172,7 @@ def leave_unread(result: JobResult, modes: bytes | None, details: bytes) -> None
     """
     for name in DETAILS:
         object.__delattr__(result, name)
-    _set(result, "_unread", details)
+    _set(result, "_unread", (details, modes, result.blocks))
     if modes is not None:
         for name, block in result.blocks.items():
             object.__delattr__(block, "modes")
@@ -190,23 +191,16 @@ def mode_rows(results: Iterable[JobResult]) -> list[Mapping[str, Sequence[Row]]]
     Raises:
         InputError: where the text of some is damaged.
     """
-    listed = [(result.blocks, _text_of(result)) for result in results]
-    read = iter(rows_from_texts([text for _, text in listed if text is not None]))
+    listed = [(result.blocks, getattr(result, "_unread", _NOTHING)) for result in results]
+    # A result that was given other blocks has none of the text.
+    texts = [unread[1] if unread[2] is blocks else None for blocks, unread in listed]
+    read = iter(rows_from_texts([text for text in texts if text is not None]))
     return [
         {name: rows_of(block.modes) for name, block in blocks.items()}
         if text is None
-        else {name: rows for name, rows in next(read).items() if name in blocks}
-        for blocks, text in listed
+        else next(read)
+        for (blocks, _), text in zip(listed, texts, strict=True)
     ]
-
-
-def _text_of(result: JobResult) -> bytes | None:
-    """Return the text that has the modes of all blocks of a result; None where there is none."""
-    found = [
-        (getattr(block, "_unread", (None, name)), name) for name, block in result.blocks.items()
-    ]
-    texts = {text if own == name else None for (text, own), name in found}
-    return texts.pop() if len(texts) == 1 else None
 
 
 @dataclass(frozen=True, repr=False)

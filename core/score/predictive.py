@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from operator import itemgetter
 
 import numpy as np
@@ -58,21 +59,18 @@ class Forecasts:
             blocks: those of them whose modes are taken.
         """
         listed = list(results)
-        hertz: list[tuple[float, float | None, float | None]] = []
-        counts, told, places = [], [], []
-        names: dict[str, int] = {}
-        for result, rows in zip(listed, mode_rows(listed), strict=True):
-            unseen = {name: rows[name] for name in UNSEEN if name in rows}
-            stds = [row[-1] for block in unseen.values() for row in block]
-            own = [row for name in blocks for row in unseen.get(name, ())]
-            hertz += map(_HERTZ, own)
-            counts.append(len(own))
-            told.append(stds.count(None) < len(stds))
-            name = structures.get(result.case, result.case)
-            places.append(names.setdefault(name, len(names)))
-        error, std = _percent(np.array(hertz, dtype=float).reshape(-1, 3).T)
-        stated, structure = np.array(told, dtype=bool), np.array(places, dtype=np.int64)
-        return cls(error, std, np.repeat(stated, counts), np.repeat(structure, counts))
+        modes = [rows.get(name, ()) for rows in mode_rows(listed) for name in UNSEEN]
+        hertz = np.array(list(map(_HERTZ, chain(*modes))), dtype=float).reshape(-1, 3).T
+        counts = np.array(list(map(len, modes)), dtype=int)
+        owner = np.repeat(np.arange(len(modes)) // len(UNSEEN), counts)
+        stated = np.bincount(owner, ~np.isnan(hertz[2]), len(listed)) > 0.0
+        numbers: dict[str, int] = {}
+        names = (structures.get(result.case, result.case) for result in listed)
+        places = np.array([numbers.setdefault(name, len(numbers)) for name in names], dtype=int)
+        wanted = np.array([name in blocks for name in UNSEEN] * len(listed), dtype=bool)
+        taken = np.repeat(wanted, counts)
+        error, std = _percent(hertz[:, taken])
+        return cls(error, std, stated[owner[taken]], places[owner[taken]])
 
     @property
     def weight(self) -> FloatArray:
