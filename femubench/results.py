@@ -5,7 +5,8 @@ from femubench.core.roles import Reporter
 from femubench.core.run.frames import modes_frame, results_frame, run_from_json, run_to_json
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
-from femubench.core.schema.results import Block, JobResult, PairedMode, Run
+from femubench.core.schema.paired_modes import PairedMode
+from femubench.core.schema.results import Block, JobResult, Run
 from femubench.core.score import predictive
 from femubench.core.score.counting import block_weights, counted_blocks
 from femubench.core.score.leaderboard import (

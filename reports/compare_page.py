@@ -216,6 +216,7 @@ def _lists(data: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:
     yield "Not compared: other case files", _jobs(data["other_cases"])
     differing = [shortened(plain(line), 300) for line in data["environment"]]
     yield "Environment", differing or ["nothing differs"]
+    yield "Notes", [shortened(plain(note), 300) for note in data["notes"]]
     if data["untested"]:
         yield "Thresholds that nothing was held against", list(data["untested"])
 

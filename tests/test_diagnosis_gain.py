@@ -18,7 +18,8 @@ from femubench.core.inference.fit import Fit, state_at
 from femubench.core.inference.hypothesis import hypotheses_of
 from femubench.core.inference.mesh_error import refined
 from femubench.core.schema.diagnosis import Cause
-from femubench.core.schema.results import Block, PairedMode
+from femubench.core.schema.paired_modes import PairedMode
+from femubench.core.schema.results import Block
 from femubench.core.score.scoring import score_model
 from femubench.fem import GroundSpring, Place, PointMass
 

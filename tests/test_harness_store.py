@@ -22,8 +22,9 @@ from femubench.core.run.frames import modes_frame, results_frame, run_from_json,
 from femubench.core.run.provenance import git_commit, new_run_id, versions
 from femubench.core.run.store import Store
 from femubench.core.run.upkeep import faults_of, repair, unsealed
+from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.records import result_to_json
-from femubench.core.schema.results import Block, JobResult, PairedMode, Run
+from femubench.core.schema.results import Block, JobResult, Run
 from femubench.core.score.ranking import rank_results
 
 MODES = (

@@ -15,7 +15,8 @@ from femubench.core.case.case import Case
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal import eigen
 from femubench.core.modal.eigen import solve_modes
-from femubench.core.schema.results import Block, JobResult, PairedMode, Run, Status
+from femubench.core.schema.paired_modes import PairedMode
+from femubench.core.schema.results import Block, JobResult, Run, Status
 from femubench.core.score.ranking import ranked, score_of
 from femubench.core.score.scoring import (
     Reference,

@@ -19,7 +19,8 @@ from femubench import Measurement, Model, Strategy, StrategyFailure, UpdateResul
 from femubench.core.run.answers import AnswerError, packed, unpacked
 from femubench.core.run.jobs import Job, JobOutcome, execute, seed_words
 from femubench.core.run.judging import judged
-from femubench.core.schema.results import Block, JobResult, PairedMode
+from femubench.core.schema.paired_modes import PairedMode
+from femubench.core.schema.results import Block, JobResult
 from femubench.core.score import predictive
 from femubench.core.score.predicted_spread import Spread
 from femubench.core.score.scoring import judge, reference_of

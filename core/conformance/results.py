@@ -18,7 +18,7 @@ from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.run.answers import head_of, packed, unpacked
 from femubench.core.run.jobs import JobOutcome, one_line
 from femubench.core.run.model_checks import check_model
-from femubench.core.schema.results import PairedMode
+from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.score.scoring import frequency_error, predict_block
 from femubench.core.update.promise import USED_ERROR, eigenvalue_rounding
 from femubench.core.update.strategy import ParameterEstimate, UpdateResult

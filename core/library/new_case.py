@@ -8,7 +8,7 @@ from pathlib import Path
 from femubench.core.case.case import Case
 from femubench.core.case.starting import Beginning, start_case
 from femubench.core.plugin.loader import Plugins
-from femubench.core.schema.results import PairedMode
+from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.score.scoring import predict_block
 
 

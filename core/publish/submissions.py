@@ -14,6 +14,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from femubench.core.errors import InputError
 from femubench.core.files import read_text
+from femubench.core.schema.bounds import Name
 from femubench.core.schema.records import (
     LARGEST_RUN,
     Record,
@@ -21,7 +22,7 @@ from femubench.core.schema.records import (
     result_to_json,
     run_from_json,
 )
-from femubench.core.schema.results import Block, JobResult, Name, Nominal, Run
+from femubench.core.schema.results import Block, JobResult, Nominal, Run
 from femubench.core.score.ranking import rank_results
 from femubench.core.score.scoring import frequency_error
 

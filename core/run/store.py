@@ -25,7 +25,7 @@ from femubench.core.run.stored import (
     records_of,
 )
 from femubench.core.schema.records import check_extent
-from femubench.core.schema.results import DONE, NOMINALS, JobResult, Nominal, Run
+from femubench.core.schema.results import DONE, NOMINALS, JobResult, Nominal, Run, rate
 from femubench.core.score.ranking import scores_and_ranks
 
 _MOST_NOTES = 3
@@ -155,7 +155,7 @@ class Store:
         reference = meta.get("reference") or None
         found = scores_and_ranks(listed, reference, meta.get("baseline"))
         for result, score, rank in zip(listed, *found, strict=True):
-            vars(result).update(score=score, rank=rank)  # nobody else has them yet
+            rate(result, score, rank)
         return Run({**meta, "notes": notes}, tuple(listed))
 
     @uncollected()

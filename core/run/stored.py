@@ -33,9 +33,9 @@ CUT_SHORT = "the last line is cut short"
 # What is asked of many records stands first, where it is found without reading the rest.
 _HEAD = re.compile(
     rb'\{"schema":2,"record":"(run|result|end)","after":"([0-9a-f]{8}|)",'
-    rb'(?:"key":("(?:[^"\\]|\\.)*"),"status":"([a-z-]+)",)?'
+    rb'(?:"key":("[^"\\]*(?:\\.[^"\\]*)*"),"status":"([a-z-]+)",)?'
 )
-_RESULT, _DETAILS = b'"result":', b',"details":'
+_RESULT, _MODES, _DETAILS = b'"result":', b',"modes":{', b',"details":'
 
 
 @dataclass(slots=True)
@@ -79,12 +79,15 @@ class Record:
         Raises:
             InputError: naming the first field that is wrong.
         """
-        start = self._text.index(_RESULT) + len(_RESULT)
-        # A quote within a text of JSON has a backslash before it: this is found nowhere else.
-        middle = self._text.index(_DETAILS, start)
-        figures = self._text[start:middle]
-        details = self._text[middle + len(_DETAILS) : -TAIL]
-        return result_from_line(figures, details, file=self.file, line=self.number)
+        text = self._text
+        start = text.index(_RESULT) + len(_RESULT)
+        # A quote within a text of JSON has a backslash before it: these are found nowhere else.
+        middle = text.find(_MODES, start)
+        end = text.index(_DETAILS, max(start, middle))
+        modes = None if middle < 0 else text[middle + len(_MODES) - 1 : end]
+        figures = text[start : end if modes is None else middle]
+        details = text[end + len(_DETAILS) : -TAIL]
+        return result_from_line(figures, modes, details, file=self.file, line=self.number)
 
     def meta(self) -> dict[str, Any]:
         """Return the meta data.
@@ -158,9 +161,10 @@ def ended(meta: Mapping[str, Any], after: bytes) -> bytes:
 
 def done(result: JobResult, after: bytes) -> bytes:
     """Return the line of a result."""
-    figures, details = result_to_line(result)
+    figures, modes, details = result_to_line(result)
     key, status = json.dumps(result.key), json.dumps(result.status)
-    body = f'{{"key":{key},"status":{status},"result":{figures},"details":{details}}}'
+    head = f'{{"key":{key},"status":{status},"result":{figures}'
+    body = f'{head},"modes":{modes},"details":{details}}}'
     return _line("result", after, body)
 
 

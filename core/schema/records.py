@@ -14,28 +14,30 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from femubench.core.errors import InputError
 from femubench.core.files import MIB, read_text
-from femubench.core.schema.details import DETAILS, with_nan
-from femubench.core.schema.results import (
-    BLOCKS,
+from femubench.core.schema.bounds import (
     LONGEST_TEXT,
-    NOMINALS,
-    Block,
     Hertz,
-    JobResult,
     Mac,
     Name,
-    Nominal,
-    PairedMode,
     Percent,
     PredictedHertz,
     Rank,
-    Run,
     Score,
     Seconds,
-    Status,
     StdHertz,
     Text,
     Whole,
+)
+from femubench.core.schema.details import DETAILS, with_nan
+from femubench.core.schema.paired_modes import PairedMode, rows_of
+from femubench.core.schema.results import (
+    BLOCKS,
+    NOMINALS,
+    Block,
+    JobResult,
+    Nominal,
+    Run,
+    Status,
     leave_unread,
 )
 from femubench.core.schema.validation import validated, wrong_field
@@ -244,18 +246,20 @@ def result_from_json(
     )
 
 
-def result_to_line(result: JobResult) -> tuple[str, str]:
-    """Return the figures of one result and its details, each as a table of compact JSON.
+def result_to_line(result: JobResult) -> tuple[str, str, str]:
+    """Return the figures of one result, its modes and its details, as tables of compact JSON.
 
     What has no value is left out.
     """
     figures = _fields(result, *_FIGURES)
     figures = {name: value for name, value in figures.items() if value is not None}
     figures["reason"] = result.reason[:LONGEST_TEXT]
-    figures["blocks"] = {name: _short_block(block) for name, block in result.blocks.items()}
+    errors = "rms_percent", "mean_mac"
+    figures["blocks"] = {name: _fields(block, *errors) for name, block in result.blocks.items()}
+    modes = {name: rows_of(block.modes) for name, block in result.blocks.items()}
     details = _fields(result, *DETAILS)
     details["traceback"] = result.traceback[-LONGEST_TEXT:]
-    return compact(figures), compact(details)
+    return compact(figures), compact(modes), compact(details)
 
 
 def compact(data: Mapping[str, Any]) -> str:
@@ -264,12 +268,19 @@ def compact(data: Mapping[str, Any]) -> str:
 
 
 def result_from_line(
-    figures: bytes, details: bytes, *, file: Path | str | None = None, line: int | None = None
+    figures: bytes,
+    modes: bytes | None,
+    details: bytes,
+    *,
+    file: Path | str | None = None,
+    line: int | None = None,
 ) -> JobResult:
-    """Return the result of which `result_to_line` gave two tables; details are read when asked for.
+    """Return the result of which `result_to_line` gave three tables.
+
+    Modes and details are read when they are asked for.
 
     Arguments:
-        figures, details: the tables.
+        figures, modes, details: the tables; modes may stand in the figures.
         file, line: where they stand, for the message.
 
     Raises:
@@ -279,7 +290,7 @@ def result_from_line(
         found: JobResult = _line_reader()(figures)
     except ValidationError as error:
         raise wrong_field(error, file, line, "result") from error
-    leave_unread(found, details)
+    leave_unread(found, modes, details)
     return found
 
 
@@ -374,15 +385,6 @@ def _encodable(data: Any) -> Any:  # noqa: ANN401 - JSON data of any form
     if isinstance(data, dict):
         return {_encodable(key): _encodable(value) for key, value in data.items()}
     return [_encodable(value) for value in data] if isinstance(data, list) else data
-
-
-def _short_block(block: Block) -> dict[str, Any]:
-    modes = []
-    for mode in block.modes:
-        told = {**_fields(mode, "modification", "predicted_std_hz")}
-        told = {name: value for name, value in told.items() if value is not None}
-        modes.append(_fields(mode, "number", "measured_hz", "predicted_hz", "mac") | told)
-    return {**_fields(block, "rms_percent", "mean_mac"), "modes": modes}
 
 
 def _block(block: Block) -> dict[str, Any]:

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
-
-from annotated_types import Ge, Gt, Le, Lt, MaxLen
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields as fields_of
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 from femubench.core.display import Shown, counted
+from femubench.core.schema.bounds import (
+    READING,
+    Mac,
+    Name,
+    Percent,
+    Rank,
+    Score,
+    Seconds,
+    Text,
+    Whole,
+)
 from femubench.core.schema.details import DETAILS, decoded
+from femubench.core.schema.paired_modes import PairedMode, Row, rows_from_texts, rows_of
 
 Status = Literal["ok", "failed", "timeout", "crashed", "diverged", "not-applicable"]
 STATUSES: tuple[Status, ...] = get_args(Status)
@@ -22,51 +32,18 @@ UNSEEN = ("higher", "modified")  # what no strategy is given
 Nominal = Literal["drawn", "textbook"]
 NOMINALS: tuple[Nominal, ...] = get_args(Nominal)
 
-# The bounds of what is read; within them all figures of a run can be computed.
-LONGEST_TEXT = 100_000  # characters of a reason or a traceback
-Name = Annotated[str, MaxLen(1_000)]
-Text = Annotated[str, MaxLen(LONGEST_TEXT)]
-Whole = Annotated[int, Ge(0), Lt(2**63)]
-Hertz = Annotated[float, Ge(1e-45), Le(1e30)]
-# Bounded so that the square of a relative error is a number.
-PredictedHertz = Annotated[float, Ge(-1e100), Le(1e100)]
-StdHertz = Annotated[float, Ge(0), Le(1e100)]
-Percent = Annotated[float, Ge(0), Le(1e150)]
-Mac = Annotated[float, Ge(-1e-6), Le(1 + 1e-6)]
-Seconds = Annotated[float, Ge(0)]
-Score = Annotated[float, Gt(0), Le(1e150)]
-Rank = Annotated[int, Ge(1), Lt(2**63)]
-_READING = {"extra": "ignore", "allow_inf_nan": False}
-_UNREAD = "_unread"
+
+_set = object.__setattr__  # of what nobody else has yet
+
+
+class _Stored:
+    """What may come from a store, of which a part is read when it is asked for."""
+
+    __slots__ = ("_unread",)
 
 
 @dataclass(frozen=True, slots=True)
-class PairedMode:
-    """One measured mode and the model's mode that was paired with it by shape.
-
-    Arguments:
-        number: label of the measured mode.
-        measured_hz: its frequency.
-        predicted_hz: the model's; None where no mode of the model matches. A negative number
-            stands for an imaginary frequency.
-        mac: of the two shapes, 0..1; None where nothing was paired or no shape was measured.
-        modification: name of the design change; None for the structure as tested.
-        predicted_std_hz: standard deviation of what a test would find about `predicted_hz`, its
-            own error of measurement included; None where the strategy does not say.
-    """
-
-    __pydantic_config__: ClassVar = _READING
-
-    number: Whole
-    measured_hz: Hertz
-    predicted_hz: PredictedHertz | None
-    mac: Mac | None
-    modification: Text | None = None
-    predicted_std_hz: StdHertz | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Block:
+class Block(_Stored):
     """The error of one set of modes: used, higher or modified.
 
     Arguments:
@@ -76,15 +53,26 @@ class Block:
         modes: the pairs.
     """
 
-    __pydantic_config__: ClassVar = _READING
+    __pydantic_config__: ClassVar = READING
 
     rms_percent: Percent
     mean_mac: Mac | None
-    modes: tuple[PairedMode, ...]
+    modes: tuple[PairedMode, ...] = ()
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name):  # noqa: ANN001, ANN204 - checkers know the fields
+            """Decode the modes of a stored block when they are asked for."""
+            if name != "modes":
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            text, own = self._unread
+            (found,) = rows_from_texts([text])
+            _set(self, name, tuple(PairedMode(*row) for row in found.get(own, ())))
+            return self.modes
 
 
-@dataclass(frozen=True)
-class JobResult:
+@dataclass(frozen=True, slots=True)
+class JobResult(_Stored):
     """The outcome of one (case, strategy, seed), started from one nominal model.
 
     Arguments:
@@ -109,7 +97,7 @@ class JobResult:
             has all that handbooks give.
     """
 
-    __pydantic_config__: ClassVar = _READING
+    __pydantic_config__: ClassVar = READING
 
     case: Name
     strategy: Name
@@ -125,11 +113,10 @@ class JobResult:
     evaluations: Whole | None = None
     score: Score | None = None
     rank: Rank | None = None
-    # By factories, so that the class has no attributes of these names: see `__getattr__`.
-    parameters: tuple[Mapping[str, Any], ...] = field(default_factory=tuple)
-    history: tuple[Mapping[str, float], ...] = field(default_factory=tuple)
+    parameters: tuple[Mapping[str, Any], ...] = ()
+    history: tuple[Mapping[str, float], ...] = ()
     diagnostics: Mapping[str, float] = field(default_factory=dict)
-    traceback: str = field(default_factory=str)
+    traceback: str = ""
     key: Name = ""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     nominal: Nominal = "drawn"
@@ -138,16 +125,20 @@ class JobResult:
 
         def __getattr__(self, name):  # noqa: ANN001, ANN204 - checkers know the fields
             """Decode the details of a stored result when the first of them is asked for."""
-            own = vars(self)
-            if name not in DETAILS or _UNREAD not in own:
+            if name not in DETAILS:
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
-            for detail, value in decoded(own[_UNREAD]).items():
-                own.setdefault(detail, value)
-            return own[name]
+            for detail, value in decoded(self._unread[0]).items():
+                if not _is_there(self, detail):
+                    _set(self, detail, value)
+            return getattr(self, name)
 
     def changed(self, **fields: object) -> JobResult:
         """Return this result with other figures; details that are not decoded stay so."""
-        return _made(vars(self) | fields)
+        made = object.__new__(JobResult)
+        for name in _PARTS:
+            if name in fields or _is_there(self, name):
+                _set(made, name, fields[name] if name in fields else getattr(self, name))
+        return made
 
     @property
     def rigid_modes_lost(self) -> int:
@@ -160,22 +151,56 @@ class JobResult:
         return self.status == "ok" and bool(self.rigid_modes_lost or self.negative_eigenvalues)
 
 
-def leave_unread(result: JobResult, details: bytes) -> None:
-    """Let a result that nobody else has yet decode its details when they are asked for.
+_NOTHING = b"", None, None
+_PARTS = ("_unread", *(field.name for field in fields_of(JobResult)))
+
+
+def _is_there(thing: _Stored, name: str) -> bool:
+    try:
+        object.__getattribute__(thing, name)
+    except AttributeError:
+        return False
+    return True
+
+
+def leave_unread(result: JobResult, modes: bytes | None, details: bytes) -> None:
+    """Let a result that nobody else has yet decode modes and details when they are asked for.
 
     Arguments:
+        modes: text for `rows_from_texts`; None where its blocks have them.
         details: text of a table of JSON; see `decoded`.
     """
-    own = vars(result)
     for name in DETAILS:
-        del own[name]
-    own[_UNREAD] = details
+        object.__delattr__(result, name)
+    _set(result, "_unread", (details, modes, result.blocks))
+    if modes is not None:
+        for name, block in result.blocks.items():
+            object.__delattr__(block, "modes")
+            _set(block, "_unread", (modes, name))
 
 
-def _made(fields: Mapping[str, object]) -> JobResult:
-    made = object.__new__(JobResult)
-    vars(made).update(fields)
-    return made
+def rate(result: JobResult, score: float, rank: int) -> None:
+    """Give a result that nobody else has yet its score and rank."""
+    _set(result, "score", score)
+    _set(result, "rank", rank)
+
+
+def mode_rows(results: Iterable[JobResult]) -> list[Mapping[str, Sequence[Row]]]:
+    """Return the modes of every result by block; those of stored ones are decoded at once.
+
+    Raises:
+        InputError: where the text of some is damaged.
+    """
+    listed = [(result.blocks, getattr(result, "_unread", _NOTHING)) for result in results]
+    # A result that was given other blocks has none of the text.
+    texts = [unread[1] if unread[2] is blocks else None for blocks, unread in listed]
+    read = iter(rows_from_texts([text for text in texts if text is not None]))
+    return [
+        {name: rows_of(block.modes) for name, block in blocks.items()}
+        if text is None
+        else next(read)
+        for (blocks, _), text in zip(listed, texts, strict=True)
+    ]
 
 
 @dataclass(frozen=True, repr=False)

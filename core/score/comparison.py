@@ -113,6 +113,7 @@ class Comparison:
         only_before, only_after: jobs of one run alone.
         other_cases: jobs of one name on case files that are not the same; not compared.
         environment: what differs between the machines, a line each.
+        notes: what was left out of either run since it is damaged, a line each.
         thresholds, excesses: what was asked for, and what lies beyond it.
         untested: metrics with a threshold for which no job has a value.
     """
@@ -128,6 +129,7 @@ class Comparison:
     only_after: tuple[Job, ...]
     other_cases: tuple[Job, ...]
     environment: tuple[str, ...]
+    notes: tuple[str, ...]
     thresholds: tuple[Threshold, ...]
     excesses: tuple[Excess, ...]
     untested: tuple[str, ...]
@@ -241,12 +243,18 @@ def compare_runs(
         only_after=tuple(job for job in new if job not in old),
         other_cases=tuple(other),
         environment=tuple(environment_differences(_safe(before.meta), _safe(after.meta))),
+        notes=tuple(dict.fromkeys((*_notes(before), *_notes(after)))),
         thresholds=tuple(thresholds),
         excesses=tuple(_excesses(rows, thresholds)),
         untested=tuple(
             t.metric for t in thresholds if all(row.values[t.metric] is None for row in rows)
         ),
     )
+
+
+def _notes(run: Run) -> list[str]:
+    told = run.meta.get("notes")
+    return list(map(str, told)) if isinstance(told, (list, tuple)) else []
 
 
 def _references(before: Run, after: Run, jobs: Iterable[Job]) -> dict[str, Mapping[str, float]]:

@@ -6,6 +6,7 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -312,17 +313,21 @@ def _over_seeds(left: FloatArray, strategy: str, seed: int) -> tuple[float, floa
 
 
 _FIGURES = ("parameter_count", "evaluations", "seconds")
+_figures = attrgetter(*_FIGURES)
 
 
 def _by_case(results: Iterable[JobResult]) -> dict[str, dict[str, list[float]]]:
     """Return errors by block and other figures, each by case, without what has no value."""
-    found: dict[str, dict[str, list[float]]] = {name: {} for name in (*BLOCKS, *_FIGURES)}
+    found: dict[str, dict[str, list[float]]] = {
+        name: defaultdict(list) for name in (*BLOCKS, *_FIGURES)
+    }
     for result in results:
-        told = [(name, getattr(result, name)) for name in _FIGURES]
-        told += [(name, block.rms_percent) for name, block in result.blocks.items()]
-        for name, value in told:
+        case = result.case
+        for name, block in result.blocks.items():
+            found[name][case].append(block.rms_percent)
+        for name, value in zip(_FIGURES, _figures(result), strict=True):
             if value is not None:
-                found[name].setdefault(result.case, []).append(value)
+                found[name][case].append(value)
     return found
 
 

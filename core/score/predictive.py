@@ -11,12 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
-from operator import attrgetter
+from itertools import chain
+from operator import itemgetter
 
 import numpy as np
 from scipy.special import ndtr
 
-from femubench.core.schema.results import UNSEEN, JobResult
+from femubench.core.schema.results import UNSEEN, JobResult, mode_rows
 from femubench.core.typing import BoolArray, FloatArray, IntArray
 
 COLUMNS = ("coverage90", "crps_percent", "log_score")
@@ -57,20 +58,19 @@ class Forecasts:
             structures: by case; one that is not named is a structure of its own.
             blocks: those of them whose modes are taken.
         """
-        hertz: list[tuple[float, float | None, float | None]] = []
-        counts, told, places = [], [], []
-        for result in results:
-            unseen = {name: b.modes for name, b in result.blocks.items() if name in UNSEEN}
-            stated = any(std is not None for m in unseen.values() for std in map(_STD, m))
-            own = [mode for name in blocks for mode in unseen.get(name, ())]
-            hertz += map(_HERTZ, own)
-            counts.append(len(own))
-            told.append(stated)
-            places.append(structures.get(result.case, result.case))
-        error, std = _percent(np.array(hertz, dtype=float).reshape(-1, 3).T)
-        place = np.unique(np.array(places, dtype=str), return_inverse=True)[1]
-        stated_of, structure = np.array(told, dtype=bool), np.asarray(place, dtype=np.int64)
-        return cls(error, std, np.repeat(stated_of, counts), np.repeat(structure, counts))
+        listed = list(results)
+        modes = [rows.get(name, ()) for rows in mode_rows(listed) for name in UNSEEN]
+        hertz = np.array(list(map(_HERTZ, chain(*modes))), dtype=float).reshape(-1, 3).T
+        counts = np.array(list(map(len, modes)), dtype=int)
+        owner = np.repeat(np.arange(len(modes)) // len(UNSEEN), counts)
+        stated = np.bincount(owner, ~np.isnan(hertz[2]), len(listed)) > 0.0
+        numbers: dict[str, int] = {}
+        names = (structures.get(result.case, result.case) for result in listed)
+        places = np.array([numbers.setdefault(name, len(numbers)) for name in names], dtype=int)
+        wanted = np.array([name in blocks for name in UNSEEN] * len(listed), dtype=bool)
+        taken = np.repeat(wanted, counts)
+        error, std = _percent(hertz[:, taken])
+        return cls(error, std, stated[owner[taken]], places[owner[taken]])
 
     @property
     def weight(self) -> FloatArray:
@@ -153,8 +153,7 @@ def log_score(error: FloatArray, std: FloatArray) -> FloatArray:
     return np.asarray(-np.log((1.0 - ANYTHING) * density + ANYTHING / (2.0 * LOST_PERCENT)))
 
 
-_STD = attrgetter("predicted_std_hz")
-_HERTZ = attrgetter("measured_hz", "predicted_hz", "predicted_std_hz")
+_HERTZ = itemgetter(1, 2, 5)  # measured, predicted, its std
 
 
 def _percent(hertz: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -144,15 +144,16 @@ def scores_and_ranks(
     groups: dict[tuple[str, int, Nominal], int] = {}
     group = [groups.setdefault(_group(result), len(groups)) for result in results]
     names = {name: n for n, name in enumerate(sorted({result.strategy for result in results}))}
-    keys = np.array(
-        [
-            (names[r.strategy], score, r.unphysical, r.status not in DONE, place)
-            for r, score, place in zip(results, scores, group, strict=True)
-        ],
-        dtype=float,
-    ).reshape(-1, 5)
-    order = np.lexsort(keys.T)
-    _, score, *tier, place = keys[order].T
+    parts = (
+        [names[result.strategy] for result in results],
+        scores,
+        [result.unphysical for result in results],
+        [result.status not in DONE for result in results],
+        group,
+    )
+    keys = np.array([np.array(part, dtype=float) for part in parts])
+    order = np.lexsort(keys)
+    _, score, *tier, place = keys[:, order]
     # As `ranked` does in each group.
     first = np.ones(len(order), dtype=bool)
     first[1:] = place[1:] != place[:-1]

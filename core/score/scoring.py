@@ -25,7 +25,8 @@ from femubench.core.modal.many_changes import ManyChanges
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import LEAST_SENSORS, WINDOW, pair_measured
 from femubench.core.modal.rigid import rigid_modes_of
-from femubench.core.schema.results import Block, PairedMode
+from femubench.core.schema.paired_modes import PairedMode
+from femubench.core.schema.results import Block
 from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.predicted_spread import MORE, Spread
 from femubench.core.score.ranking import rank_results, score_of

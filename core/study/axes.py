@@ -10,7 +10,8 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from femubench.core.errors import InputError
 from femubench.core.plugin.validation import did_you_mean
-from femubench.core.schema.results import NOMINALS, Name, Nominal, Run
+from femubench.core.schema.bounds import Name
+from femubench.core.schema.results import NOMINALS, Nominal, Run
 
 Value = bool | int | float | str | None
 _NOISE, _LEFT_OUT = "noise", "sensors_left_out"
