@@ -29,7 +29,7 @@ from femubench.core.library.cases import usable_plugins
 from femubench.core.library.rank import Plan, plan_of
 from femubench.core.modal import eigen
 from femubench.core.run.jobs import execute
-from femubench.core.run.schedule import slots_of
+from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
 
@@ -94,7 +94,7 @@ def solutions(plan: Plan) -> tuple[int, float]:
     count, seconds, solve = 0, 0.0, Mock(wraps=eigen.solve_dense)
     with threadpool_limits(1), patch.object(eigen, "solve_dense", solve):
         alone = {(nominal, case.name): solution_time(case) for nominal, case in cases}
-        for slot in slots_of(cases, plan.strategies, tuple(plan.request.all_seeds)):
+        for slot in Slots(cases, plan.strategies, tuple(plan.request.all_seeds)):
             solve.reset_mock()
             if slot.job is not None:
                 execute(slot.job)
