@@ -9,50 +9,37 @@ and of the anchor beside it. `python benchmarks/performance.py` calls it for eve
 from __future__ import annotations
 
 import json
-import resource
 import sys
+import tempfile
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from diagnosis_cost import MODES as DIAGNOSED_MODES, SOLVES, case_of, lattice as uneven_lattice
 from large_structures import lattice, planar_grid
+from processor_time import least, peak, timed
 from scipy.optimize import least_squares
-from scipy.sparse import csc_matrix
-from scipy.sparse.linalg import eigsh, splu
+from scipy.sparse import csc_array, csc_matrix
+from scipy.sparse.linalg import LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
-from femubench.core.fem.frame import Frame
+from femubench.core.diagnosis.diagnose import diagnose
+from femubench.core.fem.frame import Frame, Place, PointMass
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.structure import Structure
+from femubench.core.inference.hypothesis import by_themselves, hypotheses_of
 from femubench.core.modal.eigen import Modes, solve_modes
+from femubench.core.modal.factorisation import LU, Cholesky, cholmod_obstacle
+from femubench.core.modal.many_changes import Change, modes_of_changes
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
+from femubench.core.plugin.loader import registered_effects
 from femubench.core.typing import FloatArray
 
 MODES = 12
-_SOLVES = 40  # of Lanczos' method, for twelve modes
 Row = dict[str, Any]
 Measurement = Callable[[int], Row]
-
-
-def processor() -> float:
-    """Return seconds of processor that this process and its ended children have used."""
-    return sum(
-        sum(resource.getrusage(whose)[:2])
-        for whose in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
-    )
-
-
-def peak() -> float:
-    """Return the largest resident memory of this process so far, in MB."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-
-
-def timed(function: Callable[..., Any], *arguments: Any) -> Row:  # noqa: ANN401 - of any function
-    """Return seconds and added memory of a call, and what it returned."""
-    memory, start = peak(), processor()
-    answer = function(*arguments)
-    return {"seconds": processor() - start, "added_mb": peak() - memory, "answer": answer}
 
 
 def _solved(frame: Frame) -> Row:
@@ -69,23 +56,29 @@ def _solved(frame: Frame) -> Row:
 
 
 def _anchor(frame: Frame) -> Row:
-    """Return what no shift-invert method can do without: one factorisation and its solves."""
+    """Return what no shift-invert method can do without: one factorisation and the iteration.
+
+    With the back end that is used here, at a tenth of the first elastic eigenvalue below zero.
+    """
     model = Model.of(frame)
-    vector = np.random.default_rng(0).standard_normal(model.size)
+    first = float(solve_modes(model, MODES).elastic.eigenvalues[0])
+    shift, start = -0.1 * first, np.random.default_rng(0).standard_normal(model.size)
 
-    def factorise_and_solve() -> None:
-        shifted = csc_matrix(model.stiffness + _shift(model) * model.mass)
-        factor = splu(
-            shifted, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
-        x = vector
-        for _ in range(_SOLVES):
-            x = factor.solve(model.mass @ x)
-            x /= np.linalg.norm(x)
+    def factorise_and_iterate() -> None:
+        matrix = csc_array(model.stiffness - shift * model.mass)
+        factor: LU | Cholesky
+        if cholmod_obstacle() is None:
+            factor = Cholesky(matrix, spatial=frame.plane == "3d")
+            assert factor.factorise(matrix)
+        else:
+            factor = LU(matrix)
+        inverse = LinearOperator(matrix.shape, matvec=factor.solve, dtype=float)
+        v0 = factor.solve(model.mass @ start)
+        eigsh(model.stiffness, MODES + 2, model.mass, shift, OPinv=inverse, v0=v0, tol=0.0)
 
-    row = timed(factorise_and_solve)
+    row = timed(factorise_and_iterate)
     row.pop("answer")
-    return {"dofs": model.size, **row, "peak_mb": peak()}
+    return {"dofs": model.size, **row}
 
 
 def _shift(model: Model) -> float:
@@ -197,6 +190,74 @@ def _fitted(joints: int, *, slopes: bool) -> Row:
     return {"parameters": len(names), **row, "cost": found.cost, "peak_mb": peak()}
 
 
+def _masses(model: Model, count: int, *, inside: bool) -> list[Change]:
+    """Return masses of half a percent of the whole, each a change of its own."""
+    rng, frame = np.random.default_rng(0), model.frame_structure.frame
+    members, joints = (rng.choice(len(part), count) for part in (frame.members, frame.joints))
+    places = (
+        [Place(member=frame.members[i].name, s=0.41) for i in members]
+        if inside
+        else [Place(joint=frame.joints[i].name) for i in joints]
+    )
+    return [([PointMass(place, 0.005 * model.total_mass)], []) for place in places]
+
+
+def _changed(count: int, *, inside: bool) -> Row:
+    """Return twelve modes after each of many changes, 27 702 dofs, beside one solution."""
+    model = Model.of(lattice(9))
+    solution = least(lambda: solve_modes(model, MODES))
+    row = timed(modes_of_changes, model, _masses(model, count, inside=inside), MODES)
+    assert len(row.pop("answer")) == count
+    return {"changes": count, **row, "anchor": solution}
+
+
+def _one_by_one(count: int) -> Row:
+    """Return the same solved change by change: one measured, times their number."""
+    model = Model.of(lattice(9))
+    ((masses, springs),) = _masses(model, 1, inside=False)
+    row = timed(lambda: solve_modes(model.attach(masses, springs), MODES))
+    return {"changes": count, "seconds": count * row["seconds"], "added_mb": row["added_mb"]}
+
+
+def _meshed(joints: int) -> Row:
+    """Return the matrices of a grid from its joints and members."""
+    frame = planar_grid(joints)
+    row = timed(Model.of, frame)
+    return {"dofs": row.pop("answer").size, **row}
+
+
+def _null_jobs(count: int) -> Row:
+    """Return what so many jobs cost that do nothing, all processes together."""
+    from run_cost import null_job, start_server
+
+    start_server()
+    cost = null_job(count)
+    return {"jobs": cost.jobs, "seconds": cost.whole, "anchor": 1e-3 * cost.jobs}
+
+
+def _stored(count: int, what: str) -> Row:
+    """Return what it takes to load and rank, or to resume, a run of so many results."""
+    import pandas as pd  # noqa: F401 - what is imported is not measured
+    import scipy.stats  # noqa: F401
+    from store import MEASURED, make
+
+    with tempfile.TemporaryDirectory() as folder:
+        store = make(Path(folder), count)
+        row = timed(MEASURED[what], store)
+    return {"results": row.pop("answer"), **row}
+
+
+def _diagnosed(joints: int) -> Row:
+    """Return a diagnosis of a lattice with a softer member, beside one solution for its modes."""
+    case = case_of(uneven_lattice((joints - 1,) * 3, 3), "xyz", 16)
+    solution = least(lambda: solve_modes(case.model, DIAGNOSED_MODES))
+    row = timed(diagnose, case)
+    row.pop("answer")
+    known = len(hypotheses_of(case.model, by_themselves(registered_effects())))
+    beyond = 1e3 * (row["seconds"] - SOLVES * solution) / known
+    return {"hypotheses": known, **row, "anchor": solution, "ms": beyond, "peak_mb": peak()}
+
+
 MEASUREMENTS: dict[str, Measurement] = {
     "modes of a planar grid": lambda joints: _solved(planar_grid(joints)),
     "modes of a lattice": lambda joints: _solved(lattice(joints)),
@@ -210,6 +271,14 @@ MEASUREMENTS: dict[str, Measurement] = {
     "least squares with differences": lambda joints: _fitted(joints, slopes=False),
     "gradients": gradients,
     "forward differences": differences,
+    "masses at joints": lambda count: _changed(count, inside=False),
+    "masses inside elements": lambda count: _changed(count, inside=True),
+    "each change solved by itself": _one_by_one,
+    "mesh and matrices of a planar grid": _meshed,
+    "jobs that do nothing": _null_jobs,
+    "load and leaderboard": lambda count: _stored(count, "load"),
+    "resume": lambda count: _stored(count, "resume"),
+    "diagnosis of a lattice": _diagnosed,
 }
 
 

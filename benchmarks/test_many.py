@@ -6,15 +6,14 @@ same process; `figures` gives them all.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import islice
-from time import process_time
 
 import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
+from benchmarks.processor_time import least
 from femubench.core.fem.derivatives import derivatives
 from femubench.core.fem.frame import Place, PointMass
 from femubench.core.fem.model import Model
@@ -31,16 +30,6 @@ COUNT = 12
 USED = 5
 
 
-def seconds(function: Callable[[], object], repeats: int = 3) -> float:
-    """Return the least processor time of a few calls in s."""
-    found = []
-    for _ in range(repeats):
-        start = process_time()
-        function()
-        found.append(process_time() - start)
-    return min(found)
-
-
 def element_factors(model: Model) -> list[Parameter]:
     """Return factors on E and on the density of every element."""
     labels = list(dict.fromkeys(model.frame_structure.labels))
@@ -55,8 +44,8 @@ def gradient_share(model: Model, modes: Modes, solution: float) -> tuple[float, 
         model.frame_structure.kept.clear()
         return eigenvalue_sensitivities(model, modes, parameters)
 
-    again = seconds(lambda: eigenvalue_sensitivities(model, modes, parameters))
-    return seconds(first) / solution, again / solution
+    again = least(lambda: eigenvalue_sensitivities(model, modes, parameters))
+    return least(first) / solution, again / solution
 
 
 def masses(model: Model, count: int, *, inside: bool) -> list[Change]:
@@ -104,16 +93,16 @@ def update_and_predict(name: str, model: Model, measurement: Measurement) -> Mod
 def figures(cells: int = 8, elements: int = 3, changes: int = 100) -> dict[str, float]:
     """Return all ratios to one solution, by what they are; 27 702 dofs as they stand."""
     model = Model.of(lattice(cells, elements))
-    solution = seconds(lambda: solve_modes(model, COUNT))
+    solution = least(lambda: solve_modes(model, COUNT))
     first, again = gradient_share(model, solve_modes(model, COUNT), solution)
     found = {"dofs": float(model.size), "gradients, first": first, "gradients, again": again}
     for inside, where in ((False, "joints"), (True, "elements")):
         listed = masses(model, changes, inside=inside)
-        taken = seconds(lambda listed=listed: modes_of_changes(model, listed, COUNT), 1)
+        taken = least(lambda listed=listed: modes_of_changes(model, listed, COUNT), 1)
         found[f"{changes} masses at {where}"] = taken / solution
     measurement = exact_measurement(model)
     for name in ("baruch", "berman"):
-        taken = seconds(lambda name=name: update_and_predict(name, model, measurement))
+        taken = least(lambda name=name: update_and_predict(name, model, measurement))
         found[f"{name} and {COUNT} modes"] = taken / solution
     return found
 

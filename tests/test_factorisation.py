@@ -25,7 +25,7 @@ from femubench.core.fem.frame import (
 )
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.sections import round_tube
-from femubench.core.modal import factorisation, sparse_eigen
+from femubench.core.modal import factorisation, sparse_eigen, superlu_pivots
 from femubench.core.modal.eigen import dense_matrices, solve_dense
 from femubench.core.modal.factorisation import LU, Cholesky, cholmod_obstacle
 from femubench.core.modal.sparse_eigen import ShiftedModel, lowest_eigenpairs
@@ -199,6 +199,18 @@ def test_pivots_are_the_diagonal_of_u() -> None:
         matrix = half + half.T + sp.diags_array(random.standard_normal(size))
         factor = splu(sp.csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A")
         np.testing.assert_array_equal(pivots(factor), factor.U.diagonal())
+
+
+def test_pivots_of_another_layout_are_copied(monkeypatch: pytest.MonkeyPatch) -> None:
+    matrix = sp.csc_matrix(np.diag([2.0, -3.0, 4.0]) + 0.5)
+    assert np.iscomplexobj(pivots(splu(matrix.astype(complex))))
+    factor = splu(matrix)
+    for field, value in (("_COLUMNS", 7), ("_LOWEST", 2**62), ("_DOUBLE", 0)):
+        with monkeypatch.context() as other:
+            other.setattr(superlu_pivots, field, value)
+            assert superlu_pivots._supernodes(factor) is None
+            np.testing.assert_array_equal(pivots(factor), factor.U.diagonal())
+    assert superlu_pivots._supernodes(factor) is not None
 
 
 @pytest.mark.parametrize(

@@ -29,6 +29,7 @@ from femubench.core.typing import FloatArray, IntArray, SparseArray
 KNOWN_TO = 1e-5  # relative, of a frequency
 _MOST_STEPS = 4
 _MOST_DOFS = 200  # beyond them one solution of the whole is cheaper
+_MOST_NUMBERS = 10_000_000  # of the answers to forces at these, 80 MB of which every step has two
 _BELOW = 0.1  # the shift, of the first elastic eigenvalue
 _DEPENDENT = 1e-12
 _FREE = 1e-10
@@ -138,6 +139,8 @@ class ManyChanges:
         structure, change = attached
         place = _place(self.model.size, change)
         if not 0 < len(place.old) + place.new <= _MOST_DOFS:
+            return None
+        if len(place.old) * self.model.size > _MOST_NUMBERS:
             return None
         free = self._free_motions(place, structure)
         space = None

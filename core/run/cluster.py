@@ -47,6 +47,7 @@ _COUNTED = 2.0  # s that a count of threads is good for
 _SLURM_JOBS = 10
 _DASHBOARD = "127.0.0.1:0"
 _LEAST_AHEAD = 4  # jobs on their way while nobody works
+_MOST_CASES = 100  # that are kept on the cluster
 
 
 class DaskWorkers:
@@ -158,7 +159,7 @@ class _Flight:
         # What did not come back is tried once more, last and one at a time.
         self._again: set[int] = set()
         self._lonely: list[int] = []
-        self._yardstick: tuple[Start, Future[Yardstick]] | None = None
+        self._yardsticks: dict[Start, Future[Yardstick]] = {}
         self._coming = as_completed(loop=client.loop, with_results=True, raise_errors=False)
 
     def landed(
@@ -195,21 +196,23 @@ class _Flight:
         self._coming.add(future)
 
     def _case(self, start: Start) -> Future[Yardstick]:
-        """Return the case on the cluster, to which it goes once.
+        """Return the case on the cluster, to which it goes once unless there are very many.
 
         It is the result of a task, not scattered data: what a worker takes along as it dies can
-        be made again.
+        be made again. Jobs go seed after seed, so that every case comes up again and again.
         """
         gone = ("error", "cancelled", "lost")
-        known = self._yardstick
-        if known is None or known[0] is not start or known[1].status in gone:
+        known = self._yardsticks.pop(start, None)
+        if known is None or known.status in gone:
             self._number += 1
             pair = start, self._references[start.case.name]
             data = pickle.dumps(pair, protocol=pickle.HIGHEST_PROTOCOL)
             key = f"{self._name}-case-{self._number}"
-            known = start, self._client.submit(pickle.loads, data, key=key, pure=False)
-            self._yardstick = known
-        return known[1]
+            known = self._client.submit(pickle.loads, data, key=key, pure=False)
+        self._yardsticks[start] = known  # the last one used stands last
+        if len(self._yardsticks) > _MOST_CASES:
+            del self._yardsticks[next(iter(self._yardsticks))]
+        return known
 
     def _taken(self, future: Future[Any], found: Any) -> Iterator[tuple[int, JobResult]]:  # noqa: ANN401
         """Yield the result of a job that came back, unless it is tried again."""
@@ -248,7 +251,7 @@ class _Flight:
             self._client.cancel(left, force=True)
         self._coming.clear()
         self._places.clear()
-        self._yardstick = None
+        self._yardsticks.clear()
 
 
 @contextmanager
