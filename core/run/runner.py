@@ -48,16 +48,13 @@ def run_jobs(
 
     Arguments:
         seeds: 0 is the data as recorded, every other one a draw of measurement noise.
-        jobs: number of workers; None for the number of processors.
+        jobs, executor: number of workers, None for that of processors; or what runs the jobs.
         timeout, timeouts: seconds that one job may take, None for no limit; of single strategies.
         memory: bytes that one job may take; None for an even share of the machine's.
-        store: where each result goes as soon as it is there.
-        overwrite: which stored results of the same jobs are computed anew; see `femubench.rank`.
-        resume: go on with the latest stored run of these jobs.
+        store, overwrite, resume: where results go at once, and what of it is computed anew.
         progress: called with (result, jobs done, jobs in all).
         run_seed, request: seed of the run's own statistics, and what was asked for in plain data.
         starts: the nominal models; the cases as given where it is left out.
-        executor: what runs the jobs, as `executor_of` opens it; None for `jobs` workers here.
 
     Raises:
         InputError: for two of one name, no worker, or a run that another process works on.
@@ -73,18 +70,17 @@ def run_jobs(
     share = place.share if memory is None else memory
     limits = {s.name: Limits((timeouts or {}).get(s.name, timeout), share) for s in strategies}
     settings: dict[str, Any] = {"seed": run_seed, "jobs": place.workers, "timeout": timeout}
-    settings |= {"memory": share, "request": dict(request or {})}
     with threadpool_limits(1), ExitStack() as stack:
         references = _references([starts.yardstick(case) for case in cases])
         slots = Slots((one for case in cases for one in starts.of(case)), strategies, seeds)
+        settings |= {"memory": share, "request": dict(request or {})}
         settings["plan"] = plan_digest(slots.keys)
         meta = run_meta(cases, strategies, references, seeds, settings, starts.about(cases))
         slots.meta = meta
         meta, known = recorded(stack, store, meta, overwrite, resume)
         ending = stack.enter_context(ended(store, meta["run"]))
         results = Results(slots, store, meta["run"], progress)
-        wanted = results.keep(known)
-        for one in place.computed(slots, wanted, references, limits, results.shelf):
+        for one in place.computed(slots, results.keep(known), references, limits, results.shelf):
             results.add(*one)
     return Run({**meta, **ending}, rank_results(results.in_order(), meta["reference"]))
 
