@@ -48,16 +48,13 @@ def run_jobs(
 
     Arguments:
         seeds: 0 is the data as recorded, every other one a draw of measurement noise.
-        jobs: number of workers; None for the number of processors.
+        jobs, executor: number of workers, None for that of processors; or what runs the jobs.
         timeout, timeouts: seconds that one job may take, None for no limit; of single strategies.
         memory: bytes that one job may take; None for an even share of the machine's.
-        store: where each result goes as soon as it is there.
-        overwrite: which stored results of the same jobs are computed anew; see `femubench.rank`.
-        resume: go on with the latest stored run of these jobs.
+        store, overwrite, resume: where results go at once, and what of it is computed anew.
         progress: called with (result, jobs done, jobs in all).
         run_seed, request: seed of the run's own statistics, and what was asked for in plain data.
         starts: the nominal models; the cases as given where it is left out.
-        executor: what runs the jobs, as `executor_of` opens it; None for `jobs` workers here.
 
     Raises:
         InputError: for two of one name, no worker, or a run that another process works on.
