@@ -218,11 +218,11 @@ BARS = (
 def page_of(kept: Mapping[str, Any]) -> str:
     """Return what stands between the marks of the page."""
     lines = pd.DataFrame([bar.line(kept) for bar in BARS])
-    parts = ["### What is asked for", lines.to_markdown(index=False, disable_numparse=True)]
+    parts = ["## What is asked for", lines.to_markdown(index=False, disable_numparse=True)]
     for section in SECTIONS:
         if section.word in kept:
             found = kept[section.word]
-            parts += [f"### {section.title}", table(section, found["rows"]), found["machine"]]
+            parts += [f"## {section.title}", table(section, found["rows"]), found["machine"]]
     return "\n\n".join(parts)
 
 

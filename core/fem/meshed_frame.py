@@ -23,10 +23,14 @@ from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 
 def _positions(labels: Sequence[str]) -> dict[str, IntArray]:
-    found: dict[str, list[int]] = {}
-    for i, label in enumerate(labels):
-        found.setdefault(label, []).append(i)
-    return {label: np.array(where, dtype=np.int64) for label, where in found.items()}
+    every = np.arange(len(labels), dtype=np.int64)
+    found = {label: every[i : i + 1] for i, label in enumerate(labels)}
+    if len(found) < len(labels):
+        several: dict[str, list[int]] = {}
+        for i, label in enumerate(labels):
+            several.setdefault(label, []).append(i)
+        found |= {name: np.array(at, dtype=np.int64) for name, at in several.items() if at[1:]}
+    return found
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import pickle
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 from femubench.core.errors import InputError
@@ -14,15 +15,16 @@ from femubench.core.run.answers import AnswerError, head_of
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.judging import Verdict, judged, run_judge, run_strategy
 from femubench.core.run.limits import Limits
-from femubench.core.run.slots import Slot
+from femubench.core.run.slots import Slot, Start
 from femubench.core.run.workers import Ending, Workers
 from femubench.core.schema.records import result_from_json
-from femubench.core.schema.results import JobResult, Nominal, Status
+from femubench.core.schema.results import JobResult, Status
 from femubench.core.score.scoring import Reference
 
 _Task = tuple[int, bytes]  # place of a job, and its answer once it is there to be judged
 Show = Callable[[Slot, Mapping[str, Any]], None]
 _LEAST_JUDGING = 300.0  # s
+_MOST_CASES = 100  # that are kept as the judge reads them
 _ATTEMPTS = 3  # to start a process
 
 
@@ -68,7 +70,7 @@ class _Bench:
     ) -> None:
         self._slots, self._references, self._limits = slots, references, limits
         self._show, self._shown = show, min((slot.seed for slot in slots), default=0)
-        self._cases: dict[tuple[str, Nominal], bytes] = {}
+        self._case = lru_cache(_MOST_CASES)(self._pickled)
         self._attempts = Counter[int]()
         self._alone: set[int] = set()
         self.waiting: deque[_Task] = deque()
@@ -92,7 +94,7 @@ class _Bench:
         if answer:
             shown = self._show is not None and slot.seed == self._shown and not slot.varied
             names = slot.strategy, slot.seed, slot.nominal
-            verdict = Verdict(self._case(slot), answer, *names, exhibited=shown)
+            verdict = Verdict(self._case(slot.start), answer, *names, exhibited=shown)
             ending = workers.start(task, run_judge, verdict, self._judging(slot.strategy))
         else:
             ending = workers.start(task, run_strategy, job, self._limits[slot.strategy])
@@ -143,12 +145,9 @@ class _Bench:
             self._show(slot, data["exhibit"])
         return result
 
-    def _case(self, slot: Slot) -> bytes:
-        start = slot.case.name, slot.nominal
-        if start not in self._cases:
-            pair = (slot.case, self._references[slot.case.name])
-            self._cases[start] = pickle.dumps(pair, protocol=pickle.HIGHEST_PROTOCOL)
-        return self._cases[start]
+    def _pickled(self, start: Start) -> bytes:
+        pair = start.case, self._references[start.case.name]
+        return pickle.dumps(pair, protocol=pickle.HIGHEST_PROTOCOL)
 
     def _judging(self, strategy: str) -> Limits:
         limits = self._limits[strategy]

@@ -96,7 +96,8 @@ class Slot:
         return {**found, **self.case.conditions(self.seed)}
 
 
-@lru_cache(maxsize=2)
+# Jobs go seed after seed, so that every case comes up again and again.
+@lru_cache(maxsize=100)
 def _model(start: Start) -> bytes | JobOutcome:
     return _pickled(start.case.model)
 

@@ -224,11 +224,12 @@ class Store:
         Raises:
             InputError: when a file cannot be read.
         """
-        old, own = self.folder / OLD_FILE, self.folder / f"{run_id}{_SUFFIX}"
+        old = self.folder / OLD_FILE
         if old.exists():
             yield from (r for r in records_of(old, faults) if r.run == run_id)
-        if own.exists() and own != old:
-            yield from records_of(own, faults)
+        # What an earlier version called a run may be no name of a file.
+        if _RUN_ID.fullmatch(run_id) and self.file_of(run_id).exists():
+            yield from records_of(self.file_of(run_id), faults)
 
     def _begun(self, faults: list[InputError]) -> dict[str, dict[str, Any] | None]:
         """Return the meta data with which all runs began, oldest first; None where it is lost."""

@@ -50,7 +50,8 @@ def faults_of(store: Store) -> list[InputError]:
         for record in _chained(file, found):
             try:
                 if record.kind == "result":
-                    _ = record.result().history
+                    result = record.result()
+                    _ = result.history, [block.modes for block in result.blocks.values()]
                 else:
                     record.meta()
             except InputError as fault:

@@ -246,10 +246,13 @@ def compare_runs(
         notes=tuple(dict.fromkeys((*_notes(before), *_notes(after)))),
         thresholds=tuple(thresholds),
         excesses=tuple(_excesses(rows, thresholds)),
-        untested=tuple(
-            t.metric for t in thresholds if all(row.values[t.metric] is None for row in rows)
-        ),
+        untested=_untested(rows, thresholds),
     )
+
+
+def _untested(rows: Sequence[Row], thresholds: Iterable[Threshold]) -> tuple[str, ...]:
+    told = (t.metric for t in thresholds if all(row.values[t.metric] is None for row in rows))
+    return tuple(told)
 
 
 def _notes(run: Run) -> list[str]:
