@@ -56,6 +56,22 @@ class InputError(FemubenchError):
         return _input_error, (self.what, self.file, self.line, self.key, self.expected)
 
 
+class OutputError(FemubenchError):
+    """Tell in one line which file could not be written, and why.
+
+    Arguments:
+        file: the file.
+        error: of the system.
+    """
+
+    def __init__(self, file: Path | str, error: OSError) -> None:
+        self.file, self.error = file, error
+        super().__init__(harmless(f"{file}: cannot be written: {error.strerror or error}"))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return OutputError, (self.file, self.error)
+
+
 class UnknownNameError(InputError, KeyError):
     """A name that is not there, with the near matches; a KeyError to who looks it up."""
 

@@ -11,7 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from femubench.core.errors import InputError
+from femubench.core.errors import InputError, OutputError
 
 MIB = 2**20
 
@@ -85,6 +85,19 @@ def read_text(path: Path, largest: int) -> str:
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
+def resolved(path: Path) -> Path:
+    """Return the path without links.
+
+    Raises:
+        InputError: where links lead round in a circle.
+    """
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError) as error:  # the latter before Python 3.13
+        what = "is a link that leads back to itself"
+        raise InputError(what, file=path, expected="a file or a folder") from error
+
+
 def unreadable(path: Path, error: OSError | ValueError) -> InputError:
     """Return the error of a file that the system does not hand out."""
     why = error.strerror if isinstance(error, OSError) else str(error)
@@ -127,9 +140,21 @@ def limited_memory(most: int) -> Iterator[None]:
 
 
 def write_atomically(path: Path, content: str | bytes) -> None:
-    """Write bytes, or a text with a final newline; a reader sees the old file or the new."""
+    """Write bytes, or a text with a final newline; a reader sees the old file or the new.
+
+    Raises:
+        OutputError: where that fails; then the old file is as it was.
+    """
     if isinstance(content, str):
         content = (content.rstrip("\n") + "\n").encode()
+    try:
+        _write_beside(path, content)
+    except OSError as error:
+        raise OutputError(path, error) from error
+
+
+def _write_beside(path: Path, content: bytes) -> None:
+    """Write a file under another name, then give it its own."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     part = Path(name)
     try:

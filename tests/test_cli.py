@@ -543,12 +543,17 @@ class TestRun:
             deadline = time.monotonic() + 60.0
             while not store.files and time.monotonic() < deadline:
                 time.sleep(0.05)
-            time.sleep(0.5)
-            process.send_signal(signal.SIGINT)
+            for _ in range(2):
+                time.sleep(0.5)
+                process.send_signal(signal.SIGINT)
             # ends only when the workers, who hold the pipes too, are gone
             _, error = process.communicate(timeout=60.0)
         assert process.returncode == 130
-        assert error.strip() == "bench: interrupted"
+        assert error.strip().splitlines() == [
+            "bench: finishing the jobs that are running; Ctrl-C once more stops them",
+            "bench: interrupted",
+            "bench: 0 of 1 jobs are done; to go on: bench run case -s test-sleeps -j 1 --resume",
+        ]
 
 
 class TestPluginsAndScenarios:

@@ -1,6 +1,6 @@
 """The command ``bench``: finds the verb, imports it alone, and turns errors into exit codes.
 
-Exit codes: 0 done, 1 some run failed, 2 wrong input, 130 interrupted.
+Exit codes: 0 done, 1 some run failed, 2 wrong input, 3 a run ended before its end, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from typing import Any, NoReturn
 import click
 from click.shell_completion import CompletionItem
 
+from femubench.core.cli.ending import INTERRUPTED, remember
 from femubench.core.errors import FemubenchError, InputError, PluginError
 from femubench.core.version import __version__
 
-DONE, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
+DONE, FAILED, WRONG_INPUT = 0, 1, 2
 
 # verb: the module that holds a click command of the same name, and its help in one line. The line
 # stands here so that `bench --help` imports none of them.
@@ -65,6 +66,11 @@ VERBS = {
 
 class Bench(click.Group):
     """A group of lazily imported verbs with the exit codes of `bench`."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Take the words, which tell how to go on with a run that ends early."""
+        remember(ctx, args)
+        return super().parse_args(ctx, args)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the verbs in the order in which one meets them."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from femubench.core.errors import InputError, PluginError
+from femubench.core.errors import InputError, OutputError, PluginError
 from femubench.core.files import write_atomically
 
 if TYPE_CHECKING:
@@ -35,15 +35,25 @@ def outputs_of(
 def finish(
     run: Run, exhibits: object, outputs: dict[Path, Reporter], screen: Reporter | None
 ) -> None:
-    """Write the files, then show the ranking and where the files are."""
+    """Write the files, then show the ranking and where the files are.
+
+    A file that cannot be written keeps nobody from the ranking and the other files.
+
+    Raises:
+        OutputError: for the last such file, when all else is done.
+        PluginError: for the last reporter that failed.
+    """
     from femubench.core.library.report import rendered, text_of
 
-    written, broken = [], None
+    written: list[str] = []
+    broken: OutputError | PluginError | None = None
     for path, writer in outputs.items():
         try:
             write_atomically(path, rendered(writer, run, exhibits))
             written.append(f"{writer.name}: {path}")
-        except PluginError as fault:
+        except (OutputError, PluginError) as fault:
+            if broken is not None:
+                click.echo(f"bench: {broken}", err=True)
             broken = fault
     if screen is not None:
         click.echo("\n".join(["", text_of(screen, rendered(screen, run)), *written]))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from femubench.core.cli import options
+from femubench.core.cli.ending import telling
 from femubench.core.cli.outputs import finish, outputs_of
 from femubench.core.cli.progress import progress_bar
 from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of
@@ -124,7 +125,11 @@ def run(
     kept = store_in(store)
     old = None if locked is None else kept.load(locked)
     plan = _plan(ctx, plugins, kept) if old is None else repeated(request_of(old), plugins)
-    with executor_of(jobs, scheduler, cluster) as executor:
+    screen = None if quiet else reporter(plugins, "terminal")
+    with (
+        telling(kept, plan.jobs, screen, *_going_on(ctx)),
+        executor_of(jobs, scheduler, cluster) as executor,
+    ):
         if not quiet:
             click.echo(wrapped(_header(plan, executor.spoken), hanging=2))
         with progress_bar(quiet=quiet) as progress:
@@ -138,7 +143,6 @@ def run(
     if report_file is None:
         for writer in (reporter(plugins, name) for name in ("html", "markdown")):
             outputs[kept.folder / f"{run_name(outcome)}{writer.suffix}"] = writer
-    screen = None if quiet else reporter(plugins, "terminal")
     finish(outcome, kept.exhibits, outputs, screen)
     if old is not None:
         return _compare(old, outcome)
@@ -155,6 +159,15 @@ def _checked(ctx: click.Context, cases: Iterable[str], strategies: Iterable[str]
     if ctx.params["locked"] is not None:
         _check_locked(ctx)
     return plugins
+
+
+def _going_on(ctx: click.Context) -> tuple[Sequence[str], Sequence[str]]:
+    """Return the words that make the same command go on with its run, and those that do not."""
+    if ctx.params["locked"] is not None:
+        return (), ()
+    # `bench run --resume` alone goes on with the last run, as that was asked for.
+    alone = not ctx.params["cases"] and not ctx.params["strategies"]
+    return ("--resume",), ("--overwrite", *(("--seeds", "--seed", "--nominal") if alone else ()))
 
 
 def _given(ctx: click.Context, name: str) -> Any:  # noqa: ANN401 - of any option

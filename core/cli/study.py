@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from femubench.core.cli import options
+from femubench.core.cli.ending import telling
 from femubench.core.cli.outputs import finish, outputs_of
 from femubench.core.cli.progress import progress_bar
 from femubench.core.cli.quantities import bytes_of, timeouts_of
@@ -92,7 +93,8 @@ def study(
         click.echo("\n".join(_forecast(plan, kept, worker_count(jobs))))
         return 0
     limits = dict(timeouts)
-    with executor_of(jobs, scheduler, cluster) as executor:
+    screen = None if quiet else reporter(plugins, "terminal")
+    with telling(kept, plan.jobs, screen), executor_of(jobs, scheduler, cluster) as executor:
         if not quiet:
             click.echo(wrapped(f"{_title(plan)}, {executor.spoken}", hanging=2))
         with progress_bar(quiet=quiet) as progress:
@@ -108,7 +110,7 @@ def study(
     if report_file is None:
         for writer in (reporter(plugins, name) for name in ("html", "markdown")):
             outputs[kept.folder / f"{run_name(found)}{writer.suffix}"] = writer
-    finish(found, None, outputs, None if quiet else reporter(plugins, "terminal"))
+    finish(found, None, outputs, screen)
     return int(any(result.status not in DONE for result in found.results))
 
 

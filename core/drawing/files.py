@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from femubench.core.drawing.wireframe import Wireframe, adapter, check_same
-from femubench.core.errors import InputError
+from femubench.core.errors import InputError, OutputError
 from femubench.core.files import read_bytes, write_atomically
 from femubench.core.schema.records import parse_json
 from femubench.core.schema.sealing import TAIL, is_whole, sealed, sum_of
@@ -183,7 +183,7 @@ class Exhibits:
         if path is None or path.exists():
             return
         # Pictures are worth no failed run: a full disk is told by the results.
-        with suppress(OSError, ValueError):
+        with suppress(OSError, OutputError, ValueError):
             plain = {"schema": _SCHEMA, **data}
             text = json.dumps(plain, allow_nan=False, separators=(",", ":"))
             if len(text) > MOST_BYTES - TAIL:

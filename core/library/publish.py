@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from femubench.core.files import check_can_make
+from femubench.core.files import check_can_make, resolved
 from femubench.core.library.cases import listed
 from femubench.core.publish.publishing import Published, publish as merge
 from femubench.core.schema.records import run_to_json
@@ -34,7 +34,7 @@ def publish(
     """
     from femubench.reports.publish_page import pages_of
 
-    check_can_make(Path(folder).resolve().parent)
+    check_can_make(resolved(Path(folder)).parent)
     with TemporaryDirectory() as scratch:
         files = []
         for number, run in enumerate(listed(runs)):

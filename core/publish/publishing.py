@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from femubench.core.errors import InputError
-from femubench.core.files import MIB, read_text
+from femubench.core.errors import InputError, OutputError
+from femubench.core.files import MIB, read_text, resolved
 from femubench.core.publish.board import index_of
 from femubench.core.publish.submissions import SCHEMA, Submission, read_submission
 from femubench.core.schema.records import parse_json
@@ -51,8 +51,9 @@ def publish(folder: Path, files: Sequence[Path], render: Render) -> Published:
 
     Raises:
         InputError: for a file that is not sound, or a folder with something else in it.
+        OutputError: where the site cannot be written; then it is as it was.
     """
-    folder = folder.resolve()
+    folder = resolved(folder)
     old = _published(folder)
     merged = _merged([*old, *(read_submission(file) for file in files)])
     index = index_of(merged)
@@ -62,7 +63,10 @@ def publish(folder: Path, files: Sequence[Path], render: Render) -> Published:
         "index.json": json.dumps(index, indent=1, sort_keys=True, allow_nan=False) + "\n",
         MARKER: json.dumps({"kind": KIND, "schema": SCHEMA}) + "\n",
     }
-    _replace(folder, pages)
+    try:
+        _replace(folder, pages)
+    except OSError as error:
+        raise OutputError(folder, error) from error
     known = {item.name for item in old}
     return Published(tuple(item.name for item in merged if item.name not in known), index)
 

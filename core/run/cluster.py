@@ -10,7 +10,7 @@ import shutil
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import partial
 from itertools import islice
@@ -102,7 +102,7 @@ class DaskWorkers:
     def computed(
         self,
         slots: Sequence[Slot],
-        wanted: Sequence[int],
+        wanted: Iterable[int],
         references: Mapping[str, Reference],
         limits: Mapping[str, Limits],
         show: Show | None = None,
@@ -163,7 +163,7 @@ class _Flight:
         self._coming = as_completed(loop=client.loop, with_results=True, raise_errors=False)
 
     def landed(
-        self, wanted: Sequence[int], capacity: Callable[[], int]
+        self, wanted: Iterable[int], capacity: Callable[[], int]
     ) -> Iterator[tuple[int, JobResult]]:
         """Yield results as they arrive; a job is made when there is room for it on the way."""
         waiting = iter(wanted)

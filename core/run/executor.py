@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
@@ -43,7 +43,7 @@ class Executor(Protocol):
     def computed(
         self,
         slots: Sequence[Slot],
-        wanted: Sequence[int],
+        wanted: Iterable[int],
         references: Mapping[str, Reference],
         limits: Mapping[str, Limits],
         show: Show | None = None,
@@ -51,6 +51,7 @@ class Executor(Protocol):
         """Yield the result of every wanted slot as it comes.
 
         Arguments:
+            wanted: places of slots; the next is asked for when there is room for it.
             limits: by strategy.
             show: takes the exhibit of a job of the first seed, before its result comes.
         """
@@ -82,7 +83,7 @@ class LocalProcesses:
     def computed(
         self,
         slots: Sequence[Slot],
-        wanted: Sequence[int],
+        wanted: Iterable[int],
         references: Mapping[str, Reference],
         limits: Mapping[str, Limits],
         show: Show | None = None,

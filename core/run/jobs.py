@@ -21,6 +21,9 @@ from femubench.core.roles import CAPABILITIES, Result, Strategy, declared
 from femubench.core.schema.results import Status
 from femubench.core.update.uncertainty import MOST_SAMPLES
 
+_LONGEST_TEXT = 100_000  # characters of a message or a traceback
+_MOST_LINKS = 20  # of a chain of exceptions
+
 
 @dataclass(frozen=True)
 class Job:
@@ -127,7 +130,7 @@ def execute(job: Job) -> JobOutcome:
         strategy, model, measurement = map(pickle.loads, parts)
         reason = missing_capability(frozenset(declared(strategy, "needs")), model, measurement)
     except Exception as error:
-        return JobOutcome("failed", one_line(error), traceback.format_exc())
+        return JobOutcome("failed", one_line(error), _traceback(error))
     if reason is not None:
         return JobOutcome("not-applicable", reason)
     rng = np.random.default_rng(np.random.SeedSequence(job.words))
@@ -143,11 +146,29 @@ def execute(job: Job) -> JobOutcome:
 
 def one_line(error: BaseException) -> str:
     """Return ``ExceptionType: message`` in one line, whatever the exception's own text does."""
-    try:
-        text = " ".join(str(error).split())
-    except Exception:
-        text = ""
+    text = _text(error)
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def _text(error: BaseException) -> str:
+    """Return the beginning of an exception's own text in one line; nothing where it has none."""
+    try:
+        return " ".join(str(error)[:_LONGEST_TEXT].split())
+    except BaseException:  # Ctrl-C does not reach a worker: this is the strategy's own
+        return ""
+
+
+def _traceback(error: BaseException | None) -> str:
+    """Return the end of an exception's traceback and of those that it came from.
+
+    That of the standard library takes a minute for a message of some hundred megabytes.
+    """
+    parts: list[str] = []
+    while error is not None and len(parts) < _MOST_LINKS:
+        lines = traceback.format_tb(error.__traceback__)
+        parts.append(f"Traceback (most recent call last):\n{''.join(lines)}{one_line(error)}\n")
+        error = error.__cause__ or (None if error.__suppress_context__ else error.__context__)
+    return "\n".join(reversed(parts))[-_LONGEST_TEXT:]
 
 
 def _attempt(
@@ -161,10 +182,10 @@ def _attempt(
             status = "diverged" if isinstance(error, Diverged) else "not-applicable"
         reason = one_line(error)
         if isinstance(error, NotApplicable | StrategyFailure):
-            reason = " ".join(str(error).split()) or type(error).__name__
+            reason = _text(error) or type(error).__name__
         elif isinstance(error, MemoryError):
             reason = f"out of memory: {reason}"
-        return JobOutcome(status, reason, traceback.format_exc())
+        return JobOutcome(status, reason, _traceback(error))
 
 
 def _plain(result: Result) -> JobOutcome:

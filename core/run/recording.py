@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any, Literal
 
 from femubench.core.drawing.prediction import keep_drawings
+from femubench.core.errors import InputError
 from femubench.core.run.schedule import Show
 from femubench.core.run.slots import Slot
 from femubench.core.run.store import Store
@@ -130,10 +131,17 @@ def recorded(
 def ended(store: Store | None, run: str) -> Iterator[dict[str, Any]]:
     """Record the end of a run, also of one that is interrupted."""
     ending: dict[str, Any] = {"interrupted": True}
-    try:
-        yield ending
-        ending["interrupted"] = False
-    finally:
+
+    def record() -> None:
         ending["finished"] = datetime.now(UTC).isoformat(timespec="seconds")
         if store is not None:
             store.end(run, ending)
+
+    try:
+        yield ending
+    except BaseException:
+        with suppress(InputError):  # why the run ends is to be told, not what follows from it
+            record()
+        raise
+    ending["interrupted"] = False
+    record()

@@ -17,6 +17,7 @@ from femubench.core.run.provenance import plan_digest, run_meta
 from femubench.core.run.recording import Overwrite, Progress, Results, ended, recorded
 from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Starts
+from femubench.core.run.stopping import stopping
 from femubench.core.run.store import Store
 from femubench.core.schema.results import Run
 from femubench.core.score.scoring import Reference, rank_results, reference_of
@@ -44,7 +45,8 @@ def run_jobs(
 ) -> Run:
     """Run every strategy on every case with every seed, each job in a process of its own.
 
-    What a strategy returns is judged in another process. On Ctrl-C what is done stays in the store.
+    What a strategy returns is judged in another process. Ctrl-C lets the jobs that run come to
+    their end, once more stops them; what is done stays in the store.
 
     Arguments:
         seeds: 0 is the data as recorded, every other one a draw of measurement noise.
@@ -77,7 +79,8 @@ def run_jobs(
         meta, known = recorded(stack, store, slots.meta, overwrite, resume)
         ending = stack.enter_context(ended(store, meta["run"]))
         results = Results(slots, store, meta["run"], progress)
-        for one in place.computed(slots, results.keep(known), references, limits, results.shelf):
+        wanted = stack.enter_context(stopping()).until(results.keep(known))
+        for one in place.computed(slots, wanted, references, limits, results.shelf):
             results.add(*one)
     return Run({**meta, **ending}, rank_results(results.in_order(), meta["reference"]))
 

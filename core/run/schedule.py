@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import pickle
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from itertools import islice
 from typing import Any
 
 from femubench.core.errors import InputError
@@ -30,7 +31,7 @@ _ATTEMPTS = 3  # to start a process
 
 def computed(
     slots: Sequence[Slot],
-    wanted: Sequence[int],
+    wanted: Iterable[int],
     references: Mapping[str, Reference],
     limits: Mapping[str, Limits],
     count: int,
@@ -40,20 +41,23 @@ def computed(
     """Yield the result of every wanted slot as it comes, from processes of this machine.
 
     Arguments:
+        wanted: places of slots; the next is asked for when there is a process for it.
         count: number of processes.
         show: takes the exhibit of a job of the first seed, before its result comes.
         pulse: called twice a second and more; what it raises ends the jobs that run.
     """
 
-    bench = _Bench(slots, references, limits, show)
-    bench.waiting.extend((index, b"") for index in wanted)
-    if not bench.waiting:
+    bench = _Bench(slots, references, limits, show, iter(wanted))
+    workers = Workers[_Task](count)
+    if not bench.has_work(workers):
         return
-    with Workers[_Task](count).open() as workers:
-        while bench.waiting or bench.answers or bench.lonely or workers.busy:
+    with workers.open():
+        while True:
             pulse()
             while workers.free and bench.has_work(workers):
                 yield from bench.start(workers)
+            if not workers.busy:
+                return
             for task, ending in workers.wait():
                 yield from bench.taken(task, ending)
 
@@ -67,7 +71,9 @@ class _Bench:
         references: Mapping[str, Reference],
         limits: Mapping[str, Limits],
         show: Show | None,
+        wanted: Iterator[int] = iter(()),  # noqa: B008 - nothing is taken from it
     ) -> None:
+        self._wanted = wanted
         self._slots, self._references, self._limits = slots, references, limits
         self._show, self._shown = show, min((slot.seed for slot in slots), default=0)
         self._case = lru_cache(_MOST_CASES)(self._pickled)
@@ -80,6 +86,8 @@ class _Bench:
 
     def has_work(self, workers: Workers[_Task]) -> bool:
         """Tell whether there is something to start now."""
+        if not (self.waiting or self.answers):
+            self.waiting.extend((index, b"") for index in islice(self._wanted, 1))
         return bool(self.waiting or self.answers or (self.lonely and not workers.busy))
 
     def start(self, workers: Workers[_Task]) -> Iterator[tuple[int, JobResult]]:

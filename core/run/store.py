@@ -72,11 +72,15 @@ class Store:
 
     Arguments:
         folder: created with the first record.
+
+    Attributes:
+        working_on: the run that this process began or resumed last.
     """
 
     def __init__(self, folder: Path | str) -> None:
         self.folder = Path(folder)
         self._syncing = Syncing()
+        self.working_on: str | None = None
 
     def file_of(self, run_id: str) -> Path:
         """Return the file that holds the records of a run.
@@ -208,6 +212,7 @@ class Store:
         except OSError as error:
             what = f"cannot be written: {error.strerror}"
             raise InputError(what, file=self.folder, expected="a folder of yours") from error
+        self.working_on = run_id
         try:
             yield
         finally:
