@@ -146,6 +146,11 @@ class Case(Shown):
         """Return the modes of the structure as it was that a diagnosis is given."""
         return None if self.reference is None else self.reference.select(self.reference_used)
 
+    @property
+    def drawn_as(self) -> str:
+        """Return the name that goes into the random numbers of its jobs."""
+        return self.name
+
     def used_measurement(self, seed: int = 0) -> Measurement:
         """Return what a strategy may know: the used modes, noise added for a seed other than 0.
 
@@ -154,7 +159,7 @@ class Case(Shown):
         used = self.measurement.select(self.used)
         if seed == 0:
             return used
-        words = [seed, *self.name.encode()]
+        words = [seed, *self.drawn_as.encode()]
         return used.with_noise(np.random.default_rng(np.random.SeedSequence(words)))
 
     def conditions(self, seed: int) -> Mapping[str, float | str]:

@@ -75,7 +75,7 @@ class Slot:
         for part in parts:
             if isinstance(part, JobOutcome):
                 return part
-        words = seed_words(self.case.name, self.strategy, self.seed)
+        words = seed_words(self.case.drawn_as, self.strategy, self.seed)
         return Job(*parts, words)  # type: ignore[arg-type]
 
     @property

@@ -1,0 +1,248 @@
+"""Similar structures: all lengths, moduli and densities times a factor each, in linear elasticity.
+
+Frequencies go with sqrt(modulus / density) / length, shapes stay at the moved sensors, rotations go
+with 1 / length. This is exact for every linear elastic structure, solid or frame, so that what was
+computed for one of them is the truth of all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench.core.case.case import Case, Modification
+from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.errors import NotApplicable
+from femubench.core.fem.frame import (
+    Brace,
+    Eccentricity,
+    Frame,
+    GroundSpring,
+    Joint,
+    JointSpring,
+    Material,
+    Oscillator,
+    PointMass,
+    Preload,
+    RigidEnd,
+    Vector,
+)
+from femubench.core.fem.model import Dofs, Model
+from femubench.core.fem.sections import Section
+from femubench.core.fem.sensors import DIRECTIONS, Sensors
+from femubench.core.modal.measurement import Measurement
+from femubench.core.typing import FloatArray, SparseArray
+
+LENGTHS, MODULI = (0.7, 1.4), (0.6, 1.6)  # between which factors are drawn; densities as moduli
+_LEAST_SHIFT = 1.1  # of the frequencies, up or down: who knows them must not find them again
+
+
+@dataclass(frozen=True)
+class Similarity:
+    """Factors from a structure to a similar one.
+
+    Arguments:
+        length: of all coordinates, sizes of sections, arms and offsets.
+        modulus: of Young's moduli; Poisson's ratios stay.
+        density: of all densities.
+    """
+
+    length: float
+    modulus: float
+    density: float
+
+    @classmethod
+    def drawn(cls, rng: np.random.Generator) -> Similarity:
+        """Return factors, log-uniform, that move the frequencies by a tenth at least."""
+        while True:
+            found = cls(*(_drawn(rng, *limits) for limits in (LENGTHS, MODULI, MODULI)))
+            if abs(np.log(found.frequency)) >= np.log(_LEAST_SHIFT):
+                return found
+
+    @property
+    def frequency(self) -> float:
+        """Return the factor of all natural frequencies."""
+        return float(np.sqrt(self.modulus / self.density) / self.length)
+
+    @property
+    def mass(self) -> float:
+        """Return the factor of all masses."""
+        return self.density * self.length**3
+
+    @property
+    def force(self) -> float:
+        """Return the factor of all forces."""
+        return self.modulus * self.length**2
+
+    def stiffness(self, direction: str) -> float:
+        """Return the factor of a spring: N/m, or N m/rad for a rotation."""
+        return self.modulus * self.length ** (3 if "r" in direction else 1)
+
+    def moved(self, xyz: Vector) -> Vector:
+        """Return a point or a vector between points, m."""
+        x, y, z = (self.length * value for value in xyz)
+        return x, y, z
+
+
+def _drawn(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def similar_case(case: Case, by: Similarity) -> Case:
+    """Return the case of a similar structure: model, modes, and changes.
+
+    Gravity does not scale by itself: the multiple of the own weight that acts on the stiffness goes
+    with modulus / (density length), so that weight / stiffness is what it was.
+
+    Raises:
+        NotApplicable: for a model that is neither a frame nor matrices with their nodes.
+    """
+    measured, reference, low_high = case.measurement, case.reference, case.band
+    changes = tuple(_modification(change, by) for change in case.modifications)
+    return replace(
+        case,
+        model=_model(case.model, by),
+        measurement=_measurement(measured, by),
+        modifications=changes,
+        reference=None if reference is None else _measurement(reference, by),
+        band=None if low_high is None else (by.frequency * low_high[0], by.frequency * low_high[1]),
+        # What is drawn of a test, and told of its files, is of the structure that it was.
+        notes=(),
+        matches=(),
+        lines=None,
+        frfs=None,
+    )
+
+
+def _measurement(measured: Measurement, by: Similarity) -> Measurement:
+    """Return the modes of the similar structure, with the same relative deviations."""
+    sensors, f = measured.sensors, by.frequency
+    per_rotation = np.abs(sensors.axes[:, 3:]).sum(axis=1) > 0.0
+    readings = np.where(per_rotation, 1.0 / by.length, 1.0)[:, None]
+    weight = measured.total_mass
+    return replace(
+        measured,
+        sensors=Sensors(sensors.labels, by.length * sensors.xyz, sensors.directions),
+        frequencies=f * measured.frequencies,
+        frequency_std=f * measured.frequency_std,
+        shapes=readings * measured.shapes,
+        shape_std=readings * measured.shape_std,
+        total_mass=None if weight is None else (by.mass * weight[0], by.mass * weight[1]),
+    )
+
+
+def _modification(change: Modification, by: Similarity) -> Modification:
+    return replace(
+        change,
+        masses=tuple(_point_mass(mass, by) for mass in change.masses),
+        springs=tuple(_ground_spring(spring, by) for spring in change.springs),
+        measurement=_measurement(change.measurement, by),
+    )
+
+
+def _model(model: Model, by: Similarity) -> Model:
+    if model.structure is not None:
+        return Model.of(similar_frame(model.structure.frame, by))
+    if not isinstance(model.geometry, MatrixGeometry):
+        raise NotApplicable("a model without elements and without nodes has no similar one")
+    dofs = replace(model.dofs, xyz=by.length * model.dofs.xyz)
+    mass, stiffness = matrix_factors(dofs, by)
+
+    def parts(named: Mapping[str, SparseArray], factor: SparseArray) -> dict[str, SparseArray]:
+        return {name: _scaled(part, factor) for name, part in named.items()}
+
+    return replace(
+        model,
+        mass=_scaled(model.mass, mass),
+        stiffness=_scaled(model.stiffness, stiffness),
+        groups=parts(model.groups, stiffness),
+        mass_groups=parts(model.mass_groups, mass),
+        dofs=dofs,
+        geometry=replace(model.geometry, dofs=dofs),
+    )
+
+
+def matrix_factors(dofs: Dofs, by: Similarity) -> tuple[SparseArray, SparseArray]:
+    """Return diagonal matrices by which mass and stiffness go from both sides, (n, n) each.
+
+    Arguments:
+        dofs: a rotation bears one length more than a translation.
+        by: the similarity.
+    """
+    turns = np.abs(dofs.motions[:, 3:]).sum(axis=1) > 0.0
+    arms = np.where(turns, by.length, 1.0)
+    roots = np.sqrt(by.mass), np.sqrt(by.stiffness(DIRECTIONS[0]))
+    mass, stiffness = (sp.diags_array(root * arms, format="csr") for root in roots)
+    return mass, stiffness
+
+
+def _scaled(matrix: SparseArray, factor: SparseArray) -> SparseArray:
+    found: SparseArray = (factor @ matrix @ factor).asformat(matrix.format)
+    return found
+
+
+def similar_frame(frame: Frame, by: Similarity) -> Frame:
+    """Return the frame of the similar structure; what is no length, modulus or density stays."""
+    sections = {id(m.section): _section(m.section, by.length) for m in frame.members}
+    changed: dict[str, Any] = {
+        "joints": [Joint(j.name, by.moved(j.xyz), j.type) for j in frame.joints],
+        "members": [
+            replace(m, section=sections[id(m.section)], material=_material(m.material, by))
+            for m in frame.members
+        ],
+        "masses": [_point_mass(mass, by) for mass in frame.masses],
+        "springs": [_ground_spring(spring, by) for spring in frame.springs],
+        "joint_springs": [_joint_spring(spring, by) for spring in frame.joint_springs],
+        "rigid_ends": [_rigid_end(end, by.length) for end in frame.rigid_ends],
+        "preloads": [Preload(p.member, by.force * p.force) for p in frame.preloads],
+        "eccentricities": [
+            Eccentricity(e.member, by.length * e.y, by.length * e.z) for e in frame.eccentricities
+        ],
+        "braces": [
+            Brace(b.ends, by.stiffness("x") * b.stiffness, b.direction) for b in frame.braces
+        ],
+        "oscillators": [_oscillator(item, by) for item in frame.oscillators],
+    }
+    gravity = frame.gravity * by.modulus / (by.density * by.length)
+    return replace(
+        frame, gravity=gravity, **{name: tuple(items) for name, items in changed.items()}
+    )
+
+
+def _section(section: Section, length: float) -> Section:
+    fourth = {name: length**4 * getattr(section, name) for name in ("Iy", "Iz", "J", "Jp")}
+    sizes = {
+        name: None if size is None else length * size
+        for name, size in (("width", section.width), ("height", section.height))
+    }
+    return replace(section, A=length**2 * section.A, **fourth, **sizes)
+
+
+def _material(material: Material, by: Similarity) -> Material:
+    return replace(material, E=by.modulus * material.E, rho=by.density * material.rho)
+
+
+def _point_mass(mass: PointMass, by: Similarity) -> PointMass:
+    return PointMass(mass.at, by.mass * mass.mass, by.moved(mass.offset))
+
+
+def _ground_spring(spring: GroundSpring, by: Similarity) -> GroundSpring:
+    return replace(spring, stiffness=by.stiffness(spring.direction) * spring.stiffness)
+
+
+def _joint_spring(spring: JointSpring, by: Similarity) -> JointSpring:
+    stiffness = {name: by.stiffness(name) * value for name, value in spring.stiffness.items()}
+    return replace(spring, stiffness=stiffness, arm=by.length * spring.arm)
+
+
+def _rigid_end(end: RigidEnd, length: float) -> RigidEnd:
+    lengths = length * end.stiffness_length, length * end.mass_length
+    return RigidEnd(end.joint, end.member, *lengths)
+
+
+def _oscillator(item: Oscillator, by: Similarity) -> Oscillator:
+    return replace(item, mass=by.mass * item.mass, frequency=by.frequency * item.frequency)

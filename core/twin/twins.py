@@ -1,0 +1,149 @@
+"""Twins of cases, drawn when a run begins: what a strategy knows by heart is of no use on them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Protocol
+
+import numpy as np
+
+from femubench.core.case.case import Case
+from femubench.core.errors import NotApplicable
+from femubench.core.twin.disguise import disguised
+from femubench.core.twin.similarity import Similarity, similar_case
+
+MARK = "~"  # between the name of a case and the number of its twin
+AGAIN = f"{MARK}again"
+
+
+class TruthFamily(Protocol):
+    """What knows the truth of other structures than that of a case.
+
+    Similar structures are one family. Another one is of structures whose geometry or sections vary,
+    with frequencies and shapes between those of solid models that were solved beforehand.
+    """
+
+    def variant(self, case: Case, rng: np.random.Generator) -> Case:
+        """Return a case with another nominal model, and with what is measured on that structure.
+
+        Arguments:
+            case: name, used modes and modifications are kept.
+            rng: draws the structure.
+
+        Raises:
+            NotApplicable: where the family has no structure like that of the case.
+        """
+        ...
+
+
+class SimilarStructures:
+    """The family of similar structures, which every linear elastic case has."""
+
+    def variant(self, case: Case, rng: np.random.Generator) -> Case:
+        """Return the case of a similar structure."""
+        return similar_case(case, Similarity.drawn(rng))
+
+
+SIMILAR: tuple[TruthFamily, ...] = (SimilarStructures(),)
+
+
+@dataclass(frozen=True, repr=False)
+class Twin(Case):
+    """A case of another structure of which the truth follows from that of a case.
+
+    Arguments:
+        origin: name of the case that it is a twin of.
+        twin_seed: from which it was drawn; noise too is drawn with it.
+    """
+
+    origin: str = ""
+    twin_seed: int = 0
+
+    @property
+    def drawn_as(self) -> str:
+        """Return the name that goes into the random numbers: nobody knows them before the run."""
+        return f"{self.name} {self.twin_seed}"
+
+    def conditions(self, seed: int) -> Mapping[str, float | str]:
+        """Return of which case it is a twin, and the seed that it was drawn from."""
+        return {"twin_of": self.origin, "twin_seed": self.twin_seed}
+
+
+@dataclass(frozen=True, repr=False)
+class Again(Case):
+    """A case whose jobs are run a second time, with the same random numbers.
+
+    Arguments:
+        origin: name of the case.
+    """
+
+    origin: str = ""
+
+    @property
+    def drawn_as(self) -> str:
+        """Return the name that goes into the random numbers, that of the case."""
+        return self.origin
+
+    def conditions(self, seed: int) -> Mapping[str, float | str]:
+        """Return which case it is."""
+        return {"again": self.origin}
+
+
+def twin_of(case: Case, number: int, seed: int, families: Sequence[TruthFamily] = SIMILAR) -> Twin:
+    """Return a twin of a case.
+
+    Arguments:
+        case: of which the truth was computed.
+        number: of the twin, from 1.
+        seed: of the run's twins; the same one gives the same twins.
+        families: that change the structure one after another; those that have none like it do not.
+
+    Raises:
+        NotApplicable: where no family changes it, or its model has no names to change.
+    """
+    words = [seed, number, *case.name.encode()]
+    rng = np.random.default_rng(np.random.SeedSequence(words))
+    found, reasons = case, []
+    for family in families:
+        try:
+            found = family.variant(found, rng)
+        except NotApplicable as error:
+            reasons.append(str(error))
+    if found is case:
+        raise NotApplicable("; ".join(reasons) or "there is no family of structures")
+    name = f"{case.name}{MARK}{number}"
+    told = f"twin {number} from seed {seed} of {case.name}: {case.digest}"
+    renamed = replace(
+        disguised(found, rng),
+        name=name,
+        title=f"{case.title} (twin {number})",
+        digest=hashlib.sha256(told.encode()).hexdigest(),
+        structure=case.structure or case.name,
+    )
+    own = {field.name: getattr(renamed, field.name) for field in fields(Case)}
+    return Twin(**own, origin=case.name, twin_seed=seed)
+
+
+def twins_of(
+    cases: Sequence[Case], number: int, seed: int, families: Sequence[TruthFamily] = SIMILAR
+) -> Iterator[Twin]:
+    """Yield twins of every case that can have some; arguments as for `twin_of`.
+
+    Arguments:
+        number: of twins of each case.
+    """
+    for case in cases:
+        for place in range(1, number + 1):
+            try:
+                yield twin_of(case, place, seed, families)
+            except NotApplicable:
+                break
+
+
+def again(case: Case) -> Again:
+    """Return a case whose jobs are run a second time."""
+    own = {field.name: getattr(case, field.name) for field in fields(Case)}
+    own |= {"name": f"{case.name}{AGAIN}", "structure": case.structure or case.name}
+    return Again(**own, origin=case.name)
