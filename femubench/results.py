@@ -18,6 +18,7 @@ from femubench.core.score.leaderboard import (
     scored_on,
 )
 from femubench.core.score.ranking import OFFSET_PERCENT, SCORE_OF_FAILURE, TIE, rank_results, ranked
+from femubench.core.score.repeatability import unsteady
 from femubench.core.score.scoring import frequency_error, predict_block, score_model
 from femubench.core.score.statistics import (
     FEWEST,
@@ -26,6 +27,7 @@ from femubench.core.score.statistics import (
     structures_of,
     tell_apart,
 )
+from femubench.core.score.twin_skill import TwinSkill, twin_skills
 from femubench.core.study.axes import StudyAxes
 from femubench.core.study.skill import skill_by
 
@@ -43,6 +45,7 @@ __all__ = [
     "Store",
     "StudyAxes",
     "TIE",
+    "TwinSkill",
     "block_weights",
     "counted_blocks",
     "element_norms",
@@ -67,4 +70,6 @@ __all__ = [
     "stiffness_difference",
     "structures_of",
     "tell_apart",
+    "twin_skills",
+    "unsteady",
 ]

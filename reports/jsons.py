@@ -6,7 +6,16 @@ import json
 from typing import Any
 
 from femubench.reports.page.rounding import clean
-from femubench.results import Run, StudyAxes, leaderboard, run_to_json, skill_by, tell_apart
+from femubench.reports.twins import twins_by_strategy
+from femubench.results import (
+    Run,
+    StudyAxes,
+    leaderboard,
+    run_to_json,
+    skill_by,
+    tell_apart,
+    unsteady,
+)
 
 # Names of the contract, and the columns of the leaderboard that they stand for.
 _FIGURES = {
@@ -33,6 +42,7 @@ def board_of(run: Run) -> list[dict[str, Any]]:
     """Return the rows of the leaderboard as plain data, best first."""
     board = leaderboard(run)
     tiers = tell_apart(run, list(board["strategy"])).tier_of()
+    twins, differing = twins_by_strategy(run), unsteady(run)
     return [
         {
             "strategy": row["strategy"],
@@ -42,6 +52,8 @@ def board_of(run: Run) -> list[dict[str, Any]]:
             "interval": [clean(row["skill_low"]), clean(row["skill_high"])],
             **{name: clean(row[column]) for name, column in _FIGURES.items()},
             "physical": not row["unphysical"],
+            **({"twins": twins[row["strategy"]]} if row["strategy"] in twins else {}),
+            **({"unsteady": differing[row["strategy"]]} if row["strategy"] in differing else {}),
         }
         for row in board.to_dict("records")
     ]

@@ -23,6 +23,7 @@ from femubench.reports.summary import (
     troubles,
     unconverged,
 )
+from femubench.reports.twins import MEANING, drawn_from, suspicions
 from femubench.results import (
     FLOORS,
     JobResult,
@@ -32,6 +33,7 @@ from femubench.results import (
     leaderboard,
     ranks_by_floor,
     tell_apart,
+    twin_skills,
 )
 
 _SPECIAL = re.compile(r"([\\`*_\[\]|~])")
@@ -78,6 +80,7 @@ class MarkdownReporter:
             lead(run),
             *_FOOTNOTES,
             floors_sentence(run),
+            *_twins(run),
             *_coverage(run),
             *chain.from_iterable(
                 _case(
@@ -157,6 +160,26 @@ def floors_sentence(run: Run) -> str:
         return f"{said}the same."
     named = (f"{escape(name)} {', '.join(map(str, found))}" for name, found in moved.items())
     return f"{said}the same but for {'; '.join(named)}."
+
+
+def _twins(run: Run) -> Iterator[str]:
+    """Return the skills on twins beside those on their cases, and who may know these."""
+    found, told = twin_skills(run), suspicions(run)
+    if found:
+        yield "## Twins"
+        yield f"{MEANING} Here: {escape(drawn_from(run))}."
+        rows = (
+            [
+                escape(name) + (" (knows the cases?)" if item.suspicious else ""),
+                fixed(item.skill, 3, 6),
+                fixed(item.original_skill, 3, 6),
+                fixed(item.p, 3),
+            ]
+            for name, item in sorted(found.items(), key=lambda entry: -entry[1].original_skill)
+        )
+        yield table(["strategy", "skill on twins", "skill on their cases", "p"], rows, "lrrr")
+    if told:
+        yield "\n".join(f"- **{escape(sentence)}**" for sentence in told)
 
 
 def _coverage(run: Run) -> Iterator[str]:

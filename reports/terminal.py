@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 from femubench.reports.cells import fixed, interval, plain, shortened, whole
 from femubench.reports.summary import Trouble, lead, notes_of, spared, troubles, unconverged
-from femubench.results import Run, interval_kind, leaderboard, ranked, tell_apart
+from femubench.reports.twins import drawn_from, suspicions
+from femubench.results import (
+    Run,
+    interval_kind,
+    leaderboard,
+    ranked,
+    tell_apart,
+    twin_skills,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,6 +61,7 @@ def board_text(run: Run) -> str:
         parts.append(_stated(board))
     if len(board) > 1:
         parts.append(_first_tier(run, board))
+    parts += _twins(run, board)
     return "\n\n".join(parts)
 
 
@@ -145,6 +154,20 @@ def _stated(board: pd.DataFrame) -> str:
     rows = board[board["coverage90"].notna()].to_dict("records")
     named = (f"{plain(row['strategy'])} {100.0 * row['coverage90']:.0f} %" for row in rows)
     return textwrap.fill(f"unseen modes inside the stated 90 % interval: {', '.join(named)}", WIDTH)
+
+
+def _twins(run: Run, board: pd.DataFrame) -> Iterator[str]:
+    """Return the skills on twins beside those on their cases, and who may know these."""
+    found = twin_skills(run)
+    if found:
+        named = (
+            f"{plain(name)} {fixed(found[name].skill, 3)} ({fixed(found[name].original_skill, 3)})"
+            for name in board["strategy"]
+            if name in found
+        )
+        said = f"skill on {drawn_from(run)}, in brackets on the cases: {', '.join(named)}"
+        yield textwrap.fill(said, WIDTH)
+    yield from (textwrap.fill(f"?: {told}", WIDTH) for told in suspicions(run))
 
 
 def _first_tier(run: Run, board: pd.DataFrame) -> str:

@@ -89,7 +89,7 @@ def _shown(store: Store, run: str, screen: Reporter | None) -> int | None:
         found = store.load(run)
         if screen is not None and found.results:
             click.echo("\n" + text_of(screen, rendered(screen, found)))
-        return len(found.results)
+        return len(found.results) + len(found.beside)
     return None
 
 

@@ -1,4 +1,4 @@
-"""Durations and sizes on the command line: ``90s``, ``10m``, ``1.5h``; ``512M``, ``4G``."""
+"""Durations, sizes and numbers of twins on the command line: ``90s``, ``1.5h``; ``4G``; ``2``."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ _SIZES = {"": 1, "k": 2**10, "m": 2**20, "g": 2**30, "t": 2**40}
 _SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*([kmgt]?)(?:i?b)?", re.ASCII | re.IGNORECASE)
 _LEAST_MEMORY = 16 * 2**20
 _DURATION = re.compile(r"(\d+(?:\.\d+)?|\.\d+)\s*([smh]?)", re.ASCII)
+
+_TWINS = re.compile(r"(\d{1,2}|100)(?::(\d{1,18}))?", re.ASCII)
 
 
 def timeouts_of(
@@ -45,6 +47,22 @@ def bytes_of(ctx: click.Context, param: click.Parameter, value: str | None) -> i
     if size < _LEAST_MEMORY:
         raise click.BadParameter(f"{value!r} is no size >= 16M such as 512M or 4G")
     return size
+
+
+def twins_of(
+    ctx: click.Context, param: click.Parameter, value: str | None
+) -> tuple[int, int | None]:
+    """Return number and seed, None where none is given, of ``N[:SEED]``; a callback of click.
+
+    Raises:
+        click.BadParameter: when it is neither.
+    """
+    if value is None:
+        return 0, None
+    match = _TWINS.fullmatch(value.strip())
+    if match is None:
+        raise click.BadParameter(f"{value!r} is no number of twins such as 2, or 2:SEED")
+    return int(match[1]), None if match[2] is None else int(match[2])
 
 
 def _seconds(text: str, value: str) -> float:

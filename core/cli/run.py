@@ -12,7 +12,7 @@ from femubench.core.cli import options
 from femubench.core.cli.ending import telling
 from femubench.core.cli.outputs import finish, outputs_of
 from femubench.core.cli.progress import progress_bar
-from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of
+from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of, twins_of
 from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
 from femubench.core.errors import InputError, PluginError
@@ -51,6 +51,11 @@ if TYPE_CHECKING:
     show_default=True,
     help="The model that all strategies start from: as drawn, or with what handbooks give for "
     "torsion, shear and rotary inertia, from which the ranks are.",
+)  # fmt: skip
+@click.option(
+    "--twins", callback=twins_of, metavar="N[:SEED]",
+    help="Draw N twins of every case whose truth was computed, similar structures under other "
+    "names, and say who is good on the cases but not on them; run one job of each strategy twice.",
 )  # fmt: skip
 @click.option(
     "--timeout", "timeouts", multiple=True, callback=timeouts_of, metavar="DURATION",
@@ -98,6 +103,7 @@ def run(
     seeds: int | None,
     seed: int,
     nominal: Start,
+    twins: tuple[int, int | None],
     timeouts: dict[str, float],
     memory: int | None,
     resume: bool,
@@ -167,7 +173,10 @@ def _going_on(ctx: click.Context) -> tuple[Sequence[str], Sequence[str]]:
         return (), ()
     # `bench run --resume` alone goes on with the last run, as that was asked for.
     alone = not ctx.params["cases"] and not ctx.params["strategies"]
-    return ("--resume",), ("--overwrite", *(("--seeds", "--seed", "--nominal") if alone else ()))
+    return ("--resume",), (
+        "--overwrite",
+        *(("--seeds", "--seed", "--nominal", "--twins") if alone else ()),
+    )
 
 
 def _given(ctx: click.Context, name: str) -> Any:  # noqa: ANN401 - of any option
@@ -193,6 +202,8 @@ def _plan(ctx: click.Context, plugins: Plugins, store: Store) -> Plan:
         timeouts=limits,
         memory=words["memory"],
         resumed=store if words["resume"] else None,
+        twins=words["twins"][0],
+        twin_seed=words["twins"][1],
     )
 
 
@@ -204,7 +215,7 @@ def _check_locked(ctx: click.Context) -> None:
     """
     default = click.core.ParameterSource.DEFAULT
     words = (
-        *("cases", "strategies", "seeds", "seed", "nominal"),
+        *("cases", "strategies", "seeds", "seed", "nominal", "twins"),
         *("timeouts", "memory", "resume", "overwrite"),
     )
     for name in words:
@@ -236,7 +247,14 @@ def _header(plan: Plan, place: str) -> str:
     own = "".join(f", {name} {spoken(limit)}" for name, limit in request.timeouts.items())
     return (
         f"femubench {__version__}: {counted(cases, 'case')}{start}, "
-        f"{counted(strategies, 'strategy')}, {named} ({meaning}), "
+        f"{counted(strategies, 'strategy')}, {named} ({meaning}), {_twins(plan)}"
         f"{counted(plan.jobs, 'job')}, {place}, "
         f"timeout {spoken(request.timeout)}{own}"
     )
+
+
+def _twins(plan: Plan) -> str:
+    """Return how many twins there are, and from which seed; nothing where none was asked for."""
+    if not plan.request.twins:
+        return ""
+    return f"{counted(len(plan.beside.twins), 'twin')} (seed {plan.request.twin_seed}), "

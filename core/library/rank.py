@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import secrets
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -22,6 +23,7 @@ from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import check_strategy, chosen
 from femubench.core.plugin.variants import Variant, labelled, strategy_of
 from femubench.core.roles import Strategy
+from femubench.core.run.beside import Beside, beside
 from femubench.core.run.executor import Executor, executor_of
 from femubench.core.run.frames import modes_frame, results_frame
 from femubench.core.run.recording import Overwrite, Progress
@@ -29,8 +31,9 @@ from femubench.core.run.runner import run_jobs
 from femubench.core.run.starts import Start, Starts
 from femubench.core.run.store import Store
 from femubench.core.schema import records as serial, results
-from femubench.core.score.leaderboard import leaderboard
+from femubench.core.score.leaderboard import is_test, leaderboard
 from femubench.core.study.skill import skill_by
+from femubench.core.twin.twins import twins_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -38,6 +41,7 @@ if TYPE_CHECKING:
 StrategyLike = str | Strategy | type[Strategy]
 DEFAULT_STORE = "femubench-results"
 DEFAULT_TIMEOUT = 600.0  # s
+MOST_TWINS = 100
 _OWN = "femubench."
 _Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -55,6 +59,8 @@ class Request:
         timeout: seconds that a job may take.
         timeouts: the same for single strategies.
         memory: bytes that a job may take; None for an even share.
+        twins: of every case whose truth was computed.
+        twin_seed: from which they are drawn.
     """
 
     cases: tuple[str, ...]
@@ -65,6 +71,8 @@ class Request:
     timeout: _Seconds = DEFAULT_TIMEOUT
     timeouts: Mapping[str, _Seconds] = field(default_factory=dict)
     memory: Annotated[int, Field(ge=1)] | None = None
+    twins: Annotated[int, Field(ge=0, le=MOST_TWINS)] = 0
+    twin_seed: Annotated[int, Field(ge=0)] = 0
 
     @property
     def all_seeds(self) -> range:
@@ -107,7 +115,7 @@ class Run(results.Run):
     @classmethod
     def of(cls, run: results.Run) -> Run:
         """Return a run as one that has tables."""
-        return cls(run.meta, run.results)
+        return cls(run.meta, run.results, run.beside)
 
     @property
     def table(self) -> pd.DataFrame:
@@ -146,6 +154,7 @@ class Plan:
         cases, strategies: that they stand for.
         textbook: the cases with their textbook models by name, where those differ.
         classes: kinds of structure and truth by case.
+        beside: twins of the cases, and what runs twice.
         repeatable: whether the words say it all.
     """
 
@@ -154,15 +163,20 @@ class Plan:
     strategies: Sequence[Strategy]
     textbook: Mapping[str, Case]
     classes: Mapping[str, Sequence[str]]
+    beside: Beside
     repeatable: bool = True
 
     @property
     def jobs(self) -> int:
         """Return the number of jobs."""
-        starts = len(self.cases)
-        if self.request.nominal == "both":
-            starts += len(self.textbook)
-        return starts * len(self.strategies) * len(self.request.all_seeds)
+        own = (start for case in self.cases for start in self.starts.of(case))
+        models = sum(1 for _ in own) + sum(1 for _ in self.beside.starts(self.starts))
+        return models * len(self.strategies) * len(self.request.all_seeds)
+
+    @property
+    def starts(self) -> Starts:
+        """Return the nominal models of the cases."""
+        return Starts(self.textbook, self.request.nominal, self.classes)
 
     def run(
         self,
@@ -197,8 +211,9 @@ class Plan:
                 progress=progress,
                 run_seed=asked.seed,
                 request=asked.to_json() if self.repeatable else {"nominal": asked.nominal},
-                starts=Starts(self.textbook, asked.nominal, self.classes),
+                starts=self.starts,
                 executor=executor,
+                beside=self.beside,
             )
         )
 
@@ -220,6 +235,8 @@ def rank(
     progress: Progress | None = None,
     scheduler: str | None = None,
     cluster: str | None = None,
+    twins: int = 0,
+    twin_seed: int | None = None,
 ) -> Run:
     """Run strategies on cases, each job in a process of its own, and rank them.
 
@@ -240,6 +257,8 @@ def rank(
             with the last run.
         progress: called with (result, jobs done, jobs in all).
         scheduler, cluster: ``tcp://HOST:PORT`` of Dask; ``local:N`` or ``slurm:QUEUE`` to start.
+        twins, twin_seed: number of twins of each case whose truth was computed, and what they are
+            drawn from; None for a seed that nobody knew.
 
     Raises:
         InputError: for an unknown name, an option that does not exist, or a faulty case.
@@ -259,6 +278,8 @@ def rank(
         timeouts=timeouts,
         memory=memory,
         resumed=kept if resume else None,
+        twins=twins,
+        twin_seed=twin_seed,
     )
     with executor_of(jobs, scheduler, cluster) as where:
         return plan.run(None, kept, where, overwrite=overwrite, resume=resume, progress=progress)
@@ -276,6 +297,8 @@ def plan_of(
     timeouts: Mapping[str, float] | None = None,
     memory: int | None = None,
     resumed: Store | None = None,
+    twins: int = 0,
+    twin_seed: int | None = None,
 ) -> Plan:
     """Return what is to be run; nothing has been run when something is wrong with it.
 
@@ -285,7 +308,8 @@ def plan_of(
     """
     words, wanted = listed(cases), listed(strategies)
     if resumed is not None and not words and not wanted and resumed.runs():
-        for name, value in (("seeds", seeds), ("seed", seed), ("nominal", nominal)):
+        own = ("seeds", seeds), ("seed", seed), ("nominal", nominal), ("twins", twins or None)
+        for name, value in own:
             if value is not None:
                 what = f"--resume alone goes on as before; {name} needs CASE or -s beside it"
                 raise InputError(what)
@@ -297,7 +321,7 @@ def plan_of(
     found = _strategies(wanted, plugins)
     read = read_cases(cases, plugins)
     plain = all(isinstance(item, (str, PathLike)) for item in words)
-    return Plan(
+    return _planned(
         Request(
             cases=case_words(map(str, words), plugins) if plain else tuple(c.name for c in read),
             strategies=tuple(strategy.name for strategy in found),
@@ -307,21 +331,53 @@ def plan_of(
             timeout=DEFAULT_TIMEOUT if timeout is None else timeout,
             timeouts=_known(timeouts or {}, found),
             memory=memory,
+            twins=twins,
+            twin_seed=_twin_seed(twins, twin_seed, resumed),
         ),
         read,
         found,
-        textbook_of(read),
         classes_of(plugins),
         repeatable=plain and all(isinstance(item, str) for item in wanted),
     )
+
+
+def _planned(
+    request: Request,
+    cases: Sequence[Case],
+    strategies: Sequence[Strategy],
+    classes: Mapping[str, Sequence[str]],
+    *,
+    repeatable: bool = True,
+) -> Plan:
+    """Return a plan with textbook models and twins; arguments as those of `Plan`."""
+    drawn, others = [], Beside()
+    if request.twins:
+        # Only what was computed follows the laws of similar structures to the last digit.
+        computed = [case for case in cases if not is_test(classes.get(case.name))]
+        drawn = list(twins_of(computed, request.twins, request.twin_seed))
+        others = beside(cases, drawn, request.twins, request.twin_seed)
+    textbook = textbook_of([*cases, *drawn])
+    return Plan(request, cases, strategies, textbook, classes, others, repeatable)
+
+
+def _twin_seed(number: int, seed: int | None, resumed: Store | None) -> int:
+    """Return what twins are drawn from: a seed given, that of the last run, or one by chance."""
+    if not 0 <= number <= MOST_TWINS:
+        raise InputError(f"{number} twins", expected=f"0 to {MOST_TWINS}")
+    if not number or seed is not None:
+        return seed or 0
+    if resumed is not None and resumed.runs():
+        kept = resumed.begun().get("request") or {}
+        if kept.get("twins") == number:
+            return int(kept["twin_seed"])
+    return secrets.randbelow(2**31)
 
 
 def repeated(request: Request, plugins: Plugins) -> Plan:
     """Return the plan of what was asked for before."""
     found = _strategies(request.strategies, plugins)
     _known(request.timeouts, found)
-    read = read_cases(request.cases, plugins)
-    return Plan(request, read, found, textbook_of(read), classes_of(plugins))
+    return _planned(request, read_cases(request.cases, plugins), found, classes_of(plugins))
 
 
 def textbook_of(cases: Sequence[Case]) -> dict[str, Case]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from typing import Any
 
 from threadpoolctl import threadpool_limits
@@ -11,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
 from femubench.core.roles import Strategy
+from femubench.core.run.beside import NOTHING, Beside
 from femubench.core.run.executor import Executor, LocalProcesses, worker_count
 from femubench.core.run.limits import Limits
 from femubench.core.run.provenance import plan_digest, run_meta
@@ -19,7 +21,8 @@ from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Starts
 from femubench.core.run.stopping import stopping
 from femubench.core.run.store import Store
-from femubench.core.schema.results import Run
+from femubench.core.schema.results import JobResult, Run, origins_of
+from femubench.core.score.repeatability import unsteady
 from femubench.core.score.scoring import Reference, rank_results, reference_of
 
 _AS_GIVEN = Starts()
@@ -42,6 +45,7 @@ def run_jobs(
     request: Mapping[str, Any] | None = None,
     starts: Starts = _AS_GIVEN,
     executor: Executor | None = None,
+    beside: Beside = NOTHING,
 ) -> Run:
     """Run every strategy on every case with every seed, each job in a process of its own.
 
@@ -57,6 +61,7 @@ def run_jobs(
         progress: called with (result, jobs done, jobs in all).
         run_seed, request: seed of the run's own statistics, and what was asked for in plain data.
         starts: the nominal models; the cases as given where it is left out.
+        beside: twins of the cases and jobs to run again, whose results are no part of the figures.
 
     Raises:
         InputError: for two of one name, no worker, or a run that another process works on.
@@ -66,23 +71,37 @@ def run_jobs(
         >>> results.run_jobs([case], [nominal]).results[0].status
         'ok'
     """
-    _check_names(case=cases, strategy=strategies)
+    _check_names(case=(*cases, *beside.twins), strategy=strategies)
     place = executor or LocalProcesses(worker_count(jobs))
     place.admit(strategies, memory)
     share = place.share if memory is None else memory
     limits = {s.name: Limits((timeouts or {}).get(s.name, timeout), share) for s in strategies}
     asked = {"seed": run_seed, "timeout": timeout, "memory": share, "request": dict(request or {})}
     with threadpool_limits(1), ExitStack() as stack:
-        references = _references([starts.yardstick(case) for case in cases])
-        slots = Slots((one for case in cases for one in starts.of(case)), strategies, seeds)
-        slots.meta = _meta(cases, slots, references, {**asked, "jobs": place.workers}, starts)
+        others = list(beside.starts(starts))
+        references = _references([starts.yardstick(case) for case in (*cases, *beside.twins)])
+        references |= beside.repeated(references)
+        own = (one for case in cases for one in starts.of(case))
+        slots = Slots((*own, *others), strategies, seeds)
+        planned = {**asked, "jobs": place.workers, **beside.about(references)}
+        slots.meta = _meta(cases, slots, references, planned, starts)
         meta, known = recorded(stack, store, slots.meta, overwrite, resume)
         ending = stack.enter_context(ended(store, meta["run"]))
         results = Results(slots, store, meta["run"], progress)
         wanted = stack.enter_context(stopping()).until(results.keep(known))
         for one in place.computed(slots, wanted, references, limits, results.shelf):
             results.add(*one)
-    return Run({**meta, **ending}, rank_results(results.in_order(), meta["reference"]))
+        found = _run(meta, results.in_order())
+        if beside.repeated_case is not None:
+            ending["unsteady"] = unsteady(found)
+    return replace(found, meta={**meta, **ending})
+
+
+def _run(meta: Mapping[str, Any], results: Sequence[JobResult]) -> Run:
+    """Return a run, its results apart from those on what ran beside its cases."""
+    others = origins_of(meta)
+    own = rank_results([r for r in results if r.case not in others], meta["reference"])
+    return Run(meta, own, tuple(result for result in results if result.case in others))
 
 
 def _meta(
@@ -94,7 +113,8 @@ def _meta(
 ) -> dict[str, Any]:
     planned = {**settings, "plan": plan_digest(slots.keys)}
     who, about = slots.strategies, starts.about(cases)
-    return run_meta(cases, who, references, slots.seeds, planned, about)
+    own = {case.name: references[case.name] for case in cases}
+    return run_meta(cases, who, own, slots.seeds, planned, about)
 
 
 def _check_names(**given: Sequence[Case] | Sequence[Strategy]) -> None:

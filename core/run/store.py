@@ -25,7 +25,15 @@ from femubench.core.run.stored import (
     records_of,
 )
 from femubench.core.schema.records import check_extent
-from femubench.core.schema.results import DONE, NOMINALS, JobResult, Nominal, Run, rate
+from femubench.core.schema.results import (
+    DONE,
+    NOMINALS,
+    JobResult,
+    Nominal,
+    Run,
+    origins_of,
+    rate,
+)
 from femubench.core.score.ranking import scores_and_ranks
 
 _MOST_NOTES = 3
@@ -152,15 +160,18 @@ class Store:
                     meta.update({**record.meta(), "run": wanted})
             except InputError as fault:
                 faults.append(fault)
-        check_extent(meta, tuple(results.values()), file=self.folder)
-        listed = in_order_of_jobs(meta, results.values())
+        others = origins_of(meta)
+        everything = in_order_of_jobs(meta, results.values())
+        listed = [result for result in everything if result.case not in others]
+        beside = tuple(result for result in everything if result.case in others)
+        check_extent(meta, tuple(listed), file=self.folder)
         told = meta.get("notes")
         notes = [*(told if isinstance(told, list) else []), *notes_of(faults, self.folder)]
         reference = meta.get("reference") or None
         found = scores_and_ranks(listed, reference, meta.get("baseline"))
         for result, score, rank in zip(listed, *found, strict=True):
             rate(result, score, rank)
-        return Run({**meta, "notes": notes}, tuple(listed))
+        return Run({**meta, "notes": notes}, tuple(listed), beside)
 
     @uncollected()
     def by_key(self, run_id: str | None = None, *, but: str | None = None) -> dict[str, JobResult]:
@@ -309,7 +320,7 @@ def in_order_of_jobs(meta: Mapping[str, Any], results: Iterable[JobResult]) -> l
     cases, nominals, seeds, strategies = (
         {name: place for place, name in enumerate(names)}
         for names in (
-            meta.get("cases") or (),
+            (*(meta.get("cases") or ()), *origins_of(meta)),
             tuple(reversed(NOMINALS)),
             meta.get("seeds") or (),
             meta.get("strategies") or (),

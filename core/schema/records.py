@@ -111,10 +111,24 @@ class RunRecord(Record):
 
     meta: dict[str, Any]
     results: Annotated[list[Any], Field(max_length=MOST_RESULTS)]
+    beside: Annotated[list[Any], Field(max_length=MOST_RESULTS)] = []
 
 
 class _CaseMeta(Record):
     title: Text | None = None
+
+
+class _TwinsMeta(BaseModel):
+    """What ran beside the cases: twins by their name, and jobs that were run again."""
+
+    model_config = ConfigDict(extra="allow", allow_inf_nan=False, strict=True)
+
+    seed: Whole
+    number: Whole
+    of: dict[Name, Name]
+    again: dict[Name, Name]
+    cases: dict[Name, _CaseMeta]
+    reference: dict[Name, dict[Name, Percent]]
 
 
 class MetaRecord(BaseModel):
@@ -136,6 +150,7 @@ class MetaRecord(BaseModel):
     classes: dict[Name, list[Name]] | None = None
     citations: dict[Name, Text] | None = None
     reference: dict[Name, dict[Name, Percent]] | None = None
+    twins: _TwinsMeta | None = None
 
 
 _FIGURES = tuple(
@@ -313,7 +328,8 @@ def run_to_json(run: Run) -> dict[str, Any]:
         {**result_to_json(result), "structure": structures.get(result.case, result.case)}
         for result in run.results
     ]
-    return {"meta": meta, "results": results}
+    beside = [result_to_json(result) for result in run.beside]
+    return {"meta": meta, "results": results, **({"beside": beside} if beside else {})}
 
 
 def run_from_json(data: object, *, file: Path | str | None = None) -> Run:
@@ -328,12 +344,15 @@ def run_from_json(data: object, *, file: Path | str | None = None) -> Run:
     """
     record = validated(RunRecord, data, file, None, "")
     meta = meta_from_json(record.meta, file=file)
-    results = tuple(
-        result_from_json(item, file=file, key=f"results[{i}]")
-        for i, item in enumerate(record.results)
+    results, beside = (
+        tuple(
+            result_from_json(item, file=file, key=f"{key}[{i}]")
+            for i, item in enumerate(getattr(record, key))
+        )
+        for key in ("results", "beside")
     )
     check_extent(meta, results, file=file)
-    return Run(meta, results)
+    return Run(meta, results, beside)
 
 
 def meta_from_json(

@@ -203,6 +203,17 @@ def mode_rows(results: Iterable[JobResult]) -> list[Mapping[str, Sequence[Row]]]
     ]
 
 
+def origins_of(meta: Mapping[str, Any], *kinds: str) -> dict[str, str]:
+    """Return from the names of what ran beside the cases of a run to the cases they belong to.
+
+    Arguments:
+        meta: of the run.
+        kinds: ``of`` for twins, ``again`` for jobs that were run a second time; both by default.
+    """
+    told = meta.get("twins") or {}
+    return {name: case for kind in kinds or ("of", "again") for name, case in told[kind].items()}
+
+
 @dataclass(frozen=True, repr=False)
 class Run(Shown):
     """All results of one `bench run`.
@@ -210,10 +221,13 @@ class Run(Shown):
     Arguments:
         meta: run id, seed, versions, machine, git commit, start time; plain data.
         results: one entry a job.
+        beside: results on twins of the cases and of jobs that were run again, which are in no
+            figure of the run; ``meta["twins"]`` tells what they belong to.
     """
 
     meta: Mapping[str, Any]
     results: tuple[JobResult, ...]
+    beside: tuple[JobResult, ...] = ()
 
     @property
     def nominals(self) -> tuple[Nominal, ...]:

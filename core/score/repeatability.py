@@ -1,4 +1,4 @@
-"""What differs between a run and its repetition."""
+"""What differs between a run and its repetition, and between a job and itself run again."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from femubench.core.schema.records import result_to_json
-from femubench.core.schema.results import JobResult, Nominal, Run
+from femubench.core.schema.results import JobResult, Nominal, Run, origins_of
 
 # What belongs to a run, or to the past, rather than to a result.
 _VOLATILE = frozenset({"seconds", "rank", "score", "key", "provenance", "traceback", "unphysical"})
@@ -15,6 +15,7 @@ _COUNTS = (
     *("rigid_body_modes", "rigid_body_modes_expected", "negative_eigenvalues"),
     *("parameter_count", "evaluations"),
 )
+_MODEL = ("rigid_body_modes", "negative_eigenvalues", "parameter_count")
 
 
 def environment_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
@@ -47,6 +48,45 @@ def result_differences(old: Run, new: Run) -> list[str]:
         else:
             lines += [f"{name}: {what}" for what in _differences(before[job], after[job])]
     return lines
+
+
+def unsteady(run: Run) -> dict[str, str]:
+    """Return what differs, by strategy, where a job was run twice in a run.
+
+    It got the same data and the same random numbers, so that its answer must be the same to the
+    last bit. Time limits and crashes say something of the machine, and do not count.
+
+    Examples:
+        >>> results.unsteady(run)
+        {}
+    """
+    origins = origins_of(run.meta, "again")
+    first = _by_job(run) if origins else {}
+    found: dict[str, str] = {}
+    for item in run.beside:
+        origin = origins.get(item.case)
+        known = first.get((origin or "", item.strategy, item.seed, item.nominal))
+        if known is None or item.strategy in found:
+            continue
+        what = _answers_differ(known, item)
+        if what:
+            found[item.strategy] = f"{origin}: {what}"
+    return found
+
+
+def _answers_differ(one: JobResult, other: JobResult) -> str:
+    """Return in what two answers differ; nothing where they are the same to the last bit."""
+    if {"timeout", "crashed"} & {one.status, other.status}:
+        return ""
+    if one.status != other.status:
+        return f"{one.status}, then {other.status}"
+    if _stable(one)["parameters"] != _stable(other)["parameters"]:
+        return "other parameters"
+    for name in ("used", "higher", "modified"):
+        if _stable(one)[name] != _stable(other)[name]:
+            return f"another model: {name} modes at other frequencies"
+    parts = [name for name in _MODEL if getattr(one, name) != getattr(other, name)]
+    return f"other {parts[0].replace('_', ' ')}" if parts else ""
 
 
 def _by_job(run: Run) -> dict[tuple[str, str, int, Nominal], JobResult]:

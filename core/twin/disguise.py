@@ -1,4 +1,4 @@
-"""A case under other names and in another order, so that nothing but its physics tells what it is."""
+"""A case under other names and in another order: nothing but its physics tells what it is."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ from femubench.core.fem.model import Dofs, Model
 from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import DIRECTIONS, Sensors
 from femubench.core.modal.measurement import Measurement
-from femubench.core.typing import FloatArray, SparseArray
+from femubench.core.typing import SparseArray
 
 LENGTHS, MODULI = (0.7, 1.4), (0.6, 1.6)  # between which factors are drawn; densities as moduli
 _LEAST_SHIFT = 1.1  # of the frequencies, up or down: who knows them must not find them again

@@ -19,6 +19,7 @@ from femubench.reports.summary import (
     seeds_of,
     strategies_of,
 )
+from femubench.reports.twins import suspicions, twins_by_strategy
 from femubench.results import (
     FEWEST,
     OFFSET_PERCENT,
@@ -33,6 +34,7 @@ from femubench.results import (
     rank_results,
     structures_of,
     tell_apart,
+    unsteady,
 )
 
 VERSION = 1
@@ -64,7 +66,8 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
     """
     reference, baseline = run.meta.get("reference") or None, run.meta.get("baseline")
     board, notes, about = leaderboard(run), notes_of(run), lead(run)
-    drawn_models = started_as_drawn(run)
+    drawn_models, told = started_as_drawn(run), suspicions(run)
+    twins, differing = twins_by_strategy(run), unsteady(run)
     run = Run(run.meta, rank_results(run.ranked, reference, baseline))
     cases, strategies = cases_of(run), strategies_of(run)
     ranking = board.to_dict("records")
@@ -77,7 +80,7 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
         "run": plain(run.meta.get("run", "")),
         "header": [list(item) for item in header(run)],
         "lead": about,
-        "notes": [*notes, *(plain(note) for note in drawn), *left_out],
+        "notes": [*notes, *told, *(plain(note) for note in drawn), *left_out],
         "blocks": list(BLOCKS),
         "offset_percent": OFFSET_PERCENT,
         "score_of_failure": SCORE_OF_FAILURE,
@@ -85,7 +88,9 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
         "seeds": seeds_of(run),
         "scenarios": list(dict.fromkeys(_scenario(case) for case in cases)),
         "baseline": baseline,
-        "strategies": _strategies(run, ranking),
+        "strategies": [
+            {**item, **_odd(item["name"], twins, differing)} for item in _strategies(run, ranking)
+        ],
         "cases": listed,
         "results": [
             _result(found, cases.index(found.case), strategies.index(found.strategy))
@@ -121,6 +126,14 @@ def _strategies(run: Run, board: Iterable[Mapping[Any, Any]]) -> list[dict[str, 
         }
         for name in strategies_of(run)
     ]
+
+
+def _odd(
+    name: str, twins: Mapping[str, Mapping[str, Any]], differing: Mapping[str, str]
+) -> dict[str, Any]:
+    """Return what twins and jobs that were run again say of a strategy; nothing without them."""
+    found: dict[str, Any] = {"twins": twins[name]} if name in twins else {}
+    return {**found, **({"unsteady": plain(differing[name])} if name in differing else {})}
 
 
 def _case(run: Run, case: str, exhibits: Exhibits | None) -> dict[str, Any]:

@@ -15,6 +15,7 @@
     { key: "interval", title: "95 % interval", still: true, cell: intervalCell },
     ...(data && data.board && data.board.some((row) => row.skill_drawn !== null) ? [{ key: "skill_drawn", title: "From drawn", down: true, hint: "skill of the start from the models as drawn, against the textbook models too", cell: (row) => value(row.skill_drawn, share) }] : []),
     ...(data && data.board && data.board.some((row) => row.skill_tests !== null) ? [{ key: "skill_tests", title: "On tests", down: true, hint: "skill on tests alone, without computed truths", cell: (row) => value(row.skill_tests, share) }] : []),
+    ...(data && data.strategies && data.strategies.some((s) => s.twins) ? [{ key: "twins", title: "On twins", down: true, hint: "skill on similar structures under other names, drawn when the run began; beside it, in brackets, on the cases that have such twins", cell: twinsCell }] : []),
     ...(data && data.blocks ? data.blocks : []).map((block, k) => ({ key: `${block}_percent`, title: `${block === "used" ? "given" : block} rms,\u00a0%`, block: k, hint: block === "used" ? "median rms frequency error of the modes that were given; no part of the skill" : `median rms frequency error of the ${block} modes`, cell: (row) => value(row[`${block}_percent`], small) })),
     { key: "coverage90", title: "In 90\u00a0%", hint: "share of unseen modes in the 90 % interval that the strategy states", cell: (row) => value(row.coverage90, share) },
     { key: "crps_percent", title: "CRPS,\u00a0%", hint: "continuous ranked probability score of unseen modes in percent of the frequency; the absolute error where no uncertainty is stated", cell: (row) => value(row.crps_percent, small) },
@@ -35,6 +36,13 @@
   }
   function value(v, say, name = "") {
     return el("td", { class: `right ${name}`, "data-value": v === null || v === undefined ? "" : v }, say(v));
+  }
+  function twinsOn(row) {
+    return data.strategies[row.index].twins || null;
+  }
+  function twinsCell(row) {
+    const twins = twinsOn(row);
+    return value(twins && twins.skill, (v) => (twins ? `${share(v)} (${share(twins.original_skill)})` : number(v)));
   }
   function nameCell(row) {
     const button = el("button", { type: "button", class: "expand", title: "scores case by case", "aria-expanded": "false", "aria-controls": `cases-${row.index}`, onclick: () => toggle(row.index) }, row.strategy);
@@ -76,6 +84,8 @@
     if (row.negative_eigenvalues) flags.push(bench.plural(row.negative_eigenvalues, "negative eigenvalue"));
     if (row.unphysical && !flags.length) flags.push("unphysical");
     if (!flags.length && !row.ok) flags.push("no model");
+    if (twinsOn(row) && twinsOn(row).suspicious) flags.push("knows the cases?");
+    if (data.strategies[row.index].unsteady) flags.push("two answers to one job");
     const items = flags.map((flag) => el("span", { class: "flag" }, el("span", { "aria-hidden": "true" }, "▲ "), flag));
     return el("td", { class: items.length ? "flags" : "flags soft", "data-lost": row.rigid_modes_lost, "data-negative": row.negative_eigenvalues }, items.length ? items : "none");
   }
@@ -134,6 +144,7 @@
     if (key === "flags") return row.rigid_modes_lost + row.negative_eigenvalues + (row.ok ? 0 : 1e9);
     if (key === "coverage") return -row.ok - row.not_applicable / 1e6;
     if (key === "letters") return letters[row.index] || "~";
+    if (key === "twins") return twinsOn(row) && twinsOn(row).skill;
     if (key === "tier") return tiers[row.index];
     return row[key];
   }

@@ -1,0 +1,80 @@
+"""What runs beside the cases of a run: twins of them, and one job of every strategy again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from femubench.core.case.case import Case
+from femubench.core.run.starts import Starts
+from femubench.core.schema.results import Nominal
+from femubench.core.score.scoring import Reference
+from femubench.core.twin.twins import AGAIN, Twin, again
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Cases whose results are in no figure of a run, but beside it.
+
+    Arguments:
+        twins: of the cases of the run.
+        repeated_case: the case whose jobs are run again; None for none.
+        seed: from which the twins were drawn.
+        number: of twins that were asked for of each case.
+    """
+
+    twins: Sequence[Twin] = ()
+    repeated_case: Case | None = None
+    seed: int = 0
+    number: int = 0
+
+    def starts(self, starts: Starts) -> Iterator[tuple[Nominal, Case]]:
+        """Yield what jobs start from: of both nominal models the one that ranks."""
+        for twin in self.twins:
+            yield next(starts.of(twin))
+        if self.repeated_case is not None:
+            nominal, case = next(starts.of(self.repeated_case))
+            yield nominal, again(case)
+
+    def repeated(self, references: Mapping[str, Reference]) -> dict[str, Reference]:
+        """Return what the nominal model of the repeated case gives, under its second name."""
+        return {name: references[case] for name, case in self._again.items()}
+
+    @cached_property
+    def _again(self) -> dict[str, str]:
+        case = self.repeated_case
+        return {} if case is None else {f"{case.name}{AGAIN}": case.name}
+
+    def about(self, references: Mapping[str, Reference]) -> dict[str, Any]:
+        """Return what a run tells of it in its meta data; nothing where there is nothing."""
+        if not self.twins and self.repeated_case is None:
+            return {}
+        case, digests = self.repeated_case, {twin.name: twin.digest for twin in self.twins}
+        if case is not None:
+            digests |= dict.fromkeys(self._again, case.digest)
+        return {
+            "twins": {
+                "seed": self.seed,
+                "number": self.number,
+                "of": {twin.name: twin.origin for twin in self.twins},
+                "again": self._again,
+                "cases": {name: {"digest": digest} for name, digest in digests.items()},
+                "reference": {twin.name: references[twin.name].rms_percent for twin in self.twins},
+            }
+        }
+
+
+NOTHING = Beside()
+
+
+def beside(cases: Sequence[Case], twins: Sequence[Twin], number: int, seed: int) -> Beside:
+    """Return twins, and the case with the smallest model to run again.
+
+    Arguments:
+        cases: of the run.
+        twins: of them.
+        number, seed: of twins of each case, and what they were drawn from.
+    """
+    return Beside(twins, min(cases, key=lambda case: case.model.size), seed, number)

@@ -1,0 +1,143 @@
+"""Is a strategy as good on twins of the cases as on the cases? Who is not may know them by heart.
+
+A twin is a similar structure under other names. From its data, which are those of the case times
+known factors, a strategy that reckons makes the same errors, up to the random numbers it draws.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from femubench.core.schema.results import Run, origins_of
+from femubench.core.score.counting import Weights, block_weights
+from femubench.core.score.ranking import score_in
+from femubench.core.score.statistics import evidence_of, structures_of
+
+# How many times the error of the cases must be left on the twins to say anything: over structures,
+# besides a small p; and on every twin of a single case, where there is nothing to test.
+CLEAR, KNOWN = 1.1, 2.0
+_STOPPED = frozenset({"timeout", "crashed"})  # what they say is of the machine
+
+
+@dataclass(frozen=True)
+class TwinSkill:
+    """What the twins say of a strategy.
+
+    Arguments:
+        skill: on the twins, as a geometric mean over structures.
+        original_skill: the same on the cases that have twins.
+        p: of the signed rank test over structures, after Holm's correction over the strategies;
+            None where few structures differ.
+        worse: whether the test finds it worse on the twins, and by a tenth at least.
+        known: cases on each of whose twins it leaves more than twice the error.
+    """
+
+    skill: float
+    original_skill: float
+    p: float | None
+    worse: bool
+    known: tuple[str, ...]
+
+    @property
+    def suspicious(self) -> bool:
+        """Tell whether the strategy is clearly better on cases than on their twins."""
+        return self.worse or bool(self.known)
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """The logarithms of the scores of a strategy on a block of a case and of its twin."""
+
+    case: str
+    block: str
+    twin: str
+    there: float
+    here: float
+
+
+def twin_skills(run: Run) -> dict[str, TwinSkill]:
+    """Return what the twins say of every strategy; nothing of a run without twins.
+
+    Examples:
+        >>> results.twin_skills(run)
+        {}
+    """
+    origins, own = origins_of(run.meta, "of"), defaultdict(list)
+    if not origins:
+        return {}
+    with_twins = frozenset(origins.values())
+    known = {name: e for name, e in run.meta["reference"].items() if name in with_twins}
+    structures = structures_of(run)
+    weights = block_weights(known, structures)
+    for name, pair in _pairs(run, weights):
+        own[name].append(pair)
+    means = {
+        name: tuple(
+            _by_structure(pairs, weights, structures, value)
+            for value in (lambda p: p.there, lambda p: p.here, lambda p: p.there - p.here)
+        )
+        for name, pairs in own.items()
+    }
+    evidence = evidence_of({name: np.exp(changes) for name, (_, _, changes) in means.items()})
+    return {
+        item.strategy: TwinSkill(
+            *(1.0 - math.exp(float(np.mean(logs))) for logs in means[item.strategy][:2]),
+            p=item.p,
+            worse=item.verdict == "worse" and (item.ratio or 0.0) >= CLEAR,
+            known=_known(own[item.strategy]),
+        )
+        for item in evidence
+    }
+
+
+def _pairs(run: Run, weights: Weights) -> Iterator[tuple[str, _Pair]]:
+    """Yield the strategy and the scores of every result on a twin beside that on its case."""
+    origins, told = origins_of(run.meta, "of"), run.meta["twins"]["reference"]
+    first = {(item.strategy, item.case, item.seed): item for item in run.ranked}
+    blocks = defaultdict(list)
+    for case, block in weights:
+        blocks[case].append(block)
+    for item in run.beside:
+        case = origins.get(item.case)
+        other = first.get((item.strategy, case or "", item.seed))
+        if case is None or other is None or _STOPPED & {item.status, other.status}:
+            continue
+        for block in blocks[case]:
+            there = math.log(score_in(item, block, told[item.case]))
+            here = math.log(score_in(other, block, run.meta["reference"][case]))
+            yield item.strategy, _Pair(case, block, item.case, there, here)
+
+
+def _by_structure(
+    pairs: Iterable[_Pair],
+    weights: Weights,
+    structures: dict[str, str],
+    value: Callable[[_Pair], float],
+) -> list[float]:
+    """Return the mean of a value of every structure, weighted over its blocks as in a ranking."""
+    by_block: dict[tuple[str, str], list[float]] = defaultdict(list)
+    for pair in pairs:
+        by_block[pair.case, pair.block].append(value(pair))
+    sums: dict[str, list[float]] = defaultdict(lambda: [0.0, 0.0])
+    for (case, block), values in by_block.items():
+        weight, own = weights[case, block], sums[structures.get(case, case)]
+        own[0] += weight * float(np.mean(values))
+        own[1] += weight
+    return [total / weight for total, weight in sums.values()]
+
+
+def _known(pairs: Iterable[_Pair]) -> tuple[str, ...]:
+    """Return the cases on each of whose twins more than twice the error is left."""
+    changes: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    for pair in pairs:
+        changes[pair.case][pair.twin].append(pair.there - pair.here)
+    return tuple(
+        case
+        for case, twins in changes.items()
+        if min(float(np.mean(values)) for values in twins.values()) > math.log(KNOWN)
+    )

@@ -1,0 +1,56 @@
+"""What twins of the cases, and jobs that were run again, say of strategies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from femubench.reports.cells import plain
+from femubench.reports.page.rounding import clean
+from femubench.results import Run, twin_skills, unsteady
+
+MEANING = (
+    "Twins are similar structures under other names, drawn from a seed when the run began: other "
+    "sizes, moduli and densities, of which the truth follows exactly. A strategy that reckons errs "
+    "on them as on their cases; one that is clearly better on the cases may know these by heart."
+)
+
+
+def twins_by_strategy(run: Run) -> dict[str, dict[str, Any]]:
+    """Return by strategy, in plain data, its skill on twins and on their cases, and what is odd."""
+    return {
+        name: {
+            "skill": clean(found.skill),
+            "original_skill": clean(found.original_skill),
+            "p": clean(found.p),
+            "suspicious": found.suspicious,
+            "known": list(found.known),
+        }
+        for name, found in twin_skills(run).items()
+    }
+
+
+def drawn_from(run: Run) -> str:
+    """Return how many twins there were, and from which seed."""
+    told = run.meta.get("twins") or {}
+    twins = told.get("of") or {}
+    return f"{len(twins)} twins of {len(set(twins.values()))} cases, seed {told.get('seed')}"
+
+
+def suspicions(run: Run) -> list[str]:
+    """Return a sentence for every strategy that may know the cases, or that gave two answers."""
+    told = [
+        f"{plain(name)} knows the cases? skill {found.original_skill:.3f} on them, "
+        f"{found.skill:.3f} on their twins"
+        + (f" (more than twice the error on the twins of {_few(found.known)})" * bool(found.known))
+        for name, found in twin_skills(run).items()
+        if found.suspicious
+    ]
+    return told + [
+        f"{plain(name)} gave two answers to one job: {plain(what)}"
+        for name, what in unsteady(run).items()
+    ]
+
+
+def _few(names: tuple[str, ...]) -> str:
+    more = len(names) - 3
+    return ", ".join(map(plain, names[:3])) + (f" and {more} more" if more > 0 else "")

@@ -1,0 +1,388 @@
+"""Twins of cases: similar to the last digit, under other names; who knows cases is found."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import femubench
+from femubench.core.case.case import Case
+from femubench.core.case.reader import read_case
+from femubench.core.cli.main import bench
+from femubench.core.errors import InputError, NotApplicable
+from femubench.core.fem.frame import (
+    Brace,
+    Coupling,
+    Eccentricity,
+    Factor,
+    Frame,
+    GroundSpring,
+    Joint,
+    JointSpring,
+    Link,
+    Material,
+    Member,
+    MemberSet,
+    Oscillator,
+    Place,
+    PointMass,
+    Preload,
+    RigidEnd,
+    Support,
+)
+from femubench.core.fem.model import Model
+from femubench.core.fem.sections import rectangular_tube, round_tube
+from femubench.core.library.rank import plan_of, rank, repeated, request_of, textbook_of
+from femubench.core.modal.eigen import solve_modes
+from femubench.core.plugin.loader import load_plugins
+from femubench.core.run.beside import beside
+from femubench.core.run.runner import run_jobs
+from femubench.core.run.store import Store
+from femubench.core.schema.records import run_from_json, run_to_json
+from femubench.core.schema.results import Run
+from femubench.core.score.repeatability import unsteady
+from femubench.core.score.scoring import judge, reference_of
+from femubench.core.score.twin_skill import twin_skills
+from femubench.core.twin.disguise import disguised
+from femubench.core.twin.similarity import Similarity, matrix_factors, similar_case, similar_frame
+from femubench.core.twin.twins import Twin, again, twin_of, twins_of
+from femubench.core.typing import SparseArray
+from femubench.results import leaderboard
+
+sys.path.insert(0, str(Path(__file__).parent / "toys"))
+import harness_toys as toys
+from twin_toys import Chance, Drawn, Memory
+
+BY = Similarity(length=1.3, modulus=0.7, density=1.4)
+COMPUTED = ["frame-solid", "hframe-solid", "frame-beam", "suite/bracket", "suite/tower"]
+
+
+def everything() -> Frame:
+    """A frame in space with one of each thing that a frame can have."""
+    tube, pipe = rectangular_tube(0.03, 0.05, 0.002), round_tube(0.04, 0.003)
+    steel, light = Material(2.1e11, 0.3, 7850.0), Material(7e10, 0.33, 2700.0)
+    joints = [("A", (0, 0, 0)), ("B", (0, 0, 1)), ("C", (0.8, 0.1, 1)), ("D", (0.9, 0.2, 0))]
+    joints += [("E", (0.8, 0.9, 1.1)), ("F", (0.9, 0.9, 1.1)), ("G", (0.4, 0.9, 1.2))]
+    ends = [("A", "B"), ("B", "C"), ("C", "D"), ("C", "E"), ("B", "E"), ("F", "G"), ("B", "G")]
+    members = tuple(
+        Member(f"bar-{i}", pair, 2, tube if i % 2 else pipe, light if i > 4 else steel)
+        for i, pair in enumerate(ends)
+    )
+    at = Place(member="bar-1", s=0.4)
+    return Frame(
+        "3d",
+        "timoshenko",
+        tuple(Joint(name, xyz, "knee" if name < "D" else "") for name, xyz in joints),
+        members,
+        masses=(PointMass(at, 1.5, (0.02, 0.0, 0.05)), PointMass(Place(joint="E"), 0.4)),
+        springs=(GroundSpring(Place(joint="E"), "y", 3e4), GroundSpring(at, "rx", 70.0)),
+        supports=(Support(Place(joint="A"), ("x", "y", "z", "rx", "ry", "rz")),
+                  Support(Place(joint="D"), ("x", "y", "z"))),
+        joint_springs=(JointSpring("C", "bar-2", {"ry": 4e4, "rz": 5e4}, 0.02),
+                       JointSpring("B", "bar-4", {"x": 4e7, "rx": 5e4}, 0.03, 10.0)),
+        rigid_ends=(RigidEnd("B", "bar-0", 0.04, 0.01),),
+        links=(Link("E", ("F",)),),
+        gravity=0.7,
+        factors=(Factor("EI", ("bar-3", "bar-1/2"), 1.2), Factor("density", ("all",), 0.9)),
+        preloads=(Preload("bar-1", -900.0),),
+        eccentricities=(Eccentricity("bar-3", 0.004, -0.003),),
+        couplings=(Coupling("bar-0", 0.2),),
+        braces=(Brace(("A", "C"), 2e5), Brace(("D", "E"), 1e5, "x")),
+        oscillators=(Oscillator(Place(joint="G"), "z", 0.3, 25.0, crosswise=False),),
+        sets=(MemberSet("legs", ("bar-0", "bar-2")),),
+        families=(MemberSet("section:", ("bar-1",)),),
+    )  # fmt: skip
+
+
+def off(found: SparseArray, wanted: SparseArray) -> float:
+    """Return the largest difference of two matrices as a share of their diagonals."""
+    size = np.sqrt(np.abs(wanted.diagonal()))
+    apart = (found - wanted).tocoo()
+    return float(np.max(np.abs(apart.data) / (size[apart.row] * size[apart.col]), initial=0.0))
+
+
+@cache
+def builtin(name: str) -> Case:
+    return femubench.cases[name]
+
+
+@cache
+def twin(name: str) -> Twin:
+    return twin_of(builtin(name), 1, 5)
+
+
+def rms(case: Case) -> np.ndarray:
+    return np.array(list(reference_of(case).rms_percent.values()))
+
+
+def test_everything_that_a_frame_can_have_scales_to_the_last_digit() -> None:
+    frame = everything()
+    small, large = Model.of(frame), Model.of(similar_frame(frame, BY))
+    mass, stiffness = matrix_factors(small.dofs, BY)
+    assert off(large.mass, (mass @ small.mass @ mass).tocsr()) < 1e-12
+    assert off(large.stiffness, (stiffness @ small.stiffness @ stiffness).tocsr()) < 1e-10
+    # Each thing takes part: without any one of them the matrices are others.
+    bare = {"gravity": 0.0, "masses": (), "springs": (), "preloads": (), "oscillators": ()}
+    for name, nothing in bare.items():
+        other = Model.of(replace(frame, **{name: nothing}))
+        other_large = Model.of(similar_frame(replace(frame, **{name: nothing}), BY))
+        assert (
+            other.size != small.size
+            or (other.stiffness != small.stiffness).nnz
+            or ((other.mass != small.mass).nnz)
+        )
+        first = solve_modes(other).elastic.natural_frequencies[:5]
+        second = solve_modes(other_large).elastic.natural_frequencies[:5]
+        assert second == pytest.approx(BY.frequency * first, rel=1e-9)
+
+
+def test_weight_against_stiffness_is_what_it_was() -> None:
+    assert similar_frame(everything(), BY).gravity == pytest.approx(0.7 * 0.7 / (1.4 * 1.3))
+
+
+def test_other_names_and_orders_change_no_frequency() -> None:
+    frame = everything()
+    case = replace(toys.tiny_case(), model=Model.of(frame), measurement=_at_joints(frame),
+                   modifications=())  # fmt: skip
+    hidden = disguised(case, np.random.default_rng(3))
+    other = hidden.model.frame_structure.frame
+    first, second = (solve_modes(m.model).elastic for m in (case, hidden))
+    assert second.natural_frequencies[:8] == pytest.approx(first.natural_frequencies[:8], rel=1e-9)
+    names = {joint.name for joint in frame.joints} | {member.name for member in frame.members}
+    names |= {"knee", "legs"}
+    known = {j.name for j in other.joints} | {j.type for j in other.joints}
+    known |= {part.name for part in (*other.members, *other.sets)}
+    assert not names & known
+    assert [m.elements for m in other.members] == [2] * 7
+    assert sorted(len(item.members) for item in other.sets) == [2]
+    assert not set(case.measurement.sensors.labels) & set(hidden.measurement.sensors.labels)
+    seen = np.abs(hidden.model.observe(hidden.measurement.sensors) @ second.shapes)
+    again_seen = np.abs(case.model.observe(case.measurement.sensors) @ first.shapes)
+    assert np.sort(seen[:, 0]) == pytest.approx(np.sort(again_seen[:, 0]), rel=1e-6)
+
+
+def _at_joints(frame: Frame) -> femubench.Measurement:
+    xyz = np.array([joint.xyz for joint in frame.joints if joint.name != "G"])
+    labels = tuple(f"at-{i}" for i in range(len(xyz)))
+    sensors = femubench.Sensors(labels, xyz, ("x",) * len(xyz))
+    shapes = np.linspace(0.1, 1.0, len(xyz))[:, None]
+    one = np.ones(1)
+    return femubench.Measurement(sensors, (1,), 9.0 * one, 0.1 * one, one, shapes, 0.1 * shapes)
+
+
+@pytest.mark.parametrize("name", COMPUTED)
+def test_the_nominal_models_predict_what_they_did_times_the_factor(name: str) -> None:
+    case, other = builtin(name), twin(name)
+    factor = other.measurement.frequencies / case.measurement.frequencies
+    assert np.ptp(factor) < 1e-12 * factor[0]
+    assert abs(np.log(factor[0])) >= np.log(1.1) - 1e-12
+    for first, second in ((case, other), (_textbook(case), _textbook(other))):
+        assert rms(second) == pytest.approx(rms(first), rel=1e-9)
+        low, high = (solve_modes(c.model).elastic.natural_frequencies[:8] for c in (first, second))
+        assert high == pytest.approx(factor[0] * low, rel=1e-10)
+
+
+def _textbook(case: Case) -> Case:
+    return textbook_of([case]).get(case.name, case)
+
+
+@pytest.mark.parametrize("strategy", ["eigensensitivity", "berman", "local", "kabe-rigid"])
+def test_what_a_strategy_reckons_errs_on_a_twin_as_on_its_case(strategy: str) -> None:
+    found = femubench.strategies[strategy]()
+    for name in ("frame-solid", "hframe-solid"):
+        errors = []
+        for case in (builtin(name), twin(name)):
+            rng = np.random.default_rng(0)
+            model = found.update(case.model, case.used_measurement(), rng).model
+            blocks = judge(case, model, reference_of(case)).blocks
+            errors.append([block.rms_percent for block in blocks.values()])
+        assert errors[1] == pytest.approx(errors[0], rel=1e-5, abs=1e-7)
+
+
+def test_matrices_have_similar_ones_too(tmp_path: Path) -> None:
+    from femubench.core.case.writing import write_case
+
+    case = builtin("frame-solid")
+    factor = 1.1
+    changed = replace(case.model, stiffness=factor * case.model.stiffness)
+    write_case(tmp_path / "m", case, changed)  # whose matrices no keys give
+    plain = read_case(tmp_path / "m")
+    assert plain.model.structure is None
+    other = twin_of(plain, 1, 8)
+    assert rms(other) == pytest.approx(rms(plain), rel=1e-9)
+    assert not set(other.model.geometry.names) & set(plain.model.geometry.names)  # type: ignore[attr-defined]
+    assert other.model.dofs.direction != plain.model.dofs.direction
+
+
+def test_rotations_and_the_mass_and_the_band_scale_too() -> None:
+    case = builtin("frame-solid")
+    measured = case.measurement
+    sensors = replace(measured.sensors, directions=("rx", *measured.sensors.directions[1:]))
+    case = replace(case, band=(10.0, 20.0), measurement=replace(
+        measured, sensors=sensors, total_mass=(2.0, 0.1)))  # fmt: skip
+    other = similar_case(case, BY)
+    assert other.measurement.shapes[0] == pytest.approx(measured.shapes[0] / 1.3)
+    assert other.measurement.shape_std[0] == pytest.approx(measured.shape_std[0] / 1.3)
+    assert other.measurement.shapes[1:] == pytest.approx(measured.shapes[1:])
+    assert other.measurement.total_mass == pytest.approx((2.0 * BY.mass, 0.1 * BY.mass))
+    assert other.band == pytest.approx((10.0 * BY.frequency, 20.0 * BY.frequency))
+
+
+def test_a_model_without_nodes_has_no_twin() -> None:
+    case = toys.tiny_case()
+    bare = replace(case, model=toys.matrices_only(case.model))
+    with pytest.raises(NotApplicable, match="no similar one"):
+        twin_of(bare, 1, 0)
+    assert list(twins_of([bare, case], 2, 0))
+    assert len(list(twins_of([bare], 2, 0))) == 0
+
+
+def test_the_same_seed_gives_the_same_twins_and_another_one_others() -> None:
+    case = toys.tiny_case()
+    one, same, number, seed = (twin_of(case, *a) for a in ((1, 4), (1, 4), (2, 4), (1, 5)))
+    assert one.digest == same.digest
+    assert (one.model.stiffness != same.model.stiffness).nnz == 0
+    assert len({one.digest, number.digest, seed.digest, case.digest}) == 4
+    frequencies = [t.measurement.frequencies[0] for t in (one, number, seed)]
+    assert len(set(frequencies)) == 3
+    # Noise of a seed is drawn anew for every twin and every seed of twins.
+    noise = [t.used_measurement(3).frequencies / t.measurement.frequencies[:3] for t in (one, seed)]
+    assert np.abs(noise[0] - noise[1]).max() > 1e-4
+    repeat = again(case)
+    assert (repeat.used_measurement(3).frequencies == case.used_measurement(3).frequencies).all()
+
+
+@pytest.fixture(scope="module")
+def run() -> Run:
+    case = builtin("frame-solid")
+    twins = list(twins_of([case], 2, 11))
+    others = beside([case], twins, 2, 11)
+    truth = tuple(case.measurement.frequencies[case.measurement.frequencies > 0.0])
+    able = [toys.Unchanged(), Memory(truth[:8]), Chance(), Drawn()]
+    return run_jobs([case], able, seeds=(0, 1), jobs=2, beside=others)
+
+
+def test_who_knows_a_case_by_heart_is_marked(run: Run) -> None:
+    found = twin_skills(run)
+    assert found["memory"].original_skill > 0.8
+    assert found["memory"].skill == pytest.approx(0.0, abs=1e-6)
+    assert found["memory"].suspicious
+    assert found["memory"].known == ("frame-solid",)
+    honest = {name for name, item in found.items() if not item.suspicious}
+    assert honest == {"unchanged", "chance", "drawn"}
+    assert found["unchanged"].skill == pytest.approx(found["unchanged"].original_skill, abs=1e-9)
+
+
+def test_over_many_structures_the_signs_decide(run: Run) -> None:
+    # Twelve structures, on the twins of which a strategy leaves a fifth more error: no single case.
+    meta = {"reference": {}, "structures": {}, "twins": {**run.meta["twins"], "reference": {}}}
+    meta["twins"] |= {"of": {}, "again": {}}
+    results, others = [], []
+    for strategy, factor in (("knows", 1.2), ("none", 1.0), ("slightly", 1.05)):
+        for i in range(12):
+            name = f"case-{i}"
+            meta["reference"][name] = meta["twins"]["reference"][f"{name}~1"] = {"higher": 3.0}
+            meta["twins"]["of"][f"{name}~1"] = name
+            block = run.results[0].blocks["higher"]
+            for listed, called, f in ((results, name, 1.0), (others, f"{name}~1", factor)):
+                error = {"higher": replace(block, rms_percent=(2.0 + 0.01 * i) * f)}
+                job = run.results[0].changed(
+                    case=called, strategy=strategy, seed=seed, blocks=error
+                )
+                listed.append(job)
+    found = twin_skills(Run(meta, tuple(results), tuple(others)))
+    assert [found[n].suspicious for n in ("knows", "none", "slightly")] == [True, False, False]
+    assert found["knows"].p is not None
+    assert found["knows"].p < 0.01
+    assert found["knows"].known == ()
+
+
+def test_who_answers_otherwise_every_time_is_found(run: Run) -> None:
+    assert list(unsteady(run)) == ["chance"]
+    assert "another model" in unsteady(run)["chance"]
+    assert run.meta["unsteady"] == unsteady(run)
+
+
+def test_no_figure_of_the_run_has_twins_in_it(run: Run) -> None:
+    assert {result.case for result in run.results} == {"frame-solid"}
+    assert set(run.meta["cases"]) == set(run.meta["reference"]) == {"frame-solid"}
+    names = {"frame-solid~1", "frame-solid~2", "frame-solid~again"}
+    assert {result.case for result in run.beside} == names
+    told = {result.case: result.provenance for result in run.beside}
+    assert told["frame-solid~2"]["twin_of"] == "frame-solid"
+    assert told["frame-solid~again"]["again"] == "frame-solid"
+    alone = leaderboard(Run({k: v for k, v in run.meta.items() if k != "twins"}, run.results))
+    assert leaderboard(run).equals(alone)
+
+
+def test_reports_tell_of_twins(run: Run) -> None:
+    text = " ".join(str(femubench.report(run)).split())
+    assert "skill on 2 twins of 1 cases, seed 11" in text
+    assert "?: memory knows the cases? skill" in text
+    assert "?: chance gave two answers to one job: frame-solid: another model" in text
+    markdown = str(femubench.report(run, style="markdown"))
+    assert "## Twins" in markdown
+    assert "memory (knows the cases?)" in markdown
+    page = str(femubench.report(run, style="html"))
+    assert "knows the cases? skill" in page
+    assert '"suspicious":true' in page.replace(" ", "")
+
+    rows = {
+        row["strategy"]: row
+        for row in json.loads(str(femubench.report(run, style="json")))["leaderboard"]
+    }
+    assert rows["memory"]["twins"]["suspicious"]
+    assert not rows["drawn"]["twins"]["suspicious"]
+    assert "unsteady" in rows["chance"]
+    assert "unsteady" not in rows["drawn"]
+
+
+def test_runs_with_twins_are_kept_read_and_resumed(run: Run, tmp_path: Path) -> None:
+    back = run_from_json(run_to_json(run))
+    assert back.beside == run.beside
+    store = Store(tmp_path / "store")
+    options = {"jobs": 1, "store": store, "nominal": "textbook"}
+    first = rank("suite/bracket", "unchanged", twins=1, **options)  # type: ignore[arg-type]
+    kept = store.load()
+    assert [r.case for r in kept.beside] == ["suite/bracket~1", "suite/bracket~again"]
+    assert kept.meta["request"]["twin_seed"] == kept.meta["twins"]["seed"]
+    plugins = load_plugins()
+    repeats = repeated(request_of(kept), plugins)
+    assert [t.digest for t in repeats.beside.twins] == [
+        kept.meta["twins"]["cases"]["suite/bracket~1"]["digest"]
+    ]
+    # The seed of the last run is taken, so that the same words go on with it.
+    given = {"twins": 1, "nominal": "textbook", "resumed": store}
+    plan = plan_of("suite/bracket", "unchanged", plugins, **given)  # type: ignore[arg-type]
+    assert plan.request.twin_seed == first.meta["twins"]["seed"]
+    assert plan.jobs == 3
+    other = plan_of("suite/bracket", "unchanged", plugins, twins=1)
+    assert other.request.twin_seed != plan.request.twin_seed
+
+
+def test_what_was_measured_has_no_twins(tmp_path: Path) -> None:
+    plan = plan_of(["frame", "frame-solid"], "unchanged", load_plugins(), twins=2, twin_seed=1)
+    assert [t.name for t in plan.beside.twins] == ["frame-solid~1", "frame-solid~2"]
+    with pytest.raises(InputError, match="twins"):
+        plan_of("frame", "unchanged", load_plugins(), twins=101)
+
+
+@pytest.mark.parametrize("word", ["x", "1:", "101", "-1", "1:2:3"])
+def test_words_that_are_no_number_of_twins(word: str) -> None:
+    answer = CliRunner().invoke(bench, ["run", "frame", "--twins", word])
+    assert answer.exit_code == 2
+    assert "no number of twins" in answer.output
+
+
+def test_the_command_prints_the_seed(tmp_path: Path) -> None:
+    words = ["run", "suite/bracket", "-s", "unchanged", "--twins", "1:77", "-j", "1"]
+    answer = CliRunner().invoke(bench, [*words, "--store", str(tmp_path / "s")])
+    assert answer.exit_code == 0, answer.output
+    assert "1 twin (seed 77)" in " ".join(answer.output.split())
