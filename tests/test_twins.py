@@ -293,10 +293,8 @@ def test_over_many_structures_the_signs_decide(run: Run) -> None:
             block = run.results[0].blocks["higher"]
             for listed, called, f in ((results, name, 1.0), (others, f"{name}~1", factor)):
                 error = {"higher": replace(block, rms_percent=(2.0 + 0.01 * i) * f)}
-                job = run.results[0].changed(
-                    case=called, strategy=strategy, seed=seed, blocks=error
-                )
-                listed.append(job)
+                own = {"case": called, "strategy": strategy, "seed": 0, "blocks": error}
+                listed.append(run.results[0].changed(**own))
     found = twin_skills(Run(meta, tuple(results), tuple(others)))
     assert [found[n].suspicious for n in ("knows", "none", "slightly")] == [True, False, False]
     assert found["knows"].p is not None

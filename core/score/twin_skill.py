@@ -60,6 +60,13 @@ class _Pair:
     here: float
 
 
+_VALUES: tuple[Callable[[_Pair], float], ...] = (
+    lambda pair: pair.there,
+    lambda pair: pair.here,
+    lambda pair: pair.there - pair.here,
+)
+
+
 def twin_skills(run: Run) -> dict[str, TwinSkill]:
     """Return what the twins say of every strategy; nothing of a run without twins.
 
@@ -76,17 +83,15 @@ def twin_skills(run: Run) -> dict[str, TwinSkill]:
     weights = block_weights(known, structures)
     for name, pair in _pairs(run, weights):
         own[name].append(pair)
-    means = {
-        name: tuple(
-            _by_structure(pairs, weights, structures, value)
-            for value in (lambda p: p.there, lambda p: p.here, lambda p: p.there - p.here)
-        )
-        for name, pairs in own.items()
-    }
-    evidence = evidence_of({name: np.exp(changes) for name, (_, _, changes) in means.items()})
+    there, here, changes = (
+        {name: _by_structure(pairs, weights, structures, value) for name, pairs in own.items()}
+        for value in _VALUES
+    )
+    evidence = evidence_of({name: np.exp(values) for name, values in changes.items()})
     return {
         item.strategy: TwinSkill(
-            *(1.0 - math.exp(float(np.mean(logs))) for logs in means[item.strategy][:2]),
+            skill=1.0 - math.exp(float(np.mean(there[item.strategy]))),
+            original_skill=1.0 - math.exp(float(np.mean(here[item.strategy]))),
             p=item.p,
             worse=item.verdict == "worse" and (item.ratio or 0.0) >= CLEAR,
             known=_known(own[item.strategy]),
@@ -103,14 +108,14 @@ def _pairs(run: Run, weights: Weights) -> Iterator[tuple[str, _Pair]]:
     for case, block in weights:
         blocks[case].append(block)
     for item in run.beside:
-        case = origins.get(item.case)
-        other = first.get((item.strategy, case or "", item.seed))
-        if case is None or other is None or _STOPPED & {item.status, other.status}:
+        origin = origins.get(item.case, "")
+        other = first.get((item.strategy, origin, item.seed))
+        if other is None or _STOPPED & {item.status, other.status}:
             continue
-        for block in blocks[case]:
+        for block in blocks[origin]:
             there = math.log(score_in(item, block, told[item.case]))
-            here = math.log(score_in(other, block, run.meta["reference"][case]))
-            yield item.strategy, _Pair(case, block, item.case, there, here)
+            here = math.log(score_in(other, block, run.meta["reference"][origin]))
+            yield item.strategy, _Pair(origin, block, item.case, there, here)
 
 
 def _by_structure(

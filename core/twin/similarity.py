@@ -207,15 +207,16 @@ def similar_frame(frame: Frame, by: Similarity) -> Frame:
         ],
         "oscillators": [_oscillator(item, by) for item in frame.oscillators],
     }
+    own: dict[str, Any] = {name: tuple(items) for name, items in changed.items()}
     gravity = frame.gravity * by.modulus / (by.density * by.length)
-    return replace(
-        frame, gravity=gravity, **{name: tuple(items) for name, items in changed.items()}
-    )
+    return replace(frame, gravity=gravity, **own)
 
 
 def _section(section: Section, length: float) -> Section:
-    fourth = {name: length**4 * getattr(section, name) for name in ("Iy", "Iz", "J", "Jp")}
-    sizes = {
+    fourth: dict[str, Any] = {
+        name: length**4 * getattr(section, name) for name in ("Iy", "Iz", "J", "Jp")
+    }
+    sizes: dict[str, Any] = {
         name: None if size is None else length * size
         for name, size in (("width", section.width), ("height", section.height))
     }
