@@ -13,16 +13,22 @@ from femubench.core.display import counted
 @click.command("publish")
 @click.argument("folder", metavar="DIR", type=options.PATH)
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=options.PATH)
+@click.option(
+    "--unverified", is_flag=True,
+    help="Take also what cannot be verified, and say so on the site: runs without sandbox or "
+    "twins, of cases that are not installed here, or whose figures do not agree.",
+)  # fmt: skip
 @options.quiet
-def publish(folder: Path, files: tuple[Path, ...], quiet: bool) -> None:
+def publish(folder: Path, files: tuple[Path, ...], unverified: bool, quiet: bool) -> None:
     """Merge result files into a static site in DIR.
 
     A FILE is written by run --json, here or on another machine. DIR is new, empty, or written by
-    an earlier publish, and then the files are added. If one file is invalid, nothing is written.
+    an earlier publish, and then the files are added. If one file is invalid, or is no complete run
+    in a sandbox and with twins whose figures can all be computed again here, nothing is written.
     """
     from femubench.core.library.publish import publish as merge
 
-    done = merge(folder, files)
+    done = merge(folder, files, unverified=unverified)
     if quiet:
         return
     runs, index = len(done.index["runs"]), folder / "index.html"

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
+from femubench.core.case.case import Case
 from femubench.core.files import check_can_make, resolved
-from femubench.core.library.cases import listed
+from femubench.core.library.cases import listed, read_cases, scenarios_of, usable_plugins
+from femubench.core.library.rank import classes_of, drawn_twins, textbook_of
+from femubench.core.plugin.loader import Plugins
 from femubench.core.publish.publishing import Published, publish as merge
+from femubench.core.publish.verification import verify
 from femubench.core.schema.records import run_to_json
 from femubench.core.schema.results import Run
 
@@ -18,18 +23,24 @@ from femubench.core.schema.results import Run
 def publish(
     folder: str | PathLike[str],
     runs: Run | str | PathLike[str] | Iterable[Run | str | PathLike[str]],
+    *,
+    unverified: bool = False,
 ) -> Published:
     """Merge runs into a static site, all of them or none.
 
     Arguments:
         folder: new, empty, or made by this function: then the runs are added to it.
         runs: files that ``bench run --json`` wrote, here or on another machine, or runs.
+        unverified: whether to take, marked as such, what cannot be verified: runs without sandbox
+            or twins, of cases that are not installed here, or with figures that do not agree.
 
     Raises:
-        InputError: for a file that is not sound, or a folder with something else in it.
+        InputError: for a file that is not sound, or cannot be verified, or a folder with something
+            else in it.
 
     Examples:
-        >>> len(femubench.publish("site", femubench.rank(case, [nominal, scaled])).added)
+        >>> run = femubench.rank(case, [nominal, scaled])
+        >>> len(femubench.publish("site", run, unverified=True).added)
         1
     """
     from femubench.reports.publish_page import pages_of
@@ -42,4 +53,36 @@ def publish(
             if isinstance(run, Run):
                 file.write_text(json.dumps(run_to_json(run), allow_nan=False), encoding="utf-8")
             files.append(file)
-        return merge(Path(folder), files, pages_of)
+        installed = InstalledCases(usable_plugins())
+
+        def check(run: Run, data: Mapping[str, Any], file: Path) -> None:
+            verify(run, data, installed, file)
+
+        return merge(Path(folder), files, pages_of, check, unverified=unverified)
+
+
+class InstalledCases:
+    """The cases of the scenarios that are installed, each read once.
+
+    Arguments:
+        plugins: where they come from.
+    """
+
+    def __init__(self, plugins: Plugins) -> None:
+        self._plugins = plugins
+        self._owners = scenarios_of(plugins.scenarios)
+        self._found: dict[str, Case] = {}
+
+    def case(self, name: str) -> Case | None:
+        """Return a case by its name; None where there is none."""
+        if name in self._owners and name not in self._found:
+            (self._found[name],) = read_cases([name], self._plugins)
+        return self._found.get(name)
+
+    def twins(self, cases: Sequence[Case], number: int, seed: int) -> Sequence[Case]:
+        """Return the twins that a run of these cases draws from a seed."""
+        return drawn_twins(cases, classes_of(self._plugins), number, seed)
+
+    def yardstick(self, case: Case) -> Case:
+        """Return a case with the model that all errors are measured against."""
+        return textbook_of([case]).get(case.name, case)

@@ -33,7 +33,7 @@ from femubench.core.run.store import Store
 from femubench.core.schema import records as serial, results
 from femubench.core.score.leaderboard import is_test, leaderboard
 from femubench.core.study.skill import skill_by
-from femubench.core.twin.twins import twins_of
+from femubench.core.twin.twins import Twin, twins_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -350,14 +350,28 @@ def _planned(
     repeatable: bool = True,
 ) -> Plan:
     """Return a plan with textbook models and twins; arguments as those of `Plan`."""
-    drawn, others = [], Beside()
+    drawn: Sequence[Twin] = ()
+    others = Beside()
     if request.twins:
-        # Only what was computed follows the laws of similar structures to the last digit.
-        computed = [case for case in cases if not is_test(classes.get(case.name))]
-        drawn = list(twins_of(computed, request.twins, request.twin_seed))
+        drawn = drawn_twins(cases, classes, request.twins, request.twin_seed)
         others = beside(cases, drawn, request.twins, request.twin_seed)
     textbook = textbook_of([*cases, *drawn])
     return Plan(request, cases, strategies, textbook, classes, others, repeatable)
+
+
+def drawn_twins(
+    cases: Sequence[Case], classes: Mapping[str, Sequence[str]], number: int, seed: int
+) -> list[Twin]:
+    """Return twins of the cases whose truth was computed.
+
+    Of what was measured it is not known how a similar structure would have been.
+
+    Arguments:
+        classes: kinds of structure and truth by case.
+        number, seed: of twins of each case, and what they are drawn from.
+    """
+    computed = [case for case in cases if not is_test(classes.get(case.name))]
+    return list(twins_of(computed, number, seed))
 
 
 def _twin_seed(number: int, seed: int | None, resumed: Store | None) -> int:

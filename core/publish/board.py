@@ -12,7 +12,9 @@ from femubench.core.publish.submissions import Submission, slug
 from femubench.core.schema.results import BLOCKS, DONE, JobResult
 from femubench.core.score.counting import block_shares
 from femubench.core.score.ranking import geometric_mean, ranked as in_order, score_of
+from femubench.core.score.repeatability import unsteady
 from femubench.core.score.statistics import structures_of
+from femubench.core.score.twin_skill import twin_skills
 
 INDEX_SCHEMA = 2  # since more skill is better
 
@@ -145,6 +147,7 @@ def _described(
     runs = sorted({run.order: run for item in findings for run in item.runs}.items())
     machines = {machine_of(run): run.run.meta["machine"] for _, run in runs}
     return {
+        "marks": _marks(version.strategy, findings),
         "version": version.number,
         "femubench": version.femubench,
         "first": runs[0][1].started,
@@ -162,6 +165,21 @@ def _described(
         "comparable": bool(counted),
         "cases": cases,
     }
+
+
+def _marks(strategy: str, findings: Iterable[Finding]) -> list[str]:
+    """Return what a reader has to know of a version: who vouches for it, and what is odd."""
+    listed = list(findings)
+    runs = {run.name: run for item in listed for run in item.runs}.values()
+    marks = []
+    if not all(any(run.verified for run in item.runs) for item in listed):
+        marks.append("unverified")
+    twins = [twin_skills(run.run).get(strategy) for run in runs]
+    if any(found is not None and found.suspicious for found in twins):
+        marks.append("knows the cases?")
+    if any(strategy in unsteady(run.run) for run in runs):
+        marks.append("two answers to one job")
+    return marks
 
 
 def _on_case(
@@ -291,4 +309,5 @@ def _run_entry(item: Submission) -> dict[str, Any]:
         "versions": dict(meta["versions"]),
         "results": len(item.run.results),
         "strategies": len({result.strategy for result in item.run.results}),
+        "verified": item.verified,
     }

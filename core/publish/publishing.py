@@ -14,7 +14,7 @@ from typing import Any
 from femubench.core.errors import InputError, OutputError
 from femubench.core.files import MIB, read_text, resolved
 from femubench.core.publish.board import index_of
-from femubench.core.publish.submissions import SCHEMA, Submission, read_submission
+from femubench.core.publish.submissions import SCHEMA, Submission, Verify, read_submission
 from femubench.core.schema.records import parse_json
 
 MARKER = "femubench-site.json"
@@ -41,13 +41,22 @@ class Published:
     index: Mapping[str, Any]
 
 
-def publish(folder: Path, files: Sequence[Path], render: Render) -> Published:
+def publish(
+    folder: Path,
+    files: Sequence[Path],
+    render: Render,
+    verify: Verify | None = None,
+    *,
+    unverified: bool = True,
+) -> Published:
     """Merge result files into the site in a folder, all of them or none.
 
     Arguments:
         folder: made by this function, empty, or not there yet.
         files: what ``bench run --json`` wrote.
         render: from the content of ``index.json`` to the pages by relative name.
+        verify: checks what can be checked of a run.
+        unverified: whether to take, marked as such, what that refuses.
 
     Raises:
         InputError: for a file that is not sound, or a folder with something else in it.
@@ -55,7 +64,7 @@ def publish(folder: Path, files: Sequence[Path], render: Render) -> Published:
     """
     folder = resolved(folder)
     old = _published(folder)
-    merged = _merged([*old, *(read_submission(file) for file in files)])
+    merged = _merged([*old, *(_submission(file, verify, unverified) for file in files)])
     index = index_of(merged)
     pages = {
         **render(index),
@@ -69,6 +78,16 @@ def publish(folder: Path, files: Sequence[Path], render: Render) -> Published:
         raise OutputError(folder, error) from error
     known = {item.name for item in old}
     return Published(tuple(item.name for item in merged if item.name not in known), index)
+
+
+def _submission(file: Path, verify: Verify | None, unverified: bool) -> Submission:
+    """Return a new file, verified or, where that may be, marked as not verified."""
+    try:
+        return read_submission(file, verify)
+    except InputError:
+        if not unverified:
+            raise
+    return read_submission(file)
 
 
 def check_site(folder: Path) -> None:
@@ -102,14 +121,14 @@ def _published(folder: Path) -> list[Submission]:
     check_site(folder)
     data = folder / DATA
     names = sorted(path for path in data.glob("*.json")) if data.is_dir() else []
-    return [read_submission(path) for path in names]
+    return [read_submission(path, published=True) for path in names]
 
 
 def _merged(submissions: Iterable[Submission]) -> list[Submission]:
     """Return every run once, whatever order they came in.
 
-    A run that another file of the same run holds whole, as one made before it was resumed, is
-    left out.
+    A run that another file of the same run holds whole, as one made before it was resumed or was
+    verified, is left out.
     """
     unique = {item.name: item for item in submissions}
     listed = sorted(unique.values(), key=lambda item: item.order)
@@ -118,7 +137,10 @@ def _merged(submissions: Iterable[Submission]) -> list[Submission]:
         item
         for item in listed
         if not any(
-            item.run.meta["run"] == other.run.meta["run"] and parts[item.name] < parts[other.name]
+            item.run.meta["run"] == other.run.meta["run"]
+            and (parts[item.name], item.verified) != (parts[other.name], other.verified)
+            and parts[item.name] <= parts[other.name]
+            and item.verified <= other.verified
             for other in listed
         )
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, NoReturn
@@ -33,6 +33,9 @@ _ROUNDING = 1e-6  # relative, of an rms that is computed again from its modes
 _Word = Annotated[str, Field(max_length=200)]
 _Moment = Annotated[str, Field(pattern=_MOMENT)]
 _Digest = Annotated[_Word, Field(min_length=1)]
+# Raises InputError for a run, given with the content of its file, that cannot be verified.
+Verify = Callable[[Run, Mapping[str, Any], Path], None]
+_OF_VERIFIED = ("plan", "sandbox", "twins")  # meta data of those alone
 
 
 class _Record(BaseModel):
@@ -49,6 +52,15 @@ class _Machine(_Record):
 class _Case(_Record):
     title: Annotated[str, Field(max_length=1_000)] | None = None
     digest: _Digest
+
+
+class _Twins(_Record):
+    seed: Annotated[int, Field(ge=0)]
+    number: Annotated[int, Field(ge=0, le=1_000)]
+    of: dict[Name, Name]
+    again: dict[Name, Name]
+    cases: dict[Name, _Case]
+    reference: dict[Name, dict[Literal["used", "higher", "modified"], float]]
 
 
 class _Meta(_Record):
@@ -71,6 +83,9 @@ class _Meta(_Record):
     versions: Annotated[dict[_Word, _Word], Field(max_length=50)] = {}
     machine: _Machine = _Machine()
     git_commit: _Word | None = None
+    plan: _Word | None = None
+    sandbox: _Word | None = None
+    twins: _Twins | None = None
 
 
 @dataclass(frozen=True)
@@ -81,11 +96,13 @@ class Submission:
         run: with scores and ranks computed anew.
         text: the normalised file.
         name: of that file, from the run's id and a hash of the text.
+        verified: whether all that can be checked of it was.
     """
 
     run: Run
     text: str
     name: str
+    verified: bool = False
 
     @property
     def started(self) -> str:
@@ -98,8 +115,14 @@ class Submission:
         return self.started, self.name
 
 
-def read_submission(file: Path) -> Submission:
+def read_submission(
+    file: Path, verify: Verify | None = None, *, published: bool = False
+) -> Submission:
     """Return the run of a file, normalised.
+
+    Arguments:
+        verify: checks what can be checked; None checks the form alone.
+        published: whether the file is one of a site, which says whether it was verified.
 
     Raises:
         InputError: naming file and key of the first thing that is wrong.
@@ -112,8 +135,14 @@ def read_submission(file: Path) -> Submission:
     run = run_from_json(data, file=file)
     meta = _meta(run, file)
     results = _deduplicated(run, meta, file)
-    order = sorted(results.values(), key=lambda r: (r.case, r.strategy, r.seed, r.key))
-    return _submission(meta, order, file)
+    verified = published and data.get("verified") is True
+    if verify is not None:
+        verify(run, data, file)
+        verified = True
+    if not verified:
+        meta = {name: value for name, value in meta.items() if name not in _OF_VERIFIED}
+    beside = run.beside if verified else ()
+    return _submission(meta, results.values(), beside, file, verified=verified)
 
 
 def slug(text: str, longest: int = 40) -> str:
@@ -123,16 +152,30 @@ def slug(text: str, longest: int = 40) -> str:
     return f"{word}-{digest}" if word else digest
 
 
-def _submission(meta: Mapping[str, Any], results: Iterable[JobResult], file: Path) -> Submission:
+def _submission(
+    meta: Mapping[str, Any],
+    results: Iterable[JobResult],
+    beside: Iterable[JobResult],
+    file: Path,
+    *,
+    verified: bool,
+) -> Submission:
     """Return a run as its file says it, so that it is the same when that is read again."""
-    dropped = {"score": None, "rank": None, "traceback": ""}
-    records = [{**result_to_json(item), **dropped} for item in results]
-    data = {"schema": SCHEMA, "meta": meta, "results": records}
+    data = {"schema": SCHEMA, "meta": meta, "results": _records(results)}
+    if verified:
+        data |= {"beside": _records(beside), "verified": True}
     text = json.dumps(data, sort_keys=True, allow_nan=False, separators=(",", ":")) + "\n"
     digest = hashlib.sha256(text.encode()).hexdigest()[:12]
     run = run_from_json(json.loads(text), file=file)
     ranked = replace(run, results=rank_results(run.results, meta["reference"]))
-    return Submission(ranked, text, f"{slug(str(meta['run']))}-{digest}.json")
+    return Submission(ranked, text, f"{slug(str(meta['run']))}-{digest}.json", verified)
+
+
+def _records(results: Iterable[JobResult]) -> list[dict[str, Any]]:
+    """Return results in an order that does not depend on who ended first, without their scores."""
+    dropped = {"score": None, "rank": None, "traceback": ""}
+    order = sorted(results, key=lambda r: (r.case, r.strategy, r.seed, r.key))
+    return [{**result_to_json(item), **dropped} for item in order]
 
 
 def _meta(run: Run, file: Path) -> dict[str, Any]:

@@ -211,7 +211,8 @@ def origins_of(meta: Mapping[str, Any], *kinds: str) -> dict[str, str]:
         kinds: ``of`` for twins, ``again`` for jobs that were run a second time; both by default.
     """
     told = meta.get("twins") or {}
-    return {name: case for kind in kinds or ("of", "again") for name, case in told[kind].items()}
+    found = (told.get(kind) or {} for kind in kinds or ("of", "again"))
+    return {name: case for named in found for name, case in named.items()}
 
 
 @dataclass(frozen=True, repr=False)

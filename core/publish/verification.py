@@ -1,0 +1,219 @@
+"""What of a run can be checked here: cases, twins, measured figures, errors, scores, all jobs.
+
+What a strategy answered cannot be: that takes to run it again. But nothing else in a file is
+believed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Any, NoReturn, Protocol
+
+from femubench.core.case.case import Case
+from femubench.core.errors import InputError
+from femubench.core.run.provenance import plan_digest
+from femubench.core.schema.results import JobResult, Run
+from femubench.core.score.leaderboard import leaderboard
+from femubench.core.score.ranking import score_of
+from femubench.core.score.scoring import reference_of
+
+SANDBOX = "namespaces"  # what a run calls the one that it can have
+_AGAIN = "run it again with this version of femubench"
+_SAME = 1e-9  # relative, of measured figures, which a twin has times a factor
+_ROUNDING = 1e-6  # relative, of errors that are computed again on another machine
+
+Marks = Mapping[tuple[str, str | None, int], float]  # measured Hz by block, modification, number
+
+
+class Installed(Protocol):
+    """The cases of this installation."""
+
+    def case(self, name: str) -> Case | None:
+        """Return a case by its name; None where there is none."""
+        ...
+
+    def twins(self, cases: Sequence[Case], number: int, seed: int) -> Sequence[Case]:
+        """Return the twins that a run of these cases draws from a seed."""
+        ...
+
+    def yardstick(self, case: Case) -> Case:
+        """Return a case with the model that all errors are measured against."""
+        ...
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What this installation says of a case: measured figures and nominal errors."""
+
+    measured: Marks
+    reference: Mapping[str, float]
+
+    @classmethod
+    def of(cls, case: Case, installed: Installed) -> _Known:
+        found = reference_of(installed.yardstick(case))
+        measured = {
+            (name, mode.modification, mode.number): mode.measured_hz
+            for name, block in found.blocks.items()
+            for mode in block.modes
+        }
+        return cls(measured, found.rms_percent)
+
+
+def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) -> None:
+    """Check everything that a run says but the answers of its strategies.
+
+    Arguments:
+        run: as its file says it.
+        data: the content of that file.
+        installed: what the cases are.
+        file: for messages.
+
+    Raises:
+        InputError: naming the first thing that is wrong or cannot be checked, and what to do.
+    """
+    if run.meta.get("yardstick") != "textbook":
+        what = "errors are not measured against the textbook models"
+        _refuse(file, what, "meta.yardstick", _AGAIN)
+    _check_sandbox(run, file)
+    cases = _own_cases(run, installed, file)
+    twins = _own_twins(run, list(cases.values()), installed, file)
+    _check_complete(run, file)
+    known = {name: _Known.of(case, installed) for name, case in (cases | twins).items()}
+    _check_references(run, known, file)
+    origins = run.meta["twins"]["again"]
+    for key, results in (("results", run.results), ("beside", run.beside)):
+        for number, result in enumerate(results):
+            own = known[origins.get(result.case, result.case)]
+            _check_result(result, own, file, f"{key}[{number}]")
+    _check_board(run, data.get("leaderboard"), file)
+
+
+def _refuse(file: Path, what: str, key: str, expected: str) -> NoReturn:
+    raise InputError(what, file=file, key=key, expected=expected)
+
+
+def _check_sandbox(run: Run, file: Path) -> None:
+    told = run.meta.get("sandbox")
+    own = (result.provenance.get("sandbox", told) for result in chain(run.results, run.beside))
+    if any(one != SANDBOX for one in (told, *own)):
+        what = "the strategies ran without a sandbox"
+        _refuse(file, what, "meta.sandbox", "a run with `--sandbox require`, or --unverified")
+
+
+def _own_cases(run: Run, installed: Installed, file: Path) -> dict[str, Case]:
+    """Return the cases of a run as they are installed here, which they have to equal."""
+    found = {}
+    for name, told in run.meta["cases"].items():
+        case = installed.case(name)
+        if case is None:
+            what = f"no case {name!r} is installed here, so that nothing of it can be checked"
+            _refuse(file, what, f"meta.cases.{name}", "a built-in case, or --unverified")
+        if case.digest != told["digest"]:
+            what = f"other files than those of the case {name!r} that is installed here"
+            _refuse(file, what, f"meta.cases.{name}.digest", f"{case.digest}: {_AGAIN}")
+        structure = (run.meta.get("structures") or {}).get(name)
+        if structure != (case.structure or name):
+            what = f"{structure!r} is not its structure"
+            _refuse(file, what, f"meta.structures.{name}", repr(case.structure or name))
+        found[name] = case
+    return found
+
+
+def _own_twins(
+    run: Run, cases: Sequence[Case], installed: Installed, file: Path
+) -> dict[str, Case]:
+    """Return the twins of a run, drawn again from its seed."""
+    told = run.meta.get("twins")
+    if not told or told["number"] < 1:
+        what = "it has no twins, which would show who knows the cases"
+        _refuse(file, what, "meta.twins", "a run with `--twins 1` or more, or --unverified")
+    drawn = {t.name: t for t in installed.twins(cases, told["number"], told["seed"])}
+    stated = {name: told["cases"].get(name, {}).get("digest") for name in told["of"]}
+    if {name: twin.digest for name, twin in drawn.items()} != stated:
+        what = f"these are not the twins that seed {told['seed']} draws"
+        _refuse(file, what, "meta.twins", _AGAIN)
+    if any(told["of"][name] != name.rpartition("~")[0] for name in drawn) or not told["again"]:
+        _refuse(file, "they are of other cases, or nothing ran twice", "meta.twins", _AGAIN)
+    if not set(told["again"].values()) <= set(run.meta["cases"]):
+        _refuse(file, "what ran twice is no case of the run", "meta.twins.again", _AGAIN)
+    return drawn
+
+
+def _check_complete(run: Run, file: Path) -> None:
+    """Check that every job is there, once: nobody leaves out what did not go well."""
+    meta = run.meta
+    jobs = {(r.case, r.nominal, r.strategy, r.seed) for r in chain(run.results, run.beside)}
+    starts = {name: meta["starts"].get(name, []) for name in meta["cases"]}
+    starts |= {name: ["textbook"] for name in (*meta["twins"]["of"], *meta["twins"]["again"])}
+    wanted = {
+        (case, nominal, strategy, seed)
+        for case, nominals in starts.items()
+        for nominal in nominals
+        for strategy in meta["strategies"]
+        for seed in meta["seeds"]
+    }
+    if jobs != wanted or len(jobs) < len(run.results) + len(run.beside):
+        what = f"{len(wanted - jobs)} jobs are missing, {len(jobs - wanted)} are of no plan"
+        _refuse(file, what, "results", "all jobs of the run: go on with it by --resume")
+    keys = (result.key for result in chain(run.results, run.beside))
+    if plan_digest(keys) != meta.get("plan"):
+        _refuse(file, "the jobs are not those that the run began with", "meta.plan", _AGAIN)
+
+
+def _check_references(run: Run, known: Mapping[str, _Known], file: Path) -> None:
+    """Check the nominal errors, which every score is relative to."""
+    told = (
+        ("meta.reference", run.meta["reference"], run.meta["cases"]),
+        ("meta.twins.reference", run.meta["twins"]["reference"], run.meta["twins"]["of"]),
+    )
+    for key, stated, names in told:
+        for name in names:
+            found, own = stated.get(name, {}), known[name].reference
+            if found.keys() != own.keys() or not all(_near(found[b], own[b]) for b in own):
+                errors = ", ".join(f"{block} {error:.6g} %" for block, error in own.items())
+                _refuse(file, "not the errors of the textbook model", f"{key}.{name}", errors)
+
+
+def _near(one: float, other: float) -> bool:
+    return abs(one - other) <= _ROUNDING * (1.0 + abs(other))
+
+
+def _check_result(result: JobResult, known: _Known, file: Path, key: str) -> None:
+    """Check measured figures and score of a result."""
+    if result.status != "ok":
+        if result.blocks:
+            _refuse(file, f"errors of a job that is {result.status}", key, "none")
+        return
+    found = [
+        ((name, mode.modification, mode.number), mode.measured_hz)
+        for name, block in result.blocks.items()
+        for mode in block.modes
+    ]
+    if len(found) != len(known.measured) or {mark for mark, _ in found} != set(known.measured):
+        _refuse(file, "not the measured modes of its case", key, "each of them once")
+    for mark, hertz in found:
+        if abs(hertz - known.measured[mark]) > _SAME * known.measured[mark]:
+            what = f"{hertz:.9g} Hz was not measured: mode {mark[2]} of block {mark[0]}"
+            _refuse(file, what, f"{key}.{mark[0]}", f"{known.measured[mark]:.9g} Hz")
+    if result.score is not None and not _near(result.score, score_of(result, known.reference)):
+        _refuse(file, f"score {result.score:.6g}, its modes give another", f"{key}.score", _AGAIN)
+
+
+def _check_board(run: Run, board: object, file: Path) -> None:
+    """Check the skills of the leaderboard that comes with a run, where one does."""
+    if board is None:
+        return
+    skills = dict(leaderboard(run)[["strategy", "skill"]].itertuples(index=False))
+    rows: Iterable[object] = board if isinstance(board, list) else [board]
+    for number, row in enumerate(rows):
+        name, told = (row.get(key) if isinstance(row, dict) else None for key in _TOLD)
+        own = skills.get(name) if isinstance(name, str) else None
+        if own is None or not isinstance(told, (int, float)) or not _near(told, own):
+            what = f"skill {told!r}, the results give {own!r}"[:200]
+            _refuse(file, what, f"leaderboard[{number}].skill", "what its results give")
+
+
+_TOLD = "strategy", "skill"
