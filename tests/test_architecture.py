@@ -29,7 +29,7 @@ ROOMS = (
         "roles",
         "schema",
     ),
-    *("plugin", "fem", "modal", "identify", "case", "update"),
+    *("plugin", "fem", "modal", "identify", "case", "twin", "update"),
     *("effect", "inference", "look", "advise"),
     *("score", "study", "drawing", "diagnosis", "plot"),
     *("run", "publish", "reproduction", "challenge", "conformance", "library", "cli"),

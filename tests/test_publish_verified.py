@@ -140,9 +140,10 @@ EDITS: dict[str, tuple[Edit, str]] = {
         lambda d: d["beside"][0]["provenance"].update(sandbox="none"),
         "meta.sandbox",
     ),
-    "no twins": (lambda d: (d["meta"].pop("twins"), d.pop("beside")), "meta.twins: it has no tw"),
-    "no twins in meta": (lambda d: d["meta"].pop("twins"), "meta.twins: it has no tw"),
+    "no twins": (lambda d: (d["meta"].pop("twins"), d.pop("beside")), "meta.twins: it has no 2 tw"),
+    "no twins in meta": (lambda d: d["meta"].pop("twins"), "meta.twins: it has no 2 tw"),
     "results on twins": (lambda d: _without(d, case="suite/bracket~2"), "results: 2 jobs are"),
+    "one twin": (lambda d: d["meta"]["twins"].update(number=1), "meta.twins: it has no 2 tw"),
     "another seed": (lambda d: d["meta"]["twins"].update(seed=1), "meta.twins: these are not the"),
     "a twin left out": (
         lambda d: d["meta"]["twins"]["of"].pop("suite/bracket~2"),

@@ -44,6 +44,7 @@ from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.run.beside import beside
 from femubench.core.run.runner import run_jobs
+from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
 from femubench.core.schema.records import run_from_json, run_to_json
 from femubench.core.schema.results import Run
@@ -193,17 +194,29 @@ def _textbook(case: Case) -> Case:
     return textbook_of([case]).get(case.name, case)
 
 
-@pytest.mark.parametrize("strategy", ["eigensensitivity", "berman", "local", "kabe-rigid"])
-def test_what_a_strategy_reckons_errs_on_a_twin_as_on_its_case(strategy: str) -> None:
+@pytest.mark.parametrize(
+    ("strategy", "names"),
+    [
+        ("eigensensitivity", ("frame-solid", "hframe-solid")),
+        ("berman", ("frame-solid", "hframe-solid")),
+        ("kabe-rigid", ("frame-solid", "hframe-solid")),
+        # Where the order of causes that are equally good decides.
+        ("local", ("suite/skew-grid", "frame-solid")),
+        ("offset", ("suite/mast-on-pad",)),
+    ],
+)
+def test_what_a_strategy_reckons_errs_on_a_twin_as_on_its_case(
+    strategy: str, names: tuple[str, ...]
+) -> None:
     found = femubench.strategies[strategy]()
-    for name in ("frame-solid", "hframe-solid"):
+    for name in names:
         errors = []
         for case in (builtin(name), twin(name)):
             rng = np.random.default_rng(0)
             model = found.update(case.model, case.used_measurement(), rng).model
             blocks = judge(case, model, reference_of(case)).blocks
             errors.append([block.rms_percent for block in blocks.values()])
-        assert errors[1] == pytest.approx(errors[0], rel=1e-5, abs=1e-7)
+        assert errors[1] == pytest.approx(errors[0], rel=1e-3, abs=1e-7)
 
 
 def test_matrices_have_similar_ones_too(tmp_path: Path) -> None:
@@ -215,7 +228,7 @@ def test_matrices_have_similar_ones_too(tmp_path: Path) -> None:
     write_case(tmp_path / "m", case, changed)  # whose matrices no keys give
     plain = read_case(tmp_path / "m")
     assert plain.model.structure is None
-    other = twin_of(plain, 1, 8)
+    other = twin_of(plain, 2, 8)
     assert rms(other) == pytest.approx(rms(plain), rel=1e-9)
     assert not set(other.model.geometry.names) & set(plain.model.geometry.names)  # type: ignore[attr-defined]
     assert other.model.dofs.direction != plain.model.dofs.direction
@@ -244,6 +257,19 @@ def test_a_model_without_nodes_has_no_twin() -> None:
     assert len(list(twins_of([bare], 2, 0))) == 0
 
 
+def test_the_first_twin_keeps_the_order_and_others_do_not() -> None:
+    case = builtin("suite/tower")
+    frame = case.model.frame_structure.frame
+    for number, kept in ((1, True), (2, False)):
+        drawn = twin_of(case, number, 3)
+        other = drawn.model.frame_structure.frame
+        xyz = [np.array([joint.xyz for joint in f.joints]) for f in (frame, other)]
+        ratio = np.linalg.norm(xyz[1], axis=1) / np.linalg.norm(xyz[0], axis=1)
+        assert (np.ptp(ratio) < 1e-9) == kept
+        sensors = drawn.measurement.sensors.xyz / case.measurement.sensors.xyz[:, [0, 1, 2]]
+        assert (np.nanmax(sensors) - np.nanmin(sensors) < 1e-9) == kept
+
+
 def test_the_same_seed_gives_the_same_twins_and_another_one_others() -> None:
     case = toys.tiny_case()
     one, same, number, seed = (twin_of(case, *a) for a in ((1, 4), (1, 4), (2, 4), (1, 5)))
@@ -266,7 +292,7 @@ def run() -> Run:
     others = beside([case], twins, 2, 11)
     truth = tuple(case.measurement.frequencies[case.measurement.frequencies > 0.0])
     able = [toys.Unchanged(), Memory(truth[:8]), Chance(), Drawn()]
-    return run_jobs([case], able, seeds=(0, 1), jobs=2, beside=others)
+    return run_jobs([case], able, seeds=(0, 1), jobs=2, starts=Starts(beside=others))
 
 
 def test_who_knows_a_case_by_heart_is_marked(run: Run) -> None:
@@ -300,6 +326,28 @@ def test_over_many_structures_the_signs_decide(run: Run) -> None:
     assert found["knows"].p is not None
     assert found["knows"].p < 0.01
     assert found["knows"].known == ()
+
+
+def test_one_twin_may_be_chance_and_who_is_never_good_knows_nothing(run: Run) -> None:
+    def with_scores(here: float, *there: float) -> bool:
+        names = {f"one~{i}": "one" for i, _ in enumerate(there, start=1)}
+        told = {"of": names, "again": {}, "reference": {name: {"higher": 3.0} for name in names}}
+        meta = {"reference": {"one": {"higher": 3.0}}, "twins": told}
+        jobs = [
+            run.results[0].changed(
+                case=case,
+                seed=0,
+                strategy="s",
+                blocks={"higher": replace(run.results[0].blocks["higher"], rms_percent=rms)},
+            )
+            for case, rms in zip(("one", *names), (here, *there), strict=True)
+        ]
+        return twin_skills(Run(meta, tuple(jobs[:1]), tuple(jobs[1:])))["s"].suspicious
+
+    assert with_scores(0.5, 2.0, 2.0)
+    assert not with_scores(0.5, 2.0)
+    assert not with_scores(0.5, 2.0, 0.6)
+    assert not with_scores(4.0, 20.0, 20.0)
 
 
 def test_who_answers_otherwise_every_time_is_found(run: Run) -> None:
@@ -366,7 +414,7 @@ def test_runs_with_twins_are_kept_read_and_resumed(run: Run, tmp_path: Path) -> 
 
 
 def test_what_was_measured_has_no_twins(tmp_path: Path) -> None:
-    plan = plan_of(["frame", "frame-solid"], "unchanged", load_plugins(), twins=2, twin_seed=1)
+    plan = plan_of(["frame", "frame-solid"], "unchanged", load_plugins(), twins=(2, 1))
     assert [t.name for t in plan.beside.twins] == ["frame-solid~1", "frame-solid~2"]
     with pytest.raises(InputError, match="twins"):
         plan_of("frame", "unchanged", load_plugins(), twins=101)

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from femubench.core.library.rank import Plan
     from femubench.core.plugin.loader import Plugins
     from femubench.core.run.recording import Overwrite
-    from femubench.core.run.starts import Start
     from femubench.core.run.store import Store
     from femubench.core.schema.results import Run
 
@@ -100,27 +99,22 @@ def run(
     jobs: int | None,
     scheduler: str | None,
     cluster: str | None,
-    seeds: int | None,
-    seed: int,
-    nominal: Start,
-    twins: tuple[int, int | None],
-    timeouts: dict[str, float],
-    memory: int | None,
     resume: bool,
     overwrite: Overwrite | None,
     locked: str | None,
-    strict_plugins: bool,
     json_file: Path | None,
     csv_file: Path | None,
     store: Path | None,
     report_file: Path | None,
     quiet: bool,
+    **asked: object,
 ) -> int:
     """Run strategies on cases and rank them.
 
     A CASE is a scenario (bench scenarios list), a group of them, one case of a scenario as
     SCENARIO/PART, or a folder with a case.toml. Without any, the scenarios of the default set run.
     """
+    del asked  # what it is to be: `_plan` takes it from the context
     plugins = _checked(ctx, cases, strategies)
     from femubench.core.library.rank import repeated, request_of, store_in
     from femubench.core.library.report import reporter, run_name
@@ -202,8 +196,7 @@ def _plan(ctx: click.Context, plugins: Plugins, store: Store) -> Plan:
         timeouts=limits,
         memory=words["memory"],
         resumed=store if words["resume"] else None,
-        twins=words["twins"][0],
-        twin_seed=words["twins"][1],
+        twins=words["twins"],
     )
 
 

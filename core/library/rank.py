@@ -42,6 +42,7 @@ StrategyLike = str | Strategy | type[Strategy]
 DEFAULT_STORE = "femubench-results"
 DEFAULT_TIMEOUT = 600.0  # s
 MOST_TWINS = 100
+Twins = int | tuple[int, int | None]  # how many, and from which seed; None draws one
 _OWN = "femubench."
 _Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -169,14 +170,13 @@ class Plan:
     @property
     def jobs(self) -> int:
         """Return the number of jobs."""
-        own = (start for case in self.cases for start in self.starts.of(case))
-        models = sum(1 for _ in own) + sum(1 for _ in self.beside.starts(self.starts))
+        models = sum(1 for _ in self.starts.of_all(self.cases))
         return models * len(self.strategies) * len(self.request.all_seeds)
 
     @property
     def starts(self) -> Starts:
         """Return the nominal models of the cases."""
-        return Starts(self.textbook, self.request.nominal, self.classes)
+        return Starts(self.textbook, self.request.nominal, self.classes, self.beside)
 
     def run(
         self,
@@ -213,7 +213,6 @@ class Plan:
                 request=asked.to_json() if self.repeatable else {"nominal": asked.nominal},
                 starts=self.starts,
                 executor=executor,
-                beside=self.beside,
             )
         )
 
@@ -235,8 +234,7 @@ def rank(
     progress: Progress | None = None,
     scheduler: str | None = None,
     cluster: str | None = None,
-    twins: int = 0,
-    twin_seed: int | None = None,
+    twins: Twins = 0,
 ) -> Run:
     """Run strategies on cases, each job in a process of its own, and rank them.
 
@@ -245,20 +243,16 @@ def rank(
         strategies: names (``"NAME:OPTION=VALUE"`` with options), ``strategies[NAME](...)``,
             classes or instances, also of a notebook; all that are installed where there is none.
         seeds, seed: number of draws of noise, None for the data as recorded; the first seed.
-        nominal: the model to start from: as ``drawn``, with handbook values (``textbook``), or
-            ``both``, the default; ranks are from ``textbook`` where it is among them.
-        jobs: number of worker processes, or of Slurm jobs; None for one a processor.
+        nominal: the model to start from, ``drawn``, ``textbook`` (handbook values) or ``both``.
         timeout, timeouts: seconds that a job may take, 600 by default; of single strategies.
-        memory: bytes that a job may take; None for an even share of the machine's.
-        store: folder that keeps the results, so that a run can be continued; None for none.
-        overwrite: which stored results of the same jobs are computed anew: ``always`` all,
-            ``missing`` none, ``failed`` the failures. Default: all, of a resumed run the failures.
-        resume: go on with the last run of these jobs in the store; without cases and strategies,
-            with the last run.
+        memory, store: bytes that a job may take; folder that keeps the results.
+        overwrite: stored results of the same jobs that are computed anew: ``always``, ``missing``
+            none, ``failed`` the failures; all by default, of a resumed run the failures.
+        resume: go on with the last run of these jobs in the store; of any without words for them.
         progress: called with (result, jobs done, jobs in all).
+        jobs: number of worker processes, or of Slurm jobs; None for one a processor.
         scheduler, cluster: ``tcp://HOST:PORT`` of Dask; ``local:N`` or ``slurm:QUEUE`` to start.
-        twins, twin_seed: number of twins of each case whose truth was computed, and what they are
-            drawn from; None for a seed that nobody knew.
+        twins: number of each case whose truth was computed, or that and a seed.
 
     Raises:
         InputError: for an unknown name, an option that does not exist, or a faulty case.
@@ -268,9 +262,8 @@ def rank(
         [0.0, -0.15]
     """
     kept = None if store is None else store_in(store)
-    given = cases, strategies, usable_plugins()
     plan = plan_of(
-        *given,
+        *(cases, strategies, usable_plugins()),
         seeds=seeds,
         seed=seed,
         nominal=nominal,
@@ -279,7 +272,6 @@ def rank(
         memory=memory,
         resumed=kept if resume else None,
         twins=twins,
-        twin_seed=twin_seed,
     )
     with executor_of(jobs, scheduler, cluster) as where:
         return plan.run(None, kept, where, overwrite=overwrite, resume=resume, progress=progress)
@@ -297,18 +289,19 @@ def plan_of(
     timeouts: Mapping[str, float] | None = None,
     memory: int | None = None,
     resumed: Store | None = None,
-    twins: int = 0,
-    twin_seed: int | None = None,
+    twins: Twins = 0,
 ) -> Plan:
     """Return what is to be run; nothing has been run when something is wrong with it.
 
     Arguments:
         plugins: where cases and strategies come from.
         resumed: the store whose last run is meant where neither cases nor strategies are given.
+        twins: of every case whose truth was computed.
     """
     words, wanted = listed(cases), listed(strategies)
+    number, twin_seed = (twins, None) if isinstance(twins, int) else twins
     if resumed is not None and not words and not wanted and resumed.runs():
-        own = ("seeds", seeds), ("seed", seed), ("nominal", nominal), ("twins", twins or None)
+        own = ("seeds", seeds), ("seed", seed), ("nominal", nominal), ("twins", number or None)
         for name, value in own:
             if value is not None:
                 what = f"--resume alone goes on as before; {name} needs CASE or -s beside it"
@@ -331,8 +324,8 @@ def plan_of(
             timeout=DEFAULT_TIMEOUT if timeout is None else timeout,
             timeouts=_known(timeouts or {}, found),
             memory=memory,
-            twins=twins,
-            twin_seed=_twin_seed(twins, twin_seed, resumed),
+            twins=number,
+            twin_seed=_twin_seed(number, twin_seed, resumed),
         ),
         read,
         found,

@@ -22,6 +22,7 @@ from femubench.core.score.scoring import reference_of
 
 SANDBOX = "namespaces"  # what a run calls the one that it can have
 _AGAIN = "run it again with this version of femubench"
+_FEWEST_TWINS = 2  # with fewer, chance could be taken for knowledge
 _SAME = 1e-9  # relative, of measured figures, which a twin has times a factor
 _ROUNDING = 1e-6  # relative, of errors that are computed again on another machine
 
@@ -127,9 +128,10 @@ def _own_twins(
 ) -> dict[str, Case]:
     """Return the twins of a run, drawn again from its seed."""
     told = run.meta.get("twins")
-    if not told or told["number"] < 1:
-        what = "it has no twins, which would show who knows the cases"
-        _refuse(file, what, "meta.twins", "a run with `--twins 1` or more, or --unverified")
+    if not told or told["number"] < _FEWEST_TWINS:
+        what = f"it has no {_FEWEST_TWINS} twins, which would show who knows the cases"
+        expected = f"a run with `--twins {_FEWEST_TWINS}` or more, or --unverified"
+        _refuse(file, what, "meta.twins", expected)
     drawn = {t.name: t for t in installed.twins(cases, told["number"], told["seed"])}
     stated = {name: told["cases"].get(name, {}).get("digest") for name in told["of"]}
     if {name: twin.digest for name, twin in drawn.items()} != stated:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 from femubench.core.case.case import Case
-from femubench.core.run.starts import Starts
-from femubench.core.schema.results import Nominal
 from femubench.core.score.scoring import Reference
-from femubench.core.twin.twins import AGAIN, Twin, again
+from femubench.core.twin.twins import AGAIN, Twin
 
 
 @dataclass(frozen=True)
@@ -30,17 +28,9 @@ class Beside:
     seed: int = 0
     number: int = 0
 
-    def starts(self, starts: Starts) -> Iterator[tuple[Nominal, Case]]:
-        """Yield what jobs start from: of both nominal models the one that ranks."""
-        for twin in self.twins:
-            yield next(starts.of(twin))
-        if self.repeated_case is not None:
-            nominal, case = next(starts.of(self.repeated_case))
-            yield nominal, again(case)
-
     def repeated(self, references: Mapping[str, Reference]) -> dict[str, Reference]:
-        """Return what the nominal model of the repeated case gives, under its second name."""
-        return {name: references[case] for name, case in self._again.items()}
+        """Return references with that of the repeated case under its second name too."""
+        return {**references, **{name: references[case] for name, case in self._again.items()}}
 
     @cached_property
     def _again(self) -> dict[str, str]:

@@ -12,7 +12,6 @@ from threadpoolctl import threadpool_limits
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
 from femubench.core.roles import Strategy
-from femubench.core.run.beside import NOTHING, Beside
 from femubench.core.run.executor import Executor, LocalProcesses, worker_count
 from femubench.core.run.limits import Limits
 from femubench.core.run.provenance import plan_digest, run_meta
@@ -45,23 +44,18 @@ def run_jobs(
     request: Mapping[str, Any] | None = None,
     starts: Starts = _AS_GIVEN,
     executor: Executor | None = None,
-    beside: Beside = NOTHING,
 ) -> Run:
     """Run every strategy on every case with every seed, each job in a process of its own.
 
-    What a strategy returns is judged in another process. Ctrl-C lets the jobs that run come to
-    their end, once more stops them; what is done stays in the store.
+    Ctrl-C lets the jobs that run come to their end, once more stops them; what is done is kept.
 
     Arguments:
         seeds: 0 is the data as recorded, every other one a draw of measurement noise.
         jobs, executor: number of workers, None for that of processors; or what runs the jobs.
-        timeout, timeouts: seconds that one job may take, None for no limit; of single strategies.
-        memory: bytes that one job may take; None for an even share of the machine's.
-        store, overwrite, resume: where results go at once, and what of it is computed anew.
-        progress: called with (result, jobs done, jobs in all).
+        timeout, timeouts, memory: seconds of a job, None for no limit; of single strategies; bytes.
+        store, overwrite, resume, progress: as for `femubench.rank`.
         run_seed, request: seed of the run's own statistics, and what was asked for in plain data.
-        starts: the nominal models; the cases as given where it is left out.
-        beside: twins of the cases and jobs to run again, whose results are no part of the figures.
+        starts: the nominal models, the cases as given where left out; what runs beside them.
 
     Raises:
         InputError: for two of one name, no worker, or a run that another process works on.
@@ -71,29 +65,23 @@ def run_jobs(
         >>> results.run_jobs([case], [nominal]).results[0].status
         'ok'
     """
-    _check_names(case=(*cases, *beside.twins), strategy=strategies)
+    _check_names(case=[*cases, *starts.beside.twins], strategy=strategies)
     place = executor or LocalProcesses(worker_count(jobs))
     place.admit(strategies, memory)
     share = place.share if memory is None else memory
     limits = {s.name: Limits((timeouts or {}).get(s.name, timeout), share) for s in strategies}
     asked = {"seed": run_seed, "timeout": timeout, "memory": share, "request": dict(request or {})}
     with threadpool_limits(1), ExitStack() as stack:
-        others = list(beside.starts(starts))
-        references = _references([starts.yardstick(case) for case in (*cases, *beside.twins)])
-        references |= beside.repeated(references)
-        own = (one for case in cases for one in starts.of(case))
-        slots = Slots((*own, *others), strategies, seeds)
-        planned = {**asked, "jobs": place.workers, **beside.about(references)}
-        slots.meta = _meta(cases, slots, references, planned, starts)
+        references = _references(cases, starts)
+        slots = Slots(starts.of_all(cases), strategies, seeds)
+        slots.meta = _meta(cases, slots, references, {**asked, "jobs": place.workers}, starts)
         meta, known = recorded(stack, store, slots.meta, overwrite, resume)
         ending = stack.enter_context(ended(store, meta["run"]))
         results = Results(slots, store, meta["run"], progress)
         wanted = stack.enter_context(stopping()).until(results.keep(known))
         for one in place.computed(slots, wanted, references, limits, results.shelf):
             results.add(*one)
-        found = _run(meta, results.in_order())
-        if beside.repeated_case is not None:
-            ending["unsteady"] = unsteady(found)
+        ending |= _only_now(found := _run(meta, results.in_order()))
     return replace(found, meta={**meta, **ending})
 
 
@@ -104,6 +92,11 @@ def _run(meta: Mapping[str, Any], results: Sequence[JobResult]) -> Run:
     return Run(meta, own, tuple(result for result in results if result.case in others))
 
 
+def _only_now(run: Run) -> dict[str, Any]:
+    """Return meta data that are known only when all jobs are done."""
+    return {"unsteady": unsteady(run)} if origins_of(run.meta, "again") else {}
+
+
 def _meta(
     cases: Sequence[Case],
     slots: Slots,
@@ -112,7 +105,7 @@ def _meta(
     starts: Starts,
 ) -> dict[str, Any]:
     planned = {**settings, "plan": plan_digest(slots.keys)}
-    who, about = slots.strategies, starts.about(cases)
+    who, about = slots.strategies, {**starts.about(cases), **starts.beside.about(references)}
     own = {case.name: references[case.name] for case in cases}
     return run_meta(cases, who, own, slots.seeds, planned, about)
 
@@ -125,13 +118,13 @@ def _check_names(**given: Sequence[Case] | Sequence[Strategy]) -> None:
             raise InputError(f"{kind} {twice[0]!r} occurs twice", expected="every name once")
 
 
-def _references(cases: Sequence[Case]) -> dict[str, Reference]:
-    """Return what the model of every case gives, solved once for cases that share it."""
+def _references(cases: Sequence[Case], starts: Starts) -> dict[str, Reference]:
+    """Return what the yardstick of every case gives, solved once for cases that share it."""
     solved: dict[tuple[int, int, int], Reference] = {}
     found = {}
-    for case in cases:
+    for case in map(starts.yardstick, (*cases, *starts.beside.twins)):
         same = id(case.model), id(case.measurement), id(case.modifications)
         if same not in solved:
             solved[same] = reference_of(case)
         found[case.name] = solved[same]
-    return found
+    return starts.beside.repeated(found)

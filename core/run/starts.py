@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from femubench.core.case.case import Case
+from femubench.core.run.beside import NOTHING, Beside
 from femubench.core.schema.results import NOMINALS, Nominal
+from femubench.core.twin.twins import again
 
 Start = Literal["drawn", "textbook", "both"]
 
@@ -22,11 +24,13 @@ class Starts:
             cases as given and measures against them.
         nominal: which of the two models strategies start from.
         classes: kinds of structure and truth by case.
+        beside: twins of the cases, and what is to run again.
     """
 
     textbook: Mapping[str, Case] | None = None
     nominal: Start = "both"
     classes: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    beside: Beside = NOTHING
 
     def yardstick(self, case: Case) -> Case:
         """Return a case with the model that all errors are measured against."""
@@ -42,6 +46,16 @@ class Starts:
             yield textbook, self.yardstick(case)
         if self.nominal == drawn or (self.nominal == "both" and case.name in self.textbook):
             yield drawn, case
+
+    def of_all(self, cases: Sequence[Case]) -> Iterator[tuple[Nominal, Case]]:
+        """Yield what the jobs of a run start from; beside its cases, the model that ranks."""
+        for case in cases:
+            yield from self.of(case)
+        for twin in self.beside.twins:
+            yield next(self.of(twin))
+        if self.beside.repeated_case is not None:
+            nominal, case = next(self.of(self.beside.repeated_case))
+            yield nominal, again(case)
 
     def about(self, cases: Sequence[Case]) -> dict[str, Any]:
         """Return what a run tells of its cases: from where they start, and what they are."""

@@ -18,9 +18,12 @@ from femubench.core.score.counting import Weights, block_weights
 from femubench.core.score.ranking import score_in
 from femubench.core.score.statistics import evidence_of, structures_of
 
-# How many times the error of the cases must be left on the twins to say anything: over structures,
-# besides a small p; and on every twin of a single case, where there is nothing to test.
+# How many times the error of a case must be left on its twins: on half of the structures, besides a
+# small p; and on every twin of a single case, where there is nothing to test.
 CLEAR, KNOWN = 1.1, 2.0
+_LEVEL = 0.01  # of p, that a search by chance is not marked where it was lucky
+_GOOD = 0.5  # of the error is left on a case at most, where somebody knows it
+_FEWEST_TWINS = 2  # of a single case
 _STOPPED = frozenset({"timeout", "crashed"})  # what they say is of the machine
 
 
@@ -33,8 +36,9 @@ class TwinSkill:
         original_skill: the same on the cases that have twins.
         p: of the signed rank test over structures, after Holm's correction over the strategies;
             None where few structures differ.
-        worse: whether the test finds it worse on the twins, and by a tenth at least.
-        known: cases on each of whose twins it leaves more than twice the error.
+        worse: whether the test finds it worse on the twins, by a tenth at least on half of them.
+        known: cases on which it leaves less than half of the error, and on each of the twins more
+            than twice as much.
     """
 
     skill: float
@@ -93,7 +97,9 @@ def twin_skills(run: Run) -> dict[str, TwinSkill]:
             skill=1.0 - math.exp(float(np.mean(there[item.strategy]))),
             original_skill=1.0 - math.exp(float(np.mean(here[item.strategy]))),
             p=item.p,
-            worse=item.verdict == "worse" and (item.ratio or 0.0) >= CLEAR,
+            worse=item.p is not None
+            and item.p < _LEVEL
+            and float(np.median(changes[item.strategy])) > math.log(CLEAR),
             known=_known(own[item.strategy]),
         )
         for item in evidence
@@ -137,12 +143,16 @@ def _by_structure(
 
 
 def _known(pairs: Iterable[_Pair]) -> tuple[str, ...]:
-    """Return the cases on each of whose twins more than twice the error is left."""
+    """Return the cases on which a strategy is good, and on each of their twins much worse."""
     changes: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    levels: dict[str, list[float]] = defaultdict(list)
     for pair in pairs:
         changes[pair.case][pair.twin].append(pair.there - pair.here)
+        levels[pair.case].append(pair.here)
     return tuple(
         case
         for case, twins in changes.items()
-        if min(float(np.mean(values)) for values in twins.values()) > math.log(KNOWN)
+        if len(twins) >= _FEWEST_TWINS
+        and float(np.mean(levels[case])) < math.log(_GOOD)
+        and min(float(np.mean(values)) for values in twins.values()) > math.log(KNOWN)
     )

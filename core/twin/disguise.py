@@ -23,11 +23,11 @@ Names = Mapping[str, str]
 
 @dataclass(frozen=True)
 class Disguise:
-    """New names, and a generator for new orders.
+    """New names, and what draws new orders.
 
     Arguments:
         joints, types, members, sections, materials, sets: from old names to new ones.
-        rng: draws the orders.
+        rng: draws the orders; None leaves them as they are.
     """
 
     joints: Names
@@ -36,10 +36,10 @@ class Disguise:
     sections: Names
     materials: Names
     sets: Names
-    rng: np.random.Generator
+    rng: np.random.Generator | None
 
     @classmethod
-    def of(cls, frame: Frame, rng: np.random.Generator) -> Disguise:
+    def of(cls, frame: Frame, rng: np.random.Generator | None) -> Disguise:
         """Return new names for everything in a frame that has one."""
         return cls(
             _renamed("n", (joint.name for joint in frame.joints), rng),
@@ -119,18 +119,27 @@ class Disguise:
 
     def _shuffled(self, parts: Iterable[_Part]) -> tuple[_Part, ...]:
         listed = list(parts)
-        return tuple(listed[place] for place in self.rng.permutation(len(listed)))
+        return tuple(listed[place] for place in _order(len(listed), self.rng))
 
 
-def _renamed(letter: str, names: Iterable[str], rng: np.random.Generator) -> dict[str, str]:
-    """Return a number in a random order for every name that is not empty."""
-    known = [name for name in dict.fromkeys(names) if name]
-    order = rng.permutation(len(known))
-    return {name: f"{letter}{number + 1}" for name, number in zip(known, order, strict=True)}
+def _order(count: int, rng: np.random.Generator | None) -> list[int]:
+    return list(range(count)) if rng is None else rng.permutation(count).tolist()
 
 
-def disguised(case: Case, rng: np.random.Generator) -> Case:
+def _renamed(letter: str, names: Iterable[str], rng: np.random.Generator | None) -> dict[str, str]:
+    """Return a number for every name that is not empty, in the order of the alphabet or in none."""
+    known = sorted({name for name in names if name})
+    wide = len(str(len(known)))
+    numbers = zip(known, _order(len(known), rng), strict=True)
+    return {name: f"{letter}{number + 1:0{wide}}" for name, number in numbers}
+
+
+def disguised(case: Case, rng: np.random.Generator | None) -> Case:
     """Return a case whose joints, nodes, members, sets and sensors have other names and orders.
+
+    Arguments:
+        case: a frame, or matrices.
+        rng: draws the orders; None leaves them as they are, also that of the alphabet.
 
     Raises:
         NotApplicable: for a model that is neither a frame nor matrices with their nodes.
@@ -151,41 +160,43 @@ def disguised(case: Case, rng: np.random.Generator) -> Case:
             change,
             masses=names.placed(change.masses),
             springs=names.placed(change.springs),
-            measurement=_relabelled(change.measurement, labels),
+            measurement=_relabelled(change.measurement, labels, shuffled=rng is not None),
         )
         for change in case.modifications
     )
     return replace(
         case,
         model=model,
-        measurement=_relabelled(case.measurement, labels),
+        measurement=_relabelled(case.measurement, labels, shuffled=rng is not None),
         modifications=changes,
-        reference=None if reference is None else _relabelled(reference, labels),
+        reference=None
+        if reference is None
+        else _relabelled(reference, labels, shuffled=rng is not None),
     )
 
 
-def _relabelled(measured: Measurement, labels: Names) -> Measurement:
-    """Return modes at sensors of other names, in the order of these."""
+def _relabelled(measured: Measurement, labels: Names, *, shuffled: bool) -> Measurement:
+    """Return modes at sensors of other names, in the order of these or in theirs."""
     known = measured.sensors
     new = [labels[label] for label in known.labels]
-    order = sorted(range(len(known)), key=lambda row: (len(new[row]), new[row]))
+    order = sorted(range(len(known)), key=new.__getitem__) if shuffled else range(len(known))
     sensors = Sensors(
         tuple(new[row] for row in order),
-        known.xyz[order],
+        known.xyz[list(order)],
         tuple(known.directions[row] for row in order),
     )
     return replace(
         measured,
         sensors=sensors,
-        shapes=measured.shapes[order],
-        shape_std=measured.shape_std[order],
+        shapes=measured.shapes[list(order)],
+        shape_std=measured.shape_std[list(order)],
     )
 
 
 def _in_another_order(model: Model, geometry: MatrixGeometry, names: Disguise) -> Model:
     """Return matrices with their rows in another order, and other names of nodes and groups."""
     rng, dofs = names.rng, model.dofs
-    rows = rng.permutation(len(dofs))
+    rows = np.array(_order(len(dofs), rng), dtype=int)
     # Nodes are counted in the order in which rows first name them.
     numbers = {int(node): number for number, node in enumerate(dict.fromkeys(dofs.node[rows]))}
     moved = replace(
