@@ -11,6 +11,7 @@ import sys
 import textwrap
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import click
@@ -545,9 +546,11 @@ class TestRun:
                 time.sleep(0.05)
             time.sleep(0.5)
             # Two that come before a busy machine has taken the first are one.
-            while process.poll() is None and time.monotonic() < deadline:
+            for _ in range(5):
                 process.send_signal(signal.SIGINT)
-                time.sleep(0.5)
+                with suppress(subprocess.TimeoutExpired):
+                    process.wait(3.0)
+                    break
             # ends only when the workers, who hold the pipes too, are gone
             _, error = process.communicate(timeout=60.0)
         assert process.returncode == 130
