@@ -21,6 +21,7 @@ import femubench
 from femubench.core.cli import progress
 from femubench.core.cli.main import VERBS, bench
 from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of
+from femubench.core.errors import OutputError
 from femubench.core.files import write_atomically
 from femubench.core.run.store import Store
 
@@ -702,7 +703,7 @@ def test_files_are_replaced_in_one_step(tmp_path: Path, monkeypatch: pytest.Monk
         raise OSError("disk is full")
 
     monkeypatch.setattr(Path, "replace", fail)
-    with pytest.raises(OSError, match="disk is full"):
+    with pytest.raises(OutputError, match="result.json: cannot be written: disk is full"):
         write_atomically(path, "new")
     assert path.read_text() == "old\n"
     assert sorted(tmp_path.iterdir()) == [plain, path]
