@@ -703,7 +703,7 @@ def test_files_are_replaced_in_one_step(tmp_path: Path, monkeypatch: pytest.Monk
         raise OSError("disk is full")
 
     monkeypatch.setattr(Path, "replace", fail)
-    with pytest.raises(OutputError, match="result.json: cannot be written: disk is full"):
+    with pytest.raises(OutputError, match=r"result\.json: cannot be written: disk is full"):
         write_atomically(path, "new")
     assert path.read_text() == "old\n"
     assert sorted(tmp_path.iterdir()) == [plain, path]
