@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -130,16 +130,19 @@ def apply_values(
     given = np.asarray(values, dtype=float)
     if len(given) != len(parameters):
         raise ValueError(f"{len(parameters)} parameters have {len(given)} values")
-    arrays = {f.name: getattr(structure.properties, f.name).copy() for f in fields(BeamProperties)}
-    arrays[_SPRING] = structure.springs.copy()
+    own, springs = structure.properties, structure.springs
+    arrays: dict[str, FloatArray] = {}
     for part in touched(structure, parameters):
         value = given[part.columns]
+        for name in (part.kind,) if not part.is_factor else (n for n, _ in part.slopes):
+            if name not in arrays:
+                arrays[name] = (springs if name == _SPRING else getattr(own, name)).copy()
         if not part.is_factor:
             arrays[part.kind][part.rows] = value
         for name, exponent in part.slopes:
             np.multiply.at(arrays[name], part.rows, value**exponent)
-    springs = arrays.pop(_SPRING)
-    return BeamProperties(**arrays), springs
+    springs = arrays.pop(_SPRING, springs)
+    return replace(own, **arrays), springs
 
 
 @dataclass(frozen=True)

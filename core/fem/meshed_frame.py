@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -20,6 +20,15 @@ from femubench.core.fem.mesh import Mesh
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
+
+_Kept = TypeVar("_Kept")
+
+
+def _same(one: object, other: object) -> bool:
+    if one is other:
+        return True
+    arrays = isinstance(one, np.ndarray) and isinstance(other, np.ndarray)
+    return arrays and np.array_equal(one, other)
 
 
 def _positions(labels: Sequence[str]) -> dict[str, IntArray]:
@@ -134,6 +143,28 @@ class MeshedFrame:
     def kept(self) -> dict[str, Any]:
         """Return a store of what follows from the frame alone, whatever the parameters are."""
         return {}
+
+    def once(self, name: str, rests_on: tuple[object, ...], make: Callable[[], _Kept]) -> _Kept:
+        """Return what was made last under a name, made anew where what it rests on has changed.
+
+        Arguments:
+            rests_on: arrays, which are compared by their numbers, and other things by identity;
+                what follows from frame and mesh need not be among them.
+        """
+        entry = self.kept.get(name)
+        if entry is None or not all(map(_same, entry[0], rests_on)):
+            entry = self.kept[name] = (rests_on, make())
+        found: _Kept = entry[1]
+        return found
+
+    @property
+    def interpolation(self) -> tuple[FloatArray, ...]:
+        """Return the properties that decide how a point between two nodes moves."""
+        p = self.properties
+        if not p.shear_shape.any():
+            return p.rigid_1, p.rigid_2
+        shear = (p.shear_shape * 12 * p.EIz * p.flex_y, p.shear_shape * 12 * p.EIy * p.flex_z)
+        return p.rigid_1, p.rigid_2, *shear
 
     @cached_property
     def spring_index(self) -> dict[str, IntArray]:
