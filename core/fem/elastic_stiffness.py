@@ -18,7 +18,11 @@ def elastic_stiffness(structure: MeshedFrame) -> SparseArray:
         rows = structure.spring_rows
         stiffness = stiffness + rows.T @ sp.diags_array(structure.springs) @ rows
     if structure.frame.springs:
-        stiffness = stiffness + structure.attached((), structure.frame.springs)[1]
+        stiffness = stiffness + structure.once(
+            "springs",
+            structure.interpolation,
+            lambda: structure.attached((), structure.frame.springs)[1],
+        )
     if structure.frame.braces:
         stiffness = stiffness + brace_stiffness(structure)
     return stiffness

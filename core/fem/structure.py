@@ -89,7 +89,9 @@ class Structure(MeshedFrame):
     def _assembled_mass(self) -> SparseArray:
         mass = self.plan.assemble_from(lambda rows: mass_matrices(self.properties.take(rows)))
         if self.frame.masses:
-            mass = mass + self.attached(self.frame.masses, ())[0]
+            mass = mass + self.once(
+                "masses", self.interpolation, lambda: self.attached(self.frame.masses, ())[0]
+            )
         if self.frame.oscillators:
             mass = mass + oscillator_matrices(self)[0]
         return prune(mass)
