@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -38,8 +39,16 @@ class Touched:
 
     def incidence(self, rows: int, parameters: int) -> SparseArray:
         """Return 1 where a parameter touches a row, sparse (n_parameters, rows)."""
-        ones = np.ones(len(self.rows))
-        return sp.csr_array((ones, (self.columns, self.rows)), shape=(parameters, rows))
+        found = self._incidence.get((rows, parameters))
+        if found is None:
+            pairs = np.ones(len(self.rows)), (self.columns, self.rows)
+            found = sp.csr_array(pairs, shape=(parameters, rows))
+            self._incidence[rows, parameters] = found
+        return found
+
+    @cached_property
+    def _incidence(self) -> dict[tuple[int, int], SparseArray]:
+        return {}
 
     @property
     def is_factor(self) -> bool:

@@ -62,8 +62,9 @@ def rigid_modes_of(model: Model) -> FloatArray:
     if structure is None:
         candidates = _without_energy(model, vectors[:, _moving(vectors)])
     else:
+        rests_on = structure.interpolation if structure.frame.springs else ()
         candidates = structure.once(
-            "free motions", structure.interpolation, lambda: _not_held(structure, motion, vectors)
+            "free motions", rests_on, lambda: _not_held(structure, motion, vectors)
         )
     return _orthonormal(candidates, candidates.T @ model.mass_times(candidates))
 
