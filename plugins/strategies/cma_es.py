@@ -22,7 +22,7 @@ class _Hidden(MetaPathFinder):
     def __init__(self, package: str) -> None:
         self.package, self.thread = package, get_ident()
 
-    def find_spec(self, name: str, path: object, target: object = None) -> None:
+    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
         """Find nothing, and let nobody else find the package."""
         if get_ident() == self.thread and name.partition(".")[0] == self.package:
             raise ModuleNotFoundError(f"{name} is left out here", name=name)
