@@ -20,7 +20,6 @@ from femubench.core.fem.sensing import sensor_rows
 from femubench.core.fem.sensors import Sensors
 from femubench.core.typing import FloatArray, SparseArray
 
-
 _ROUNDING = 1e-14
 
 
