@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -38,8 +39,16 @@ class Touched:
 
     def incidence(self, rows: int, parameters: int) -> SparseArray:
         """Return 1 where a parameter touches a row, sparse (n_parameters, rows)."""
-        ones = np.ones(len(self.rows))
-        return sp.csr_array((ones, (self.columns, self.rows)), shape=(parameters, rows))
+        found = self._incidence.get((rows, parameters))
+        if found is None:
+            pairs = np.ones(len(self.rows)), (self.columns, self.rows)
+            found = sp.csr_array(pairs, shape=(parameters, rows))
+            self._incidence[rows, parameters] = found
+        return found
+
+    @cached_property
+    def _incidence(self) -> dict[tuple[int, int], SparseArray]:
+        return {}
 
     @property
     def is_factor(self) -> bool:
@@ -130,16 +139,19 @@ def apply_values(
     given = np.asarray(values, dtype=float)
     if len(given) != len(parameters):
         raise ValueError(f"{len(parameters)} parameters have {len(given)} values")
-    arrays = {f.name: getattr(structure.properties, f.name).copy() for f in fields(BeamProperties)}
-    arrays[_SPRING] = structure.springs.copy()
+    own, springs = structure.properties, structure.springs
+    arrays: dict[str, FloatArray] = {}
     for part in touched(structure, parameters):
         value = given[part.columns]
+        for name in (part.kind,) if not part.is_factor else (n for n, _ in part.slopes):
+            if name not in arrays:
+                arrays[name] = (springs if name == _SPRING else getattr(own, name)).copy()
         if not part.is_factor:
             arrays[part.kind][part.rows] = value
         for name, exponent in part.slopes:
             np.multiply.at(arrays[name], part.rows, value**exponent)
-    springs = arrays.pop(_SPRING)
-    return BeamProperties(**arrays), springs
+    springs = arrays.pop(_SPRING, springs)
+    return replace(own, **arrays), springs
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from itertools import repeat
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -20,6 +21,16 @@ from femubench.core.fem.mesh import Mesh
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
+
+_Kept = TypeVar("_Kept")
+
+
+def _same(one: object, other: object, rounding: float) -> bool:
+    if one is other or not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
+        return one is other
+    if one.shape != other.shape:
+        return False
+    return bool((np.abs(one - other) <= rounding * np.abs(one)).all())
 
 
 def _positions(labels: Sequence[str]) -> dict[str, IntArray]:
@@ -134,6 +145,35 @@ class MeshedFrame:
     def kept(self) -> dict[str, Any]:
         """Return a store of what follows from the frame alone, whatever the parameters are."""
         return {}
+
+    def once(
+        self,
+        name: str,
+        rests_on: tuple[object, ...],
+        make: Callable[[], _Kept],
+        rounding: float = 0.0,
+    ) -> _Kept:
+        """Return what was made last under a name, made anew where what it rests on has changed.
+
+        Arguments:
+            rests_on: arrays, which are compared by their numbers, and other things by identity;
+                what follows from frame and mesh need not be among them.
+            rounding: relative difference of numbers that counts as none.
+        """
+        entry = self.kept.get(name)
+        if entry is None or not all(map(_same, entry[0], rests_on, repeat(rounding))):
+            entry = self.kept[name] = (rests_on, make())
+        found: _Kept = entry[1]
+        return found
+
+    @property
+    def interpolation(self) -> tuple[FloatArray, ...]:
+        """Return the properties that decide how a point between two nodes moves."""
+        p = self.properties
+        if not p.shear_shape.any():
+            return p.rigid_1, p.rigid_2
+        shear = (p.shear_shape * 12 * p.EIz * p.flex_y, p.shear_shape * 12 * p.EIy * p.flex_z)
+        return p.rigid_1, p.rigid_2, *shear
 
     @cached_property
     def spring_index(self) -> dict[str, IntArray]:
