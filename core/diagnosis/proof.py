@@ -21,7 +21,7 @@ from femubench.core.inference.mesh_error import mesh_bias, mesh_corrections
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.posterior import Explanation, Key, Posterior
 from femubench.core.inference.residuals import Data
-from femubench.core.modal.eigen import once_for
+from femubench.core.modal.eigen import enough_modes, modes_of, once_for
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import Gain
@@ -176,6 +176,7 @@ def held_out(
     before = state_at(Problem(nominal.model, nominal.space, data, noise), (), np.zeros(0))
     whole = Problem(best.model, best.space, data, noise)
     after = state_at(whole, found.parts, found.state.x)
+    modes_of(extended, enough_modes(extended, 2 * len(everything)))  # the most that is asked for
     # A cause may add a mode: the extended model has corrections of its own for the mesh.
     own_bias = mesh_bias(extended, len(nominal.data.bias))
     own_data = data if own_bias is None else Data(everything, own_bias)

@@ -16,6 +16,7 @@ from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 _MANY = 4  # elements to one kind, from which on these are taken together
 _EQUAL = 1e-9  # of the largest factor
+_AT_ONCE = 512  # elements whose forces are held at once
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,16 @@ class Projector:
         """Return the displacements of all elements, (n_elements, n_active, N)."""
         assert self.structure is not None
         return self._gathered(self.vectors, np.arange(len(self.shift)))
+
+    def share(self, other: Projector) -> None:
+        """Take the displacements of elements from a projector whose first vectors these are."""
+        if self.structure is not None:
+            self.local = other.local[:, :, : self.vectors.shape[1]]
+
+    def forget(self) -> None:
+        """Let go the displacements of all elements; they are worked out anew where wanted."""
+        vars(self).pop("local", None)
+        self._near = None
 
     def __call__(self, hypothesis: Hypothesis) -> Projection:
         """Return a hypothesis in the coordinates of the basis."""
@@ -260,12 +271,15 @@ class Projector:
     def _form(
         self, operator: ElementOperator, left: Sequence[FloatArray], right: FloatArray
     ) -> FloatArray:
-        every = len(operator.elements) == len(right)
-        near, moved = (
-            [x if every else x[operator.elements] for x in some] for some in (left, [right])
-        )
-        force = (self._blocks(operator) @ moved[0]).reshape(-1, right.shape[2])
-        return np.vstack([x.reshape(len(force), -1).T @ force for x in near])
+        matrices, every = self._blocks(operator), operator.elements
+        total = np.zeros((sum(x.shape[2] for x in left), right.shape[2]))
+        # Some elements at once: the forces of all would be the largest array of all.
+        for first in range(0, len(every), _AT_ONCE):
+            own = slice(first, first + _AT_ONCE)
+            rows = own if len(every) == len(right) else every[own]
+            force = (matrices[own] @ right[rows]).reshape(-1, right.shape[2])
+            total += np.vstack([x[rows].reshape(len(force), -1).T @ force for x in left])
+        return total
 
     def _blocks(self, operator: ElementOperator) -> FloatArray:
         matrices = operator.matrices
@@ -332,8 +346,8 @@ class Projector:
         both = np.column_stack([motion, np.zeros((n + extra, extra))])
         both[n:, 1:] = np.eye(extra)
         springs = [term for term in terms if term.matrix == "stiffness"]
-        pulled = np.sum([term.operator.apply(both) for term in springs], axis=0)
-        motion[n:] = -np.linalg.solve(pulled[n:, 1:], pulled[n:, 0])
+        pulled = np.sum([term.operator.project(both) for term in springs], axis=0)
+        motion[n:] = -np.linalg.solve(pulled[1:, 1:], pulled[1:, 0])
         return motion
 
     def _seen(self, rows: SparseArray, extra: int) -> FloatArray:
@@ -341,8 +355,9 @@ class Projector:
         if not extra:
             return np.asarray(rows @ self.vectors)
         # By their few entries: to cut sparse rows in two takes longer than all the rest.
-        entries, (n, known) = rows.tocoo(), self.vectors.shape
-        line, column = entries.coords
+        entries, (n, known) = rows.tocsr(), self.vectors.shape
+        line = np.repeat(np.arange(len(entries.indptr) - 1), np.diff(entries.indptr))
+        column = entries.indices
         own = column < n
         found = np.zeros((rows.shape[0], known + extra))
         np.add.at(found[:, :known], line[own], entries.data[own, None] * self.vectors[column[own]])
