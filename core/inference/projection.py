@@ -111,11 +111,6 @@ class Projector:
         assert self.structure is not None
         return self._gathered(self.vectors, np.arange(len(self.shift)))
 
-    def share(self, other: Projector) -> None:
-        """Take the displacements of elements from a projector whose first vectors these are."""
-        if self.structure is not None:
-            self.local = other.local[:, :, : self.vectors.shape[1]]
-
     def forget(self) -> None:
         """Let go the displacements of all elements; they are worked out anew where wanted."""
         vars(self).pop("local", None)
@@ -193,8 +188,10 @@ class Projector:
     def _gathered(self, vectors: FloatArray, elements: IntArray) -> FloatArray:
         """Return the displacements of some elements that can move, (k, n_active, N)."""
         assert self.structure is not None
-        rows = (12 * elements[:, None] + self.active).ravel()
-        moved = np.asarray(self.structure.gather[rows] @ vectors)
+        gather = self.structure.gather
+        if 12 * len(elements) < gather.shape[0] or len(self.active) < 12:
+            gather = gather[(12 * elements[:, None] + self.active).ravel()]
+        moved = np.asarray(gather @ vectors)
         return moved.reshape(len(elements), len(self.active), -1)
 
     def _pulled(self, operator: ElementOperator, near: FloatArray) -> FloatArray:

@@ -219,16 +219,26 @@ class Basis:
             parts: the hypotheses in them.
         """
         near, known = self.modes.take(np.arange(self.tracked)), len(self.modes)
-        self.bare.projector.share(self.projector)
+        self.forget()
         waiting: list[tuple[Projection, FloatArray]] = []
         for part in parts:
             kept = np.delete(np.arange(known + part.extra), np.arange(self.exact, known))
-            waiting.append((part.restricted(kept), exerted(part.hypothesis, near)))
-            if part is parts[-1] or sum(f.shape[1] for _, f in waiting) >= _AT_ONCE:
-                found = self.bare.responses([force for _, force in waiting], _FROM_HYPOTHESIS)
-                for (one, _), added in zip(waiting, found, strict=True):
-                    yield self.bare.with_motions(space, [one], added).space
+            force = exerted(part.hypothesis, near)
+            if sum(f.shape[1] for _, f in waiting) + force.shape[1] > _AT_ONCE:
+                yield from self._answered(space, waiting)
                 waiting = []
+            waiting.append((part.restricted(kept), force))
+        yield from self._answered(space, waiting)
+        self.forget()
+
+    def _answered(
+        self, space: Space, waiting: Sequence[tuple[Projection, FloatArray]]
+    ) -> Iterator[Space]:
+        """Yield the coordinates of some hypotheses, whose forces are solved for at once."""
+        if waiting:
+            found = self.bare.responses([force for _, force in waiting], _FROM_HYPOTHESIS)
+            for (one, _), added in zip(waiting, found, strict=True):
+                yield self.bare.with_motions(space, [one], added).space
 
     def with_motions(
         self, space: Space, parts: Sequence[Projection], added: FloatArray
