@@ -111,11 +111,6 @@ class Projector:
         assert self.structure is not None
         return self._gathered(self.vectors, np.arange(len(self.shift)))
 
-    def forget(self) -> None:
-        """Let go the displacements of all elements; they are worked out anew where wanted."""
-        vars(self).pop("local", None)
-        self._near = None
-
     def __call__(self, hypothesis: Hypothesis) -> Projection:
         """Return a hypothesis in the coordinates of the basis."""
         change = hypothesis.change
@@ -145,6 +140,8 @@ class Projector:
             added: the further vectors, (n, r).
         """
         change, known, r = projection.hypothesis.change, self.vectors.shape[1], added.shape[1]
+        if not r:
+            return projection
         if not projection.whole:
             touched, shared = self._acted_on(change.terms)
             seen = [np.asarray(rows[:, : len(added)] @ added) for rows in shared.values()]

@@ -22,6 +22,7 @@ import scipy.linalg as la
 from femubench.core.effect.change import ElementOperator, RowOperator, Term
 from femubench.core.fem.model import Model
 from femubench.core.inference.fit import Problem
+from femubench.core.inference.free_memory import give_back
 from femubench.core.inference.hypothesis import Hypothesis, magnitudes
 from femubench.core.inference.modal_basis import Space, nominal_space, rigid_first
 from femubench.core.inference.noise import Noise
@@ -135,9 +136,11 @@ class Basis:
         return bare
 
     def forget(self) -> None:
-        """Let go what is as large as all the rest, and soon worked out anew."""
-        self.projector.forget()
-        self.bare.projector.forget()
+        """Let go what is as large as all the rest of a large model, and soon worked out anew."""
+        if not self.complete:
+            for name in ("bare", "projector", "momentum"):
+                vars(self).pop(name, None)
+            give_back()
 
     def response(
         self, forces: FloatArray, most: int, known: FloatArray | None = None
@@ -321,19 +324,19 @@ def exerted(hypothesis: Hypothesis, near: Modes) -> FloatArray:
 def _touched(terms: Sequence[Term], count: int) -> IntArray:
     """Return the dofs of the model that some terms act on: mostly few of them."""
     every, found = np.arange(count), [np.zeros(0, dtype=np.int64)]
-    elements = []
+    members: list[ElementOperator] = []
     for operator in (term.operator for term in terms):
         if isinstance(operator, ElementOperator):
-            if len(operator.elements) > len(operator.structure.mesh.ends) / _MANY:
-                return every
-            elements.append(operator.elements)
-            gather = operator.structure.gather
+            members.append(operator)
         elif isinstance(operator, RowOperator):
             found.append(operator.rows.tocsr().indices)
         else:
             return every
-    if elements:
-        known = np.unique(np.concatenate(elements))
+    if members:
+        gather = members[0].structure.gather
+        known = np.unique(np.concatenate([operator.elements for operator in members]))
+        if 12 * len(known) > gather.shape[0] / _MANY:
+            return every
         found.append(gather[(12 * known[:, None] + np.arange(12)).ravel()].indices)
     dofs = np.unique(np.concatenate(found))
     return dofs[dofs < count]
