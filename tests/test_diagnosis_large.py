@@ -276,6 +276,11 @@ class TestCoordinates:
         basis.forget()
         assert not {"bare", "projector", "momentum"} & vars(basis).keys()
         assert_array_equal(basis.projector(hypothesis).cores, before)
+        force = np.ones((model.size, 1))
+        moved = basis.solver.solve(force)
+        basis.solver.forget()
+        assert "_factor" not in vars(basis.solver)
+        assert_array_equal(basis.solver.solve(force), moved)
 
     def test_a_large_model_is_solved_once_for_fewer_modes(
         self, model: Model, monkeypatch: pytest.MonkeyPatch

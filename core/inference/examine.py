@@ -225,6 +225,7 @@ def examine(
         floor = max((e.log_weight for e in explanations), default=-np.inf) - _HOPELESS
         more, atlas = Search(own, known, pairs=pairs, floor=floor, effort=effort).run()
     posterior = Posterior.of([*explanations, *more])
+    basis.solver.forget()
     basis.forget()
     return Examination(
         *(model, own, slopes, tolerance, posterior, tuple(atlas), basis.modes),
