@@ -27,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
 
 TOYS = Path(__file__).parent / "toys"
-KILLS, JOBS = 8, 104
+FEW_KILLS, MANY_KILLS, JOBS = 8, 50, 104
 CASE = toys.tiny_case()
 
 
@@ -315,7 +315,10 @@ def timed(script: Path) -> float:
     return time.monotonic() - before
 
 
-def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kills", [FEW_KILLS, pytest.param(MANY_KILLS, marks=pytest.mark.sweep)])
+def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(
+    kills: int, tmp_path: Path
+) -> None:
     """SIGKILL of the parent at random moments; the last one is left to finish."""
     draw = random.Random(20)
     seeds = JOBS // 4
@@ -327,16 +330,18 @@ def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(tmp_p
         scripts[name].write_text(text)
     whole, start = (timed(scripts["calm"]) for _ in range(2))  # the second has nothing to do
     ended_early = 0
-    for _ in range(KILLS):
+    for _ in range(kills):
         process = subprocess.Popen([sys.executable, str(scripts["killed"])])
         try:
             # Most of the moments lie among the first jobs of a start, some before them.
-            process.wait(draw.uniform(0.6, 1.0) * start + 0.1 * draw.random() * (whole - start))
+            process.wait(
+                draw.uniform(0.6, 1.0) * start + 0.8 / kills * draw.random() * (whole - start)
+            )
             ended_early += 1
         except subprocess.TimeoutExpired:
             process.send_signal(signal.SIGKILL)
             process.wait()
-    assert ended_early < KILLS
+    assert ended_early < kills
     subprocess.run([sys.executable, str(scripts["killed"])], check=True)
     calm, killed = (stores[name].load() for name in ("calm", "killed"))
     assert len(calm.results) == JOBS
