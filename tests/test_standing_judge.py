@@ -1,4 +1,4 @@
-"""Judges that live through a run: one answer never tells on the next, and a dead one is replaced."""
+"""Judges that live through a run: no answer tells on the next, and a dead judge is replaced."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def test_a_judge_that_has_grown_is_replaced(
     judges: Judges[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     size = CASE.model.size
-    large = LowRank(np.ones((size, 300 * MIB // (8 * size))), np.eye(2))
+    large = LowRank(np.ones((size, 120 * MIB // (8 * size))), np.eye(2))
     answer = packed(JobOutcome("ok", model=replace(CASE.model, mass_change=large)), CASE.model)
     fresh = result(judges, GOOD)
     before = process(judges)

@@ -15,7 +15,7 @@ import sys
 import threading
 import time
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -38,7 +38,7 @@ _PR_SET_DUMPABLE = 4
 
 @dataclass(frozen=True)
 class _Request:
-    """What a judge is asked, all written by this program but the answer in the verdict.
+    """What a judge is asked, all of it written by this program; the answer follows as it came.
 
     Arguments:
         case: digest of the case; `Verdict.case` is empty where the judge has it already.
@@ -62,18 +62,19 @@ def serve(
     while not grown:
         try:
             request: _Request = pickle.loads(requests.recv_bytes())
+            verdict = replace(request.verdict, answer=requests.recv_bytes())
         except EOFError:
             return
         for digest in request.forget:
             cases.pop(digest, None)
         with _memory(request.memory):
             if request.case not in cases:
-                cases[request.case] = pickle.loads(request.verdict.case)
-            data = run_judge(request.verdict, *cases[request.case])
+                cases[request.case] = pickle.loads(verdict.case)
+            data = run_judge(verdict, *cases[request.case])
         grown = _peak() - first > _GROWTH
         data = (_IS_DONE if grown else _GOES_ON) + data
         write_all(answer.fileno(), len(data).to_bytes(LENGTH_BYTES, "big") + data)
-        del request, data
+        del request, verdict, data
 
 
 def _stand_apart(*descriptors: int) -> None:
@@ -131,6 +132,7 @@ class _Judge:
 
     def ask(self, case: bytes, verdict: Verdict, memory: int | None) -> None:
         """Send an answer to be judged, the case too where it is not there yet."""
+        answer, verdict = verdict.answer, replace(verdict, answer=b"")
         if case in self.held:
             verdict = replace(verdict, case=b"")
         self.held[case] = self.held.pop(case, len(verdict.case))
@@ -140,13 +142,13 @@ class _Judge:
         ):
             forget.append(self.held.popitem(last=False)[0])
         request = _Request(case, tuple(forget), verdict, memory)
-        data = pickle.dumps(request, protocol=pickle.HIGHEST_PROTOCOL)
+        parts = pickle.dumps(request, protocol=pickle.HIGHEST_PROTOCOL), answer
         # With an end of its own, which stays open however long it takes.
         way = connection.Connection(os.dup(self.requests.fileno()), readable=False)
-        if len(data) <= _AT_ONCE:
-            _send(way, data)
+        if sum(map(len, parts)) <= _AT_ONCE:
+            _send(way, parts)
         else:  # one that was stopped must not stop its parent
-            threading.Thread(target=_send, args=(way, data), daemon=True).start()
+            threading.Thread(target=_send, args=(way, parts), daemon=True).start()
 
     def end(self) -> None:
         """End the process; what it is at is lost."""
@@ -158,9 +160,10 @@ class _Judge:
         self.process.close()
 
 
-def _send(way: connection.Connection, data: bytes) -> None:
+def _send(way: connection.Connection, parts: Sequence[bytes]) -> None:
     with way, suppress(OSError):  # it died: whoever waits for its answer learns of it
-        way.send_bytes(data)
+        for part in parts:
+            way.send_bytes(part)
 
 
 class Judges(Generic[Key]):
