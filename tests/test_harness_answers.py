@@ -41,7 +41,6 @@ HEAD = {
     **{"parameter_count": 1, "parameters": [], "history": [{"r": 0.1}], "diagnostics": {}},
     **{"model": {"mass": None, "stiffness": None}, "samples": [], "arrays": []},
 }
-OF_A_CLASS = {Model: "planted"}
 
 
 def sent(head: Any, rest: bytes = b"", status: bytes = b"o") -> bytes:
@@ -371,7 +370,7 @@ def _fill(name: str, part: int, value: float) -> Callable[[dict[str, Any], list[
     return change
 
 
-FRAME_OF = ("structure", "frame")
+FRAME_OF = ("structure", "fields")
 
 
 @pytest.mark.parametrize(
@@ -430,7 +429,7 @@ def test_members_in_billions_of_elements_are_not_meshed() -> None:
         frame = replace(NOMINAL.frame_structure.frame)
         members = tuple(replace(member, elements=10**9) for member in frame.members)
         plain = frame_to_plain(replace(frame, members=members), frame)
-        head["structure"]["frame"]["members"] = json.loads(json.dumps(plain))["members"]
+        head["structure"]["fields"]["members"] = json.loads(json.dumps(plain))["members"]
 
     assert "more than the" in verdict_on(forged(many))["reason"]
 

@@ -130,13 +130,6 @@ def _hints() -> Mapping[str, Any]:
     return {**get_type_hints(Frame), "members": _Members}
 
 
-def prepare_readers() -> None:
-    """Make what reads a frame, once for all processes that fork from this one."""
-    for name in _CHANGED:
-        _reader(_hints()[name])
-    _reader(tuple[Parameter, ...])
-
-
 def _numbered(members: tuple[Member, ...]) -> _Members:
     sections: dict[int, tuple[Section, dict[float, tuple[float, float]]]] = {}
     materials: dict[int, Material] = {}

@@ -24,11 +24,8 @@ from femubench.core.run.plain_frame import (
     frame_from_plain,
     frame_to_plain,
     parameters_from_plain,
-    prepare_readers,
 )
 from femubench.core.typing import AnyArray, IntArray, SparseArray
-
-__all__ = ["model_from_plain", "model_to_plain", "prepare_readers"]
 
 _MATRICES = ("mass", "stiffness")
 _CHANGES = ("mass_change", "stiffness_change")
@@ -184,7 +181,7 @@ def _plain(structure: Structure, nominal: Model, shelf: Shelf) -> dict[str, Any]
     found["changes"].append(shelf.put(values))
     if structure.frame is not nominal.structure.frame:
         kinematics = structure.kinematics
-        found["frame"] = frame_to_plain(structure.frame, nominal.structure.frame)
+        found["fields"] = frame_to_plain(structure.frame, nominal.structure.frame)
         found["node"] = shelf.put(kinematics.node)
         found["direction"] = "".join(name.ljust(2) for name in kinematics.direction)
     return found
@@ -207,7 +204,7 @@ def _structure(data: object, arrays: Sequence[AnyArray], nominal: Model) -> Stru
         raise BytesError("the properties of its elements are not one a property and element")
     springs = _taken(arrays, data.get("springs"))
     plain = nominal.structure
-    if "frame" in data:
+    if "fields" in data:
         plain = _meshed(data, arrays, plain, count)
     elif plain.changes:
         plain = Structure.build(plain.frame)
@@ -227,7 +224,7 @@ def _structure(data: object, arrays: Sequence[AnyArray], nominal: Model) -> Stru
 def _meshed(
     data: Mapping[str, Any], arrays: Sequence[AnyArray], nominal: Structure, count: int
 ) -> Structure:
-    found = Structure.build(frame_from_plain(data["frame"], nominal.frame, count))
+    found = Structure.build(frame_from_plain(data["fields"], nominal.frame, count))
     kinematics = found.kinematics
     direction = "".join(name.ljust(2) for name in kinematics.direction)
     same = direction == data.get("direction")
