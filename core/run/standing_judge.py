@@ -32,6 +32,7 @@ _CASE_BYTES = 128 * MIB  # of them together, pickled
 _GROWTH = 192 * MIB  # of its memory, after which it is replaced
 _AT_ONCE = 60_000  # bytes that a pipe takes at once
 _GOES_ON, _IS_DONE = b"\0", b"\1"
+_LAST_BREATH = 5.0  # s that a process may take to end
 _LOOK = 0.5  # s between two looks at its memory
 _PR_SET_DUMPABLE = 4
 
@@ -156,8 +157,10 @@ class _Judge:
         for end in (self.requests, self.answer, self.output):
             with suppress(OSError):
                 end.close()
-        self.process.join()
-        self.process.close()
+        # The server tells of its end, and may have been stopped.
+        self.process.join(_LAST_BREATH)
+        with suppress(ValueError):
+            self.process.close()
 
 
 def _send(way: connection.Connection, parts: Sequence[bytes]) -> None:
