@@ -106,7 +106,7 @@ def test_a_job_that_ends_its_workers_is_crashed_and_the_others_are_not(two: Dask
 
 def test_jobs_end_as_they_end_here(two: DaskWorkers) -> None:
     """Failures, limits and strategies without a module of their own."""
-    strategies = [toys.Failing(), toys.Exiting(-9), toys.Looping(), toys.Unpicklable()]
+    strategies = [toys.Failing(), toys.Exiting(-9), toys.Looping(), toys.Unsendable()]
     cases = [toys.tiny_case()]
     there, here = (
         run_jobs(cases, strategies, timeout=1.0, jobs=2, executor=place) for place in (two, None)

@@ -124,7 +124,7 @@ class Model(Shown):
         structure = Structure.build(source) if isinstance(source, Frame) else source
         mass, stiffness = structure.matrices()
         return cls(
-            mass, stiffness, _dofs(structure), structure, structure, free=structure.frame.free
+            mass, stiffness, dofs_of(structure), structure, structure, free=structure.frame.free
         )
 
     def rows(self) -> list[tuple[str, str]]:
@@ -215,7 +215,7 @@ class Model(Shown):
         return replace(
             self,
             **moved,
-            dofs=_dofs(structure),
+            dofs=dofs_of(structure),
             geometry=structure,
             structure=structure,
             mass_change=_spread_low_rank(self.mass_change, np.arange(self.size), size),
@@ -250,7 +250,8 @@ class Model(Shown):
         )
 
 
-def _dofs(structure: Structure) -> Dofs:
+def dofs_of(structure: Structure) -> Dofs:
+    """Return the labels of the degrees of freedom of a meshed frame."""
     kinematics = structure.kinematics
     xyz = structure.mesh.xyz[kinematics.node]
     return Dofs(kinematics.node, kinematics.direction, xyz, kinematics.axes)
