@@ -20,6 +20,10 @@ from femubench.core.fem.sensing import sensor_rows
 from femubench.core.fem.sensors import Sensors
 from femubench.core.typing import FloatArray, SparseArray
 
+# Elements from which on a structure keeps its plan only once parameters are set: a solution for
+# its modes takes ten times as long as another plan, and needs the memory.
+_PLANNED_ONCE = 100_000
+
 
 @dataclass(frozen=True)
 class Structure(MeshedFrame):
@@ -80,6 +84,9 @@ class Structure(MeshedFrame):
             mass, stiffness = mass + more_mass, stiffness + more_stiffness
         if self.preload is not None:
             stiffness = stiffness + self.preload
+        if not self.changes and len(self.mesh.ends) > _PLANNED_ONCE:
+            for name in ("plan", "gather"):
+                self.__dict__.pop(name, None)
         return prune(mass), prune(stiffness)
 
     def observe(self, sensors: Sensors) -> SparseArray:

@@ -13,7 +13,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal.factorisation import LU, Cholesky, Factor, cholmod_obstacle
-from femubench.core.modal.generalised_mass import mass_normalised
+from femubench.core.modal.generalised_mass import generalised_masses
 from femubench.core.modal.inertia import Change, negative_after, negative_by_cholesky
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.modal.smooth_fields import softest_smooth_field
@@ -231,6 +231,7 @@ def lowest_eigenpairs(model: Model, count: int) -> tuple[FloatArray, FloatArray]
         shapes = np.hstack([shapes, others])[:, order]
     else:
         raise ModelError(f"{missed} eigenvalues below {eigenvalues[-1]:.6g} were not found")
+    del shifted  # and the factors with it, before matrices are copied
     _check(model, eigenvalues, shapes)
     energy = np.einsum("ij,ij->j", modes, model.stiffness_times(modes))
     values = np.concatenate([energy, eigenvalues])
@@ -266,9 +267,12 @@ def _shift_invert(
                       which=which, v0=first, tol=0.0)
             )  # fmt: skip
     eigenvalues = np.concatenate([values for values, _ in pieces])
-    shapes = np.hstack([vectors for _, vectors in pieces])
-    order = np.argsort(eigenvalues)
-    return eigenvalues[order], mass_normalised(model, shapes[:, order])
+    shapes = pieces[0][1] if len(pieces) == 1 else np.hstack([vectors for _, vectors in pieces])
+    order = np.argsort(eigenvalues, kind="stable")
+    if np.any(np.diff(order) < 0):
+        shapes = shapes[:, order]
+    shapes /= np.sqrt(generalised_masses(model, shapes))  # in place: nothing is as large as these
+    return eigenvalues[order], shapes
 
 
 def _missed(shifted: ShiftedModel, eigenvalues: FloatArray, rigid: int) -> int:
