@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, Protocol
@@ -17,6 +18,8 @@ from femubench.core.typing import FloatArray, SparseArray
 # From about so many unknowns on, nested dissection earns its own time on structures in space.
 _DISSECTED = 50_000
 _MISSING = "no scikit-sparse"
+_AT_ONCE = 4_000_000  # entries of right sides solved at once
+_BLOCK = 32  # columns at once from which more gain nothing
 
 
 class Factor(Protocol):
@@ -29,6 +32,18 @@ class Factor(Protocol):
     @property
     def negative(self) -> int | None:
         """Return the number of negative pivots; None where rows were exchanged for stability."""
+        ...
+
+
+class Definite(Protocol):
+    """A factorised positive definite matrix, whose place others can take."""
+
+    def factorise(self, matrix: SparseArray) -> bool:
+        """Put another matrix into the place of the last; False where it is not definite."""
+        ...
+
+    def compliance(self, basis: SparseArray) -> FloatArray:
+        """Return basis' inverse basis of sparse columns, (p, p)."""
         ...
 
 
@@ -67,7 +82,13 @@ class Cholesky:
         """Return the inverse times one or several right sides, (n,) or (n, m)."""
         return np.asarray(self._factor(right))
 
-    def half(self, right: FloatArray) -> FloatArray:
+    def compliance(self, basis: SparseArray) -> FloatArray:
+        """Return basis' inverse basis of sparse columns, (p, p)."""
+        # A column is felt along its path in the elimination tree alone: the rest is zero.
+        half = sp.hstack([sp.csc_array(self._half(part)) for part in _blocks(basis)], format="csc")
+        return np.asarray((half.T @ half).toarray())
+
+    def _half(self, right: FloatArray) -> FloatArray:
         """Return L^-1 right with the rows of L in its own order, so that half' half = solve."""
         permuted = self._factor.apply_P(right)
         return np.asarray(self._factor.solve_L(permuted, use_LDLt_decomposition=False))
@@ -106,6 +127,35 @@ class LU:
         if not np.array_equal(self._factor.perm_r, self._factor.perm_c):
             return None
         return int(np.sum(pivots(self._factor) < 0.0))
+
+
+class DefiniteLU:
+    """L U of positive definite matrices by SuperLU; no pivot of such a matrix is negative."""
+
+    def __init__(self) -> None:
+        self._factor: LU | None = None
+
+    def factorise(self, matrix: SparseArray) -> bool:
+        """Put another matrix into the place of the last; False where it is not definite."""
+        self._factor = None
+        try:
+            factor = LU(matrix)
+        except RuntimeError:
+            return False
+        self._factor = factor if factor.negative == 0 else None
+        return self._factor is not None
+
+    def compliance(self, basis: SparseArray) -> FloatArray:
+        """Return basis' inverse basis of sparse columns, (p, p)."""
+        assert self._factor is not None, "a definite matrix comes first"
+        return np.hstack([basis.T @ self._factor.solve(part) for part in _blocks(basis)])
+
+
+def _blocks(columns: SparseArray) -> Iterator[FloatArray]:
+    """Yield some columns at a time, dense."""
+    width = min(max(_AT_ONCE // columns.shape[0], 4), _BLOCK)
+    for start in range(0, columns.shape[1], width):
+        yield columns[:, start : start + width].toarray()
 
 
 def _indexed(matrix: SparseArray) -> sp.csc_matrix:

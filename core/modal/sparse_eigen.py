@@ -12,9 +12,9 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import LowRank, Model
-from femubench.core.modal.factorisation import LU, Cholesky, Factor, cholmod_obstacle
+from femubench.core.modal.factorisation import LU, Cholesky, DefiniteLU, Factor, cholmod_obstacle
 from femubench.core.modal.generalised_mass import generalised_masses
-from femubench.core.modal.inertia import Change, negative_after, negative_by_cholesky
+from femubench.core.modal.inertia import Change, negative_after, negative_by_pins, signs_hold
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.modal.smooth_fields import softest_smooth_field
 from femubench.core.typing import FloatArray, SparseArray
@@ -117,20 +117,25 @@ class ShiftedModel:
     def eigenvalues_below(self, about: int = 8) -> int | None:
         """Return how many eigenvalues lie below the shift (Sylvester's law of inertia).
 
-        None where the factorisation pivoted off the diagonal, so that its signs mean nothing.
+        None where neither the signs of pivots nor pins tell, as within rounding of an eigenvalue.
 
         Arguments:
             about: how many are expected; a bad guess costs time alone.
         """
+        matrix, change = self._matrix, self._change
         if self.shift > 0.0 and "_factor" not in self.__dict__ and self._cholesky is not None:
-            matrix, change = self._matrix, self._change
-            found = negative_by_cholesky(self._cholesky, matrix, change, self.model, about)
+            found = negative_by_pins(self._cholesky, matrix, change, self.model, about)
             if found is not None:
                 return found
         below = self._factor.negative
-        if below is None or self._woodbury is None or self._change is None:
+        # Of a definite matrix no factor grows.
+        if below is None or (below and not signs_hold(self._factor, matrix)):
+            for kept in ("_factor", "_woodbury"):  # one factorisation at a time
+                self.__dict__.pop(kept, None)
+            return negative_by_pins(DefiniteLU(), matrix, change, self.model, about)
+        if self._woodbury is None or change is None:
             return below
-        return negative_after(below, self._change[1], self._woodbury[1])
+        return negative_after(below, change[1], self._woodbury[1])
 
 
 def _free_rigid_modes(model: Model) -> FloatArray:
@@ -254,7 +259,7 @@ def _shift_invert(
     stiffness = LinearOperator((size, size), matvec=model.stiffness_times, dtype=float)
     below = shifted.eigenvalues_below()
     if below is None:
-        raise ModelError("negative eigenvalues cannot be counted: the factors were pivoted")
+        raise ModelError("negative eigenvalues cannot be counted: rounding hides their signs")
     rayleigh = np.einsum("ij,ij->j", known.modes, model.stiffness_times(known.modes))
     below -= int(np.sum(rayleigh < shifted.shift))
     count = min(count, size - known.modes.shape[1] - 1)
