@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
+from threadpoolctl import ThreadpoolController
 
 from femubench import fem
 from femubench.core.fem.frame import (
@@ -31,6 +32,7 @@ from femubench.core.modal.factorisation import LU, Cholesky, cholmod_obstacle
 from femubench.core.modal.inertia import negative_after, signs_hold
 from femubench.core.modal.sparse_eigen import ShiftedModel, lowest_eigenpairs
 from femubench.core.modal.superlu_pivots import pivots
+from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]
 TUBE, ALUMINIUM = round_tube(0.02, 0.002), Material(70e9, 0.3, 2700.0)
@@ -268,6 +270,31 @@ def test_pivots_of_another_layout_are_copied(monkeypatch: pytest.MonkeyPatch) ->
             assert superlu_pivots._supernodes(factor) is None
             np.testing.assert_array_equal(pivots(factor), factor.U.diagonal())
     assert superlu_pivots._supernodes(factor) is not None
+
+
+def test_threads_of_numpy_are_as_they_were_after_cholmod(
+    ladder: FrameBuilder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    use(monkeypatch, "CHOLMOD")
+    model = Model.of(ladder(elements=30))
+    pools = ThreadpoolController().select(user_api="blas")
+    with pools.limit(limits=2):
+        own, seen = pools.lib_controllers[0], []
+        own.set_num_threads(1)
+        before = [pool.num_threads for pool in pools.lib_controllers]
+        solve = Cholesky.solve.__wrapped__  # type: ignore[attr-defined]
+
+        def watched(factor: Cholesky, right: FloatArray) -> FloatArray:
+            seen.append({pool.num_threads for pool in pools.lib_controllers})
+            return np.asarray(solve(factor, right))
+
+        monkeypatch.setattr(Cholesky, "solve", factorisation._threads_of_numpy()(watched))
+        cholmod_obstacle.cache_clear()
+        lowest_eigenpairs(model, 12)
+        assert [pool.num_threads for pool in pools.lib_controllers] == before
+    assert set(before) == {1, 2}
+    assert seen
+    assert all(threads == {1} for threads in seen)
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,11 +16,34 @@ import scipy.sparse as sp
 from femubench.core.modal.superlu_pivots import pivots
 from femubench.core.typing import FloatArray, SparseArray
 
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
+
 # From about so many unknowns on, nested dissection earns its own time on structures in space.
 _DISSECTED = 50_000
 _MISSING = "no scikit-sparse"
 _AT_ONCE = 4_000_000  # entries of right sides solved at once
 _BLOCK = 32  # columns at once from which more gain nothing
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    """Return the BLAS of NumPy and that of CHOLMOD, once both are loaded."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController().select(user_api="blas")
+
+
+@contextmanager
+def _threads_of_numpy() -> Iterator[None]:
+    """Give the BLAS of CHOLMOD no more threads than that of NumPy may use within the block."""
+    pools = _blas()
+    threads = [pool.num_threads for pool in pools.lib_controllers]
+    if len({*threads}) < 2:
+        yield
+        return
+    with pools.limit(limits=min(threads)):
+        yield
 
 
 class Factor(Protocol):
@@ -68,6 +92,7 @@ class Cholesky:
             _indexed(pattern), mode="supernodal", ordering_method=order, use_long=False
         )
 
+    @_threads_of_numpy()
     def factorise(self, matrix: SparseArray) -> bool:
         """Put another matrix into the place of the last; False where it is not definite."""
         from sksparse.cholmod import CholmodNotPositiveDefiniteError
@@ -78,10 +103,12 @@ class Cholesky:
             return False
         return True
 
+    @_threads_of_numpy()
     def solve(self, right: FloatArray) -> FloatArray:
         """Return the inverse times one or several right sides, (n,) or (n, m)."""
         return np.asarray(self._factor(right))
 
+    @_threads_of_numpy()
     def compliance(self, basis: SparseArray) -> FloatArray:
         """Return basis' inverse basis of sparse columns, (p, p)."""
         # A column is felt along its path in the elimination tree alone: the rest is zero.
@@ -181,7 +208,6 @@ def cholmod_obstacle() -> str | None:
             f"CHOLMOD is linked to the reference BLAS {slow}, six times slower than OpenBLAS "
             "(Debian: apt install libopenblas0)"
         )
-    _as_many_threads()
     return None
 
 
@@ -200,15 +226,6 @@ def _reference_blas(libraries: list[str]) -> str | None:
         if re.match(r"lib(ref)?blas\.", Path(path).name) and not tuned.search(path):
             return path
     return None
-
-
-def _as_many_threads() -> None:
-    """Give the BLAS that came with CHOLMOD no more threads than that of NumPy may use."""
-    from threadpoolctl import threadpool_info, threadpool_limits
-
-    pools = [pool for pool in threadpool_info() if pool["user_api"] == "blas"]
-    if pools:
-        threadpool_limits(min(pool["num_threads"] for pool in pools), "blas")
 
 
 def solver_name() -> str:
