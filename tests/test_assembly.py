@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from femubench.core.errors import ModelError
+from femubench.core.fem import structure as structure_module
 from femubench.core.fem.beam import mass_matrices, stiffness_matrices
 from femubench.core.fem.frame import (
     Frame,
@@ -53,6 +54,26 @@ def test_assembly_is_the_sum_of_rotated_elements(portal: FrameBuilder) -> None:
     np.testing.assert_allclose(
         found_stiffness, stiffness, rtol=0, atol=1e-13 * np.abs(stiffness).max()
     )
+
+
+def test_a_large_structure_lets_go_of_its_plan_until_parameters_are_set(
+    portal: FrameBuilder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small = Structure.build(portal(3))
+    expected = small.matrices()
+    monkeypatch.setattr(structure_module, "_PLANNED_ONCE", 5)
+    large = Structure.build(portal(3))
+    for one, other in zip(expected, large.matrices(), strict=True):
+        np.testing.assert_array_equal(one.toarray(), other.toarray())
+    assert "plan" in vars(small)
+    assert not {"plan", "gather"} & set(vars(large))
+    stiffer = Parameter("stiffer", "E", large.labels[:4])
+    changed = large.with_values([stiffer], [1.5])
+    for one, other in zip(
+        small.with_values([stiffer], [1.5]).matrices(), changed.matrices(), strict=True
+    ):
+        np.testing.assert_array_equal(one.toarray(), other.toarray())
+    assert changed.with_values([stiffer], [1.1]).plan is changed.plan
 
 
 def test_local_axes_are_right_handed_and_hold_up(portal: FrameBuilder) -> None:

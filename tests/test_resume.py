@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from femubench.core.errors import InputError
 from femubench.core.run import provenance as keys, slots, store as locks
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
+from femubench.core.schema import sealing
 from femubench.core.schema.results import JobResult, Run
 from femubench.core.score.repeatability import environment_differences, result_differences
 
@@ -359,3 +361,22 @@ def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(
     assert names == {"exhibits", f"{killed.meta['run']}.jsonl"}
     kept = {key for key in good if stores["killed"].exhibits.of(key) is not None}
     assert len(kept) == 4  # of the first seed: two cases, two strategies
+
+
+def test_a_record_that_is_whole_but_wrong_is_computed_again(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    first = some(store)
+    file = store.file_of(first.meta["run"])
+    lines = file.read_bytes().splitlines(keepends=True)
+    place = next(i for i, line in enumerate(lines) if b'"softer"' in line and b'"result"' in line)
+    wrong = lines[place].rstrip(b"\n")[: -sealing.TAIL] + b"}"
+    assert b'"seconds":' in wrong
+    wrong = re.sub(rb'"seconds":[0-9.e-]+', b'"seconds":"long"', wrong, count=1)
+    lines[place] = sealing.sealed(wrong) + b"\n"
+    file.write_bytes(b"".join(lines))
+    assert len(store.latest()) == len(store.by_key()) + 1
+    again = some(store, resume=True)
+    assert len(again.results) == len(first.results)
+    assert {item.strategy: item.status for item in again.results}["softer"] == "ok"
+    jobs = [item["result"]["strategy"] for item in records(store) if "result" in item]
+    assert jobs.count("softer") == 2

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 import scipy.sparse as sp
@@ -87,19 +88,23 @@ def _resolved(structure: MeshedFrame, parameters: Sequence[Parameter]) -> tuple[
             found += _rigid_ends(structure, parameters, numbers)
             continue
         positions = structure.spring_index if kind == _SPRING else structure.label_index
-        pairs = [(p, place) for p in numbers for place in _places(parameters[p])]
+        places = [_places(parameters[p]) for p in numbers]
+        named = list(chain.from_iterable(places))
         try:
-            rows = [positions[place] for _, place in pairs]
+            rows = list(map(positions.__getitem__, named))
         except KeyError:
+            pairs = ((p, place) for p, own in zip(numbers, places, strict=True) for place in own)
             p, place = next(pair for pair in pairs if pair[1] not in positions)
             raise ModelError(f"{parameters[p].name}: there is no place {place!r}") from None
-        columns = np.repeat([p for p, _ in pairs], [len(index) for index in rows])
+        columns = np.repeat(np.array(numbers, dtype=np.int64), list(map(len, places)))
         every = np.concatenate(rows) if rows else np.zeros(0, dtype=np.int64)
-        found.append(Touched(kind, every, columns.astype(np.int64)))
+        if len(every) > len(rows):  # split elements
+            columns = np.repeat(columns, list(map(len, rows)))
+        found.append(Touched(kind, every, columns))
     return tuple(found)
 
 
-def _places(parameter: Parameter) -> Iterable[str]:
+def _places(parameter: Parameter) -> Collection[str]:
     places = parameter.places
     return places if len(places) < 2 else dict.fromkeys(places)
 

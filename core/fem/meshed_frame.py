@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.assembly import AssemblyPlan, plan_assembly
+from femubench.core.fem.assembly import AssemblyPlan, narrowed, plan_assembly
 from femubench.core.fem.beam import BeamProperties
 from femubench.core.fem.frame import Frame, GroundSpring, PointMass
 from femubench.core.fem.kinematics import Kinematics, point_rows, spring_rows
@@ -94,9 +94,9 @@ class MeshedFrame:
             (mesh.axes.reshape(-1)[9 * element + entry % 9], columns, bounds),
             shape=(12 * count, 6 * len(mesh.xyz)),
         )
-        gather = turn @ self.kinematics.transform
+        gather = narrowed(turn) @ self.kinematics.transform
         gather.eliminate_zeros()
-        return gather
+        return narrowed(gather)
 
     @cached_property
     def plan(self) -> AssemblyPlan:
@@ -254,7 +254,7 @@ class MeshedFrame:
             motion: displacements from positions (k, 3) and axes (k, 6), as columns (k, r).
         """
         transform, xyz = self.kinematics.transform, self.mesh.xyz
-        own = motion(xyz[self.kinematics.node], self.kinematics.axes)
+        own = motion(xyz[self.kinematics.node], self.kinematics.motions())
         free = np.tile(self.active_local[:6], (len(xyz), 1))
         free[self.mesh.oscillators] = False  # they have dofs of their own and hold nothing
         active = np.setdiff1d(np.flatnonzero(free), self.kinematics.unused)

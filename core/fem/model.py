@@ -15,7 +15,7 @@ from femubench.core.errors import ModelError, NotApplicable
 from femubench.core.fem.assembly import prune
 from femubench.core.fem.attaching import MatrixChange, attach, grown
 from femubench.core.fem.frame import Frame, GroundSpring, PointMass
-from femubench.core.fem.sensors import DIRECTIONS, Sensors
+from femubench.core.fem.sensors import Sensors, unit_motions
 from femubench.core.fem.structure import Structure
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
@@ -45,8 +45,7 @@ class Dofs:
         """Return the unit motion of every dof in (x, y, z, rx, ry, rz), (n, 6)."""
         if self.axes is not None:
             return self.axes
-        number = {name: i for i, name in enumerate(DIRECTIONS)}
-        return np.eye(6)[[number[name] for name in self.direction]]
+        return unit_motions(self.direction)
 
 
 @dataclass(frozen=True)

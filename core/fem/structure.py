@@ -21,6 +21,9 @@ from femubench.core.fem.sensors import Sensors
 from femubench.core.typing import FloatArray, SparseArray
 
 _ROUNDING = 1e-14
+# Elements from which on a structure keeps its plan only once parameters are set: a solution for
+# its modes takes ten times as long as another plan, and needs the memory.
+_PLANNED_ONCE = 100_000
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,11 @@ class Structure(MeshedFrame):
             stiffness = stiffness + oscillator_matrices(self)[1]
         if self.preload is not None:
             stiffness = stiffness + self.preload
-        return self._mass(), prune(stiffness)
+        mass = self._mass()
+        if not self.changes and len(self.mesh.ends) > _PLANNED_ONCE:
+            for name in ("plan", "gather"):
+                self.__dict__.pop(name, None)
+        return mass, prune(stiffness)
 
     def _mass(self) -> SparseArray:
         """Return the mass, of a small frame a copy of the last one where nothing of it changed."""

@@ -17,7 +17,7 @@ from femubench.core.run.answers import AnswerError, head_of
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.judging import Verdict, judged, run_strategy
 from femubench.core.run.limits import Limits
-from femubench.core.run.slots import Slot, Start
+from femubench.core.run.slots import Slot, Start, first_seed
 from femubench.core.run.standing_judge import Judges
 from femubench.core.run.workers import Ending, Workers
 from femubench.core.schema.records import result_from_json
@@ -82,7 +82,7 @@ class _Bench:
     ) -> None:
         self._wanted = wanted
         self._slots, self._references, self._limits = slots, references, limits
-        self._show, self._shown = show, min((slot.seed for slot in slots), default=0)
+        self._show, self._shown = show, first_seed(slots)
         self._case = lru_cache(_MOST_CASES)(self._pickled)
         self._attempts = Counter[int]()
         self._alone: set[int] = set()
