@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 StrategyLike = str | Strategy | type[Strategy]
 DEFAULT_STORE = "femubench-results"
 DEFAULT_TIMEOUT = 600.0  # s
-_OWN = "femubench."
 _Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
@@ -332,7 +331,7 @@ def textbook_of(cases: Sequence[Case]) -> dict[str, Case]:
     from femubench.core.effect.textbook import textbook_model
     from femubench.core.plugin.loader import registered_effects
 
-    known = [item for item in registered_effects() if type(item).__module__.startswith(_OWN)]
+    known = registered_effects()
     found = {}
     for case in cases:
         with suppress(NotApplicable):
