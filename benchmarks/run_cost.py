@@ -29,7 +29,7 @@ from femubench.core.library.cases import usable_plugins
 from femubench.core.library.rank import Plan, plan_of
 from femubench.core.modal import eigen
 from femubench.core.run.answers import packed, unpacked
-from femubench.core.run.jobs import Job, execute
+from femubench.core.run.jobs import Job, performed
 from femubench.core.run.judging import judged
 from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Starts
@@ -123,7 +123,8 @@ def solutions(plan: Plan) -> Solutions:
         for slot in Slots(pairs, plan.strategies, tuple(plan.request.all_seeds)):
             if isinstance(slot.job, Job):
                 # By way of its bytes: the strategy's model has modes that the judge's has not.
-                outcome = unpacked(packed(execute(slot.job)))
+                outcome, given = performed(slot.job)
+                outcome = unpacked(packed(outcome, given), slot.case.model)
                 names = slot.strategy, slot.seed, slot.nominal
                 judged(slot.case, references[slot.case.name], names, outcome)
     return found

@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from femubench.core.errors import ModelError
+from femubench.core.fem import structure as structure_module
 from femubench.core.fem.beam import mass_matrices, stiffness_matrices
 from femubench.core.fem.frame import (
     Frame,
@@ -21,10 +22,12 @@ from femubench.core.fem.frame import (
     PointMass,
 )
 from femubench.core.fem.model import Model
+from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.sections import Section, constant_kappa
 from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
+from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]
@@ -51,6 +54,26 @@ def test_assembly_is_the_sum_of_rotated_elements(portal: FrameBuilder) -> None:
     np.testing.assert_allclose(
         found_stiffness, stiffness, rtol=0, atol=1e-13 * np.abs(stiffness).max()
     )
+
+
+def test_a_large_structure_lets_go_of_its_plan_until_parameters_are_set(
+    portal: FrameBuilder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small = Structure.build(portal(3))
+    expected = small.matrices()
+    monkeypatch.setattr(structure_module, "_PLANNED_ONCE", 5)
+    large = Structure.build(portal(3))
+    for one, other in zip(expected, large.matrices(), strict=True):
+        np.testing.assert_array_equal(one.toarray(), other.toarray())
+    assert "plan" in vars(small)
+    assert not {"plan", "gather"} & set(vars(large))
+    stiffer = Parameter("stiffer", "E", large.labels[:4])
+    changed = large.with_values([stiffer], [1.5])
+    for one, other in zip(
+        small.with_values([stiffer], [1.5]).matrices(), changed.matrices(), strict=True
+    ):
+        np.testing.assert_array_equal(one.toarray(), other.toarray())
+    assert changed.with_values([stiffer], [1.1]).plan is changed.plan
 
 
 def test_local_axes_are_right_handed_and_hold_up(portal: FrameBuilder) -> None:
@@ -145,6 +168,39 @@ def test_planar_models_are_parts_of_the_spatial_one(plane: str, theory: str) -> 
     everything = solve_modes(spatial).natural_frequencies
     for frequency in solve_modes(model).elastic.natural_frequencies[:10]:
         assert np.abs(everything / frequency - 1.0).min() < 1e-7
+
+
+def test_what_a_structure_keeps_is_what_it_would_make_anew(fitted_portal: FrameBuilder) -> None:
+    """In any order of changes, and whatever is done to a matrix that was handed out."""
+    frame = fitted_portal(3)
+    length = np.linalg.norm(np.subtract(frame.joint("J1").xyz, frame.joint("J5").xyz))
+    on_rigid_end = Place(member="m8", s=float(1.0 - 0.015 / length))
+    masses = (*frame.masses, PointMass(on_rigid_end, 0.3))
+    frame = replace(frame, masses=masses, springs=(GroundSpring(on_rigid_end, "z", 3e4),))
+    base = Structure.build(frame)
+    every, first = tuple(filter(None, base.label_index)), ("m8/1", "m8/2")
+    lines = [[frame.joint(name).xyz for name in frame.members[k].ends] for k in (8, 4)]
+    points = np.array([np.average(line, axis=0, weights=(0.3, 0.7)) for line in lines])
+    sensors = Sensors(("a", "b"), points, ("z", "-ry"))
+    changed = base
+    for quantity, places, value in (
+        *(("E", every, 1.3), ("EI", first, 0.8), ("density", every, 0.9), ("rhoJp", first, 1.1)),
+        *(("shear", every, 1.5), ("rotary", every, 2.0), ("GJ", every, 0.7), ("E", first, 0.6)),
+        *(("rigid", ("m8@J5",), 0.002), ("rhoA", first, 1.2), ("spring", ("m0@J1:rx",), 5e3)),
+    ):
+        parameter = Parameter(quantity, quantity, places)
+        for start in (changed, base):
+            assert Model.of(start).observe(sensors).shape == (2, len(base.kinematics.node))
+            found = start.with_values([parameter], [value])
+            anew = replace(found)
+            assert not {"kept", "plan"} & set(vars(anew))
+            model, expected = Model.of(found), Model.of(anew)
+            np.testing.assert_array_equal(model.mass.toarray(), expected.mass.toarray())
+            np.testing.assert_array_equal(model.stiffness.toarray(), expected.stiffness.toarray())
+            readings = expected.observe(sensors).toarray()
+            np.testing.assert_allclose(model.observe(sensors).toarray(), readings, atol=1e-13)
+            np.testing.assert_array_equal(rigid_modes_of(model), rigid_modes_of(expected))
+            model.mass.data[:], changed = 0.0, found if start is changed else changed
 
 
 def test_sensors_read_points_between_nodes(ladder: FrameBuilder) -> None:

@@ -817,7 +817,8 @@ def test_a_truss_is_diagnosed(tmp_path: Path) -> None:
 def test_a_run_takes_over_what_a_strategy_makes_of_the_model(
     model: Callable[..., Model], cards: str
 ) -> None:
-    wanted = changed(model(cards), {("E", "all"): 1.1})
-    found = unpacked(packed(JobOutcome("ok", model=wanted))).model
+    nominal = model(cards)
+    wanted = changed(nominal, {("E", "all"): 1.1})
+    found = unpacked(packed(JobOutcome("ok", model=wanted), nominal), nominal).model
     assert found is not None
     assert near(found, wanted, 0.0)

@@ -66,6 +66,8 @@ def test_a_table_is_part_of_the_digest(tmp_path: Path) -> None:
     ("joints", "members", "told"),
     [
         (JOINTS.replace("0.4,", "nan,"), MEMBERS, "joints.csv:4: x: 'nan' is not allowed"),
+        (JOINTS.splitlines()[0] + "\n", MEMBERS, "joints.csv: no rows"),
+        (JOINTS, MEMBERS.splitlines()[0] + "\n", "members.csv: no rows"),
         (JOINTS.replace("0.6", ""), MEMBERS, "joints.csv:4: z: '' is not allowed"),
         (JOINTS.replace("tip", "knee"), MEMBERS, "joints.csv:4: name: 'knee' is listed twice"),
         (JOINTS, MEMBERS.replace("tip,5", "top,5"), "members.csv:3: end_2: member 'arm' ends"),

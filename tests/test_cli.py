@@ -21,6 +21,7 @@ import femubench
 from femubench.core.cli import progress
 from femubench.core.cli.main import VERBS, bench
 from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of
+from femubench.core.errors import OutputError
 from femubench.core.files import write_atomically
 from femubench.core.run.store import Store
 
@@ -543,16 +544,19 @@ class TestRun:
             deadline = time.monotonic() + 60.0
             while not store.files and time.monotonic() < deadline:
                 time.sleep(0.05)
-            for _ in range(2):
-                time.sleep(0.5)
-                process.send_signal(signal.SIGINT)
+            assert process.stderr is not None
+            time.sleep(0.5)
+            process.send_signal(signal.SIGINT)
+            told = [process.stderr.readline(), process.stderr.readline()]
+            process.send_signal(signal.SIGINT)
             # ends only when the workers, who hold the pipes too, are gone
             _, error = process.communicate(timeout=60.0)
         assert process.returncode == 130
-        assert error.strip().splitlines() == [
-            "bench: finishing the jobs that are running; Ctrl-C once more stops them",
-            "bench: interrupted",
-            "bench: 0 of 1 jobs are done; to go on: bench run case -s test-sleeps -j 1 --resume",
+        assert [*told, *error.splitlines(keepends=True)] == [
+            "\n",
+            "bench: finishing the jobs that are running; Ctrl-C once more stops them\n",
+            "bench: interrupted\n",
+            "bench: 0 of 2 jobs are done; to go on: bench run case -s test-sleeps -j 1 --resume\n",
         ]
 
 
@@ -699,7 +703,7 @@ def test_files_are_replaced_in_one_step(tmp_path: Path, monkeypatch: pytest.Monk
         raise OSError("disk is full")
 
     monkeypatch.setattr(Path, "replace", fail)
-    with pytest.raises(OSError, match="disk is full"):
+    with pytest.raises(OutputError, match=r"result\.json: cannot be written: disk is full"):
         write_atomically(path, "new")
     assert path.read_text() == "old\n"
     assert sorted(tmp_path.iterdir()) == [plain, path]

@@ -130,8 +130,19 @@ class TestAsking:
         assert invoke("case").exit_code == 0
         ((case, effects, pairs),) = search.calls
         assert (case.folder, case.tolerance, pairs) == (Path("case"), TOLERANCE, True)
-        assert effects == list(load_plugins().effects)
-        assert {"test-rust", "test-moss"} <= set(effects)
+        assert effects == list(load_plugins(strangers=False).effects)
+
+    def test_effects_of_a_plugin_that_is_named_come_too(
+        self, invoke: Invoke, search: Search
+    ) -> None:
+        assert invoke("case", "--plugin", "femubench_diagnose_tests").exit_code == 0
+        ((_, effects, _),) = search.calls
+        assert effects == [*load_plugins(strangers=False).effects, "test-rust", "test-moss"]
+        words = ("--effects", "density", "--plugin", "femubench_diagnose_tests")
+        assert invoke("case", *words).exit_code == 0
+        assert search.calls[1][1] == ["density", "test-rust", "test-moss"]
+        result = invoke("case", "--plugin", "femubench_diagnose_test")
+        assert (result.exit_code, "did you mean" in result.stderr) == (2, True)
 
     def test_options_reach_the_search(self, invoke: Invoke, search: Search) -> None:
         words = ("--effects", "test-moss, test-rust,test-moss", "--no-pairs", "--tolerance", "0.02")

@@ -229,3 +229,22 @@ def test_chi_square_of_scattered_frames_is_the_number_of_data(
     assert chi2.var() == pytest.approx(2.0 * expected, rel=0.35)
     # Without the scatter in the noise the same data would be refused.
     assert np.square(rows).sum(axis=1).mean() > expected + 10.0 * error
+
+
+def test_other_deviations_are_weighed_as_with_a_covariance_of_their_own() -> None:
+    """A few by a change of low rank, many by their own factor, none as they are."""
+    rng = np.random.default_rng(7)
+    shared = rng.standard_normal((30, 12))
+    covariance = np.eye(30) + shared @ shared.T
+    noise = Noise(np.linalg.cholesky(covariance), rng.standard_normal(30))
+    ratios = np.ones((4, 30))
+    ratios[1, [3, 9]] = 1e-3, 7.0
+    ratios[2, 4:9] = 0.2
+    ratios[3, 2:] = 1.0 / 3.0
+    rows = rng.standard_normal((4, 30))
+    chi2, log_det = noise.reweighed(rows, ratios)
+    for i, ratio in enumerate(ratios):
+        # Measurement has unit deviations in units of its own; the rest keeps its size.
+        own = np.diag(1.0 / np.square(ratio)) + shared @ shared.T
+        assert chi2[i] == pytest.approx(rows[i] @ np.linalg.solve(own, rows[i]), rel=1e-9)
+        assert log_det[i] == pytest.approx(0.5 * np.linalg.slogdet(own)[1], rel=1e-9)

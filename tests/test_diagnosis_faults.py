@@ -16,8 +16,9 @@ from femubench.core.challenge.draw import draw_case
 from femubench.core.challenge.score import candidates
 from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.diagnosis.serial import diagnosis_to_json
+from femubench.core.inference.charge import charges_of
 from femubench.core.inference.examine import examine
-from femubench.core.inference.fault_search import inquire, log_density
+from femubench.core.inference.fault_search import _Drawn, inquire, log_density
 from femubench.core.plugin.loader import load_plugins, registered_faults
 from femubench.effect import Suspect
 from femubench.plugins.faults.readings import multiplied, swapped
@@ -330,3 +331,16 @@ def test_the_json_says_the_side_and_a_group_keeps_its_faults() -> None:
     fault = ("sensor-sign", "sensor:S1")
     assert candidates(answer) == ((fault, ("a", "p")), (fault, ("b", "q")))
     assert answer.probability == pytest.approx(0.9)
+
+
+def test_suspects_weighed_at_once_are_as_each_by_itself() -> None:
+    case = clean("ladder", 0)
+    used = case.measurement.select(case.used)
+    charges = [
+        c for c in charges_of(case.model, used, registered_faults()) if c.fault.side == "data"
+    ]
+    now = _Drawn(case.model, used, None, 1.0)
+    for (charge, gain), own in zip(now.all_screened(charges), charges, strict=True):
+        assert charge.suspect is own.suspect
+        assert gain == pytest.approx(now.screened(own)[1], rel=1e-9, abs=1e-9), own.suspect.place
+    assert len({c.fault.name for c in charges}) > 4

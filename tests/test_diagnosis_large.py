@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from femubench import Measurement, Model, Sensors, solve_modes
 from femubench.core.case.case import Case
@@ -26,7 +26,13 @@ from femubench.core.inference.noise import Noise
 from femubench.core.inference.projection import Projection, Projector
 from femubench.core.inference.residuals import Data
 from femubench.core.inference.screening import _pulls, screened, with_shortlist
-from femubench.core.inference.static_response import Basis, LargeProblem, enriched, placed
+from femubench.core.inference.static_response import (
+    Basis,
+    LargeProblem,
+    _touched,
+    enriched,
+    placed,
+)
 from femubench.core.modal import eigen
 from femubench.core.modal.eigen import Modes, modes_of
 from femubench.effect import Effect
@@ -178,6 +184,8 @@ class TestCoordinates:
             assert (found is None) == (expected is None)
             if expected is not None and found is not None:
                 assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+        same = projector.widened(projector(hypothesis), modes[:, :0])
+        assert_array_equal(same.cores, projector(hypothesis).cores)
         kept = np.r_[0:20, len(modes.T) : len(modes.T) + hypothesis.change.extra]
         stiff = widened.matrix(factors, mass=False)
         if stiff is not None:
@@ -222,6 +230,57 @@ class TestCoordinates:
                 follow = own * (dynamic[30:, :30] @ near[:, j])
                 exact = dynamic[:30, :30] @ near[:, j] - dynamic[:30, 30:] @ follow
                 assert_allclose(forces[g, :, j], exact, atol=1e-9 * np.abs(exact).max())
+
+    @pytest.mark.parametrize(
+        ("effect", "place"),
+        [(JointRotation(), "E"), (AttachedOscillator(), "BE@0.5"), (YoungsModulus(), "all")],
+    )
+    def test_partners_of_a_cause_are_those_of_its_own_motions(
+        self, model: Model, effect: Effect, place: str
+    ) -> None:
+        """Taken over from the basis, they are as when projected on all motions anew."""
+        problem = posed_on(model, ())
+        seed = projected(problem, one(model, MemberStiffness(), "AB"))
+        assert isinstance(problem, LargeProblem)
+        there = problem.common.enriched(problem.space, (seed,))
+        hypothesis = one(model, effect, place)
+        found = there.projected(projected(problem, hypothesis))
+        expected = Projector(model, there.vectors)(hypothesis)
+        for mass in (False, True):
+            one_way = found.matrix(hypothesis.typical_factors, mass=mass)
+            other = expected.matrix(hypothesis.typical_factors, mass=mass)
+            assert (one_way is None) == (other is None)
+            if one_way is not None and other is not None:
+                assert_allclose(one_way, other, atol=1e-9 * np.abs(other).max())
+        assert_allclose(found.weights, expected.weights, rtol=1e-9)
+
+    def test_an_effect_pulls_at_no_other_dofs_than_those_it_touches(self, model: Model) -> None:
+        shapes = np.random.default_rng(5).standard_normal((model.size, 3))
+        some = [*KNOWN, LocalStiffnessLoss(), AttachedOscillator(), JointOffset(), AxialPreload()]
+        for hypothesis in hypotheses_of(model, some):
+            terms, extra = hypothesis.change.terms, hypothesis.change.extra
+            rows = _touched(terms, model.size)
+            others = np.setdiff1d(np.arange(model.size), rows)
+            grown = np.vstack([shapes, np.zeros((extra, 3))])
+            for term in terms:
+                assert not term.operator.apply(grown)[others].any()
+            if hypothesis.name in ("local-stiffness-loss", "attached-oscillator"):
+                assert len(rows) < 20
+
+    def test_what_is_forgotten_is_worked_out_anew(self, model: Model) -> None:
+        problem = posed_on(model, ())
+        assert isinstance(problem, LargeProblem)
+        basis, hypothesis = problem.common, one(model, YoungsModulus(), "all")
+        before, _ = basis.projector(hypothesis).cores, basis.momentum
+        assert {"projector", "momentum"} <= vars(basis).keys()
+        basis.forget()
+        assert not {"bare", "projector", "momentum"} & vars(basis).keys()
+        assert_array_equal(basis.projector(hypothesis).cores, before)
+        force = np.ones((model.size, 1))
+        moved = basis.solver.solve(force)
+        basis.solver.forget()
+        assert "_factor" not in vars(basis.solver)
+        assert_array_equal(basis.solver.solve(force), moved)
 
     def test_a_large_model_is_solved_once_for_fewer_modes(
         self, model: Model, monkeypatch: pytest.MonkeyPatch

@@ -14,7 +14,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 from stranger_effects import CAUTION, SUMMARY, Bare, Plain, Skin
 
-from femubench import Diagnosis, Model, diagnose
+from femubench import Diagnosis, InputError, Model, diagnose
 from femubench.core.case.case import Case
 from femubench.core.challenge import draw
 from femubench.core.challenge.draw import BlindCase, draw_case
@@ -48,7 +48,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 
 def known(*names: str) -> list[Effect]:
-    return [effect for effect in registered_effects() if effect.name in names]
+    return [effect for effect in registered_effects("strangers") if effect.name in names]
 
 
 @pytest.fixture(scope="module")
@@ -137,9 +137,20 @@ def softer(case: Case) -> Diagnosis:
     return diagnose(replace(case, model=model), known(Skin.name, Plain.name))
 
 
-def test_the_sweep_draws_it_by_itself_and_judges_what_is_said_of_it() -> None:
-    drawn = (Task("A", k, 500 + k, "A", "ladder", "one", 0.0) for k in range(400))
-    task = next(t for t in drawn if t.draw().truth.causes[0].effect == Skin.name)
+class TaskOfSkin(Task):
+    def draw(self) -> BlindCase:
+        return draw_case(self.seed, self.kind, effect=Skin.name)
+
+
+def test_without_being_named_it_is_neither_drawn_nor_looked_for() -> None:
+    assert not {Skin.name, Bare.name, Plain.name} & {e.name for e in registered_effects()}
+    assert not {Skin.name, Bare.name, Plain.name} & set(draw.registered_effects())
+    with pytest.raises(InputError, match="no plugin 'stranger'; did you mean 'strangers'"):
+        registered_effects("stranger")
+
+
+def test_the_sweep_judges_what_is_said_of_it() -> None:
+    task = TaskOfSkin("A", 0, 503, "A", "ladder", "one", 0.0)
     record = run_task(task, lambda case: diagnose(case, known(Skin.name, *OURS)))
     assert record["effects"] == [Skin.name]
     # Another modulus with another torsion constant has almost the same bending stiffness.

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
+from threading import Thread
 
 import numpy as np
 import pytest
@@ -23,6 +26,7 @@ from femubench.fem import (
     Support,
 )
 from femubench.modal import mac, rigid_modes_of
+from femubench.plugins.strategies import cma_es
 from femubench.plugins.strategies.cma_es import CmaEs
 from femubench.plugins.strategies.cross_model import CrossModel
 from femubench.plugins.strategies.eigensensitivity import Eigensensitivity
@@ -157,6 +161,34 @@ def test_searches_repeat_with_the_seed_and_leave_the_random_state_alone() -> Non
         first = factors_of(strategy, model, measurement)
         assert factors_of(strategy, model, measurement) == first
     assert repr(np.random.get_state()) == state  # noqa: NPY002
+
+
+def test_a_search_in_a_worker_loads_no_plots() -> None:
+    code = """
+import sys
+from femubench.plugins.strategies import cma_es
+cma_es.parent_process = object
+before = list(sys.meta_path)
+assert cma_es._cma().CMAEvolutionStrategy([0.0, 0.0], 1.0, {"verbose": -9}).ask()
+assert sys.meta_path == before
+print("matplotlib" in sys.modules)
+"""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False
+    )
+    assert (done.stdout, done.stderr) == ("False\n", "")
+
+
+def test_a_package_is_hidden_from_one_thread_alone() -> None:
+    hidden, found = cma_es._Hidden("matplotlib"), []
+    for name in ("matplotlib", "matplotlib.pyplot"):
+        with pytest.raises(ImportError, match="left out"):
+            hidden.find_spec(name)
+    hidden.find_spec("matplotlib_inline")
+    other = Thread(target=lambda: found.append(hidden.find_spec("matplotlib")))  # type: ignore[func-returns-value]
+    other.start()
+    other.join()
+    assert found == [None]
 
 
 def test_slopes_are_those_of_differences_and_few_shapes_give_the_same_frequencies() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
+from threadpoolctl import ThreadpoolController
 
 from femubench import fem
 from femubench.core.fem.frame import (
@@ -28,8 +29,10 @@ from femubench.core.fem.sections import round_tube
 from femubench.core.modal import factorisation, sparse_eigen, superlu_pivots
 from femubench.core.modal.eigen import dense_matrices, solve_dense
 from femubench.core.modal.factorisation import LU, Cholesky, cholmod_obstacle
+from femubench.core.modal.inertia import negative_after, signs_hold
 from femubench.core.modal.sparse_eigen import ShiftedModel, lowest_eigenpairs
 from femubench.core.modal.superlu_pivots import pivots
+from femubench.core.typing import FloatArray
 
 FrameBuilder = Callable[..., Frame]
 TUBE, ALUMINIUM = round_tube(0.02, 0.002), Material(70e9, 0.3, 2700.0)
@@ -182,6 +185,62 @@ def test_the_count_by_pins_is_one(portal: FrameBuilder, monkeypatch: pytest.Monk
         assert ShiftedModel(model, shift).eigenvalues_below(number) == number + 1
 
 
+def vanishing_pivots(seed: int) -> tuple[Model, float]:
+    """Return a model and a shift that leaves an ulp of 60 diagonals, the first to be pivots.
+
+    Their multipliers of 1e16 round away what the diagonals of their neighbours were.
+    """
+    random, n, tiny = np.random.default_rng(seed), 600, 60
+    strong = (np.repeat(np.arange(tiny), 2), tiny + random.choice(n - tiny, 2 * tiny, False))
+    chain = np.arange(tiny, n - 1)
+    rows, columns = np.append(strong[1], chain + 1), np.append(strong[0], chain)
+    values = np.append(random.uniform(2.4, 2.7, 2 * tiny), np.full(len(chain), -0.1))
+    weak = sp.random_array(
+        (n - tiny, n - tiny),
+        density=8 / n,
+        rng=random,
+        data_sampler=lambda size: random.uniform(-0.03, 0.03, size),
+    )
+    low = sp.coo_array((values, (rows, columns)), shape=(n, n))
+    low = low + sp.block_diag([sp.csc_array((tiny, tiny)), weak])
+    diagonal = np.append(np.full(tiny, np.nextafter(1.0, 2.0)), np.full(n - tiny, 4.05))
+    stiffness = sp.csc_array(low + low.T + sp.diags_array(diagonal))
+    return fem.matrix_model(sp.eye_array(n), stiffness, range(n), ["x"] * n), 1.0
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_signs_of_grown_pivots_are_not_believed(
+    seed: int, back_end: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, shift = vanishing_pivots(seed)
+    mass, stiffness = dense_matrices(model)
+    eigenvalues = np.linalg.eigvalsh(stiffness - shift * mass)
+    assert np.abs(eigenvalues).min() > 1.0
+    expected = int(np.sum(eigenvalues < 0.0))
+    matrix = sp.csc_array(model.stiffness - shift * model.mass)
+    assert not signs_hold(LU(matrix), matrix)
+    assert signs_hold(LU(matrix, pivot=1.0), matrix)
+    assert ShiftedModel(model, shift).eigenvalues_below(expected) == expected
+    if back_end == "SuperLU":
+        monkeypatch.setattr(sparse_eigen, "negative_by_pins", lambda *_: None)
+        assert ShiftedModel(model, shift).eigenvalues_below(expected) is None
+
+
+def test_rounding_that_hides_an_eigenvalue_is_told() -> None:
+    for smallest, expected in ((1e-11, 1), (-1e-11, 0), (1e-15, None), (-1e-15, None)):
+        capacitance = np.diag([smallest, 1.0])
+        assert negative_after(0, np.array([-1.0, 1.0]), capacitance) == expected
+
+
+@pytest.mark.usefixtures("back_end")
+def test_the_count_beside_an_eigenvalue_of_a_fine_mesh() -> None:
+    model = Model.of(lattice((4, 4, 1), 200))
+    eigenvalues, _ = lowest_eigenpairs(model, 14)
+    for near, counts in ((1e-3, {13}), (1e-7, {13, None})):
+        shift = float(eigenvalues[-1] * (1.0 - near))
+        assert ShiftedModel(model, shift).eigenvalues_below(13) in counts
+
+
 @pytest.mark.usefixtures("back_end")
 def test_matrices_without_places() -> None:
     ones = np.ones(600)
@@ -211,6 +270,31 @@ def test_pivots_of_another_layout_are_copied(monkeypatch: pytest.MonkeyPatch) ->
             assert superlu_pivots._supernodes(factor) is None
             np.testing.assert_array_equal(pivots(factor), factor.U.diagonal())
     assert superlu_pivots._supernodes(factor) is not None
+
+
+def test_threads_of_numpy_are_as_they_were_after_cholmod(
+    ladder: FrameBuilder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    use(monkeypatch, "CHOLMOD")
+    model = Model.of(ladder(elements=30))
+    pools = ThreadpoolController().select(user_api="blas")
+    with pools.limit(limits=2):
+        own, seen = pools.lib_controllers[0], []
+        own.set_num_threads(1)
+        before = [pool.num_threads for pool in pools.lib_controllers]
+        solve = Cholesky.solve.__wrapped__  # type: ignore[attr-defined]
+
+        def watched(factor: Cholesky, right: FloatArray) -> FloatArray:
+            seen.append({pool.num_threads for pool in pools.lib_controllers})
+            return np.asarray(solve(factor, right))
+
+        monkeypatch.setattr(Cholesky, "solve", factorisation._threads_of_numpy()(watched))
+        cholmod_obstacle.cache_clear()
+        lowest_eigenpairs(model, 12)
+        assert [pool.num_threads for pool in pools.lib_controllers] == before
+    assert set(before) == {1, 2}
+    assert seen
+    assert all(threads == {1} for threads in seen)
 
 
 @pytest.mark.parametrize(

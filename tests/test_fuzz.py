@@ -28,8 +28,11 @@ from mutations import changed_json, edits, json_edits, mutated
 from seeds import CASES, matrix_case, run_text, store_text, universal_case
 from watch import watched
 
-FEW, MANY = 0.05, 1.0  # share of the inputs in the tests of every day
-INPUTS = {"toml": 6000, "csv": 5000, "mtx": 4000, "universal": 3500, "run": 2500, "store": 2000}
+FEW, MANY = 0.012, 1.0  # share of the inputs in the tests of every day
+INPUTS = {
+    **{"toml": 24_000, "csv": 20_000, "mtx": 16_000, "universal": 14_000},
+    **{"run": 8_000, "store": 6_000},
+}
 MOST_CHARACTERS = 2500
 _CLI_SAMPLE = 12
 READERS = tuple(load_plugins().readers.values())

@@ -106,7 +106,7 @@ def test_a_job_that_ends_its_workers_is_crashed_and_the_others_are_not(two: Dask
 
 def test_jobs_end_as_they_end_here(two: DaskWorkers) -> None:
     """Failures, limits and strategies without a module of their own."""
-    strategies = [toys.Failing(), toys.Exiting(-9), toys.Looping(), toys.Unpicklable()]
+    strategies = [toys.Failing(), toys.Exiting(-9), toys.Looping(), toys.Unsendable()]
     cases = [toys.tiny_case()]
     there, here = (
         run_jobs(cases, strategies, timeout=1.0, jobs=2, executor=place) for place in (two, None)
@@ -194,17 +194,22 @@ def test_an_interrupted_run_keeps_what_is_done_and_leaves_nothing_behind(tmp_pat
     )
     with quiet as process, ExitStack() as ended:
         below: list[psutil.Process] = []
+        told: list[str] = [""]
         ended.callback(process.kill)  # leaving the block waits for it
         until = time.monotonic() + 120.0
         while process.poll() is None and time.monotonic() < until:
             if any('"status":"ok"' in file.read_text() for file in store.files):
                 below = psutil.Process(process.pid).children(recursive=True)
-                # As a terminal does it.
+                # As a terminal does it; the second is for the job that never ends.
+                assert process.stderr is not None
+                os.killpg(process.pid, signal.SIGINT)
+                told = [process.stderr.readline(), process.stderr.readline()]
                 os.killpg(process.pid, signal.SIGINT)
                 break
             time.sleep(0.2)
         _, text = process.communicate(timeout=60.0)
     assert process.returncode == -signal.SIGINT
+    assert told[-1].startswith("bench: finishing the jobs that are running")
     assert text.strip().splitlines()[-1] == "KeyboardInterrupt"
     assert "distributed" not in re.sub(r'File "[^"]*"', "", text)
     assert below

@@ -7,7 +7,7 @@ import re
 import sys
 import textwrap
 from collections.abc import Iterator
-from importlib.metadata import distributions
+from importlib.metadata import EntryPoint, distributions
 from pathlib import Path
 from types import ModuleType
 
@@ -24,9 +24,12 @@ from femubench import (
     hookimpl,
     solve_modes,
 )
+from femubench.core import roles
 from femubench.core.case.reader import read_case
 from femubench.core.plugin import hookspecs
-from femubench.core.plugin.loader import HOOKS, Plugins, load_plugins
+from femubench.core.plugin.foreign import ForeignStrategy
+from femubench.core.plugin.importing import HOOKS
+from femubench.core.plugin.loader import Plugins, load_plugins
 from femubench.core.plugin.validation import (
     check_effect,
     check_reader,
@@ -90,7 +93,8 @@ def test_third_party_loads_beside_broken_ones(site: Path) -> None:
     )
     # through the entry-point group of the whole environment, as `bench` does
     plugins = load_plugins()
-    assert isinstance(plugins.strategies["nothing-at-all"], Strategy)
+    assert isinstance(plugins.strategies["nothing-at-all"], roles.Strategy)
+    assert "fine_one_plugin" not in sys.modules
     assert not {"typo", "wants"} & set(plugins.strategies)
     faults = {fault.plugin: fault for fault in plugins.broken}
     assert set(faults) >= {"no-import-entry", "exits-entry", "typo-entry", "wants-entry"}
@@ -111,19 +115,27 @@ def test_name_that_is_taken_is_refused(site: Path) -> None:
     distribution(site, "a-first", GOOD.format(name="twice"))
     distribution(site, "b-second", GOOD.format(name="twice"))
     plugins = from_site(site)
-    assert type(plugins.strategies["twice"]).__module__ == "a_first_plugin"
+    first = plugins.strategies["twice"]
+    assert isinstance(first, ForeignStrategy)
+    assert first.modules == ("a_first_plugin",)
     (fault,) = plugins.broken
     assert (fault.plugin, fault.hook) == ("b-second-entry", "femubench_strategies")
     assert "'twice' is taken" in fault.message
 
 
 def test_third_party_cannot_take_a_builtin_name(site: Path) -> None:
-    """`aaa` sorts before `femubench`, and yet comes after it."""
-    distribution(site, "aaa", GOOD.format(name="ours"))
-    distribution(site, "femubench", GOOD.format(name="ours"))
-    plugins = from_site(site)
-    assert [plugin.distribution for plugin in plugins.loaded] == ["femubench 1.0", "aaa 1.0"]
-    assert [fault.plugin for fault in plugins.broken] == ["aaa-entry"]
+    """`aaa` sorts before `femubench`, and who takes its name has not its rights."""
+    distribution(site, "aaa", GOOD.format(name="unchanged"))
+    distribution(site, "femubench", GOOD.format(name="unchanged"))
+    own = EntryPoint("strategies", "femubench.plugins.strategies", "femubench")
+    found = [point for dist in distributions(path=[str(site)]) for point in dist.entry_points]
+    plugins = load_plugins([*found, own])
+    assert [plugin.plugin for plugin in plugins.loaded] == [
+        "strategies", "aaa-entry", "femubench-entry",
+    ]  # fmt: skip
+    assert [plugin.own for plugin in plugins.loaded] == [True, False, False]
+    assert [fault.plugin for fault in plugins.broken] == ["aaa-entry", "femubench-entry"]
+    assert not {"aaa_plugin", "femubench_plugin"} & set(sys.modules)
 
 
 @pytest.mark.parametrize(
@@ -160,16 +172,22 @@ def test_one_bad_entry_leaves_the_others(site: Path) -> None:
     ]
 
 
+def given(source: str) -> Plugins:
+    """Load a plugin that somebody has imported."""
+    module = ModuleType("later_plugin")
+    exec(textwrap.dedent(source), module.__dict__)
+    return load_plugins([], {"later": module})
+
+
 REFERENCES = GOOD.replace("[Nothing]", "{{'nothing': __name__ + ':Nothing'}}")
 
 
 def test_an_offer_by_reference_is_loaded_when_it_is_used(site: Path) -> None:
-    distribution(site, "later", REFERENCES.format(name="nothing").replace("__name__", "'heavy'"))
-    plugins = from_site(site)
+    plugins = given(REFERENCES.format(name="nothing").replace("__name__", "'heavy'"))
     assert list(plugins.strategies) == ["nothing"]
     assert dict(plugins.loaded[0].offers)["strategies"] == ("nothing",)
     assert plugins.broken == ()
-    with pytest.raises(PluginError, match=re.escape("plugin 'later-entry' (later 1.0) in femu")):
+    with pytest.raises(PluginError, match=re.escape("plugin 'later' (given by hand) in femu")):
         plugins.strategies["nothing"]
     source = textwrap.dedent(GOOD.format(name="nothing"))
     (site / "heavy.py").write_text(source, encoding="utf-8")
@@ -186,11 +204,14 @@ def test_an_offer_by_reference_is_loaded_when_it_is_used(site: Path) -> None:
         ((":Nothing'", ":Nobody'"), "has no attribute 'Nobody'"),
     ],
 )
-def test_a_wrong_reference_is_told_when_it_is_used(
+def test_a_wrong_reference_is_told_when_it_is_used_and_of_a_stranger_at_once(
     site: Path, change: tuple[str, str], says: str
 ) -> None:
-    distribution(site, "wrong", REFERENCES.format(name="nothing").replace(*change))
-    plugins = from_site(site)
+    source = REFERENCES.format(name="nothing").replace(*change)
+    distribution(site, "wrong", source)
+    (fault,) = from_site(site).broken
+    assert says in fault.message
+    plugins = given(source.replace("__name__", "'wrong_plugin'"))
     assert plugins.broken == ()
     (name,) = plugins.strategies
     with pytest.raises(PluginError, match=re.escape(says)):

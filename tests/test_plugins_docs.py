@@ -15,7 +15,8 @@ from femubench import Reader, Scenario, Strategy, UpdateResult
 from femubench.core.cli.plugins import plugins
 from femubench.core.library.new_package import KINDS, write_package
 from femubench.core.plugin import hookspecs
-from femubench.core.plugin.loader import HOOKS, load_plugins
+from femubench.core.plugin.importing import HOOKS
+from femubench.core.plugin.loader import load_plugins
 from femubench.core.roles import CAPABILITIES
 from femubench.effect import Effect, Fault, FrameEffect, Suspect
 from femubench.results import Reporter

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from femubench import Measurement, StrategyFailure, UpdateResult
+from femubench.core.typing import FloatArray
 from femubench.core.update import posterior_sampling
+from femubench.core.update.posterior_sampling import StretchMove
 from femubench.core.update.quadratic_fit import QuadraticFit, coefficients_of
 from femubench.plugins.strategies.sampling import BayesianSampling
 from femubench.update import Discrepancy
@@ -97,9 +101,39 @@ def test_the_generator_alone_decides_on_the_result(monkeypatch: pytest.MonkeyPat
     assert (first.model.stiffness != second.model.stiffness).nnz == 0
 
 
+def chain_of(density: Callable[[FloatArray], FloatArray], steps: int, **options: Any) -> Any:
+    import emcee
+
+    sampler = emcee.EnsembleSampler(24, 3, density, vectorize=True, **options)
+    sampler.random_state = np.random.RandomState(7).get_state()
+    sampler.run_mcmc(0.3 * np.random.default_rng(3).standard_normal((24, 3)), steps)
+    return sampler
+
+
+def test_the_stretch_move_is_that_of_emcee() -> None:
+    def density(x: FloatArray) -> FloatArray:
+        inside = -0.5 * np.square(x * [1.0, 2.0, 0.5]).sum(axis=1)
+        return np.where(x[:, 0] > -1.5, inside, -np.inf)
+
+    plain, ours = chain_of(density, 200), chain_of(density, 200, moves=StretchMove())
+    np.testing.assert_array_equal(ours.get_chain(), plain.get_chain())
+    np.testing.assert_array_equal(ours.get_log_prob(), plain.get_log_prob())
+    np.testing.assert_array_equal(ours.acceptance_fraction, plain.acceptance_fraction)
+    assert 0.1 < ours.acceptance_fraction.mean() < 0.9
+
+
+def test_a_density_without_a_value_ends_the_chain() -> None:
+    def density(x: FloatArray) -> FloatArray:
+        return np.where(np.abs(x).max(axis=1) < 4.0, 0.0, np.nan)
+
+    with pytest.raises(StrategyFailure, match="no value at a point"):
+        chain_of(density, 200, moves=StretchMove())
+
+
 def test_a_chain_that_is_too_short_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(posterior_sampling, "_LONGEST", 500)
     monkeypatch.setattr(posterior_sampling, "_LONG_ENOUGH", 400.0)
+    monkeypatch.setattr(posterior_sampling, "_OFF", np.inf)  # no polynomials are to blame
     with pytest.raises(StrategyFailure, match=r"^500 steps are \d+ autocorrelation times, expec"):
         sampled(CASE.used_measurement())
 

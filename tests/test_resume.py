@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from femubench.core.errors import InputError
 from femubench.core.run import provenance as keys, slots, store as locks
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
+from femubench.core.schema import sealing
 from femubench.core.schema.results import JobResult, Run
 from femubench.core.score.repeatability import environment_differences, result_differences
 
@@ -27,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import harness_toys as toys
 
 TOYS = Path(__file__).parent / "toys"
-KILLS, JOBS = 8, 104
+FEW_KILLS, MANY_KILLS, JOBS = 8, 50, 104
 CASE = toys.tiny_case()
 
 
@@ -315,7 +317,10 @@ def timed(script: Path) -> float:
     return time.monotonic() - before
 
 
-def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(tmp_path: Path) -> None:
+@pytest.mark.parametrize("kills", [FEW_KILLS, pytest.param(MANY_KILLS, marks=pytest.mark.sweep)])
+def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(
+    kills: int, tmp_path: Path
+) -> None:
     """SIGKILL of the parent at random moments; the last one is left to finish."""
     draw = random.Random(20)
     seeds = JOBS // 4
@@ -327,16 +332,18 @@ def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(tmp_p
         scripts[name].write_text(text)
     whole, start = (timed(scripts["calm"]) for _ in range(2))  # the second has nothing to do
     ended_early = 0
-    for _ in range(KILLS):
+    for _ in range(kills):
         process = subprocess.Popen([sys.executable, str(scripts["killed"])])
         try:
             # Most of the moments lie among the first jobs of a start, some before them.
-            process.wait(draw.uniform(0.6, 1.0) * start + 0.1 * draw.random() * (whole - start))
+            process.wait(
+                draw.uniform(0.6, 1.0) * start + 0.8 / kills * draw.random() * (whole - start)
+            )
             ended_early += 1
         except subprocess.TimeoutExpired:
             process.send_signal(signal.SIGKILL)
             process.wait()
-    assert ended_early < KILLS
+    assert ended_early < kills
     subprocess.run([sys.executable, str(scripts["killed"])], check=True)
     calm, killed = (stores[name].load() for name in ("calm", "killed"))
     assert len(calm.results) == JOBS
@@ -354,3 +361,22 @@ def test_a_run_that_is_killed_again_and_again_ends_like_an_undisturbed_one(tmp_p
     assert names == {"exhibits", f"{killed.meta['run']}.jsonl"}
     kept = {key for key in good if stores["killed"].exhibits.of(key) is not None}
     assert len(kept) == 4  # of the first seed: two cases, two strategies
+
+
+def test_a_record_that_is_whole_but_wrong_is_computed_again(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    first = some(store)
+    file = store.file_of(first.meta["run"])
+    lines = file.read_bytes().splitlines(keepends=True)
+    place = next(i for i, line in enumerate(lines) if b'"softer"' in line and b'"result"' in line)
+    wrong = lines[place].rstrip(b"\n")[: -sealing.TAIL] + b"}"
+    assert b'"seconds":' in wrong
+    wrong = re.sub(rb'"seconds":[0-9.e-]+', b'"seconds":"long"', wrong, count=1)
+    lines[place] = sealing.sealed(wrong) + b"\n"
+    file.write_bytes(b"".join(lines))
+    assert len(store.latest()) == len(store.by_key()) + 1
+    again = some(store, resume=True)
+    assert len(again.results) == len(first.results)
+    assert {item.strategy: item.status for item in again.results}["softer"] == "ok"
+    jobs = [item["result"]["strategy"] for item in records(store) if "result" in item]
+    assert jobs.count("softer") == 2

@@ -347,11 +347,10 @@ def test_a_name_neither_breaks_the_screen_nor_the_document(tmp_path: Path) -> No
 # Only what this program has written itself goes through pickle: see each reason.
 TRUSTED = {
     "core/run/jobs.py": "writes strategies; a worker reads the job that the parent has written",
-    "core/run/schedule.py": "writes cases for the process that judges",
+    "core/run/schedule.py": "writes cases for the processes that judge",
     "core/run/slots.py": "writes jobs for its own workers",
     "core/run/cluster.py": "sends cases to workers of the same user, who send results as Dask does",
-    "core/run/judging.py": "reads the case that the parent has written",
-    "core/run/answers.py": "writes a model; reads it by a reader of a few classes alone",
+    "core/run/standing_judge.py": "reads cases and the requests that the parent has written",
     "core/conformance": "asks whether a strategy can be pickled, which is a rule of the contract",
 }
 # Arrays of one publication, from the folder that the user names for it; no case can ask for it.

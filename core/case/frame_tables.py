@@ -12,6 +12,7 @@ from femubench.core.case.faults import KeyPath, at_key
 from femubench.core.case.files import CaseFiles
 from femubench.core.case.schema import CaseSpec, parse_spec
 from femubench.core.case.tables import Cells, plain_number, read_cells, whole_number
+from femubench.core.errors import InputError
 from femubench.core.typing import IntArray
 
 # A key of a joint or member that is a list stands in one column an entry.
@@ -66,6 +67,8 @@ class FrameTables:
         required = [c for k in KEYS[key] if k not in OPTIONAL for c in columns_of(k)]
         cells = read_cells(path)
         cells.check_columns(tuple(required), optional)
+        if not cells.cells:
+            raise InputError("no rows", file=path, expected=f"one of the {key} at least")
         self.found[key] = path, np.array(cells.lines)
         return _entries(key, cells)
 

@@ -215,7 +215,7 @@ class MemberSpec(Table):
 
     name: Name = Field(description=NAME)
     ends: tuple[Name, Name] = Field(description="the names of two joints")
-    elements: Count = Field(1, description="a whole number >= 1")
+    elements: Count = Field(1, description="a whole number from 1 to 1000000")
     section: Name = Field(description="the name of a section")
     material: Name = Field(description="the name of a material")
     up: Vector | None = Field(None, description="a vector in the local x-z plane, 3d only")

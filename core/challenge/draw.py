@@ -275,13 +275,20 @@ class BlindCase:
     truth: Truth
 
 
-@lru_cache(maxsize=1)
-def registered_effects() -> Effects:
-    """Return the effects on frames of all plugins, by name."""
-    from femubench.core.plugin.loader import load_plugins
+@lru_cache(maxsize=8)
+def registered_effects(*named: str) -> Effects:
+    """Return the effects on frames that come with femubench, and those named, by name.
 
-    offered = load_plugins().effects
-    return {name: e for name, e in sorted(offered.items()) if isinstance(e, FrameEffect)}
+    Arguments:
+        named: effects of any plugin, which is imported here; unknown names are left out.
+    """
+    from femubench.core.plugin import loader
+
+    found = {effect.name: effect for effect in loader.registered_effects()}
+    if not set(named) <= set(found):
+        offered = loader.load_plugins().effects
+        found |= {name: offered[name] for name in named if name in offered}
+    return {name: e for name, e in sorted(found.items()) if isinstance(e, FrameEffect)}
 
 
 def draw_case(
@@ -303,7 +310,7 @@ def draw_case(
         hidden: one effect, none, a pair, or a cause outside the catalogue.
         effect: the effect to hide, or the one outside; None for a random one.
         scatter: standard deviation of every element's stiffness and mass, relative.
-        effects: the catalogue by name; None for those of all plugins.
+        effects: the catalogue by name; None for those that come with femubench and `effect`.
 
     Raises:
         InputError: for an unknown structure, kind or effect, or one that does not fit there.
@@ -315,7 +322,8 @@ def draw_case(
         raise InputError(f"scatter {scatter}", key="scatter", expected=expected)
     words = [seed, KINDS.index(kind), crc32(structure.encode()), HIDDEN.index(hidden)]
     choice, elements, noise = np.random.SeedSequence(words).spawn(3)
-    catalogue = registered_effects() if effects is None else effects
+    named = () if effect is None or hidden == "outside" else (effect,)
+    catalogue = registered_effects(*named) if effects is None else effects
     candidates = Candidates(
         specimen, kind, catalogue, scatter, np.random.default_rng(choice), elements
     )

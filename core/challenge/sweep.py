@@ -118,7 +118,8 @@ def run_task(task: Task, diagnose: Diagnose) -> Record:
         diagnose: from a case to its diagnosis.
     """
     blind = task.draw()
-    delta = delta_chi2(blind.case, blind.truth, registered_effects())
+    known = registered_effects(*(cause.effect for cause in blind.truth.causes))
+    delta = delta_chi2(blind.case, blind.truth, known)
     begin = time.perf_counter()
     record = {**asdict(task), "truth": str(blind.truth), "delta_chi2": list(delta)}
     record["effects"] = [cause.effect for cause in blind.truth.causes]

@@ -54,8 +54,12 @@ def _seconds(ctx: click.Context, param: click.Parameter, value: float | None) ->
     help="End the search for several causes after so long; a note says so. Default: no end.",
 )  # fmt: skip
 @click.option(
-    "--effects", metavar="A,B,...", help="Try these effects only. Default: all that apply."
+    "--effects", metavar="A,B,...", help="Try these effects only. Default: all that come along."
 )
+@click.option(
+    "--plugin", "others", multiple=True, metavar="NAME",
+    help="Try the effects and faults of this plugin too, which is imported; may be repeated.",
+)  # fmt: skip
 @options.style("terminal", "markdown")
 @click.option(
     "--report", "report_file", type=options.OUTPUT, metavar="FILE",
@@ -74,6 +78,7 @@ def diagnose(
     no_faults: bool,
     budget: float | None,
     effects: str | None,
+    others: tuple[str, ...],
     style: str,
     report_file: Path | None,
     quiet: bool,
@@ -85,16 +90,12 @@ def diagnose(
     """
     plugins = plugins_for(ctx)
     if report_file is not None:
-        if report_file.suffix.lower() not in _STYLES:
-            known = " or ".join(_STYLES)
-            what = "does not say its format"
-            raise InputError(what, file=report_file, expected=f"a name with {known}")
-        if _STYLES[report_file.suffix.lower()] == "html":
-            require("matplotlib", "plot", "a page with drawings")
+        _check_report(report_file)
     if output is not None:
         check_new(output)
     names = None if effects is None else [word.strip() for word in effects.split(",")]
     chosen("effect", names or (), plugins.effects)
+    chosen("plugin", others, (plugin.plugin for plugin in plugins.loaded))
     read = one_case(case, plugins)
     from femubench.core.diagnosis.serial import diagnosis_to_json
     from femubench.core.library.diagnose import diagnosis_of, has_model
@@ -108,6 +109,7 @@ def diagnose(
             tolerance=tolerance,
             budget=budget,
             told=told,
+            others=others,
         )
     written = output if output is not None and has_model(found) else None
     fault = None if written is None else _fault(found, written)
@@ -122,6 +124,19 @@ def diagnose(
     if output is not None and written is None:
         what = f"the verdict is {found.verdict!r}: nothing was written to {output}"
         click.echo(f"bench: {' '.join(what.split())}", err=True)
+
+
+def _check_report(file: Path) -> None:
+    """Make sure that the suffix of a report says its format, and that it can be written.
+
+    Raises:
+        InputError: otherwise.
+    """
+    if file.suffix.lower() not in _STYLES:
+        known = " or ".join(_STYLES)
+        raise InputError("does not say its format", file=file, expected=f"a name with {known}")
+    if _STYLES[file.suffix.lower()] == "html":
+        require("matplotlib", "plot", "a page with drawings")
 
 
 def _fault(found: Diagnosis, folder: Path) -> Exception | None:

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 
 import click
 
+from femubench.core.cli.quantities import bytes_of, timeouts_of
 from femubench.core.files import check_writable
 
 Option: TypeAlias = Callable[[Callable[..., Any]], Callable[..., Any]]
@@ -80,3 +81,41 @@ cluster = click.option(
     "--cluster", metavar="CLUSTER",
     help="Start a Dask cluster for the run: local:N workers here, or slurm:QUEUE.",
 )  # fmt: skip
+
+_timeouts = click.option(
+    "--timeout", "timeouts", multiple=True, callback=timeouts_of, metavar="DURATION",
+    help="Give up on a job after this time, e.g. 90s, 10m, 1h. STRATEGY=DURATION is for one "
+    "strategy; may be repeated. Default: 10m.",
+)  # fmt: skip
+
+_memory = click.option(
+    "--memory", callback=bytes_of, metavar="SIZE",
+    help="Stop a job that takes more, e.g. 512M, 4G. Default: an even share of the machine's.",
+)  # fmt: skip
+
+_csv_file = click.option(
+    "--csv", "csv_file", type=OUTPUT, metavar="FILE", help="Write one line per job as CSV."
+)
+
+_report_file = click.option(
+    "--report", "report_file", type=OUTPUT, metavar="FILE",
+    help="Write the report there; its suffix decides the format. Default: RUN.html and "
+    "RUN.md in the store.",
+)  # fmt: skip
+
+
+def of_jobs(json: str) -> Option:
+    """Return what every verb has that runs jobs: where, within which limits, and into which files.
+
+    Arguments:
+        json: what is in the file of JSON.
+    """
+    where, limits = (jobs, scheduler, cluster), (_timeouts, _memory)
+    files = (json_file(json), _csv_file, store("Keep results there."), _report_file, quiet)
+
+    def with_all(command: Callable[..., Any]) -> Callable[..., Any]:
+        for option in reversed((*where, *limits, *files)):
+            command = option(command)
+        return command
+
+    return with_all

@@ -13,6 +13,7 @@ from femubench.core.files import write_atomically
 if TYPE_CHECKING:
     from femubench.core.plugin.loader import Plugins
     from femubench.core.roles import Reporter
+    from femubench.core.run.store import Store
     from femubench.core.schema.results import Run
 
 
@@ -33,21 +34,31 @@ def outputs_of(
 
 
 def finish(
-    run: Run, exhibits: object, outputs: dict[Path, Reporter], screen: Reporter | None
-) -> None:
+    ctx: click.Context,
+    run: Run,
+    outputs: dict[Path, Reporter],
+    plugins: Plugins,
+    store: Store,
+    exhibits: object = None,
+) -> int:
     """Write the files, then show the ranking and where the files are.
 
     A file that cannot be written keeps nobody from the ranking and the other files.
+    Returns the exit code: 1 where some job has no result.
 
     Raises:
         OutputError: for the last such file, when all else is done.
         PluginError: for the last reporter that failed.
     """
-    from femubench.core.library.report import rendered, text_of
+    from femubench.core.library.report import rendered, reporter, run_name, text_of
+    from femubench.core.schema.results import DONE
 
-    written: list[str] = []
+    files, written = dict(outputs), list[str]()
     broken: OutputError | PluginError | None = None
-    for path, writer in outputs.items():
+    if ctx.params["report_file"] is None:
+        for own in (reporter(plugins, name) for name in ("html", "markdown")):
+            files[store.folder / f"{run_name(run)}{own.suffix}"] = own
+    for path, writer in files.items():
         try:
             write_atomically(path, rendered(writer, run, exhibits))
             written.append(f"{writer.name}: {path}")
@@ -55,7 +66,9 @@ def finish(
             if broken is not None:
                 click.echo(f"bench: {broken}", err=True)
             broken = fault
-    if screen is not None:
+    if not ctx.params["quiet"]:
+        screen = reporter(plugins, "terminal")
         click.echo("\n".join(["", text_of(screen, rendered(screen, run)), *written]))
     if broken is not None:
         raise broken
+    return int(any(result.status not in DONE for result in run.results))

@@ -8,9 +8,10 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 from femubench.core.cli.registry import wrapped
-from femubench.core.plugin.loader import LoadedPlugin, Plugins
+from femubench.core.plugin.foreign import doc_of
+from femubench.core.plugin.loader import LoadedPlugin, Plugins, shown
+from femubench.core.plugin.options import ToldOptions, options_of
 from femubench.core.plugin.validation import CHECKS, KINDS
-from femubench.core.plugin.variants import options_of
 from femubench.core.roles import Effect, Fault, Reader, Reporter, Scenario, Strategy, declared
 
 Row = tuple[str, str]
@@ -30,9 +31,9 @@ def pages_of(name: str, plugins: Plugins) -> Iterator[str]:
     """
     found = False
     for kind in CHECKS:
-        offered = getattr(plugins, kind).get(name)
-        if offered is not None:
-            found = True
+        offers = getattr(plugins, kind)
+        if name in offers:
+            found, offered = True, shown(offers, name)
             source = _source(kind, name, plugins.loaded)
             yield _page(f"{name}: {_ROLES[kind]}", _about(offered), [source, *_ROWS[kind](offered)])
     for plugin in plugins.loaded:
@@ -62,7 +63,7 @@ def _about(offered: object) -> Iterator[str]:
     """Return the first paragraphs of a class's own docstring, up to its sections."""
     if isinstance(offered, Scenario):
         return
-    text = type(offered).__doc__ or ""
+    text = doc_of(offered)
     for number, paragraph in enumerate(inspect.cleandoc(text).split("\n\n")):
         if number == _PARAGRAPHS or paragraph.lstrip().startswith(_SECTIONS):
             return
@@ -85,7 +86,9 @@ def _strategy(strategy: Strategy) -> Iterator[Row]:
 
 def _open_mappings(strategy: object) -> Iterator[str]:
     """Return options that take further entries by name, such as ``stiffness.ry=1e4``."""
-    if is_dataclass(strategy):
+    if isinstance(strategy, ToldOptions):
+        yield from strategy.open
+    elif is_dataclass(strategy):
         for field in fields(strategy):
             if isinstance(getattr(strategy, field.name), Mapping):
                 yield field.name

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 
 import click
 
-from femubench.core.plugin.loader import BrokenPlugin, Plugins, load_plugins
+from femubench.core.plugin.importing import BrokenPlugin
+from femubench.core.plugin.loader import Plugins, load_plugins
 
 
 def plugins_for(ctx: click.Context) -> Plugins:

@@ -12,7 +12,7 @@ from femubench.core.cli import options
 from femubench.core.cli.ending import telling
 from femubench.core.cli.outputs import finish, outputs_of
 from femubench.core.cli.progress import progress_bar
-from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of, twins_of
+from femubench.core.cli.quantities import spoken, twins_of
 from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
 from femubench.core.errors import InputError, PluginError
@@ -34,9 +34,6 @@ if TYPE_CHECKING:
     "-s", "--strategy", "strategies", multiple=True, metavar="STRATEGY",
     help="Run this strategy, or STRATEGY:OPTION=VALUE,...; may be repeated. Default: all.",
 )  # fmt: skip
-@options.jobs
-@options.scheduler
-@options.cluster
 @click.option(
     "--seeds", type=click.IntRange(1), metavar="N",
     help="Run N draws of measurement noise, seeds S+1 .. S+N, instead of the data as recorded.",
@@ -57,15 +54,6 @@ if TYPE_CHECKING:
     "names, and say who is good on the cases but not on them; run one job of each strategy twice.",
 )  # fmt: skip
 @click.option(
-    "--timeout", "timeouts", multiple=True, callback=timeouts_of, metavar="DURATION",
-    help="Give up on a job after this time, e.g. 90s, 10m, 1h. STRATEGY=DURATION is for one "
-    "strategy; may be repeated. Default: 10m.",
-)  # fmt: skip
-@click.option(
-    "--memory", callback=bytes_of, metavar="SIZE",
-    help="Stop a job that takes more, e.g. 512M, 4G. Default: an even share of the machine's.",
-)  # fmt: skip
-@click.option(
     "--resume", is_flag=True,
     help="Continue the last run of these jobs: run what is missing, and failed jobs again. Without "
     "CASE and -s, continue the last run in the store.",
@@ -80,17 +68,7 @@ if TYPE_CHECKING:
     help="Repeat a stored run and report differences; exit 1 if a result differs.",
 )  # fmt: skip
 @click.option("--strict-plugins", is_flag=True, help="Stop with exit code 2 if a plugin is broken.")
-@options.json_file("Write the results as JSON.")
-@click.option(
-    "--csv", "csv_file", type=options.OUTPUT, metavar="FILE", help="Write one line per job as CSV."
-)
-@options.store("Keep results there.")
-@click.option(
-    "--report", "report_file", type=options.OUTPUT, metavar="FILE",
-    help="Write the report there; its suffix decides the format. Default: RUN.html and "
-    "RUN.md in the store.",
-)  # fmt: skip
-@options.quiet
+@options.of_jobs("Write the results as JSON.")
 @click.pass_context
 def run(
     ctx: click.Context,
@@ -117,9 +95,8 @@ def run(
     del asked  # what it is to be: `_plan` takes it from the context
     plugins = _checked(ctx, cases, strategies)
     from femubench.core.library.rank import repeated, request_of, store_in
-    from femubench.core.library.report import reporter, run_name
+    from femubench.core.library.report import reporter
     from femubench.core.run.executor import executor_of
-    from femubench.core.schema.results import DONE
 
     outputs = outputs_of(plugins, json_file, csv_file, report_file)
     kept = store_in(store)
@@ -140,13 +117,8 @@ def run(
                 progress=progress,
                 executor=executor,
             )
-    if report_file is None:
-        for writer in (reporter(plugins, name) for name in ("html", "markdown")):
-            outputs[kept.folder / f"{run_name(outcome)}{writer.suffix}"] = writer
-    finish(outcome, kept.exhibits, outputs, screen)
-    if old is not None:
-        return _compare(old, outcome)
-    return int(any(result.status not in DONE for result in outcome.results))
+    code = finish(ctx, outcome, outputs, plugins, kept, kept.exhibits)
+    return code if old is None else _compare(old, outcome)
 
 
 def _checked(ctx: click.Context, cases: Iterable[str], strategies: Iterable[str]) -> Plugins:

@@ -12,7 +12,6 @@ from femubench.core.cli import options
 from femubench.core.cli.ending import telling
 from femubench.core.cli.outputs import finish, outputs_of
 from femubench.core.cli.progress import progress_bar
-from femubench.core.cli.quantities import bytes_of, timeouts_of
 from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
 
@@ -28,34 +27,12 @@ if TYPE_CHECKING:
     "--dry-run", is_flag=True,
     help="Check the file, say how many jobs there are and how long they take; run none.",
 )  # fmt: skip
-@options.jobs
-@options.scheduler
-@options.cluster
-@click.option(
-    "--timeout", "timeouts", multiple=True, callback=timeouts_of, metavar="DURATION",
-    help="Give up on a job after this time, e.g. 90s, 10m, 1h. STRATEGY=DURATION is for one "
-    "strategy; may be repeated. Default: 10m.",
-)  # fmt: skip
-@click.option(
-    "--memory", callback=bytes_of, metavar="SIZE",
-    help="Stop a job that takes more, e.g. 512M, 4G. Default: an even share of the machine's.",
-)  # fmt: skip
 @click.option(
     "--overwrite", type=click.Choice(["always", "missing", "failed"]), default="failed",
     show_default=True,
     help="Which stored results of the same jobs are computed again: all, none, or the failures.",
 )  # fmt: skip
-@options.json_file("Write the results and the skill of every cell as JSON.")
-@click.option(
-    "--csv", "csv_file", type=options.OUTPUT, metavar="FILE", help="Write one line per job as CSV."
-)
-@options.store("Keep results there.")
-@click.option(
-    "--report", "report_file", type=options.OUTPUT, metavar="FILE",
-    help="Write the report there; its suffix decides the format. Default: RUN.html and "
-    "RUN.md in the store.",
-)  # fmt: skip
-@options.quiet
+@options.of_jobs("Write the results and the skill of every cell as JSON.")
 @click.pass_context
 def study(
     ctx: click.Context,
@@ -81,10 +58,9 @@ def study(
     """
     plugins = plugins_for(ctx)
     from femubench.core.library.rank import store_in
-    from femubench.core.library.report import reporter, run_name
+    from femubench.core.library.report import reporter
     from femubench.core.library.study import study_plan
     from femubench.core.run.executor import executor_of, worker_count
-    from femubench.core.schema.results import DONE
     from femubench.core.study.study_file import read_study
 
     outputs = outputs_of(plugins, json_file, csv_file, report_file)
@@ -107,11 +83,7 @@ def study(
                 overwrite=overwrite,
                 progress=progress,
             )
-    if report_file is None:
-        for writer in (reporter(plugins, name) for name in ("html", "markdown")):
-            outputs[kept.folder / f"{run_name(found)}{writer.suffix}"] = writer
-    finish(found, None, outputs, screen)
-    return int(any(result.status not in DONE for result in found.results))
+    return finish(ctx, found, outputs, plugins, kept)
 
 
 def _title(plan: StudyPlan) -> str:

@@ -53,7 +53,11 @@ def _spots(effect: Effect) -> Iterator[tuple[str, Model, str]]:
 @check("effect", "described", "It has a summary or a docstring.")
 def described(bench: Bench) -> Verdict:
     """Look for a text that tells what the model lacks."""
-    effect = bench.subject
+    return kit.inspected(bench, is_described)
+
+
+def is_described(effect: Effect) -> Verdict:
+    """Look for a text of an effect that tells what the model lacks."""
     if getattr(effect, "summary", "") or own_doc(type(effect)):
         return passed()
     return failed("neither summary nor docstring, expected what the model lacks")

@@ -12,7 +12,16 @@ from typing import Any, Literal, TypeAlias
 
 from femubench.core.conformance import SECONDS
 from femubench.core.conformance.problems import PLAIN, Problem, problem
-from femubench.core.conformance.trial import Observation, Trial, Want, observation_of, run_trial
+from femubench.core.conformance.trial import (
+    Observation,
+    Trial,
+    Want,
+    brought,
+    observation_of,
+    run_trial,
+)
+from femubench.core.plugin.foreign import is_foreign
+from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Strategy
 from femubench.core.run.jobs import one_line, sent
 from femubench.core.run.limits import MIB, Limits
@@ -219,14 +228,36 @@ def _judged(task: tuple[Callable[..., Verdict], bytes]) -> bytes:
     """Return the verdict of a function as JSON; runs in a worker."""
     function, arguments = task
     try:
-        verdict = function(*pickle.loads(arguments))
+        subject, *further = pickle.loads(arguments)
+        verdict = function(brought(subject), *further)
     except BaseException as error:
         verdict = failed(f"{one_line(error)}, expected no exception")
     return json.dumps([verdict.status, verdict.message]).encode()
 
 
+def inspected(bench: Bench, function: Callable[..., Verdict]) -> Verdict:
+    """Return the verdict of a function that looks at the code of the subject, where that may run.
+
+    Arguments:
+        function: importable by name; its only argument is the subject.
+    """
+    subject = bench.subject
+    strange = is_foreign(subject.base if isinstance(subject, Variant) else subject)
+    return bench.apart(function) if strange else function(subject)
+
+
+def _sendable(subject: object, what: str) -> Verdict:
+    try:
+        sent(subject)
+    except Exception as error:
+        return failed(f"{one_line(error)}, expected {what} that pickle can send")
+    return passed()
+
+
 def picklable(bench: Bench, what: str) -> Verdict:
     """Judge whether the subject can be sent to a worker."""
+    if is_foreign(bench.subject):
+        return bench.apart(_sendable, what)
     if isinstance(bench.code, str):
         return failed(f"{bench.code}, expected {what} that pickle can send")
     return passed()

@@ -121,8 +121,7 @@ for _name, _sentence in _RESULTS.items():
     check("strategy", _name, _sentence, wants=_with_results)(partial(_of_results, name=_name))
 
 
-def _inner(bench: Bench) -> Strategy:
-    subject: Strategy = bench.subject
+def _inner(subject: Strategy) -> Strategy:
     return subject.base if isinstance(subject, Variant) else subject
 
 
@@ -134,7 +133,12 @@ def _inner(bench: Bench) -> Strategy:
 )
 def described(bench: Bench) -> Verdict:
     """Look at citation, docstring and promises."""
-    strategy = _inner(bench)
+    return kit.inspected(bench, is_described)
+
+
+def is_described(subject: Strategy) -> Verdict:
+    """Look at citation, docstring and promises of a strategy."""
+    strategy = _inner(subject)
     if not str(strategy.citation).strip():
         return failed("citation is empty, expected author, year, title, equation")
     promises: object = declared(strategy, "promises")
@@ -155,7 +159,12 @@ def described(bench: Bench) -> Verdict:
 )
 def options_documented(bench: Bench) -> Verdict:
     """Look for the fields of the dataclass in its docstring and those of its bases."""
-    strategy: Any = _inner(bench)
+    return kit.inspected(bench, names_options)
+
+
+def names_options(subject: Strategy) -> Verdict:
+    """Look for the fields of a strategy in its docstring and those of its bases."""
+    strategy: Any = _inner(subject)
     fields = dataclasses.fields(strategy) if dataclasses.is_dataclass(strategy) else ()
     if not fields:
         return kit.not_applicable("it has no options")

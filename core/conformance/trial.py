@@ -10,7 +10,7 @@ import tracemalloc
 import warnings
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 
@@ -19,6 +19,8 @@ from femubench.core.conformance.problems import Problem
 from femubench.core.conformance.results import Given, faults_of
 from femubench.core.errors import NotApplicable, StrategyFailure
 from femubench.core.fem.model import Model
+from femubench.core.plugin.foreign import imported
+from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Result, Strategy, declared
 from femubench.core.run.jobs import missing_capability, one_line
 from femubench.core.run.workers import Ending
@@ -106,7 +108,7 @@ def observation_of(problem: str, ending: Ending) -> Observation:
 
 
 def _observe(trial: Trial) -> Observation:
-    strategy: Strategy = pickle.loads(trial.strategy)
+    strategy: Strategy = brought(pickle.loads(trial.strategy))
     problem = trial.problem
     needs = frozenset(declared(strategy, "needs"))
     reason = missing_capability(needs, problem.model, problem.measurement)
@@ -128,6 +130,13 @@ def _observe(trial: Trial) -> Observation:
         warnings.simplefilter("ignore")
         faults = faults_of(Given(problem, result, promises_of(strategy)))
     return replace(found, faults=faults, prints=fingerprint(result, "result"))
+
+
+def brought(subject: Any) -> Any:  # noqa: ANN401 - any role
+    """Return a subject whose code is there: in a worker that of a stranger may be imported."""
+    if isinstance(subject, Variant):
+        return replace(subject, base=imported(subject.base))
+    return imported(subject)
 
 
 def _inputs(given: Problem) -> dict[str, str]:

@@ -160,6 +160,7 @@ def _proof(
 ) -> _Proof:
     best = examination.best
     model = extended_by(case.model, best)
+    after = score_model(case, model)  # asks for the most modes: all that follows is given those
     unseen = unseen_of(case, examination, best, model)
     crossed = None
     if any(len(part.before) for part in unseen):
@@ -167,12 +168,13 @@ def _proof(
         confirmed = found is not None
         if found is not None and found is not best:
             best, model = found, extended_by(case.model, found)
+            after = score_model(case, model)
             unseen = unseen_of(case, examination, best, model)
     else:
         crossed = left_out(examination, effects, effort)
         unseen = (crossed,)
         confirmed = crossed.confirms(len(best.parts))
-    gain = gain_of(score_model(given, given.model), score_model(case, model), crossed)
+    gain = gain_of(score_model(given, given.model), after, crossed)
     return _Proof(best, model, unseen, gain, crossed is not None, confirmed)
 
 
@@ -328,9 +330,10 @@ def _notes(
     cautions = (getattr(part.hypothesis.effect, "caution", "") for part in best.parts)
     notes += dict.fromkeys(caution for caution in cautions if caution)
     if isinstance(examination.problem, LargeProblem) and best.parts:
+        off = departure(best.fit, proof.model)
         notes.append(
             "The causes were sought in modal coordinates: the extended model, solved anew, is "
-            f"{departure(best.fit):.1g} standard deviations of all data together from the fit."
+            f"{off:.1g} standard deviations of all data together from the fit."
         )
     return tuple(notes)
 

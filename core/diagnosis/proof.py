@@ -21,7 +21,7 @@ from femubench.core.inference.mesh_error import mesh_bias, mesh_corrections
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.posterior import Explanation, Key, Posterior
 from femubench.core.inference.residuals import Data
-from femubench.core.modal.eigen import once_for
+from femubench.core.modal.eigen import enough_modes, modes_of, once_for
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import Gain
@@ -176,6 +176,7 @@ def held_out(
     before = state_at(Problem(nominal.model, nominal.space, data, noise), (), np.zeros(0))
     whole = Problem(best.model, best.space, data, noise)
     after = state_at(whole, found.parts, found.state.x)
+    modes_of(extended, enough_modes(extended, 2 * len(everything)))  # the most that is asked for
     # A cause may add a mode: the extended model has corrections of its own for the mesh.
     own_bias = mesh_bias(extended, len(nominal.data.bias))
     own_data = data if own_bias is None else Data(everything, own_bias)
@@ -339,16 +340,18 @@ def extended_by(model: Model, explanation: Explanation, x: FloatArray | None = N
         >>> diagnosis.extended_by(model, examination.best).size == model.size
         True
     """
-    parts = explanation.parts
-
-    def made(x: FloatArray) -> Model:
-        return extended(extended(model, explanation.base.parts, explanation.base.x), parts, x)
-
     if x is not None:
-        return made(np.clip(x, *bounds_of(parts)))
+        return _extended(model, explanation, np.clip(x, *bounds_of(explanation.parts)))
     # With the explanation, so that nothing else has its number as long as this is kept.
     key = "extended by", id(explanation)
-    return once_for(model, key, lambda: (explanation, made(explanation.fit.state.x)))[1]
+    found = explanation, explanation.fit.state.x
+    return once_for(model, key, lambda: (explanation, _extended(model, *found)))[1]
+
+
+def _extended(model: Model, explanation: Explanation, x: FloatArray) -> Model:
+    """Return a model of its own with an explanation in it, at coordinates of its causes."""
+    base = extended(model, explanation.base.parts, explanation.base.x)
+    return extended(base, explanation.parts, x)
 
 
 def unseen_of(
@@ -389,12 +392,11 @@ def _neighbours(model: Model, explanation: Explanation) -> list[Model]:
     found = explanation.fit
     size, turn = np.linalg.eigh(found.covariance)
     low, high = bounds_of(found.parts)
-    base = extended(model, explanation.base.parts, explanation.base.x)
     steps = [
         np.clip(found.state.x + np.sqrt(s) * t, low, high)
         for s, t in zip(size, turn.T, strict=True)
     ]
-    return [extended(base, found.parts, x) for x in steps]
+    return [_extended(model, explanation, x) for x in steps]
 
 
 def stands(
@@ -451,7 +453,10 @@ def borne_out(case: Case, examination: Examination) -> Explanation | None:
 
 def _judged(case: Case, examination: Examination, found: Explanation) -> tuple[bool, float]:
     """Tell whether unseen data bear an explanation out, and its ln Bayes factor on them."""
-    model = extended_by(case.model, found)
+    if found is examination.best:
+        model = extended_by(case.model, found)
+    else:  # asked for once: it and its modes need not last
+        model = _extended(case.model, found, found.fit.state.x)
     unseen = unseen_of(case, examination, found, model)
     log_bayes = sum(part.log_bayes for part in unseen)
     return stands(case, examination, found, model, unseen), log_bayes

@@ -119,7 +119,7 @@ class Exhibits:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder / FOLDER
+        self.store, self._folder = folder, folder / FOLDER
         self.notes: list[str] = []
 
     def of(self, key: str) -> dict[str, Any] | None:

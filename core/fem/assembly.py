@@ -166,6 +166,15 @@ def _stable_order(keys: IntArray, size: int) -> IntArray:
     return np.asarray(rows.tocsc().indices)
 
 
+def narrowed(matrix: SparseArray) -> SparseArray:
+    """Return a sparse matrix by rows, with indices of 32 bits where these are enough."""
+    found = sp.csr_array(matrix)
+    if max(found.nnz, *found.shape) < 2**31:
+        found.indices = found.indices.astype(np.int32, copy=False)
+        found.indptr = found.indptr.astype(np.int32, copy=False)
+    return found
+
+
 def prune(matrix: SparseArray, reference: SparseArray | None = None) -> SparseArray:
     """Return the matrix without the entries that cancelled to roundoff.
 

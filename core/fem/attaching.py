@@ -160,12 +160,13 @@ def _with_node(kinematics: Kinematics, node: int) -> Kinematics:
         ),
         shape=(old.shape[0] + 6, count + len(free)),
     )
+    axes = kinematics.axes
     return replace(
         kinematics,
         transform=transform,
         node=np.append(kinematics.node, np.full(len(free), node)),
         direction=(*kinematics.direction, *(DIRECTIONS[i] for i in free)),
-        axes=np.vstack([kinematics.axes, np.eye(6)[free]]),
+        axes=None if axes is None else np.vstack([axes, np.eye(6)[free]]),
     )
 
 

@@ -19,6 +19,10 @@ TWIST = np.array([3, 9])
 BEND_XY = np.array([1, 5, 7, 11])
 BEND_XZ = np.array([2, 4, 8, 10])
 SLOPE_SIGN = np.array([1.0, -1.0, 1.0, -1.0])
+# Beside those that decide on the interpolation, which the mass matrix shares.
+MASS_PROPERTIES = (
+    *("rhoA", "rhoJp", "rhoIy", "rhoIz", "rigid_mass_1", "rigid_mass_2", "ecc_y", "ecc_z"),
+)
 _DIGITS = 12  # in which elements of one kind agree
 _REACH = 0.5 * float(np.sqrt(0.6))
 # Points and weights on 0..1, exact up to the fifth degree.

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain
 
 import numpy as np
 import scipy.sparse as sp
@@ -38,8 +40,16 @@ class Touched:
 
     def incidence(self, rows: int, parameters: int) -> SparseArray:
         """Return 1 where a parameter touches a row, sparse (n_parameters, rows)."""
-        ones = np.ones(len(self.rows))
-        return sp.csr_array((ones, (self.columns, self.rows)), shape=(parameters, rows))
+        found = self._incidence.get((rows, parameters))
+        if found is None:
+            pairs = np.ones(len(self.rows)), (self.columns, self.rows)
+            found = sp.csr_array(pairs, shape=(parameters, rows))
+            self._incidence[rows, parameters] = found
+        return found
+
+    @cached_property
+    def _incidence(self) -> dict[tuple[int, int], SparseArray]:
+        return {}
 
     @property
     def is_factor(self) -> bool:
@@ -78,19 +88,23 @@ def _resolved(structure: MeshedFrame, parameters: Sequence[Parameter]) -> tuple[
             found += _rigid_ends(structure, parameters, numbers)
             continue
         positions = structure.spring_index if kind == _SPRING else structure.label_index
-        pairs = [(p, place) for p in numbers for place in _places(parameters[p])]
+        places = [_places(parameters[p]) for p in numbers]
+        named = list(chain.from_iterable(places))
         try:
-            rows = [positions[place] for _, place in pairs]
+            rows = list(map(positions.__getitem__, named))
         except KeyError:
+            pairs = ((p, place) for p, own in zip(numbers, places, strict=True) for place in own)
             p, place = next(pair for pair in pairs if pair[1] not in positions)
             raise ModelError(f"{parameters[p].name}: there is no place {place!r}") from None
-        columns = np.repeat([p for p, _ in pairs], [len(index) for index in rows])
+        columns = np.repeat(np.array(numbers, dtype=np.int64), list(map(len, places)))
         every = np.concatenate(rows) if rows else np.zeros(0, dtype=np.int64)
-        found.append(Touched(kind, every, columns.astype(np.int64)))
+        if len(every) > len(rows):  # split elements
+            columns = np.repeat(columns, list(map(len, rows)))
+        found.append(Touched(kind, every, columns))
     return tuple(found)
 
 
-def _places(parameter: Parameter) -> Iterable[str]:
+def _places(parameter: Parameter) -> Collection[str]:
     places = parameter.places
     return places if len(places) < 2 else dict.fromkeys(places)
 
@@ -130,16 +144,19 @@ def apply_values(
     given = np.asarray(values, dtype=float)
     if len(given) != len(parameters):
         raise ValueError(f"{len(parameters)} parameters have {len(given)} values")
-    arrays = {f.name: getattr(structure.properties, f.name).copy() for f in fields(BeamProperties)}
-    arrays[_SPRING] = structure.springs.copy()
+    own, springs = structure.properties, structure.springs
+    arrays: dict[str, FloatArray] = {}
     for part in touched(structure, parameters):
         value = given[part.columns]
+        for name in (part.kind,) if not part.is_factor else (n for n, _ in part.slopes):
+            if name not in arrays:
+                arrays[name] = (springs if name == _SPRING else getattr(own, name)).copy()
         if not part.is_factor:
             arrays[part.kind][part.rows] = value
         for name, exponent in part.slopes:
             np.multiply.at(arrays[name], part.rows, value**exponent)
-    springs = arrays.pop(_SPRING)
-    return BeamProperties(**arrays), springs
+    springs = arrays.pop(_SPRING, springs)
+    return replace(own, **arrays), springs
 
 
 @dataclass(frozen=True)

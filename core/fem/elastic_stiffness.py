@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.fem.attachments import brace_stiffness
@@ -16,9 +17,15 @@ def elastic_stiffness(structure: MeshedFrame) -> SparseArray:
     stiffness = structure.plan.assemble_from(lambda e: stiffness_matrices(properties.take(e)))
     if len(structure.springs):
         rows = structure.spring_rows
-        stiffness = stiffness + rows.T @ sp.diags_array(structure.springs) @ rows
+        each = rows.data * np.repeat(structure.springs, np.diff(rows.indptr))
+        pull = sp.csr_array((each, rows.indices, rows.indptr), shape=rows.shape)
+        stiffness = stiffness + pull.T @ rows
     if structure.frame.springs:
-        stiffness = stiffness + structure.attached((), structure.frame.springs)[1]
+        stiffness = stiffness + structure.once(
+            "springs",
+            structure.interpolation,
+            lambda: structure.attached((), structure.frame.springs)[1],
+        )
     if structure.frame.braces:
         stiffness = stiffness + brace_stiffness(structure)
     return stiffness

@@ -9,11 +9,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
+from femubench.core.fem.assembly import narrowed
 from femubench.core.fem.beam import BeamProperties, shape_functions
 from femubench.core.fem.frame import ACTIVE, Frame, GroundSpring, Oscillator, Place
 from femubench.core.fem.links import Linkage, linkage, rigid_arm
 from femubench.core.fem.mesh import ON_MEMBER, SAME_STATION, Connection, Mesh, member_axes
-from femubench.core.fem.sensors import DIRECTIONS
+from femubench.core.fem.sensors import DIRECTIONS, unit_motions
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 _NO_ARM = 1e-9  # m
@@ -27,7 +28,8 @@ class Kinematics:
         transform: node displacements = transform @ free dofs, (6 n_nodes, n).
         node: node of every free dof, (n,).
         direction: its direction, (n,).
-        axes: its unit motion in (x, y, z, rx, ry, rz), (n, 6).
+        axes: its unit motion in (x, y, z, rx, ry, rz), (n, 6); None where all of them move in their
+            directions.
         active: which of x, y, z, rx, ry, rz may move at all, (6,).
         unused: displacements of joints at which no member ends and of which no link makes use,
             (k,).
@@ -37,10 +39,14 @@ class Kinematics:
     transform: SparseArray
     node: IntArray
     direction: tuple[str, ...]
-    axes: FloatArray
+    axes: FloatArray | None
     active: BoolArray
     unused: IntArray
     bodies: IntArray
+
+    def motions(self, dofs: slice = slice(None)) -> FloatArray:
+        """Return the unit motions of free dofs in (x, y, z, rx, ry, rz), (n, 6)."""
+        return unit_motions(self.direction[dofs]) if self.axes is None else self.axes[dofs]
 
 
 def rigid_motions(xyz: FloatArray, axes: FloatArray) -> FloatArray:
@@ -269,13 +275,14 @@ def _assemble_transform(
         )
         transform = transform + pick @ transform[6 * base : 6 * base + 6]
     transform.eliminate_zeros()
-    axes = np.vstack([np.eye(6)[flat % 6], *(basis.T for _, basis, _ in own)])
+    axes = None
     if len(further):
+        axes = np.vstack([np.eye(6)[flat % 6], *(basis.T for _, basis, _ in own)])
         order = np.lexsort((direction, node))
         node, direction, axes = node[order], direction[order], axes[order]
         transform = transform[:, order].tocsr()
     return Kinematics(
-        transform=transform,
+        transform=narrowed(transform),
         node=node,
         direction=tuple(map(DIRECTIONS.__getitem__, direction.tolist())),
         axes=axes,

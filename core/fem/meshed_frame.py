@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from itertools import repeat
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.assembly import AssemblyPlan, plan_assembly
+from femubench.core.fem.assembly import AssemblyPlan, narrowed, plan_assembly
 from femubench.core.fem.beam import BeamProperties
 from femubench.core.fem.frame import Frame, GroundSpring, PointMass
 from femubench.core.fem.kinematics import Kinematics, point_rows, spring_rows
@@ -20,6 +21,16 @@ from femubench.core.fem.mesh import Mesh
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
+
+_Kept = TypeVar("_Kept")
+
+
+def _same(one: object, other: object, rounding: float) -> bool:
+    if one is other or not (isinstance(one, np.ndarray) and isinstance(other, np.ndarray)):
+        return one is other
+    if one.shape != other.shape:
+        return False
+    return bool((np.abs(one - other) <= rounding * np.abs(one)).all())
 
 
 def _positions(labels: Sequence[str]) -> dict[str, IntArray]:
@@ -83,9 +94,9 @@ class MeshedFrame:
             (mesh.axes.reshape(-1)[9 * element + entry % 9], columns, bounds),
             shape=(12 * count, 6 * len(mesh.xyz)),
         )
-        gather = turn @ self.kinematics.transform
+        gather = narrowed(turn) @ self.kinematics.transform
         gather.eliminate_zeros()
-        return gather
+        return narrowed(gather)
 
     @cached_property
     def plan(self) -> AssemblyPlan:
@@ -134,6 +145,35 @@ class MeshedFrame:
     def kept(self) -> dict[str, Any]:
         """Return a store of what follows from the frame alone, whatever the parameters are."""
         return {}
+
+    def once(
+        self,
+        name: str,
+        rests_on: tuple[object, ...],
+        make: Callable[[], _Kept],
+        rounding: float = 0.0,
+    ) -> _Kept:
+        """Return what was made last under a name, made anew where what it rests on has changed.
+
+        Arguments:
+            rests_on: arrays, which are compared by their numbers, and other things by identity;
+                what follows from frame and mesh need not be among them.
+            rounding: relative difference of numbers that counts as none.
+        """
+        entry = self.kept.get(name)
+        if entry is None or not all(map(_same, entry[0], rests_on, repeat(rounding))):
+            entry = self.kept[name] = (rests_on, make())
+        found: _Kept = entry[1]
+        return found
+
+    @property
+    def interpolation(self) -> tuple[FloatArray, ...]:
+        """Return the properties that decide how a point between two nodes moves."""
+        p = self.properties
+        if not p.shear_shape.any():
+            return p.rigid_1, p.rigid_2
+        shear = (p.shear_shape * 12 * p.EIz * p.flex_y, p.shear_shape * 12 * p.EIy * p.flex_z)
+        return p.rigid_1, p.rigid_2, *shear
 
     @cached_property
     def spring_index(self) -> dict[str, IntArray]:
@@ -214,7 +254,7 @@ class MeshedFrame:
             motion: displacements from positions (k, 3) and axes (k, 6), as columns (k, r).
         """
         transform, xyz = self.kinematics.transform, self.mesh.xyz
-        own = motion(xyz[self.kinematics.node], self.kinematics.axes)
+        own = motion(xyz[self.kinematics.node], self.kinematics.motions())
         free = np.tile(self.active_local[:6], (len(xyz), 1))
         free[self.mesh.oscillators] = False  # they have dofs of their own and hold nothing
         active = np.setdiff1d(np.flatnonzero(free), self.kinematics.unused)

@@ -15,7 +15,7 @@ from femubench.core.errors import ModelError, NotApplicable
 from femubench.core.fem.assembly import prune
 from femubench.core.fem.attaching import MatrixChange, attach, grown
 from femubench.core.fem.frame import Frame, GroundSpring, PointMass
-from femubench.core.fem.sensors import DIRECTIONS, Sensors
+from femubench.core.fem.sensors import Sensors, unit_motions
 from femubench.core.fem.structure import Structure
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
@@ -45,8 +45,7 @@ class Dofs:
         """Return the unit motion of every dof in (x, y, z, rx, ry, rz), (n, 6)."""
         if self.axes is not None:
             return self.axes
-        number = {name: i for i, name in enumerate(DIRECTIONS)}
-        return np.eye(6)[[number[name] for name in self.direction]]
+        return unit_motions(self.direction)
 
 
 @dataclass(frozen=True)
@@ -124,7 +123,7 @@ class Model(Shown):
         structure = Structure.build(source) if isinstance(source, Frame) else source
         mass, stiffness = structure.matrices()
         return cls(
-            mass, stiffness, _dofs(structure), structure, structure, free=structure.frame.free
+            mass, stiffness, dofs_of(structure), structure, structure, free=structure.frame.free
         )
 
     def rows(self) -> list[tuple[str, str]]:
@@ -215,7 +214,7 @@ class Model(Shown):
         return replace(
             self,
             **moved,
-            dofs=_dofs(structure),
+            dofs=dofs_of(structure),
             geometry=structure,
             structure=structure,
             mass_change=_spread_low_rank(self.mass_change, np.arange(self.size), size),
@@ -250,7 +249,8 @@ class Model(Shown):
         )
 
 
-def _dofs(structure: Structure) -> Dofs:
+def dofs_of(structure: Structure) -> Dofs:
+    """Return the labels of the degrees of freedom of a meshed frame."""
     kinematics = structure.kinematics
     xyz = structure.mesh.xyz[kinematics.node]
     return Dofs(kinematics.node, kinematics.direction, xyz, kinematics.axes)

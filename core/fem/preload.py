@@ -288,7 +288,7 @@ def _loose(structure: MeshedFrame) -> FloatArray:
         scale = np.repeat([1.0, size], 3)
         return np.asarray(rigid_motions(points - centre, axes) / scale)
 
-    own = motion(xyz[kinematics.node], kinematics.axes)
+    own = motion(xyz[kinematics.node], kinematics.motions())
     moving = np.abs(own).max(axis=0, initial=0.0) > _HELD
     _, singular, turn = la.svd(np.linalg.qr(structure.held(motion)[:, moving], mode="r"))
     rank = int(np.sum(singular > _HELD))

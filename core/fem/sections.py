@@ -8,6 +8,8 @@ from functools import partial
 
 import numpy as np
 
+from femubench.core.errors import ModelError
+
 ShearCoefficients = Callable[[float], tuple[float, float]]
 
 
@@ -68,6 +70,24 @@ class _ConstantPair:
 
     def __call__(self, nu: float) -> tuple[float, float]:
         return self.along_y, self.along_z
+
+
+@dataclass(frozen=True)
+class TabulatedKappa:
+    """Shear coefficients that are known for some materials alone.
+
+    Arguments:
+        rows: Poisson's ratio and the coefficients along y and along z.
+    """
+
+    rows: tuple[tuple[float, float, float], ...]
+
+    def __call__(self, nu: float) -> tuple[float, float]:
+        """Return both coefficients; raises ModelError for another material."""
+        for known, along_y, along_z in self.rows:
+            if known == nu:
+                return along_y, along_z
+        raise ModelError(f"no shear coefficient is known for a Poisson's ratio of {nu:g}")
 
 
 def bredt(b: float, h: float, wall: float) -> float:

@@ -10,9 +10,13 @@ import numpy as np
 from femubench.core.typing import FloatArray
 
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
-
-
 _TINY = 1e-9  # of a unit vector
+
+
+def unit_motions(directions: Iterable[str]) -> FloatArray:
+    """Return the unit motions in (x, y, z, rx, ry, rz) of directions among these six, (n, 6)."""
+    number = {name: i for i, name in enumerate(DIRECTIONS)}
+    return np.eye(6)[np.fromiter((number[name] for name in directions), dtype=np.int8)]
 
 
 def axis_of(direction: str) -> FloatArray:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from femubench.core.fem.assembly import prune
+from femubench.core.fem.assembly import AT_ONCE, prune
 from femubench.core.fem.attachments import oscillator_matrices
-from femubench.core.fem.beam import mass_matrices
+from femubench.core.fem.beam import MASS_PROPERTIES, mass_matrices
 from femubench.core.fem.derivatives import apply_values
 from femubench.core.fem.elastic_stiffness import elastic_stiffness
 from femubench.core.fem.frame import Frame
@@ -19,6 +19,11 @@ from femubench.core.fem.preload import gravity_stiffness, preload_stiffness
 from femubench.core.fem.sensing import sensor_rows
 from femubench.core.fem.sensors import Sensors
 from femubench.core.typing import FloatArray, SparseArray
+
+_ROUNDING = 1e-14
+# Elements from which on a structure keeps its plan only once parameters are set: a solution for
+# its modes takes ten times as long as another plan, and needs the memory.
+_PLANNED_ONCE = 100_000
 
 
 @dataclass(frozen=True)
@@ -71,16 +76,34 @@ class Structure(MeshedFrame):
         Raises:
             ModelError: when a preload has no redundancy to live on, or nothing bears the weight.
         """
-        mass = self.plan.assemble_from(lambda rows: mass_matrices(self.properties.take(rows)))
-        if self.frame.masses:
-            mass = mass + self.attached(self.frame.masses, ())[0]
         stiffness = elastic_stiffness(self)
         if self.frame.oscillators:
-            more_mass, more_stiffness = oscillator_matrices(self)
-            mass, stiffness = mass + more_mass, stiffness + more_stiffness
+            stiffness = stiffness + oscillator_matrices(self)[1]
         if self.preload is not None:
             stiffness = stiffness + self.preload
-        return prune(mass), prune(stiffness)
+        mass = self._mass()
+        if not self.changes and len(self.mesh.ends) > _PLANNED_ONCE:
+            for name in ("plan", "gather"):
+                self.__dict__.pop(name, None)
+        return mass, prune(stiffness)
+
+    def _mass(self) -> SparseArray:
+        """Return the mass, of a small frame a copy of the last one where nothing of it changed."""
+        p = self.properties
+        if len(p) > AT_ONCE:
+            return self._assembled_mass()
+        own = [getattr(p, name) for name in MASS_PROPERTIES]
+        return self.once("mass", (*own, *self.interpolation), self._assembled_mass).copy()
+
+    def _assembled_mass(self) -> SparseArray:
+        mass = self.plan.assemble_from(lambda rows: mass_matrices(self.properties.take(rows)))
+        if self.frame.masses:
+            mass = mass + self.once(
+                "masses", self.interpolation, lambda: self.attached(self.frame.masses, ())[0]
+            )
+        if self.frame.oscillators:
+            mass = mass + oscillator_matrices(self)[0]
+        return prune(mass)
 
     def observe(self, sensors: Sensors) -> SparseArray:
         """Return sensor readings from free dofs, sparse (n_sensors, n).
@@ -88,4 +111,6 @@ class Structure(MeshedFrame):
         Raises:
             ModelError: when a sensor lies off the structure.
         """
-        return sensor_rows(self, sensors)
+        rests_on = (sensors, *self.interpolation)
+        # A factor on E leaves the ratio of shear to bending as it is, but for its last digit.
+        return self.once("readings", rests_on, lambda: sensor_rows(self, sensors), _ROUNDING)

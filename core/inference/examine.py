@@ -53,7 +53,7 @@ class Examination:
     Arguments:
         model: the nominal model.
         problem: the data in its modal coordinates.
-        slopes: sensitivities of the data to the scatter of elements, (n_data, n_scatter).
+        slopes: sensitivities of the frequencies to the scatter of elements, (m, n_scatter).
         tolerance: standard deviation of that scatter.
         posterior: all explanations.
         found: the atlas of every textbook set that was searched.
@@ -96,11 +96,10 @@ class Examination:
     @property
     def scatter(self) -> float:
         """Return the relative standard deviation of a frequency by ordinary scatter."""
-        count = len(self.problem.data.measurement)
         if self.slopes.shape[1] == 0 or self.tolerance == 0.0:
             return 0.0
         m = self.problem.data.measurement
-        size = np.linalg.norm(self.slopes[:count], axis=1)
+        size = np.linalg.norm(self.slopes, axis=1)
         return float(self.tolerance * np.median(size * m.frequency_std / m.frequencies))
 
     @property
@@ -222,9 +221,12 @@ def examine(
             error = model_error_of(problem, basis, before, width, log(1.0 - beam))
             explanations = searched(problem, error, known, pairs, effort)
         own = replace(problem, noise=beam_noise(basis, slopes, before, tolerance, log(beam)))
+        slopes = slopes[: len(measurement)].copy()  # those of shapes fill the memory
         floor = max((e.log_weight for e in explanations), default=-np.inf) - _HOPELESS
         more, atlas = Search(own, known, pairs=pairs, floor=floor, effort=effort).run()
     posterior = Posterior.of([*explanations, *more])
+    basis.solver.forget()
+    basis.forget()
     return Examination(
         *(model, own, slopes, tolerance, posterior, tuple(atlas), basis.modes),
         *(error, reference, width, beam),
@@ -352,7 +354,7 @@ def beam_noise(
     if before is not None:
         earlier = scatter_slopes(before.problem, basis.modes)[:, : slopes.shape[1]]
         rows, known = np.vstack([earlier, slopes]), before.raw
-    covariance = np.eye(len(rows)) + tolerance**2 * rows @ rows.T
+    covariance = np.eye(len(rows)) + tolerance**2 * (rows @ rows.T)
     return conditioned(covariance, known, weight, beam=True)
 
 

@@ -93,12 +93,18 @@ def agreed(found: Fit) -> Fit | None:
     return best
 
 
-def departure(found: Fit) -> float:
+def departure(found: Fit, model: Model | None = None) -> float:
     """Return how far a fit is from what its own model gives, in deviations of the data in all.
+
+    Arguments:
+        found: the fit.
+        model: its own, where it is made already.
 
     Raises:
         FemubenchError: when that model cannot be built or solved.
     """
     state = found.state
-    exact = raw_residual(state.problem, extended(state.problem.model, state.parts, state.x))
+    if model is None:
+        model = extended(state.problem.model, state.parts, state.x)
+    exact = raw_residual(state.problem, model)
     return float(np.linalg.norm(state.problem.noise.whiten(exact - state.raw)))

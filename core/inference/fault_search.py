@@ -14,6 +14,7 @@ discounted.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import exp, log
@@ -52,6 +53,7 @@ _ROUNDS = 3
 _TWICE = 2.0  # by which deviations must be stated too large to be told
 _LITTLE = 0.3  # share of the squared misfit that is left, where a fault is most of it
 _FIT, _GROSS = 0.05, 0.05
+_AT_ONCE = 256  # data that are weighed at once
 _GRID, _FAR, _EDGE, _CURVED = 13, 3.0, 0.02, 0.02
 
 Depth = Literal["one", "several"]
@@ -300,34 +302,29 @@ class _Drawn:
         own = wide.frequency_std != m.frequency_std
         return not own.any() or bool(error[~own].sum() < _LITTLE * error.sum())
 
-    @cached_property
-    def _model_error(self) -> FloatArray:
-        """Return the covariance of model error, in deviations of the data, (n_data, n_data)."""
-        factor = self.state.problem.noise.factor
-        return np.asarray(factor @ factor.T - np.eye(len(factor)))
-
-    def first(self, measurement: Measurement) -> float:
-        """Return by how many nats other data are likelier, at the scales of these."""
-        own = self.state.problem.data
-        data = replace(own, measurement=measurement)
-        if len(data) != len(own):
-            return -np.inf
-        ratio = own.std / data.std
-        rest = self.state.against(data) - ratio * self.state.problem.noise.mean
-        if np.array_equal(ratio, np.ones(len(own))):
-            white = self.state.problem.noise.whiten(rest)
-            log_det = -self.state.problem.noise.log_density + self.state.problem.noise.log_weight
-        else:
-            covariance = np.eye(len(own)) + ratio[:, None] * self._model_error * ratio
-            lower = la.cholesky(covariance, lower=True)
-            white = la.solve_triangular(lower, rest, lower=True)
-            log_det = float(np.log(lower.diagonal() / ratio).sum())
-        return jacobian(own, data) - 0.5 * float(white @ white) - log_det - self._plain
+    def likelier(self, others: Iterable[Measurement]) -> FloatArray:
+        """Return by how many nats other data are likelier, each at the scales of these, (k,)."""
+        own, noise = self.state.problem.data, self.state.problem.noise
+        data = [replace(own, measurement=other) for other in others]
+        found, rows = np.full(len(data), -np.inf), [len(one) == len(own) for one in data]
+        same = [one for one in data if len(one) == len(own)]
+        if not same:
+            return found
+        ratio = np.array([own.std / one.std for one in same])
+        apart = np.array([self.state.against(one) for one in same])
+        chi2, log_det = noise.reweighed(apart / ratio - noise.mean, ratio)
+        sizes = np.array([_log_size(one) for one in same]) - self._log_size
+        found[rows] = sizes - 0.5 * chi2 - log_det - self._plain
+        return found
 
     @cached_property
     def _plain(self) -> float:
         noise = self.state.problem.noise
         return noise.log_density - noise.log_weight - 0.5 * self.state.chi2
+
+    @cached_property
+    def _log_size(self) -> float:
+        return _log_size(self.state.problem.data)
 
     def screened(self, charge: Charge) -> tuple[Charge, float]:
         """Return a fault with its parameter estimated, and what it gains at the present scales."""
@@ -338,23 +335,38 @@ class _Drawn:
 
     def _screened(self, charge: Charge) -> tuple[Charge, float]:
         if charge.suspect.parameter is None or charge.single:
-            return charge, self.first(charge.mended[1]) + charge.log_prior
+            return charge, float(self.likelier([charge.mended[1]])[0]) + charge.log_prior
         found = self.estimated(charge)
         if not _inside(found):
             return found, -np.inf
-        return found, self.first(found.mended[1]) + self.prior(found)
+        return found, float(self.likelier([found.mended[1]])[0]) + self.prior(found)
+
+    def all_screened(self, charges: Sequence[Charge]) -> Weighed:
+        """Return every fault as `screened` does; those without a parameter many at once."""
+        fixed = [c for c in charges if c.suspect.parameter is None or c.single]
+        gains: dict[Charge, float] = {}
+        for first in range(0, len(fixed), _AT_ONCE):
+            some = fixed[first : first + _AT_ONCE]
+            with suppress(FemubenchError, la.LinAlgError):
+                gains.update(zip(some, self.likelier(c.mended[1] for c in some), strict=True))
+        return [
+            (c, float(gains[c]) + c.log_prior) if c in gains else self.screened(c) for c in charges
+        ]
 
     def estimated(self, charge: Charge) -> Charge:
         """Return a fault with its parameter at the most probable value."""
         if charge.suspect.parameter is None:
             return charge
 
+        def costs(points: FloatArray) -> FloatArray:
+            gains = self.likelier([charge.corrected(float(x))[1] for x in points])
+            return 0.5 * np.square(points) - np.where(np.isfinite(gains), gains, -1e300)
+
         def cost(x: float) -> float:
-            gain = self.first(charge.corrected(x)[1])
-            return 0.5 * x**2 - (gain if np.isfinite(gain) else -1e300)
+            return float(costs(np.array([x]))[0])
 
         grid = np.linspace(*_between(charge.suspect.parameter), _GRID)
-        nearest = int(np.argmin([cost(x) for x in grid]))
+        nearest = int(np.argmin(costs(grid)))
         between = grid[max(nearest - 1, 0)], grid[min(nearest + 1, _GRID - 1)]
         found = minimize_scalar(cost, bounds=between, method="bounded", options={"xatol": 1e-3})
         x = float(found.x)
@@ -398,7 +410,7 @@ def _weighed(now: _Drawn, faults: Sequence[Fault]) -> Weighed:
     charges = charges_of(now.model, now.measurement, faults)
     with threadpool_limits(1):
         data = [charge for charge in charges if charge.fault.side == "data"]
-        promises = [now.screened(charge) for charge in data]
+        promises = now.all_screened(data)
         promises += now.typed([charge for charge in charges if charge.fault.side == "input"])
         kinds: dict[str, Weighed] = {}
         for charge, gain in in_order(promises, lambda pair: -pair[1]):
@@ -456,8 +468,10 @@ def log_density(examination: Examination, measured: Measurement) -> float:
 
 def jacobian(before: Data, after: Data) -> float:
     """Return the sum of ln |d after / d before| of data that were exchanged and multiplied."""
-    sizes = []
-    for data in (after, before):
-        values = np.abs(np.concatenate([data.measurement.frequencies, data.shapes.ravel()]))
-        sizes.append(np.log(values[values > 0.0]).sum())
-    return float(sizes[0] - sizes[1])
+    return _log_size(after) - _log_size(before)
+
+
+def _log_size(data: Data) -> float:
+    """Return the sum of ln |datum| of frequencies and shapes, but for those that are zero."""
+    values = np.abs(np.concatenate([data.measurement.frequencies, data.shapes.ravel()]))
+    return float(np.log(values[values > 0.0]).sum())

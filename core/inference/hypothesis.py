@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import product
 
 import numpy as np
@@ -26,6 +26,8 @@ _OSCILLATOR = (0.4, 1.2, 2.2)
 _STIFF = 0.01
 _TYPICAL = 0.6
 _NOTHING = 1e-12
+_SIZES, _FREQUENCIES = (0.3, 1.5), 15
+_ALWAYS = 1e-6  # of a factor, from which on what is there at x = 0 counts
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,20 @@ class Hypothesis:
         low, high = self.bounds
         return np.asarray(self.factors(np.clip(np.full(len(low), _TYPICAL), low, high)[None])[0])
 
+    @cached_property
+    def directions(self) -> tuple[FloatArray, FloatArray]:
+        """Return coordinates, (g, k), and factors of the terms, (g, n_terms), for first order.
+
+        What is there at any magnitude, such as the arms of joints, may be no small change on a fine
+        mesh, and first order overrates it: the rest is tried with and without it.
+        """
+        grid = magnitudes(self)
+        factors = self.factors(np.vstack([grid, np.zeros((1, grid.shape[1]))]))
+        factors, always = factors[:-1], factors[-1:]
+        if np.abs(always).max() <= _ALWAYS:
+            return grid, factors
+        return np.vstack([grid, grid]), np.vstack([factors, factors - always])
+
     def values(self, x: FloatArray) -> FloatArray:
         """Return parameter values of coordinates, (g, k) both."""
         columns = [p.value(x[:, i]) for i, p in enumerate(self.parameters)]
@@ -119,6 +135,35 @@ class Hypothesis:
         up, down = np.minimum(x + step, high), np.maximum(x - step, low)
         width = (up - down).diagonal()
         return np.asarray((self.factors(up) - self.factors(down)) / width[:, None])
+
+
+def magnitudes(hypothesis: Hypothesis, sizes: tuple[float, ...] = _SIZES) -> FloatArray:
+    """Return coordinates at which a hypothesis is tried, (g, k).
+
+    Arguments:
+        hypothesis: with one parameter or more.
+        sizes: positive; the second parameter of what adds dofs is its frequency, which runs over
+            its range.
+    """
+    kinds = tuple((*p.range, p.one_sided) for p in hypothesis.parameters)
+    return _magnitudes(kinds, hypothesis.change.extra > 0, sizes)
+
+
+@lru_cache(maxsize=256)  # frequencies are ranges of many oscillators
+def _magnitudes(
+    kinds: tuple[tuple[float, float, bool], ...], moves: bool, sizes: tuple[float, ...]
+) -> FloatArray:
+    """Return the same of parameters by range and side; it must not be written to."""
+    chosen = []
+    for i, (low, high, one_sided) in enumerate(kinds):
+        if moves and i:
+            chosen.append(np.linspace(low, high, _FREQUENCIES))
+        else:
+            below = () if one_sided else tuple(-size for size in sizes)
+            chosen.append(np.unique(np.clip([*below, *sizes], low, high)))
+    found = np.array(list(product(*chosen)))
+    found.flags.writeable = False
+    return found
 
 
 def combined(points: Sequence[Sequence[float]]) -> FloatArray:

@@ -170,6 +170,12 @@ def solve_pencil(stiffness: FloatArray, mass: FloatArray) -> tuple[FloatArray, F
     return values, vectors
 
 
+def rigid_first(modes: Modes) -> Modes:
+    """Return modes, rigid-body motions first; the same ones, not a copy, where they are."""
+    order = np.argsort(~modes.rigid, kind="stable")
+    return modes if np.array_equal(order, np.arange(len(order))) else modes.take(order)
+
+
 def nominal_space(
     model: Model, modes: Modes, sensors: Sensors, hypotheses: Sequence[Hypothesis]
 ) -> Space:
@@ -181,8 +187,7 @@ def nominal_space(
         sensors: where shapes are read.
         hypotheses: what may be missing.
     """
-    order = np.argsort(~modes.rigid, kind="stable")
-    modes = modes.take(order)
+    modes = rigid_first(modes)
     project = Projector(model, modes.shapes)
     readings = np.asarray(model.observe(sensors) @ modes.shapes)
     eigenvalues = np.where(modes.rigid, 0.0, modes.eigenvalues)

@@ -23,7 +23,7 @@ from femubench.core.fem.beam import mass_matrices, stiffness_matrices
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.fem.structure import Structure
 from femubench.core.inference.fit import Problem, State, state_at
-from femubench.core.inference.modal_basis import Space, scatter_terms
+from femubench.core.inference.modal_basis import Space, rigid_first, scatter_terms
 from femubench.core.inference.noise import Noise
 from femubench.core.modal.eigen import Modes
 from femubench.core.typing import BoolArray, FloatArray, IntArray
@@ -75,11 +75,10 @@ def error_slopes(
         **_shapes(nominal),
     }
     if structure is not None:
-        shapes = modes.take(np.argsort(~modes.rigid, kind="stable")).shapes
         rows = scatter_slopes(problem, modes)
         count = len(structure.properties)
         found["element stiffness"], found["element mass"] = rows[:, :count], rows[:, count:]
-        local = (structure.gather @ shapes).reshape(len(structure.mesh.ends), 12, -1)
+        local = _at_joints(structure, rigid_first(modes).shapes)
         found["mass of joints"] = _joint_masses(nominal, structure, local)
         stiff, heavy, types = _end_moments(structure, local)
         values = nominal.eigenvalues[nominal.partner]
@@ -99,7 +98,7 @@ def scatter_slopes(problem: Problem, modes: Modes) -> FloatArray:
         return np.zeros((len(problem.data), 0))
     space: Space = problem.space
     nominal = state_at(problem, (), np.zeros(0))
-    shapes = modes.take(np.argsort(~modes.rigid, kind="stable")).shapes
+    shapes = rigid_first(modes).shapes
     # Close modes are turned to the measured ones, and their forces with them.
     turned = nominal.vectors[:, nominal.partner]
     top = int(np.flatnonzero(np.abs(turned).max(axis=1) > _TURNED)[-1]) + 1
@@ -160,20 +159,35 @@ def _shapes(nominal: State) -> dict[str, FloatArray]:
     return found
 
 
-def _joint_masses(nominal: State, structure: Structure, local: FloatArray) -> FloatArray:
+def _at_joints(structure: Structure, shapes: FloatArray) -> dict[int, FloatArray]:
+    """Return the displacements of the elements at joints and at ends of members, (12, N) each."""
+    mesh = structure.mesh
+    order = np.lexsort((mesh.stations[:, 0], mesh.member))
+    last = np.flatnonzero(np.diff(mesh.member[order], append=-1))
+    outer = order[np.concatenate([last, [0], last[:-1] + 1])]
+    at_joints = np.flatnonzero((mesh.ends < len(structure.frame.joints)).any(axis=1))
+    elements = np.union1d(outer, at_joints)
+    rows = (12 * elements[:, None] + np.arange(12)).ravel()
+    local = (structure.gather[rows] @ shapes).reshape(len(elements), 12, -1)
+    return dict(zip(elements.tolist(), local, strict=True))
+
+
+def _joint_masses(
+    nominal: State, structure: Structure, local: Mapping[int, FloatArray]
+) -> FloatArray:
     """Return the slopes of a mass at every joint, as a share of the structure, (n_data, n).
 
     Arguments:
         nominal: the model as drawn.
         structure: its frame.
-        local: displacements of the elements in all modes, (n_elements, 12, N).
+        local: displacements of elements, (12, N) each, of those at joints and ends at least.
     """
     mesh, frame = structure.mesh, structure.frame
     moved: dict[int, FloatArray] = {}
-    for element, ends in enumerate(mesh.ends):
-        for node, part in zip(ends, (slice(0, 3), slice(6, 9)), strict=True):
+    for element, own in local.items():
+        for node, part in zip(mesh.ends[element], (slice(0, 3), slice(6, 9)), strict=True):
             if node < len(frame.joints):
-                moved.setdefault(int(node), local[element, part])
+                moved.setdefault(int(node), own[part])
     mass = nominal.problem.space.mass
     values = nominal.eigenvalues[nominal.partner]
     near = nominal.vectors[:, nominal.partner]
@@ -182,7 +196,7 @@ def _joint_masses(nominal: State, structure: Structure, local: FloatArray) -> Fl
 
 
 def _end_moments(
-    structure: Structure, local: FloatArray
+    structure: Structure, local: Mapping[int, FloatArray]
 ) -> tuple[FloatArray, FloatArray, IntArray]:
     """Return the end moments of all members by all modes, scaled, and the class of each.
 
@@ -191,7 +205,7 @@ def _end_moments(
 
     Arguments:
         structure: the frame as drawn.
-        local: displacements of the elements in all modes, (n_elements, 12, N).
+        local: displacements of elements, (12, N) each, of those at joints and ends at least.
 
     Returns:
         elastic moments and, at unit eigenvalue, those of inertia, both times the root of the unit
@@ -219,7 +233,8 @@ def _end_moments(
     known = {label: i for i, label in enumerate(dict.fromkeys(labels))}
     types = np.array([known[label] for label in labels], dtype=np.int64)
     # In a truss no end has a moment.
-    elastic, inertial = (np.array(rows).reshape(len(labels), local.shape[2]) for rows in moments)
+    count = next(iter(local.values())).shape[1]
+    elastic, inertial = (np.array(rows).reshape(len(labels), count) for rows in moments)
     return elastic, inertial, types
 
 
@@ -321,9 +336,11 @@ class ModelError:
     def _blocks(self) -> tuple[FloatArray, FloatArray]:
         """Return the covariances by class of reference and data as one, and within each state."""
         r, n = len(self.residual), self.present.shape[1]
+        if not r:
+            return self.present.reshape(len(self.names), -1), np.zeros((0, n * n))
         joint = np.zeros((len(self.names), r + n, r + n))
         joint[:, :r, :r], joint[:, r:, r:] = self.reference, self.present
-        apart = joint.copy() if r else joint[:0]
+        apart = joint.copy()
         joint[:, :r, r:], joint[:, r:, :r] = self.cross, np.swapaxes(self.cross, 1, 2)
         flat = joint.shape[1] ** 2
         return joint.reshape(-1, flat), apart.reshape(-1, flat)
@@ -402,14 +419,16 @@ class ModelError:
         """Return what the data say of the scales, 1/2 tr C^-1 C_k C^-1 C_l, (k, k)."""
         joint, apart = self._blocks
         tau, unshared = self._variances(v)
-        slopes = joint + unshared * apart if len(apart) else joint
-        slopes = tau[:, None] * slopes
+        turned = np.empty((len(joint) + (len(apart) > 0), *inverse.shape))
+        # One class after the other: all of them are as large as all the rest.
+        for k, own in enumerate(joint):
+            slope = own + unshared * apart[k] if len(apart) else own
+            turned[k] = inverse @ (tau[k] * slope).reshape(inverse.shape)
         if len(apart):
-            slopes = np.concatenate([slopes, (unshared * tau @ apart)[None]])
-        turned = inverse @ slopes.reshape(-1, *inverse.shape)
+            turned[-1] = inverse @ (unshared * tau @ apart).reshape(inverse.shape)
         flat = turned.reshape(len(turned), -1)
-        other = np.swapaxes(turned, 1, 2).reshape(len(turned), -1)
-        return np.asarray(0.5 * (2.0 * _SPREAD) ** 2 * flat @ other.T)
+        found = np.array([flat @ own.T.ravel() for own in turned])
+        return 0.5 * (2.0 * _SPREAD) ** 2 * found
 
     def log_density(self, state: State, v: FloatArray) -> float:
         """Return ln of the density of all data, linear in the causes, and of scales."""

@@ -10,6 +10,8 @@ import scipy.linalg as la
 
 from femubench.core.typing import FloatArray
 
+_FEW = 4  # from this share of all data on, a change of the covariance is no longer one of few
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -60,6 +62,36 @@ class Noise:
     def whiten(self, rows: FloatArray) -> FloatArray:
         """Return vectors along the last axis in units of the noise, same shape."""
         return np.asarray(rows @ self._inverse.T)
+
+    def reweighed(self, rows: FloatArray, ratios: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return chi-square, (k,), and ln of the root of the determinant, of reweighed data, (k,).
+
+        The mean is no part of it, nor the weight. What is not measurement stays as it is, so that
+        a few deviations change few entries of the diagonal: a change of low rank (Woodbury).
+
+        Arguments:
+            rows: residuals in the deviations that this noise is of, (k, n_data).
+            ratios: of these deviations over the other ones, (k, n_data).
+        """
+        white = self.whiten(rows)
+        chi2 = np.square(white).sum(axis=1)
+        log_det = np.full(len(rows), float(np.log(self.factor.diagonal()).sum()))
+        for i in np.flatnonzero((ratios != 1.0).any(axis=1)):
+            own = np.flatnonzero(ratios[i] != 1.0)
+            added = 1.0 / np.square(ratios[i, own]) - 1.0
+            if _FEW * len(own) > len(self.factor):
+                total = self.factor @ self.factor.T
+                total[own, own] += added
+                lower = la.cholesky(total, lower=True, overwrite_a=True)
+                chi2[i] = np.square(la.solve_triangular(lower, rows[i], lower=True)).sum()
+                log_det[i] = np.log(lower.diagonal()).sum()
+                continue
+            felt = self._inverse[:, own]
+            inner = np.eye(len(own)) + added[:, None] * (felt.T @ felt)
+            along = white[i] @ felt
+            chi2[i] -= along @ np.linalg.solve(inner, added * along)
+            log_det[i] += 0.5 * np.linalg.slogdet(inner)[1]
+        return chi2, log_det
 
 
 def marginal(rows: FloatArray, slopes: FloatArray) -> FloatArray:

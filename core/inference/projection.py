@@ -16,6 +16,7 @@ from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 _MANY = 4  # elements to one kind, from which on these are taken together
 _EQUAL = 1e-9  # of the largest factor
+_AT_ONCE = 512  # elements whose forces are held at once
 
 
 @dataclass(frozen=True)
@@ -139,6 +140,8 @@ class Projector:
             added: the further vectors, (n, r).
         """
         change, known, r = projection.hypothesis.change, self.vectors.shape[1], added.shape[1]
+        if not r:
+            return projection
         if not projection.whole:
             touched, shared = self._acted_on(change.terms)
             seen = [np.asarray(rows[:, : len(added)] @ added) for rows in shared.values()]
@@ -182,8 +185,10 @@ class Projector:
     def _gathered(self, vectors: FloatArray, elements: IntArray) -> FloatArray:
         """Return the displacements of some elements that can move, (k, n_active, N)."""
         assert self.structure is not None
-        rows = (12 * elements[:, None] + self.active).ravel()
-        moved = np.asarray(self.structure.gather[rows] @ vectors)
+        gather = self.structure.gather
+        if 12 * len(elements) < gather.shape[0] or len(self.active) < 12:
+            gather = gather[(12 * elements[:, None] + self.active).ravel()]
+        moved = np.asarray(gather @ vectors)
         return moved.reshape(len(elements), len(self.active), -1)
 
     def _pulled(self, operator: ElementOperator, near: FloatArray) -> FloatArray:
@@ -260,12 +265,15 @@ class Projector:
     def _form(
         self, operator: ElementOperator, left: Sequence[FloatArray], right: FloatArray
     ) -> FloatArray:
-        every = len(operator.elements) == len(right)
-        near, moved = (
-            [x if every else x[operator.elements] for x in some] for some in (left, [right])
-        )
-        force = (self._blocks(operator) @ moved[0]).reshape(-1, right.shape[2])
-        return np.vstack([x.reshape(len(force), -1).T @ force for x in near])
+        matrices, every = self._blocks(operator), operator.elements
+        total = np.zeros((sum(x.shape[2] for x in left), right.shape[2]))
+        # Some elements at once: the forces of all would be the largest array of all.
+        for first in range(0, len(every), _AT_ONCE):
+            own = slice(first, first + _AT_ONCE)
+            rows = own if len(every) == len(right) else every[own]
+            force = (matrices[own] @ right[rows]).reshape(-1, right.shape[2])
+            total += np.vstack([x[rows].reshape(len(force), -1).T @ force for x in left])
+        return total
 
     def _blocks(self, operator: ElementOperator) -> FloatArray:
         matrices = operator.matrices
@@ -332,8 +340,8 @@ class Projector:
         both = np.column_stack([motion, np.zeros((n + extra, extra))])
         both[n:, 1:] = np.eye(extra)
         springs = [term for term in terms if term.matrix == "stiffness"]
-        pulled = np.sum([term.operator.apply(both) for term in springs], axis=0)
-        motion[n:] = -np.linalg.solve(pulled[n:, 1:], pulled[n:, 0])
+        pulled = np.sum([term.operator.project(both) for term in springs], axis=0)
+        motion[n:] = -np.linalg.solve(pulled[1:, 1:], pulled[1:, 0])
         return motion
 
     def _seen(self, rows: SparseArray, extra: int) -> FloatArray:
@@ -341,8 +349,9 @@ class Projector:
         if not extra:
             return np.asarray(rows @ self.vectors)
         # By their few entries: to cut sparse rows in two takes longer than all the rest.
-        entries, (n, known) = rows.tocoo(), self.vectors.shape
-        line, column = entries.coords
+        entries, (n, known) = rows.tocsr(), self.vectors.shape
+        line = np.repeat(np.arange(len(entries.indptr) - 1), np.diff(entries.indptr))
+        column = entries.indices
         own = column < n
         found = np.zeros((rows.shape[0], known + extra))
         np.add.at(found[:, :known], line[own], entries.data[own, None] * self.vectors[column[own]])

@@ -13,15 +13,14 @@ import numpy as np
 
 from femubench.core.inference.fit import Fit, Problem, State, fit, state_at
 from femubench.core.inference.grid_search import Screened, residuals_at, screen
-from femubench.core.inference.hypothesis import Hypothesis
+from femubench.core.inference.hypothesis import Hypothesis, magnitudes
 from femubench.core.inference.noise import marginal
 from femubench.core.inference.projection import Projection, Projector
-from femubench.core.inference.static_response import LargeProblem, magnitudes
+from femubench.core.inference.static_response import LargeProblem
 from femubench.core.ties import in_order, least
 from femubench.core.typing import FloatArray
 
 _MOST, _OF_A_NAME, _PARTNERS = 240, 12, 60
-_NOTHING = 1e-6
 _CHUNK = 512  # forces that are held at once
 _SIZES = (0.12, 0.5, 1.3, 2.6)  # at which each is tried
 _STEPS = 3
@@ -108,9 +107,12 @@ def beside(problem: Problem, seed: Fit) -> Problem:
     there = state_at(own, space.projections, state.x)
     taken = {id(part.hypothesis) for part in seed.parts}
     free = [h for h in problem.hypotheses if id(h) not in taken]
-    projector = Projector(problem.model, found.vectors)
-    ranked = _ranked(projector, there, free)
-    partners = tuple(projector(h) for h in _chosen(ranked, _PARTNERS, 3))
+    problem.common.forget()  # one of two as large arrays at a time
+    ranked = _ranked(Projector(problem.model, found.vectors), there, free)
+    known = {id(p.hypothesis): p for p in problem.space.projections}
+    chosen = _chosen(ranked, _PARTNERS, 3)
+    parts = [known.get(id(h)) or problem.common.projector(h) for h in chosen]
+    partners = tuple(map(found.projected, parts))
     rebased = replace(space, projections=partners).rebased(space.projections, state.x)
     return replace(own, space=rebased)
 
@@ -193,20 +195,6 @@ class _Pulls:
     masses: FloatArray
 
 
-def _directions(hypothesis: Hypothesis) -> tuple[FloatArray, FloatArray]:
-    """Return coordinates, (g, k), and factors of the terms, (g, n_terms), to be tried.
-
-    What is there at any magnitude, such as the arms of joints, may be no small change on a fine
-    mesh, and first order overrates it: the rest is tried with and without it.
-    """
-    grid = magnitudes(hypothesis)
-    factors = hypothesis.factors(grid)
-    always = hypothesis.factors(np.zeros((1, grid.shape[1])))
-    if np.abs(always).max() <= _NOTHING:
-        return grid, factors
-    return np.vstack([grid, grid]), np.vstack([factors, factors - always])
-
-
 def _pulls(
     projector: Projector,
     hypothesis: Hypothesis,
@@ -222,7 +210,7 @@ def _pulls(
         near, values: the modes in the coordinates, (N, m), and their eigenvalues, (m,).
         weighed: whether the mass is a datum.
     """
-    grid, factors = _directions(hypothesis)
+    grid, factors = hypothesis.directions
     if hypothesis.change.extra:
         return _followed(projector(hypothesis), grid, factors, near, values)
     terms = hypothesis.change.terms
@@ -240,7 +228,7 @@ def _followed(
 
     Arguments:
         part: the hypothesis.
-        grid, factors: as in `_directions`.
+        grid, factors: as in `Hypothesis.directions`.
         near, values: as in `_pulls`.
     """
     count, m = near.shape

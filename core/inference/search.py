@@ -172,6 +172,8 @@ class Search:
         best = _best(explanations)
         if not best.parts:
             return explanations
+        if isinstance(best.fit.state.problem, LargeProblem):
+            best.fit.state.problem.common.forget()  # a solution takes its room
         others = [e for e in explanations if e is not best]
         borne = agreed(best.fit)
         return others if borne is None else [*others, replace(best, fit=borne)]

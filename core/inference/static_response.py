@@ -14,34 +14,34 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
 from weakref import WeakValueDictionary
 
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.effect.change import RowOperator, Term
+from femubench.core.effect.change import ElementOperator, RowOperator, Term
 from femubench.core.fem.model import Model
 from femubench.core.inference.fit import Problem
-from femubench.core.inference.hypothesis import Hypothesis
-from femubench.core.inference.modal_basis import Space, nominal_space
+from femubench.core.inference.free_memory import give_back
+from femubench.core.inference.hypothesis import Hypothesis, magnitudes
+from femubench.core.inference.modal_basis import Space, nominal_space, rigid_first
 from femubench.core.inference.noise import Noise
 from femubench.core.inference.projection import Projection, Projector
 from femubench.core.inference.residuals import Data
 from femubench.core.modal.eigen import DENSE_LIMIT, Modes, modes_of, once_for
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.sparse_eigen import ShiftedModel
-from femubench.core.typing import FloatArray, SparseArray
+from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 _A_MODE, _SPARE = 4, 20  # modes that are solved for every measured one, and besides
 _RIGID, _MISSED = 6, 6
 _SHIFT = 0.5  # of the first elastic eigenvalue, below zero
 _FROM_SENSORS, _FROM_HYPOTHESIS = 40, 64  # vectors at most
-_AT_ONCE = 64  # forces that are solved for at once
+_AT_ONCE, _COLUMNS = 32, 32  # forces that are held, and solved for, at once
 _APART = 1e-10  # squared sine below which a vector lies in the span of the others
 _FELT = 1e-7  # of the largest force
 _FEW_TERMS = 6
-_SIZES, _FREQUENCIES = (0.3, 1.5), 15
+_MANY = 4  # of so many elements one that is touched: no longer few
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +84,7 @@ class Basis:
     @classmethod
     def _solved(cls, model: Model, measurement: Measurement) -> Basis:
         count = _RIGID + _A_MODE * len(measurement) + _SPARE
-        modes = modes_of(model, count if model.size > DENSE_LIMIT else None)
-        modes = modes.take(np.argsort(~modes.rigid, kind="stable"))
+        modes = rigid_first(modes_of(model, count if model.size > DENSE_LIMIT else None))
         first = float(np.abs(modes.eigenvalues[~modes.rigid]).min(initial=np.inf))
         shift = min(-_SHIFT * first, 2.0 * float(modes.eigenvalues.min()))
         tracked = min(int(modes.rigid.sum()) + len(measurement) + _MISSED, len(modes))
@@ -133,11 +132,15 @@ class Basis:
         e, m = self.exact, self.modes
         modes = Modes(m.eigenvalues[:e], m.shapes[:, :e], m.rigid[:e])
         bare = replace(self, modes=modes)
-        # Views of what is there, in place of copies.
-        vars(bare)["momentum"] = self.momentum[:, :e]
-        if self.model.structure is not None:
-            bare.projector.local = self.projector.local[:, :, :e]
+        vars(bare)["momentum"] = self.momentum[:, :e]  # a view of what is there, not a copy
         return bare
+
+    def forget(self) -> None:
+        """Let go what is as large as all the rest of a large model, and soon worked out anew."""
+        if not self.complete:
+            for name in ("bare", "projector", "momentum"):
+                vars(self).pop(name, None)
+            give_back()
 
     def response(
         self, forces: FloatArray, most: int, known: FloatArray | None = None
@@ -156,12 +159,14 @@ class Basis:
     ) -> list[FloatArray]:
         """Return the `response` to each of several sets of forces, (n, r) each."""
         shapes, momentum = self.modes.shapes[:, : self.exact], self.momentum[:, : self.exact]
-        together = np.hstack(forces)
-        if together.shape[1] == 0:
+        moved = np.hstack(forces)
+        if moved.shape[1] == 0:
             return list(forces)
-        together -= momentum @ (shapes.T @ together)
-        moved = self.solver.solve(together)
-        del together
+        # A few columns at once: the largest arrays of all would be their like.
+        parts = [slice(i, i + _COLUMNS) for i in range(0, moved.shape[1], _COLUMNS)]
+        for own in parts:
+            moved[:, own] -= momentum @ (shapes.T @ moved[:, own])
+            moved[:, own] = self.solver.solve(moved[:, own])
         there = [(self.modes.shapes, self.momentum)]
         if known is not None and known.shape[1]:
             there.append((known, self.model.mass_times(known)))
@@ -169,8 +174,9 @@ class Basis:
         whole = np.sqrt(np.einsum("ij,ij->j", moved, self.model.mass_times(moved)))
         for _ in range(2):  # the second time what rounding left of the basis
             shares = [heavy.T @ moved for _, heavy in there]
-            for (vectors, _), share in zip(there, shares, strict=True):
-                moved -= vectors @ share
+            for own in (slice(i, i + _COLUMNS) for i in range(0, moved.shape[1], _COLUMNS)):
+                for (vectors, _), share in zip(there, shares, strict=True):
+                    moved[:, own] -= vectors @ share[:, own]
             moved /= np.where(whole > 0.0, whole, 1.0)
             mass, blocks, last = self.model.mass_times(moved), [], 0
             for count in counts:
@@ -179,6 +185,7 @@ class Basis:
                 values, turn = np.linalg.eigh(moved[:, own].T @ mass[:, own])
                 kept = np.flatnonzero(values > _APART)[-most:]
                 blocks.append(moved[:, own] @ (turn[:, kept] / np.sqrt(values[kept])))
+            del mass
             moved, counts = np.hstack(blocks), [block.shape[1] for block in blocks]
             whole = np.ones(moved.shape[1])
         return blocks
@@ -215,15 +222,26 @@ class Basis:
             parts: the hypotheses in them.
         """
         near, known = self.modes.take(np.arange(self.tracked)), len(self.modes)
+        self.forget()
         waiting: list[tuple[Projection, FloatArray]] = []
         for part in parts:
             kept = np.delete(np.arange(known + part.extra), np.arange(self.exact, known))
-            waiting.append((part.restricted(kept), exerted(part.hypothesis, near)))
-            if part is parts[-1] or sum(f.shape[1] for _, f in waiting) >= _AT_ONCE:
-                found = self.bare.responses([force for _, force in waiting], _FROM_HYPOTHESIS)
-                for (one, _), added in zip(waiting, found, strict=True):
-                    yield self.bare.with_motions(space, [one], added).space
+            force = exerted(part.hypothesis, near)
+            if sum(f.shape[1] for _, f in waiting) + force.shape[1] > _AT_ONCE:
+                yield from self._answered(space, waiting)
                 waiting = []
+            waiting.append((part.restricted(kept), force))
+        yield from self._answered(space, waiting)
+        self.forget()
+
+    def _answered(
+        self, space: Space, waiting: Sequence[tuple[Projection, FloatArray]]
+    ) -> Iterator[Space]:
+        """Yield the coordinates of some hypotheses, whose forces are solved for at once."""
+        if waiting:
+            found = self.bare.responses([force for _, force in waiting], _FROM_HYPOTHESIS)
+            for (one, _), added in zip(waiting, found, strict=True):
+                yield self.bare.with_motions(space, [one], added).space
 
     def with_motions(
         self, space: Space, parts: Sequence[Projection], added: FloatArray
@@ -242,12 +260,13 @@ class Basis:
         inner[:, len(old) :], inner[len(old) :, : len(old)] = cross, cross[: len(old)].T
         values, turn = np.linalg.eigh(inner)
         values = np.concatenate([space.eigenvalues[: self.exact], values])
-        widened = (self.projector.widened(part, added) for part in parts)
-        own = tuple(part.turned(self.exact, turn) for part in widened)
         readings = np.hstack([self.readings, self.rows @ added])
         readings[:, self.exact :] = readings[:, self.exact :] @ turn
-        found = replace(space, eigenvalues=values, readings=readings, projections=own)
-        return Coordinates(self, found, added, turn)
+        there = Coordinates(
+            self, replace(space, eigenvalues=values, readings=readings), added, turn
+        )
+        own = tuple(map(there.projected, parts))
+        return replace(there, space=replace(there.space, projections=own))
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,84 +289,99 @@ class Coordinates:
     def vectors(self) -> FloatArray:
         """Return the motions of all coordinates, (n, N + r)."""
         shapes, exact = self.basis.modes.shapes, self.basis.exact
-        tail = np.hstack([shapes[:, exact:], self.added])
-        return np.hstack([shapes[:, :exact], tail @ self.turn])
+        tail = shapes[:, exact:] @ self.turn[: shapes.shape[1] - exact]
+        tail += self.added @ self.turn[shapes.shape[1] - exact :]
+        return np.hstack([shapes[:, :exact], tail])
+
+    def projected(self, part: Projection) -> Projection:
+        """Return a hypothesis in these coordinates, from how it is in those of the basis."""
+        widened = self.basis.projector.widened(part, self.added)
+        return widened.turned(self.basis.exact, self.turn)
 
 
 def exerted(hypothesis: Hypothesis, near: Modes) -> FloatArray:
     """Return forces that span what a hypothesis exerts on some modes at any magnitude, (n, r)."""
-    terms = hypothesis.change.terms
-    if len(terms) > _FEW_TERMS:
-        blocks = list(_at_sizes(hypothesis, near))
+    change, shapes = hypothesis.change, near.shapes
+    rows = _touched(change.terms, len(shapes))
+    if len(change.terms) > _FEW_TERMS:
+        blocks = list(_at_sizes(hypothesis, near, rows))
     else:
-        blocks = [_range(term, near.shapes, hypothesis.change.extra).copy() for term in terms]
+        blocks = [_range(term, shapes, change.extra)[rows] for term in change.terms]
     scaled = []
     for block in blocks:
         if size := float(np.linalg.norm(block)):
             block /= size  # in place: they may be the largest arrays of all
             scaled.append(block)
-    return _principal(scaled) if scaled else np.zeros((len(near.shapes), 0))
+    if not scaled:
+        return np.zeros((len(shapes), 0))
+    felt = np.any([block.any(axis=1) for block in scaled], axis=0)
+    rows, own = rows[felt], _principal([block[felt] for block in scaled])
+    result = np.zeros((len(shapes), own.shape[1]))
+    result[rows] = own
+    return result
 
 
-def _at_sizes(hypothesis: Hypothesis, near: Modes) -> FloatArray:
-    """Return the forces at a few magnitudes, where single terms are too many, (g, n, m)."""
+def _touched(terms: Sequence[Term], count: int) -> IntArray:
+    """Return the dofs of the model that some terms act on: mostly few of them."""
+    every, found = np.arange(count), [np.zeros(0, dtype=np.int64)]
+    members: list[ElementOperator] = []
+    for operator in (term.operator for term in terms):
+        if isinstance(operator, ElementOperator):
+            members.append(operator)
+        elif isinstance(operator, RowOperator):
+            found.append(operator.rows.tocsr().indices)
+        else:
+            return every
+    if members:
+        gather = members[0].structure.gather
+        known = np.unique(np.concatenate([operator.elements for operator in members]))
+        if 12 * len(known) > gather.shape[0] / _MANY:
+            return every
+        found.append(gather[(12 * known[:, None] + np.arange(12)).ravel()].indices)
+    dofs = np.unique(np.concatenate(found))
+    return dofs[dofs < count]
+
+
+def _at_sizes(hypothesis: Hypothesis, near: Modes, rows: IntArray) -> FloatArray:
+    """Return the forces at a few magnitudes, where single terms are too many, (g, k, m).
+
+    Arguments:
+        hypothesis: what exerts them.
+        near: the modes.
+        rows: dofs outside of which there are none, (k,).
+    """
     factors = hypothesis.factors(magnitudes(hypothesis))
-    forces = np.zeros((len(factors), *near.shapes.shape))
+    forces = np.zeros((len(factors), len(rows), near.shapes.shape[1]))
     # One term after the other: a hundred of them at once would take a gigabyte.
     for term, own in zip(hypothesis.change.terms, factors.T, strict=True):
-        pull = _applied(term, near.shapes, hypothesis.change.extra)
+        pull = _applied(term, near.shapes, hypothesis.change.extra)[rows]
         if term.matrix == "mass":
-            pull = pull * -near.eigenvalues
+            pull *= -near.eigenvalues
         for total, factor in zip(forces, own, strict=True):
             total += factor * pull
     return forces
 
 
-def magnitudes(hypothesis: Hypothesis, sizes: Sequence[float] = _SIZES) -> FloatArray:
-    """Return coordinates at which a hypothesis is tried, (g, k).
-
-    Arguments:
-        hypothesis: with one parameter or more.
-        sizes: positive; the second parameter of what adds dofs is its frequency, which runs over
-            its range.
-    """
-    chosen = []
-    for i, parameter in enumerate(hypothesis.parameters):
-        low, high = parameter.range
-        if hypothesis.change.extra and i:
-            chosen.append(np.linspace(low, high, _FREQUENCIES))
-        else:
-            below = [] if parameter.one_sided else [-size for size in sizes]
-            chosen.append(np.unique(np.clip([*below, *sizes], low, high)))
-    return np.array(list(product(*chosen)))
-
-
 def _principal(blocks: Sequence[FloatArray]) -> FloatArray:
-    """Return orthonormal forces that span the largest of some, zero where these are, (n, r).
+    """Return orthonormal forces that span the largest of some, (k, r).
 
     Arguments:
-        blocks: forces, side by side, (n, c_i) each.
+        blocks: forces, side by side, (k, c_i) each.
     """
-    count = len(blocks[0])
-    rows = np.flatnonzero(np.any([block.any(axis=1) for block in blocks], axis=0))
-    local = [block if len(rows) == count else block[rows] for block in blocks]
-    if len(rows) < sum(block.shape[1] for block in local):
-        left, size, _ = la.svd(np.hstack(local), full_matrices=False)
+    if len(blocks[0]) < sum(block.shape[1] for block in blocks):
+        left, size, _ = la.svd(np.hstack(blocks), full_matrices=False)
         kept = np.flatnonzero(size > _FELT * size[0])[:_FROM_HYPOTHESIS]
-        own = left[:, kept]
-    else:
-        gram = np.vstack([np.hstack([one.T @ other for other in local]) for one in local])
-        square, turn = la.eigh(gram)
-        size = np.sqrt(np.maximum(square[::-1], 0.0))
-        kept = np.flatnonzero(size > _FELT * size[0])[:_FROM_HYPOTHESIS]
-        turn = turn[:, ::-1][:, kept] / size[kept]
-        last = np.cumsum([block.shape[1] for block in local])[:-1]
-        own = np.zeros((len(rows), len(kept)))
-        for block, part in zip(local, np.split(turn, last), strict=True):
-            own += block @ part
-    result = np.zeros((count, len(kept)))
-    result[rows] = own
-    return result
+        return np.asarray(left[:, kept])
+    gram = np.vstack([np.hstack([one.T @ other for other in blocks]) for one in blocks])
+    square, turn = la.eigh(gram)
+    size = np.sqrt(np.maximum(square[::-1], 0.0))
+    kept = np.flatnonzero(size > _FELT * size[0])[:_FROM_HYPOTHESIS]
+    turn = turn[:, ::-1][:, kept] / size[kept]
+    last = np.cumsum([block.shape[1] for block in blocks])[:-1]
+    own = np.zeros((len(blocks[0]), len(kept)))
+    for block, part in zip(blocks, np.split(turn, last), strict=True):
+        own += block @ part
+    return own
 
 
 def _range(term: Term, shapes: FloatArray, extra: int) -> FloatArray:

@@ -100,7 +100,7 @@ def challenge(
         hidden: ``one`` effect, ``none``, a ``pair``, one ``outside`` the catalogue, or ``any``.
         scatter: standard deviation of each element's stiffness and mass, relative.
         truth: where the sealed truth goes; ``truth.sealed`` in the folder by default.
-        effects: the catalogue by name; None for those of all plugins.
+        effects: the catalogue by name; None for those that come with femubench.
         truths: a folder of truths from outside, one of which is posed in place of drawing one;
             kind, structure, hidden, scatter and effects then say nothing.
         reference: whether the case of such a truth brings the healthy structure.
@@ -205,7 +205,7 @@ def score_challenge(
         folder: of the case.
         answer: a diagnosis, or a file as ``bench diagnose --json`` writes it.
         truth: the sealed truth; ``truth.sealed`` in the folder by default.
-        effects: the catalogue by name; None for those of all plugins.
+        effects: the catalogue by name; None for those that come with femubench.
 
     Raises:
         InputError: when case, truth or answer cannot be read, or do not belong together.
@@ -226,7 +226,8 @@ def score_challenge(
         same = same_place(None if structure is None else structure.frame)
         chi2 = () if hidden.truth.chi2 is None else (hidden.truth.chi2,)
         return Scored(hidden, chi2, judge_by_truth(hidden.truth, given, same), commitment)
-    known = registered_effects() if effects is None else effects
+    named = [cause.effect for cause in hidden.causes]
+    known = registered_effects(*named) if effects is None else effects
     missing = [cause.effect for cause in hidden.causes if cause.effect not in known]
     if missing:
         what = f"the hidden effect {missing[0]!r} is not installed"

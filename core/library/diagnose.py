@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -18,7 +18,7 @@ from femubench.core.errors import InputError, NotApplicable
 from femubench.core.files import check_new, make_folder
 from femubench.core.inference.effort import Effort, Told
 from femubench.core.library.cases import CaseLike, listed, one_case, usable_plugins
-from femubench.core.plugin.loader import Plugins
+from femubench.core.plugin.loader import Plugins, registered_faults
 from femubench.core.plugin.validation import check_effect, chosen
 from femubench.core.roles import Effect
 
@@ -36,6 +36,7 @@ def diagnose(
     tolerance: float | None = None,
     budget: float | None = None,
     output: str | PathLike[str] | None = None,
+    plugins: Iterable[str] = (),
 ) -> Diagnosis:
     """Return what is missing in a case's model, where, how sure, and what it gains.
 
@@ -43,13 +44,15 @@ def diagnose(
 
     Arguments:
         case: a name, a folder or a `Case`.
-        effects: what may be missing, by name or as effects; all that are installed by default.
+        effects: what may be missing, by name or as effects; by default all that come with
+            femubench.
         pairs: whether more than one cause is sought.
         faults: whether faults of the data and of what was typed in are sought too.
         tolerance: standard deviation of every element's relative scatter; the case's by default.
         budget: seconds after which the search for several causes ends, and a note says so; None
             for no end. What is found then depends on how fast the machine is.
         output: new folder for the extended model as a case, where one was found.
+        plugins: installed plugins whose effects and faults are tried too; they are imported here.
 
     Raises:
         InputError: when the case or an effect is unknown, or the case lacks what it takes.
@@ -67,6 +70,7 @@ def diagnose(
         faults=faults,
         tolerance=tolerance,
         budget=budget,
+        others=tuple(plugins),
     )
     if output is not None and has_model(found):
         write_extended(found, Path(output))
@@ -83,14 +87,16 @@ def diagnosis_of(
     tolerance: float | None = None,
     budget: float | None = None,
     told: Told | None = None,
+    others: Sequence[str] = (),
 ) -> Diagnosis:
     """Return the diagnosis; see `diagnose`.
 
-    `told` is called after every fit with how many are done, and how many are known so far.
+    `told` is called after every fit with how many are done, and how many are known so far; `others`
+    are the plugins of strangers that are asked for.
     """
     if budget is not None and not budget >= 0.0:
         raise InputError(f"budget = {budget!r}", expected="seconds >= 0")
-    wanted = _effects(effects, plugins)
+    wanted = _effects(effects, plugins, others)
     read = one_case(case, plugins)
     if tolerance is not None:
         read = replace(read, tolerance=tolerance)
@@ -98,19 +104,24 @@ def diagnosis_of(
         # Many small matrices: threads would only wait for each other.
         with threadpool_limits(1):
             effort = Effort(budget, told)
-            wrong = None if faults else ()
+            wrong = (registered_faults(*others) if others else None) if faults else ()
             return search(read, effects=wanted, faults=wrong, pairs=pairs, effort=effort)
     except NotApplicable as fault:
         raise InputError(f"cannot be diagnosed: {fault}", file=read.folder) from fault
 
 
-def _effects(given: object, plugins: Plugins) -> list[Effect]:
-    """Return the effects to try.
+def _effects(given: object, plugins: Plugins, others: Sequence[str]) -> list[Effect]:
+    """Return the effects to try: those given or those that came along, and those of the others.
 
     Raises:
-        InputError: for an unknown one.
+        InputError: for an unknown one, or an unknown plugin.
     """
-    wanted = [*plugins.effects] if given is None else listed(given)
+    chosen("plugin", others, (plugin.plugin for plugin in plugins.loaded))
+    strange = [plugin for plugin in plugins.loaded if not plugin.own]
+    added = [name for p in strange if p.plugin in others for name in p.offers["effects"]]
+    left = {name for p in strange for name in p.offers["effects"]}.difference(added)
+    wanted = [*plugins.effects] if given is None else [*listed(given), *added]
+    wanted = [item for item in wanted if given is not None or item not in left]
     chosen("effect", (item for item in wanted if isinstance(item, str)), plugins.effects)
     unique = [item for i, item in enumerate(wanted) if item not in wanted[:i]]
     return [plugins.effects[e] if isinstance(e, str) else check_effect(e) for e in unique]

@@ -43,7 +43,6 @@ DEFAULT_STORE = "femubench-results"
 DEFAULT_TIMEOUT = 600.0  # s
 MOST_TWINS = 100
 Twins = int | tuple[int, int | None]  # how many, and from which seed; None draws one
-_OWN = "femubench."
 _Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
@@ -395,7 +394,7 @@ def textbook_of(cases: Sequence[Case]) -> dict[str, Case]:
     from femubench.core.effect.textbook import textbook_model
     from femubench.core.plugin.loader import registered_effects
 
-    known = [item for item in registered_effects() if type(item).__module__.startswith(_OWN)]
+    known = registered_effects()
     found = {}
     for case in cases:
         with suppress(NotApplicable):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import os
 import re
@@ -12,16 +13,19 @@ from typing import Any
 
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
+from femubench.core.drawing.files import Exhibits
 from femubench.core.errors import FemubenchError, InputError, PluginError
 from femubench.core.files import check_writable, read_bytes, write_atomically
 from femubench.core.library.cases import usable_plugins
-from femubench.core.library.rank import read_run, store_in
+from femubench.core.library.rank import Run as Tables, read_run, store_in
+from femubench.core.plugin.apart import Origin
+from femubench.core.plugin.importing import offered_by
 from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import chosen, unknown
 from femubench.core.reproduction.study import Study, cells_to_json
 from femubench.core.roles import Reporter
 from femubench.core.run.store import Store
-from femubench.core.schema.records import finite, parse_json
+from femubench.core.schema.records import finite, parse_json, run_from_json
 from femubench.core.schema.results import Run
 from femubench.core.score.comparison import Comparison
 from femubench.core.study.axes import StudyAxes
@@ -221,6 +225,22 @@ def rendered(found: Reporter, run: Run, exhibits: object = None) -> str | bytes:
             f"reporter {found.name!r} gave {type(content).__name__}, expected {expected.__name__}"
         )
     return content
+
+
+def written_apart(origin: Origin, question: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the reporter of a stranger writes; runs in a process of its own.
+
+    Arguments:
+        origin: the plugin.
+        question: ``name`` of the reporter, ``way`` of writing, ``run``, folder of the ``store``.
+    """
+    found = offered_by(origin, "reporters", question["name"])
+    run, way, store = Tables.of(run_from_json(question["run"])), question["way"], question["store"]
+    further = [Exhibits(Path(store)) if store else None] if way == "render_with" else []
+    content = getattr(found, way)(run, *further)
+    if isinstance(content, bytes):
+        return {"bytes": base64.b64encode(content).decode()}
+    return {"text": content if isinstance(content, str) else None, "type": type(content).__name__}
 
 
 def _study_report(style: str, run: Run) -> str:

@@ -17,6 +17,7 @@ from femubench.core.modal.pairing import LEAST_SENSORS, Pairing, pair_measured
 from femubench.core.modal.sparse_eigen import ShiftedModel
 from femubench.core.typing import FloatArray
 
+_COLUMNS = 16  # that are solved for at once
 _DEFAULT_STD = 0.02  # of the largest component, where a shape has no deviation
 _NEAR = 1e-7  # relative distance to an eigenvalue below which K - lambda M is as good as singular
 _WEIGHTS = (1e-6, 1e18)  # of the readings against the model, times the largest sensitivity
@@ -159,9 +160,15 @@ class _Solver:
         self.shifted = ShiftedModel(model, eigenvalue)
 
     def __call__(self, right: FloatArray) -> FloatArray:
-        answer = self.shifted.solve(right)
-        left = self.model.stiffness_times(answer) - self.eigenvalue * self.model.mass_times(answer)
-        return np.asarray(answer + self.shifted.solve(right - left))
+        answer = np.empty(right.shape)
+        # A few columns at once: of a large model each array is as large as the factors.
+        for first in range(0, right.shape[1], _COLUMNS):
+            own = slice(first, first + _COLUMNS)
+            near = self.shifted.solve(right[:, own])
+            left = right[:, own] - self.model.stiffness_times(near)
+            left += self.eigenvalue * self.model.mass_times(near)
+            answer[:, own] = near + self.shifted.solve(left)
+        return answer
 
 
 def _discrepancy(values: FloatArray, parts: FloatArray) -> float:

@@ -19,6 +19,7 @@ from femubench.core.modal.sparse_eigen import lowest_eigenpairs
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 DENSE_LIMIT = 500
+_MANY = 20  # modes of a large model, where nobody says how many
 _RIGID_SHARE = 0.9
 _ROUNDOFF = 32.0 * np.finfo(float).eps
 _ZERO = 1e-6  # of the first elastic eigenvalue
@@ -206,7 +207,8 @@ def solve_modes(model: Model, count: int | None = None) -> Modes:
     Arguments:
         model: any model; up to 500 dofs it is solved densely and completely.
         count: number of modes wanted, rigid ones included; None for all (small models), or 20
-            of a large one, which has its negative eigenvalues besides.
+            of a large one, which has its negative eigenvalues besides. What of them is known, by
+            `modes_of` or without a solution, is not solved again.
 
     Raises:
         ModelError: when the eigenvalue problem has no solution, e.g. a mechanism without mass.
@@ -215,8 +217,8 @@ def solve_modes(model: Model, count: int | None = None) -> Modes:
         >>> print(femubench.solve_modes(model).elastic.natural_frequencies[:3].round(1))
         [255.8 277.7 581.3]
     """
-    known = _kept_modes(model, 20 if count is None else count)
-    if known is not None:
+    wanted = _MANY if count is None else count
+    if model.size > DENSE_LIMIT and (known := _known_modes(model, wanted)) is not None:
         return known
     count_evaluation()
     if model.size <= DENSE_LIMIT:
@@ -224,10 +226,9 @@ def solve_modes(model: Model, count: int | None = None) -> Modes:
         if not (np.isfinite(mass).all() and np.isfinite(stiffness).all()):
             raise ModelError("a matrix has entries that are not finite")
         eigenvalues, shapes = solve_dense(mass, stiffness)
-    else:
-        eigenvalues, shapes = lowest_eigenpairs(model, 20 if count is None else count)
-    if model.size <= DENSE_LIMIT:
         eigenvalues, shapes = eigenvalues[:count], shapes[:, :count]
+    else:
+        eigenvalues, shapes = lowest_eigenpairs(model, wanted)
     share = rigid_share(model, shapes, rigid_modes_of(model))
     return Modes(_without_roundoff(model, eigenvalues, shapes), shapes, share > _RIGID_SHARE)
 
@@ -292,6 +293,24 @@ def _forget(kept: dict[int, Any], number: int, _: object) -> None:
     kept.pop(number, None)
 
 
+@dataclass(frozen=True)
+class _Lowest:
+    """The lowest modes that are known of a large model.
+
+    Arguments:
+        count: number of them, those with negative eigenvalues aside.
+        modes: all of them from the lowest one on.
+    """
+
+    count: int
+    modes: Modes
+
+    def first(self, wanted: int) -> Modes:
+        """Return so many of them, and the negative ones."""
+        stop = wanted + max(len(self.modes) - self.count, 0)
+        return self.modes.take(np.arange(stop)) if stop < len(self.modes) else self.modes
+
+
 def keep_modes(model: Model, modes: Modes) -> None:
     """Keep the lowest modes of a large model, which follow without a solution, as long as it.
 
@@ -299,19 +318,19 @@ def keep_modes(model: Model, modes: Modes) -> None:
         model: with more dofs than are solved densely.
         modes: all of them from the lowest one on.
     """
-    once_for(model, _LOWEST, lambda: modes)
+    negative = int(np.sum(modes.eigenvalues < -zero_tolerance(modes)))
+    _lowest_known(model)[_LOWEST] = _Lowest(len(modes) - negative, modes)
 
 
-def _kept_modes(model: Model, count: int) -> Modes | None:
-    """Return so many modes and the negative ones, where they were kept."""
-    entry = _kept.get(id(model))
-    if model.size <= DENSE_LIMIT or entry is None or entry[0]() is not model:
-        return None
-    modes: Modes | None = entry[1].get(_LOWEST)
-    if modes is None:
-        return None
-    wanted = count + int(np.sum(modes.eigenvalues < -zero_tolerance(modes)))
-    return modes.take(np.arange(wanted)) if wanted <= len(modes) else None
+def _lowest_known(model: Model) -> dict[str, _Lowest]:
+    """Return where the lowest modes are that were kept or solved; empty where none were."""
+    return once_for(model, _LOWEST, dict)
+
+
+def _known_modes(model: Model, wanted: int) -> Modes | None:
+    """Return so many modes and the negative ones, where they are known."""
+    lowest = _lowest_known(model).get(_LOWEST)
+    return None if lowest is None or lowest.count < wanted else lowest.first(wanted)
 
 
 def modes_of(model: Model, count: int | None = None) -> Modes:
@@ -329,10 +348,9 @@ def modes_of(model: Model, count: int | None = None) -> Modes:
     if model.size <= DENSE_LIMIT:
         modes = once_for(model, "modes", lambda: solve_modes(model))
         return modes if count is None else modes.take(np.arange(min(count, len(modes))))
-    wanted = 20 if count is None else count
-    kept: dict[str, tuple[int, Modes]] = once_for(model, "lowest modes, solved", dict)
-    if "solved" not in kept or kept["solved"][0] < wanted:
-        kept["solved"] = wanted, solve_modes(model, wanted)
-    known, modes = kept["solved"]
-    negative = max(len(modes) - known, 0)
-    return modes if known == wanted else modes.take(np.arange(min(wanted + negative, len(modes))))
+    wanted = _MANY if count is None else count
+    modes = solve_modes(model, wanted)
+    lowest = _lowest_known(model)
+    if _LOWEST not in lowest or lowest[_LOWEST].count < wanted:
+        lowest[_LOWEST] = _Lowest(wanted, modes)
+    return modes

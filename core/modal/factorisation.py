@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,9 +16,34 @@ import scipy.sparse as sp
 from femubench.core.modal.superlu_pivots import pivots
 from femubench.core.typing import FloatArray, SparseArray
 
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
+
 # From about so many unknowns on, nested dissection earns its own time on structures in space.
 _DISSECTED = 50_000
 _MISSING = "no scikit-sparse"
+_AT_ONCE = 4_000_000  # entries of right sides solved at once
+_BLOCK = 32  # columns at once from which more gain nothing
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    """Return the BLAS of NumPy and that of CHOLMOD, once both are loaded."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController().select(user_api="blas")
+
+
+@contextmanager
+def _threads_of_numpy() -> Iterator[None]:
+    """Give the BLAS of CHOLMOD no more threads than that of NumPy may use within the block."""
+    pools = _blas()
+    threads = [pool.num_threads for pool in pools.lib_controllers]
+    if len({*threads}) < 2:
+        yield
+        return
+    with pools.limit(limits=min(threads)):
+        yield
 
 
 class Factor(Protocol):
@@ -29,6 +56,18 @@ class Factor(Protocol):
     @property
     def negative(self) -> int | None:
         """Return the number of negative pivots; None where rows were exchanged for stability."""
+        ...
+
+
+class Definite(Protocol):
+    """A factorised positive definite matrix, whose place others can take."""
+
+    def factorise(self, matrix: SparseArray) -> bool:
+        """Put another matrix into the place of the last; False where it is not definite."""
+        ...
+
+    def compliance(self, basis: SparseArray) -> FloatArray:
+        """Return basis' inverse basis of sparse columns, (p, p)."""
         ...
 
 
@@ -53,6 +92,7 @@ class Cholesky:
             _indexed(pattern), mode="supernodal", ordering_method=order, use_long=False
         )
 
+    @_threads_of_numpy()
     def factorise(self, matrix: SparseArray) -> bool:
         """Put another matrix into the place of the last; False where it is not definite."""
         from sksparse.cholmod import CholmodNotPositiveDefiniteError
@@ -63,11 +103,19 @@ class Cholesky:
             return False
         return True
 
+    @_threads_of_numpy()
     def solve(self, right: FloatArray) -> FloatArray:
         """Return the inverse times one or several right sides, (n,) or (n, m)."""
         return np.asarray(self._factor(right))
 
-    def half(self, right: FloatArray) -> FloatArray:
+    @_threads_of_numpy()
+    def compliance(self, basis: SparseArray) -> FloatArray:
+        """Return basis' inverse basis of sparse columns, (p, p)."""
+        # A column is felt along its path in the elimination tree alone: the rest is zero.
+        half = sp.hstack([sp.csc_array(self._half(part)) for part in _blocks(basis)], format="csc")
+        return np.asarray((half.T @ half).toarray())
+
+    def _half(self, right: FloatArray) -> FloatArray:
         """Return L^-1 right with the rows of L in its own order, so that half' half = solve."""
         permuted = self._factor.apply_P(right)
         return np.asarray(self._factor.solve_L(permuted, use_LDLt_decomposition=False))
@@ -108,6 +156,35 @@ class LU:
         return int(np.sum(pivots(self._factor) < 0.0))
 
 
+class DefiniteLU:
+    """L U of positive definite matrices by SuperLU; no pivot of such a matrix is negative."""
+
+    def __init__(self) -> None:
+        self._factor: LU | None = None
+
+    def factorise(self, matrix: SparseArray) -> bool:
+        """Put another matrix into the place of the last; False where it is not definite."""
+        self._factor = None
+        try:
+            factor = LU(matrix)
+        except RuntimeError:
+            return False
+        self._factor = factor if factor.negative == 0 else None
+        return self._factor is not None
+
+    def compliance(self, basis: SparseArray) -> FloatArray:
+        """Return basis' inverse basis of sparse columns, (p, p)."""
+        assert self._factor is not None, "a definite matrix comes first"
+        return np.hstack([basis.T @ self._factor.solve(part) for part in _blocks(basis)])
+
+
+def _blocks(columns: SparseArray) -> Iterator[FloatArray]:
+    """Yield some columns at a time, dense."""
+    width = min(max(_AT_ONCE // columns.shape[0], 4), _BLOCK)
+    for start in range(0, columns.shape[1], width):
+        yield columns[:, start : start + width].toarray()
+
+
 def _indexed(matrix: SparseArray) -> sp.csc_matrix:
     """Return a matrix as CHOLMOD reads it: columns, sorted, with indices of 32 bits."""
     found = sp.csc_matrix(matrix)
@@ -131,7 +208,6 @@ def cholmod_obstacle() -> str | None:
             f"CHOLMOD is linked to the reference BLAS {slow}, six times slower than OpenBLAS "
             "(Debian: apt install libopenblas0)"
         )
-    _as_many_threads()
     return None
 
 
@@ -150,15 +226,6 @@ def _reference_blas(libraries: list[str]) -> str | None:
         if re.match(r"lib(ref)?blas\.", Path(path).name) and not tuned.search(path):
             return path
     return None
-
-
-def _as_many_threads() -> None:
-    """Give the BLAS that came with CHOLMOD no more threads than that of NumPy may use."""
-    from threadpoolctl import threadpool_info, threadpool_limits
-
-    pools = [pool for pool in threadpool_info() if pool["user_api"] == "blas"]
-    if pools:
-        threadpool_limits(min(pool["num_threads"] for pool in pools), "blas")
 
 
 def solver_name() -> str:

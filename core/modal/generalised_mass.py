@@ -8,6 +8,16 @@ from femubench.core.fem.model import Model
 from femubench.core.typing import FloatArray
 
 
+def generalised_masses(model: Model, shapes: FloatArray) -> FloatArray:
+    """Return phi' M phi of every shape, (m,).
+
+    Arguments:
+        model: whose mass counts.
+        shapes: at all its dofs, (n, m).
+    """
+    return np.asarray(np.einsum("ij,ij->j", shapes, model.mass_times(shapes)))
+
+
 def mass_normalised(model: Model, shapes: FloatArray) -> FloatArray:
     """Return shapes with phi' M phi = 1 each, (n, m).
 
@@ -20,4 +30,4 @@ def mass_normalised(model: Model, shapes: FloatArray) -> FloatArray:
         >>> np.allclose(np.diag(shapes.T @ model.mass_times(shapes)), 1.0)
         True
     """
-    return np.asarray(shapes / np.sqrt(np.einsum("ij,ij->j", shapes, model.mass_times(shapes))))
+    return np.asarray(shapes / np.sqrt(generalised_masses(model, shapes)))

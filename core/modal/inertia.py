@@ -1,4 +1,4 @@
-"""How many negative eigenvalues a symmetric matrix has, proved by a Cholesky factorisation."""
+"""How many negative eigenvalues a symmetric matrix has, and proofs of it."""
 
 from __future__ import annotations
 
@@ -7,20 +7,45 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from femubench.core.fem.model import Model
-from femubench.core.modal.factorisation import Cholesky
+from femubench.core.modal.factorisation import Definite, Factor
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 Change = tuple[FloatArray, FloatArray]  # (basis, eigenvalues): basis @ diag(eigenvalues) @ basis'
 _TRIES = 4
 _HELD = 4.0  # stiffness over shift times mass from which on a dof needs no spring of its own
 _MOST_LOOSE = 200
-_AT_ONCE = 4_000_000  # entries of right sides solved at once
-_BLOCK = 32  # columns at once from which more gain nothing
+_LOST = 1e-13  # of what cancels: a smaller eigenvalue has no sign
+_PROBES, _STEPS = 2, 2
+_TRUSTED = 0.1  # spectral radius of the error; 1 is where a sign can change
 _CHOICE = 8  # nodes to choose from for every one chosen
 
 
-def negative_by_cholesky(
-    cholesky: Cholesky, matrix: SparseArray, change: Change | None, model: Model, about: int
+def signs_hold(factor: Factor, matrix: SparseArray) -> bool:
+    """Tell whether the pivots have the signs of the matrix, in spite of growth and rounding.
+
+    They are exactly those of A + E. Between this and A no eigenvalue passes zero where
+    (A + E)^-1 E has a spectral radius below 1, for which some steps of iteration are a measure.
+
+    Arguments:
+        factor: of the matrix, without exchanges.
+        matrix: A, symmetric, sparse, (n, n).
+
+    Source: Higham (2002), Accuracy and Stability of Numerical Algorithms, sections 9.3 and 11.1.
+    """
+    vectors = np.random.default_rng(0).standard_normal((matrix.shape[0], _PROBES))
+    for _ in range(_STEPS):
+        error = vectors - factor.solve(matrix @ vectors)
+        share = la.norm(error, axis=0) / la.norm(vectors, axis=0)
+        if not share.max() < _TRUSTED:
+            return False
+        vectors = error
+        if not vectors.any(axis=0).all():
+            break
+    return True
+
+
+def negative_by_pins(
+    definite: Definite, matrix: SparseArray, change: Change | None, model: Model, about: int
 ) -> int | None:
     """Return the number of negative eigenvalues of matrix + change; None where pins do not help.
 
@@ -29,7 +54,7 @@ def negative_by_cholesky(
     them out again is a change of low rank, whose inertia is that of a small dense matrix.
 
     Arguments:
-        cholesky: analysed for the pattern of the matrix; holds the pinned matrix afterwards.
+        definite: ready for the pattern of the matrix; holds the pinned matrix afterwards.
         matrix: K - shift M, sparse.
         change: its part of low rank.
         model: where its nodes are.
@@ -48,13 +73,13 @@ def negative_by_cholesky(
         pins = pins[size[pins] > 0.0]
         spring = np.zeros(model.size)
         spring[pins] = size[pins]
-        if cholesky.factorise(sp.csc_array(matrix + sp.diags_array(spring))):
-            return _without(cholesky, pins, np.sqrt(size[pins]), change)
+        if definite.factorise(sp.csc_array(matrix + sp.diags_array(spring))):
+            return _without(definite, model.size, pins, np.sqrt(size[pins]), change)
     return None
 
 
-def negative_after(negative: int, values: FloatArray, capacitance: FloatArray) -> int:
-    """Return the number of negative eigenvalues of A + U C U'.
+def negative_after(negative: int, values: FloatArray, capacitance: FloatArray) -> int | None:
+    """Return the number of negative eigenvalues of A + U C U'; None where rounding hides one.
 
     Arguments:
         negative: of A.
@@ -63,24 +88,26 @@ def negative_after(negative: int, values: FloatArray, capacitance: FloatArray) -
 
     Source: Haynsworth (1968).
     """
-    inner = la.eigvalsh(capacitance)
+    # What cancels in the diagonal sets its rounding errors, and those of the rest after scaling.
+    own = 1.0 / values
+    root = np.sqrt(np.abs(own) + np.abs(np.diagonal(capacitance) - own))
+    inner = la.eigvalsh(capacitance / np.outer(root, root))
+    if np.abs(inner).min(initial=1.0) < _LOST:
+        return None
     return negative + int(np.sum(values < 0.0)) - int(np.sum(inner < 0.0))
 
 
-def _without(cholesky: Cholesky, pins: IntArray, root: FloatArray, change: Change | None) -> int:
+def _without(
+    definite: Definite, size: int, pins: IntArray, root: FloatArray, change: Change | None
+) -> int | None:
     """Return the number of negative eigenvalues once the springs are out and the change is in."""
-    count, size = len(pins), cholesky.size
+    count = len(pins)
     basis = sp.csc_array((root, (pins, np.arange(count))), shape=(size, count))
     values = np.full(count, -1.0)
     if change is not None:
         basis = sp.hstack([basis, sp.csc_array(change[0])], format="csc")
         values = np.concatenate([values, change[1]])
-    width = min(max(_AT_ONCE // size, 4), _BLOCK)
-    blocks = (basis[:, i : i + width].toarray() for i in range(0, len(values), width))
-    # A pin is felt along its path in the elimination tree alone: the rest of a column is zero.
-    half = sp.hstack([sp.csc_array(cholesky.half(block)) for block in blocks], format="csc")
-    gram = (half.T @ half).toarray()
-    return negative_after(0, values, np.diag(1.0 / values) + gram)
+    return negative_after(0, values, np.diag(1.0 / values) + definite.compliance(basis))
 
 
 def _pins(model: Model, count: int) -> IntArray:

@@ -187,7 +187,7 @@ class ManyChanges:
         if structure is not None and place.new:
             kinematics, new = structure.kinematics, slice(self.model.size, None)
             xyz = structure.mesh.xyz[kinematics.node[new]]
-            at = np.vstack([at, self._continued(xyz, kinematics.axes[new])])
+            at = np.vstack([at, self._continued(xyz, kinematics.motions(new))])
         energy, size = at.T @ place.ground @ at, np.abs(at).T @ np.abs(place.ground) @ np.abs(at)
         values, turn = la.eigh(0.5 * (energy + energy.T))
         turn = turn[:, np.abs(values) <= _FREE * np.trace(size)]

@@ -8,8 +8,10 @@ import numpy as np
 import scipy.linalg as la
 
 from femubench.core.fem.model import Dofs, Model
+from femubench.core.fem.structure import Structure
 from femubench.core.typing import BoolArray, FloatArray
 
+_Motion = Callable[[FloatArray, FloatArray], FloatArray]
 _ZERO_ENERGY = 1e-12
 _HELD = 1e-9  # of a motion whose largest translation is 1
 
@@ -32,7 +34,7 @@ def _moving(vectors: FloatArray) -> BoolArray:
     return np.asarray(np.abs(vectors).max(axis=0, initial=0.0) > _HELD)
 
 
-def _motions(dofs: Dofs) -> Callable[[FloatArray, FloatArray], FloatArray]:
+def _motions(dofs: Dofs) -> _Motion:
     """Return the six motions of a body about the centroid, from positions and axes of dofs."""
     centre = dofs.xyz.mean(axis=0)
     size = max(float(np.abs(dofs.xyz - centre).max()), 1e-12)
@@ -57,19 +59,25 @@ def rigid_modes_of(model: Model) -> FloatArray:
     """
     motion, structure = _motions(model.dofs), model.structure
     vectors = motion(model.dofs.xyz, model.dofs.motions)
-    moving = _moving(vectors)
     if structure is None:
-        candidates = _without_energy(model, vectors[:, moving])
+        candidates = _without_energy(model, vectors[:, _moving(vectors)])
     else:
-        _, singular, turn = la.svd(np.linalg.qr(structure.held(motion)[:, moving], mode="r"))
-        rank = int(np.sum(singular > _HELD))
-        candidates = vectors[:, moving] @ turn[rank:].T
+        rests_on = structure.interpolation if structure.frame.springs else ()
+        candidates = structure.once(
+            "free motions", rests_on, lambda: _not_held(structure, motion, vectors)
+        )
     return _orthonormal(candidates, candidates.T @ model.mass_times(candidates))
 
 
-def rigid_continuation(
-    dofs: Dofs, rigid: FloatArray
-) -> Callable[[FloatArray, FloatArray], FloatArray]:
+def _not_held(structure: Structure, motion: _Motion, vectors: FloatArray) -> FloatArray:
+    """Return the combinations of motions that neither supports nor springs to ground see."""
+    moving = _moving(vectors)
+    _, singular, turn = la.svd(np.linalg.qr(structure.held(motion)[:, moving], mode="r"))
+    rank = int(np.sum(singular > _HELD))
+    return np.asarray(vectors[:, moving] @ turn[rank:].T)
+
+
+def rigid_continuation(dofs: Dofs, rigid: FloatArray) -> _Motion:
     """Return how rigid-body motions move further dofs, from their positions (k, 3) and axes (k, 6).
 
     Arguments:

@@ -12,9 +12,9 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import LowRank, Model
-from femubench.core.modal.factorisation import LU, Cholesky, Factor, cholmod_obstacle
-from femubench.core.modal.generalised_mass import mass_normalised
-from femubench.core.modal.inertia import Change, negative_after, negative_by_cholesky
+from femubench.core.modal.factorisation import LU, Cholesky, DefiniteLU, Factor, cholmod_obstacle
+from femubench.core.modal.generalised_mass import generalised_masses
+from femubench.core.modal.inertia import Change, negative_after, negative_by_pins, signs_hold
 from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.modal.smooth_fields import softest_smooth_field
 from femubench.core.typing import FloatArray, SparseArray
@@ -105,6 +105,11 @@ class ShiftedModel:
         solved = self._factor.solve(basis)
         return solved, np.diag(1.0 / values) + basis.T @ solved
 
+    def forget(self) -> None:
+        """Let the factors go; they are made anew where they are wanted."""
+        for name in ("_woodbury", "_factor", "_cholesky"):
+            vars(self).pop(name, None)
+
     def solve(self, right: FloatArray) -> FloatArray:
         """Return (K - shift M)^-1 @ right, (n,) or (n, m)."""
         answer = self._factor.solve(right)
@@ -117,20 +122,25 @@ class ShiftedModel:
     def eigenvalues_below(self, about: int = 8) -> int | None:
         """Return how many eigenvalues lie below the shift (Sylvester's law of inertia).
 
-        None where the factorisation pivoted off the diagonal, so that its signs mean nothing.
+        None where neither the signs of pivots nor pins tell, as within rounding of an eigenvalue.
 
         Arguments:
             about: how many are expected; a bad guess costs time alone.
         """
+        matrix, change = self._matrix, self._change
         if self.shift > 0.0 and "_factor" not in self.__dict__ and self._cholesky is not None:
-            matrix, change = self._matrix, self._change
-            found = negative_by_cholesky(self._cholesky, matrix, change, self.model, about)
+            found = negative_by_pins(self._cholesky, matrix, change, self.model, about)
             if found is not None:
                 return found
         below = self._factor.negative
-        if below is None or self._woodbury is None or self._change is None:
+        # Of a definite matrix no factor grows.
+        if below is None or (below and not signs_hold(self._factor, matrix)):
+            for kept in ("_factor", "_woodbury"):  # one factorisation at a time
+                self.__dict__.pop(kept, None)
+            return negative_by_pins(DefiniteLU(), matrix, change, self.model, about)
+        if self._woodbury is None or change is None:
             return below
-        return negative_after(below, self._change[1], self._woodbury[1])
+        return negative_after(below, change[1], self._woodbury[1])
 
 
 def _free_rigid_modes(model: Model) -> FloatArray:
@@ -231,6 +241,7 @@ def lowest_eigenpairs(model: Model, count: int) -> tuple[FloatArray, FloatArray]
         shapes = np.hstack([shapes, others])[:, order]
     else:
         raise ModelError(f"{missed} eigenvalues below {eigenvalues[-1]:.6g} were not found")
+    del shifted  # and the factors with it, before matrices are copied
     _check(model, eigenvalues, shapes)
     energy = np.einsum("ij,ij->j", modes, model.stiffness_times(modes))
     values = np.concatenate([energy, eigenvalues])
@@ -253,7 +264,7 @@ def _shift_invert(
     stiffness = LinearOperator((size, size), matvec=model.stiffness_times, dtype=float)
     below = shifted.eigenvalues_below()
     if below is None:
-        raise ModelError("negative eigenvalues cannot be counted: the factors were pivoted")
+        raise ModelError("negative eigenvalues cannot be counted: rounding hides their signs")
     rayleigh = np.einsum("ij,ij->j", known.modes, model.stiffness_times(known.modes))
     below -= int(np.sum(rayleigh < shifted.shift))
     count = min(count, size - known.modes.shape[1] - 1)
@@ -266,9 +277,12 @@ def _shift_invert(
                       which=which, v0=first, tol=0.0)
             )  # fmt: skip
     eigenvalues = np.concatenate([values for values, _ in pieces])
-    shapes = np.hstack([vectors for _, vectors in pieces])
-    order = np.argsort(eigenvalues)
-    return eigenvalues[order], mass_normalised(model, shapes[:, order])
+    shapes = pieces[0][1] if len(pieces) == 1 else np.hstack([vectors for _, vectors in pieces])
+    order = np.argsort(eigenvalues, kind="stable")
+    if np.any(np.diff(order) < 0):
+        shapes = shapes[:, order]
+    shapes /= np.sqrt(generalised_masses(model, shapes))  # in place: nothing is as large as these
+    return eigenvalues[order], shapes
 
 
 def _missed(shifted: ShiftedModel, eigenvalues: FloatArray, rigid: int) -> int:

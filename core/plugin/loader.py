@@ -1,82 +1,63 @@
 """Find plugins through the entry-point group ``femubench`` and collect what they offer.
 
-Built-ins and third parties take the same way in. Every plugin is loaded, checked and called on its
-own: what is wrong with one is recorded in `Plugins.broken` and touches no other. What is offered by
-reference is imported when it is used: a list of names costs none of the numerics behind them.
+What comes with femubench is imported here. Every other plugin is described by a process of its own,
+and nothing of it is imported here to be listed. What is wrong with one is recorded in
+`Plugins.broken` and touches no other. What a built-in offers by reference is imported when it is
+used: a list of names costs none of the numerics behind them.
 """
 
 from __future__ import annotations
 
-import inspect
+import sys
 import tomllib
-import traceback
-from collections import UserDict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any
 
-import pluggy
-
-from femubench.core.errors import PluginError
-from femubench.core.plugin import hookspecs
+from femubench.core.errors import PluginError, harmless
+from femubench.core.plugin import apart
+from femubench.core.plugin.apart import Origin
+from femubench.core.plugin.foreign import Foreign, made
+from femubench.core.plugin.importing import (
+    PREFIX,
+    BrokenPlugin,
+    Offers,
+    Source,
+    take,
+)
 from femubench.core.plugin.markers import PROJECT
-from femubench.core.plugin.validation import CHECKS, did_you_mean
+from femubench.core.plugin.source_files import stamps
+from femubench.core.plugin.validation import CHECKS, chosen, of_type
 from femubench.core.roles import Effect, Fault, Reader, Reporter, Scenario, Strategy
 from femubench.core.version import __version__
 
-PREFIX = f"{PROJECT}_"
-HOOKS = tuple(PREFIX + kind for kind in CHECKS)
-
-# A plugin that calls sys.exit() on import is as broken as one that raises; Ctrl-C is the user's.
-_FAULTS = (Exception, SystemExit)
-
-
-@dataclass(frozen=True)
-class BrokenPlugin:
-    """What is wrong with a plugin, or with one thing that it offers.
-
-    Arguments:
-        plugin: name of the entry point.
-        distribution: what was installed, with its version.
-        hook: the hook concerned; empty when the plugin could not be loaded at all.
-        message: one line.
-        traceback: for whoever asks for it.
-    """
-
-    plugin: str
-    distribution: str
-    hook: str
-    message: str
-    traceback: str
-
-    def __str__(self) -> str:
-        where = f" in {self.hook}" if self.hook else ""
-        return f"plugin {self.plugin!r} ({self.distribution}){where}: {self.message}"
+DESCRIBE = "femubench.core.plugin.describing:described"
+_LONGEST_MESSAGE = 2000  # characters
 
 
 @dataclass(frozen=True)
 class LoadedPlugin:
-    """A plugin in use and the names of what it offers by kind."""
+    """A plugin in use.
+
+    Arguments:
+        plugin: name of the entry point.
+        distribution: what was installed, with its version.
+        offers: the names of what it offers by kind.
+        own: whether its code is imported here: it comes with femubench, or was given by hand.
+    """
 
     plugin: str
     distribution: str
     offers: Mapping[str, tuple[str, ...]]
+    own: bool = True
 
 
-class Offers(UserDict[str, Any]):
-    """What plugins offer of one kind, by name, in the order of the plugins.
-
-    Asking for an entry that was offered by reference loads it, and raises PluginError where that
-    fails or where the entry does not fill its role.
-    """
-
-    def __getitem__(self, name: str) -> Any:  # noqa: ANN401 - as the kind has it
-        entry = self.data[name]
-        if isinstance(entry, _Reference):
-            entry = self.data[name] = entry.load()
-        return entry
+def shown(offers: Mapping[str, Any], name: str) -> Any:  # noqa: ANN401 - as the kind has it
+    """Return an entry, of a stranger's effect or fault what is known of it without its code."""
+    entry = offers.data[name] if isinstance(offers, Offers) else None
+    return entry if isinstance(entry, Foreign) else offers[name]
 
 
 @dataclass(frozen=True)
@@ -93,44 +74,11 @@ class Plugins:
     broken: tuple[BrokenPlugin, ...] = ()
 
 
-@dataclass(frozen=True)
-class _Source:
-    """Where a plugin comes from: an entry point, or an object given by hand."""
-
-    name: str
-    distribution: str
-    entry_point: EntryPoint | None = None
-    given: object = None
-
-    def load(self) -> object:
-        return self.given if self.entry_point is None else self.entry_point.load()
-
-
-@dataclass(frozen=True)
-class _Reference:
-    """A thing that a plugin offers as ``module:Class``, to be loaded when it is used."""
-
-    source: _Source
-    kind: str
-    target: EntryPoint
-
-    @property
-    def name(self) -> str:
-        return self.target.name
-
-    def load(self) -> Any:  # noqa: ANN401 - as the kind has it
-        try:
-            filled = CHECKS[self.kind](self.target.load())
-            if filled.name != self.name:
-                named = f"is named {filled.name!r} and offered as {self.name!r}"
-                raise PluginError(f"{self.target.value} {named}")
-        except _FAULTS as fault:
-            raise PluginError(str(_broken(self.source, fault, PREFIX + self.kind))) from fault
-        return filled
-
-
 def load_plugins(
-    points: Iterable[EntryPoint] | None = None, extra: Mapping[str, object] | None = None
+    points: Iterable[EntryPoint] | None = None,
+    extra: Mapping[str, object] | None = None,
+    *,
+    strangers: bool = True,
 ) -> Plugins:
     """Return what all plugins offer.
 
@@ -138,183 +86,163 @@ def load_plugins(
         points: the entry points; by default all of the group ``femubench`` that are installed,
             and those of the clone that femubench is imported from where it is not installed.
         extra: further plugins by name, already imported.
+        strangers: whether plugins that did not come with femubench are described.
     """
     installed = tuple(entry_points(group=PROJECT) if points is None else points)
-    sources = list(_installed(installed))
-    if points is None and not any(_package(point) == PROJECT for point in installed):
+    sources = _installed(installed)
+    if points is None and not any(source.own for source in sources):
         sources = [*_of_clone(), *sources]
     sources += [
-        _Source(name, "given by hand", given=plugin) for name, plugin in (extra or {}).items()
+        Source(name, "given by hand", given=plugin) for name, plugin in (extra or {}).items()
     ]
     found: dict[str, Offers] = {kind: Offers() for kind in CHECKS}
     loaded: list[LoadedPlugin] = []
     broken: list[BrokenPlugin] = []
+    told = _descriptions([s.origin for s in sources if strangers and s.origin is not None])
     for source in sources:
-        try:
-            manager = _register(source)
-        except _FAULTS as fault:
-            broken.append(_broken(source, fault))
-            continue
-        offers = {
-            kind: tuple(_collect(source, manager, kind, taken, broken))
-            for kind, taken in found.items()
-        }
-        loaded.append(LoadedPlugin(source.name, source.distribution, offers))
+        if source.origin is None:
+            offers = take(source, found, broken)
+            if offers is not None:
+                loaded.append(LoadedPlugin(source.name, source.distribution, offers))
+        elif strangers:
+            loaded += _believed(source.origin, told[source.origin], found, broken)
     return Plugins(**found, loaded=tuple(loaded), broken=tuple(broken))
 
 
-def registered_effects() -> tuple[Effect, ...]:
-    """Return every effect that plugins offer, the built-in ones first.
+_known: dict[object, Any] = {}
+
+
+def _descriptions(origins: Sequence[Origin]) -> dict[Origin, Any]:
+    """Return what every plugin says of itself, or as text why it does not.
+
+    A plugin is asked once, as long as its files stay as they are.
+    """
+    keys = {origin: (origin, tuple(sys.path), stamps(origin.top)) for origin in origins}
+    new = [origin for origin, key in keys.items() if key not in _known]
+    questions = [
+        {"do": DESCRIBE, "origin": [one.plugin, one.value, one.distribution]} for one in new
+    ]
+    for origin, answer in zip(new, apart.ask(questions), strict=True):
+        _known[keys[origin]] = answer
+    return {origin: _known[key] for origin, key in keys.items()}
+
+
+def _believed(
+    origin: Origin,
+    told: Any,  # noqa: ANN401 - what a stranger told
+    found: Mapping[str, Offers],
+    broken: list[BrokenPlugin],
+) -> Iterator[LoadedPlugin]:
+    """Take what a stranger's plugin says that it offers, where it fills its role."""
+    if isinstance(told, str) or "fault" in told:
+        message = told if isinstance(told, str) else ": ".join(map(str, told["fault"]))
+        broken.append(_wrong(origin, "", message))
+        return
+    try:
+        faults = [_told_broken(origin, item) for item in of_type(told["broken"], list, "faults")]
+        offered = {kind: of_type(told["offers"][kind], list, kind) for kind in found}
+    except (KeyError, TypeError, PluginError) as fault:
+        broken.append(_wrong(origin, "", f"its description is none: {fault}"))
+        return
+    broken += faults
+    offers = {
+        kind: tuple(_described(origin, kind, offered[kind], taken, broken))
+        for kind, taken in found.items()
+    }
+    if told.get("loaded") is True:
+        yield LoadedPlugin(origin.plugin, origin.distribution, offers, own=False)
+
+
+def _described(
+    origin: Origin, kind: str, offered: Iterable[Any], taken: Offers, broken: list[BrokenPlugin]
+) -> Iterator[str]:
+    for item in offered:
+        try:
+            entry = made(origin, kind, item)
+            if entry.name in taken:
+                raise PluginError(f"the name {entry.name!r} is taken by another of the {kind}")
+        except PluginError as fault:
+            broken.append(_wrong(origin, PREFIX + kind, str(fault)))
+            continue
+        taken[entry.name] = entry
+        yield entry.name
+
+
+def _wrong(origin: Origin, hook: str, message: str, trace: str = "") -> BrokenPlugin:
+    clean = harmless(message)[:_LONGEST_MESSAGE]
+    return BrokenPlugin(origin.plugin, origin.distribution, hook, clean, trace)
+
+
+def _told_broken(origin: Origin, item: Any) -> BrokenPlugin:  # noqa: ANN401 - what a stranger told
+    texts = [of_type(item[key], str, key) for key in ("hook", "message", "traceback")]
+    trace = "".join(f"{_printable(line)}\n" for line in texts[2].splitlines())
+    return _wrong(origin, harmless(texts[0])[:80], texts[1], trace)
+
+
+def _printable(line: str) -> str:
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
+
+
+def registered_effects(*plugins: str) -> tuple[Effect, ...]:
+    """Return the effects that come with femubench, and all of some other plugins.
+
+    Arguments:
+        plugins: names of installed plugins, which are imported here.
+
+    Raises:
+        UnknownNameError: for another name.
 
     Examples:
         >>> torsion.name in [one.name for one in diagnosis.registered_effects()]
         True
     """
-    return tuple(load_plugins().effects.values())
+    return tuple(_registered("effects", plugins))
 
 
-def registered_faults() -> tuple[Fault, ...]:
-    """Return every fault of data or input that plugins offer."""
-    return tuple(load_plugins().faults.values())
+def registered_faults(*plugins: str) -> tuple[Fault, ...]:
+    """Return the faults of data or input that come with femubench, and all of some other plugins.
+
+    Arguments:
+        plugins: names of installed plugins, which are imported here.
+
+    Raises:
+        UnknownNameError: for another name.
+    """
+    return tuple(_registered("faults", plugins))
 
 
-class _HookError(PluginError):
-    """A PluginError that knows its hook."""
-
-    def __init__(self, hook: str, message: str) -> None:
-        self.hook = hook
-        super().__init__(message)
-
-
-def _installed(points: Iterable[EntryPoint]) -> Iterator[_Source]:
-    """Return the entry points, the built-ins first so that no one can take their names."""
-
-    def order(point: EntryPoint) -> tuple[bool, str, str]:
-        name = _package(point)
-        return name != PROJECT, name, point.name
-
-    for point in sorted(points, key=order):
-        dist = point.dist
-        distribution = "no distribution" if dist is None else f"{dist.name} {dist.version}"
-        yield _Source(point.name, distribution, point)
+def _registered(kind: str, plugins: Sequence[str]) -> Iterator[Any]:
+    found = load_plugins(strangers=bool(plugins))
+    chosen("plugin", plugins, (plugin.plugin for plugin in found.loaded))
+    offers: Offers = getattr(found, kind)
+    for plugin in found.loaded:
+        for name in plugin.offers[kind]:
+            if plugin.own or plugin.plugin in plugins:
+                yield offers[name]
 
 
-def _package(point: EntryPoint) -> str:
-    return "" if point.dist is None else point.dist.name
+def _installed(points: Iterable[EntryPoint]) -> list[Source]:
+    """Return the entry points, the built-ins first so that no one can take their names.
+
+    A built-in is what leads to a module of femubench, and to nothing that somebody else installed.
+    """
+    found = []
+    for point in points:
+        name, distribution = "", "no distribution"
+        if point.dist is not None:
+            about = point.dist.metadata  # read once: a look at the name alone reads the file too
+            name = str(about["Name"])
+            distribution = f"{name} {about['Version']}"
+        own = point.module.partition(".")[0] == PROJECT and name in ("", PROJECT)
+        found.append((not own, name, Source(point.name, distribution, point, own=own)))
+    return [one[2] for one in sorted(found, key=lambda one: (*one[:2], one[2].name))]
 
 
-def _of_clone() -> Iterator[_Source]:
+def _of_clone() -> Iterator[Source]:
     """Return the built-ins as the clone's pyproject.toml lists them."""
     file = Path(__file__).parents[3] / "pyproject.toml"
     if file.is_file():
         listed = tomllib.loads(file.read_text(encoding="utf-8"))["project"]["entry-points"][PROJECT]
         for name, module in sorted(listed.items()):
             point = EntryPoint(name, module, PROJECT)
-            yield _Source(name, f"{PROJECT} {__version__}, not installed", point)
-
-
-def _register(source: _Source) -> pluggy.PluginManager:
-    """Return a manager of this one plugin, so that a fault of another cannot reach it.
-
-    Raises:
-        PluginError: when a hook is misspelt, unmarked or has arguments that it cannot get.
-    """
-    manager = pluggy.PluginManager(PROJECT)
-    manager.add_hookspecs(hookspecs)
-    plugin = source.load()
-    _check_spelling(plugin, manager)
-    try:
-        manager.register(plugin, source.name)
-        manager.check_pending()
-    except pluggy.PluginValidationError as fault:
-        text = " ".join(str(fault).split())
-        hook = next((name for name in HOOKS if repr(name) in text), "")
-        raise _HookError(hook, text.removeprefix(f"Plugin {source.name!r} ")) from fault
-    return manager
-
-
-def _check_spelling(plugin: object, manager: pluggy.PluginManager) -> None:
-    """Find functions that look like hooks or are marked as hooks and are none.
-
-    pluggy's `check_pending` sees the marked ones only and cannot say what was meant.
-    """
-    for name in dir(plugin):
-        options = manager.parse_hookimpl_opts(plugin, name)
-        if options is not None:
-            hook = options["specname"] or name
-            if hook not in HOOKS and not options["optionalhook"]:
-                raise _HookError(name, f"unknown hook {hook!r}{_or_known(hook)}")
-            continue
-        if not name.startswith(PREFIX):
-            continue
-        # A plugin may well import a module femubench_something: only functions count.
-        if inspect.isroutine(inspect.getattr_static(plugin, name, None)):
-            lacks = f"{name}() lacks the decorator @femubench.hookimpl"
-            unknown = f"unknown hook {name!r}{_or_known(name)}"
-            raise _HookError(name, lacks if name in HOOKS else unknown)
-
-
-def _or_known(name: str) -> str:
-    return did_you_mean(name, HOOKS) or f"; the hooks are {', '.join(HOOKS)}"
-
-
-def _collect(
-    source: _Source,
-    manager: pluggy.PluginManager,
-    kind: str,
-    taken: Offers,
-    broken: list[BrokenPlugin],
-) -> Iterator[str]:
-    """Call one hook of one plugin; what passes the checks goes into `taken`."""
-    hook = PREFIX + kind
-    try:
-        offered = list(_call(manager, hook))
-    except _FAULTS as fault:
-        broken.append(_broken(source, fault, hook))
-        return
-    for entry in offered:
-        try:
-            filled = (
-                _Reference(source, kind, entry)
-                if isinstance(entry, EntryPoint)
-                else CHECKS[kind](entry)
-            )
-            if filled.name in taken:
-                raise PluginError(f"the name {filled.name!r} is taken by another of the {kind}")
-        except _FAULTS as fault:
-            broken.append(_broken(source, fault, hook))
-            continue
-        taken[filled.name] = filled
-        yield filled.name
-
-
-def _call(manager: pluggy.PluginManager, hook: str) -> Iterator[object]:
-    """Call a hook and return one flat series of what its implementations gave."""
-    caller = getattr(manager.hook, hook)
-    answers = caller()
-    # pluggy drops None, which is what a forgotten `return` gives.
-    if len(answers) < len(caller.get_hookimpls()):
-        raise PluginError("returned None instead of a list")
-    for answer in answers:
-        if isinstance(answer, (str, bytes)) or not isinstance(answer, Iterable):
-            raise PluginError(f"returned {answer!r} instead of a list")
-        if not isinstance(answer, Mapping):
-            yield from answer
-            continue
-        for name, value in answer.items():
-            if not isinstance(value, str) or not EntryPoint.pattern.match(value):
-                raise PluginError(f"{name!r} is offered as {value!r}, not as 'module:Class'")
-            yield EntryPoint(name, value, hook)
-
-
-def _broken(source: _Source, fault: BaseException, hook: str = "") -> BrokenPlugin:
-    text = " ".join(str(fault).split())
-    kind = type(fault).__name__
-    message = text if isinstance(fault, PluginError) else f"{kind}: {text}" if text else kind
-    return BrokenPlugin(
-        source.name,
-        source.distribution,
-        fault.hook if isinstance(fault, _HookError) else hook,
-        message,
-        "".join(traceback.format_exception(fault)),
-    )
+            yield Source(name, f"{PROJECT} {__version__}, not installed", point)

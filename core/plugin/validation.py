@@ -7,9 +7,9 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from femubench.core.errors import PluginError, UnknownNameError
+from femubench.core.errors import PluginError, UnknownNameError, harmless
 from femubench.core.roles import (
     CAPABILITIES,
     Effect,
@@ -21,6 +21,7 @@ from femubench.core.roles import (
     declared,
 )
 
+Thing = TypeVar("Thing")
 # Names become words on the command line and parts of file names.
 _WORD = re.compile(r"[A-Za-z0-9][A-Za-z0-9._+-]*")
 _GROUPED = re.compile(rf"({_WORD.pattern}/)?{_WORD.pattern}")
@@ -175,6 +176,39 @@ def chosen(kind: str, names: Iterable[str], known: Iterable[str]) -> tuple[str, 
         if name not in known:
             raise unknown(kind, name, known)
     return unique
+
+
+def check_name(filled: object) -> None:
+    """Make sure that a name is one word.
+
+    Raises:
+        PluginError: when it is none.
+    """
+    _check_name(filled, filled, _WORD)
+
+
+def of_type(value: object, wanted: type[Thing], what: str) -> Thing:
+    """Return a value that a process of a stranger told.
+
+    Raises:
+        PluginError: when it is of another type.
+    """
+    if not isinstance(value, wanted):
+        raise PluginError(f"{what} was told as {type(value).__name__}, not {wanted.__name__}")
+    return value
+
+
+def listed_texts(value: object, what: str, known: Iterable[str] | None = None) -> list[str]:
+    """Return a list of lines that a process of a stranger told.
+
+    Raises:
+        PluginError: when it is none, or an entry is not among the known ones.
+    """
+    found = [harmless(of_type(item, str, what)) for item in of_type(value, list, what)]
+    for item in found if known is not None else ():
+        if item not in (known or ()):
+            raise PluginError(f"{what} {item[:80]!r} is unknown")
+    return found
 
 
 def _instance(offered: object) -> object:

@@ -9,14 +9,14 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, is_dataclass
 from typing import Any, cast
 
 from femubench.core.errors import InputError
+from femubench.core.plugin.options import SIMPLE, ToldOptions, entry_of, options_of, with_options
 from femubench.core.plugin.validation import did_you_mean
 from femubench.core.roles import Strategy, declared
 
-_SIMPLE = (bool, int, float, str, type(None))
 _UNKNOWN = object()
 
 
@@ -90,6 +90,8 @@ def labelled(strategy: Strategy, default: Strategy | None = None) -> Variant:
     Arguments:
         default: the same with default options; None for what its class makes without arguments.
     """
+    if default is None and isinstance(strategy, ToldOptions):
+        default = strategy.usual
     if default is None:
         try:
             default = type(strategy)()
@@ -107,7 +109,7 @@ def _settings(strategy: Strategy) -> dict[str, Any]:
     return options_of(strategy) or {
         key: value
         for key, value in own.items()
-        if isinstance(value, _SIMPLE) and key[:1] != "_" and key not in ("name", "citation")
+        if isinstance(value, SIMPLE) and key[:1] != "_" and key not in ("name", "citation")
     }
 
 
@@ -121,17 +123,15 @@ def _changed(base: Strategy, options: Mapping[str, object]) -> Strategy:
     Raises:
         InputError: for an option that it does not have, or a value of another type.
     """
-    known, changed = options_of(base), base
+    known = options_of(base)
+    wanted: dict[str, object] = {}
     for name, given in options.items():
         key = _full(base.name, name, known)
-        present = known.get(key, _entry(base, key))
+        present = known.get(key, entry_of(base, key, _UNKNOWN))
         if present is _UNKNOWN:
             raise _no_option(base.name, name, known)
-        try:
-            changed = _with(changed, key, _value(base.name, key, given, present))
-        except (TypeError, ValueError) as error:
-            raise InputError(f"strategy {base.name!r}: option {name}: {error}") from error
-    return changed
+        wanted[key] = _value(base.name, key, given, present)
+    return with_options(base, wanted)
 
 
 def _no_option(strategy: str, key: str, known: Mapping[str, object]) -> InputError:
@@ -159,33 +159,6 @@ def _shortest(key: str, known: Iterable[str]) -> str:
 
 def _text(value: object) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
-
-
-def _with(holder: Any, key: str, value: object) -> Any:  # noqa: ANN401 - a strategy, or options of one
-    """Return a copy with one option set, of the thing itself or of one of its options."""
-    name, _, inner = key.partition(".")
-    if isinstance(holder, Mapping):
-        return {**holder, key: value}
-    return replace(holder, **{name: _with(getattr(holder, name), inner, value) if inner else value})
-
-
-def _entry(strategy: object, key: str) -> object:
-    """Return the present entry of an option that maps names to numbers."""
-    name, _, inner = key.partition(".")
-    holder = getattr(strategy, name, None) if is_dataclass(strategy) else None
-    return float(holder.get(inner, 0.0)) if inner and isinstance(holder, Mapping) else _UNKNOWN
-
-
-def options_of(strategy: object) -> dict[str, Any]:
-    """Return the options that fit on a command line, with their present values."""
-    if not is_dataclass(strategy) or isinstance(strategy, type):
-        return {}
-    present = {field.name: getattr(strategy, field.name) for field in fields(strategy)}
-    simple = {name: value for name, value in present.items() if isinstance(value, _SIMPLE)}
-    for name, value in present.items():
-        inner = value if isinstance(value, Mapping) else options_of(value)
-        simple |= {f"{name}.{k}": v for k, v in inner.items() if isinstance(v, _SIMPLE)}
-    return simple
 
 
 def _value(strategy: str, key: str, given: object, present: object) -> object:

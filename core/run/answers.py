@@ -1,145 +1,131 @@
 """What a worker hands back, as bytes that can do nothing but hold data.
 
-A strategy's process has no friends: whatever comes out of it is read with a schema, and the model
-by a reader that knows the classes of a model and no others (Python documentation, pickle,
-"Restricting Globals").
+A strategy's process has no friends: whatever comes out of it is a status, a head of JSON and arrays
+of numbers, read with a schema; the model is told as its difference from the nominal one.
 """
 
 from __future__ import annotations
 
-import io
-import json
 import math
-import pickle
 import traceback
+import warnings
 from collections.abc import Mapping
 from dataclasses import fields, replace
-from typing import Any, get_args
+from typing import Any
 
-from femubench.core.errors import FemubenchError
+from femubench.core.errors import FemubenchError, StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.run.jobs import JobOutcome, one_line
+from femubench.core.run.plain_arrays import BytesError, Shelf, opened
+from femubench.core.run.plain_model import model_from_plain, model_to_plain
 from femubench.core.schema.results import Status
 
-_HEAD = 8  # bytes that hold the length of the head
-_LONGEST_HEAD = 64 * 2**20  # bytes
-_APART = ("model", "samples")  # what is no JSON
+# The first byte tells how a job ended, so that nobody else has to read an answer that is judged.
+_STATUS: Mapping[int, Status] = {
+    ord("o"): "ok", ord("f"): "failed", ord("d"): "diverged", ord("n"): "not-applicable"
+}  # fmt: skip
+_LONGEST_REPORT = 2 * 2**20  # bytes of the head of what has not succeeded
+_APART = ("status", "model", "samples")  # what is no JSON
 _LONGEST_TEXT = 100_000
 _LONGEST_NAME = 500
 _LONGEST_REASON = 2_000
 _MOST_FIGURES = 200_000
-_NUMPY = ("numpy", "numpy._core", "numpy.core", "scipy.sparse")
-_NAMES = {
-    "builtins": {"complex", "frozenset", "object", "set", "slice"},
-    "collections": {"OrderedDict"},
-    "copyreg": {"_reconstructor"},
-    "functools": {"partial"},
-    "types": {"MappingProxyType"},
-    "femubench.core.case.nodes": {"MatrixGeometry"},
-}
-_NUMPY_NAMES = frozenset(
-    {"_reconstruct", "_frombuffer", "scalar", "dtype", "ndarray"}
-    | {
-        f"{form}_{kind}"
-        for form in ("csr", "csc", "coo", "dia", "bsr")
-        for kind in ("array", "matrix")
-    }
-)
-# Where the classes of a model live; functions there (a section's kappa) compute and do no more.
-_OURS = ("femubench.core.fem.", "femubench.core.fem.model", "femubench.core.modal.measurement")
 
 
 class AnswerError(FemubenchError):
     """A worker handed back something that is no outcome."""
 
 
-def packed(outcome: JobOutcome) -> bytes:
-    """Return an outcome as bytes; one that cannot be sent has failed."""
+def packed(outcome: JobOutcome, nominal: Model | None = None) -> bytes:
+    """Return an outcome as bytes; one that cannot be sent has failed.
+
+    Arguments:
+        nominal: the model that the job started from; of an outcome without a model None will do.
+    """
     try:
-        parts = outcome.model, outcome.samples
-        model = b"" if outcome.model is None else pickle.dumps(parts, protocol=5)
-        head = {f.name: getattr(outcome, f.name) for f in fields(outcome) if f.name not in _APART}
-        text = json.dumps(head).encode()
+        return _sealed(outcome, nominal)
+    except StrategyFailure as error:
+        reason, trace = str(error), traceback.format_exc()
     except Exception as error:
-        reason = f"the result cannot be sent back: {one_line(error)}"
-        failed = JobOutcome("failed", reason, traceback.format_exc(), outcome.seconds)
-        return packed(failed)
-    return len(text).to_bytes(_HEAD, "big") + text + model
+        reason, trace = f"the result cannot be sent back: {one_line(error)}", traceback.format_exc()
+    return _sealed(JobOutcome("failed", reason, trace, outcome.seconds), None)
+
+
+def _sealed(outcome: JobOutcome, nominal: Model | None) -> bytes:
+    head = {f.name: getattr(outcome, f.name) for f in fields(outcome) if f.name not in _APART}
+    head |= {"reason": _clean(outcome.reason, _LONGEST_REASON)}
+    head |= {"traceback": _clean(outcome.traceback, _LONGEST_TEXT)}
+    shelf = Shelf()
+    if outcome.model is not None and nominal is not None:
+        head |= model_to_plain(outcome.model, outcome.samples, nominal, shelf)
+    letter = next(letter for letter, status in _STATUS.items() if status == outcome.status)
+    return bytes([letter]) + shelf.sealed(head)
+
+
+def _clean(text: str, longest: int) -> str:
+    return text[:longest].encode("utf-8", "replace").decode("utf-8")
+
+
+def status_of(data: bytes) -> Status:
+    """Return how a job ended, without a look at the rest; raises AnswerError."""
+    status = _STATUS.get(data[0]) if data else None
+    if status is None:
+        raise AnswerError("the result cannot be read: it does not say how the job ended")
+    return status
 
 
 def head_of(data: bytes) -> JobOutcome:
-    """Return an outcome without its model.
+    """Return an outcome without its model; of one to be judged nothing but that it is ``ok``.
 
     Raises:
         AnswerError: when the bytes are none.
     """
-    size = int.from_bytes(data[:_HEAD], "big")
-    if size > _LONGEST_HEAD:
-        raise AnswerError(f"its own report has {size} bytes, allowed {_LONGEST_HEAD}")
+    status = status_of(data)
+    if status == "ok":
+        return JobOutcome(status)
     try:
-        head = json.loads(data[_HEAD : _HEAD + size])
-        return _checked(head)
+        return _checked(status, opened(memoryview(data)[1:], _LONGEST_REPORT)[0])
     except Exception as error:  # whatever a stranger's text does to its reader
-        raise AnswerError(f"the result cannot be read: {one_line(error)}") from error
+        raise _unreadable(error) from error
 
 
-def unpacked(data: bytes) -> JobOutcome:
+def unpacked(data: bytes, nominal: Model) -> JobOutcome:
     """Return an outcome with its model.
 
+    Arguments:
+        nominal: the model that the job started from, of the case.
+
     Raises:
-        AnswerError: when the bytes are none, or hold what a model has no use for.
+        AnswerError: when the bytes are none, or hold what is no model of the case.
     """
-    outcome = head_of(data)
-    if outcome.status != "ok":
-        return outcome
-    start = _HEAD + int.from_bytes(data[:_HEAD], "big")
+    if status_of(data) != "ok":
+        return head_of(data)
     try:
-        held = _ModelReader(io.BytesIO(memoryview(data)[start:])).load()
-    except AnswerError:
-        raise
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            head, arrays = opened(memoryview(data)[1:])
+            model, samples = model_from_plain(head, arrays, nominal)
+        return replace(_checked("ok", head), model=model, samples=samples)
     except Exception as error:
-        raise AnswerError(f"the result cannot be read: {one_line(error)}") from error
-    model, samples = held if type(held) is tuple and len(held) == 2 else (held, ())
-    if type(model) is not Model:
-        raise AnswerError(f"the updated model is {type(model).__name__}, expected femubench.Model")
-    if not (type(samples) is tuple and all(type(sample) is Model for sample in samples)):
-        raise AnswerError("the samples of the updated model are no tuple of femubench.Model")
-    return replace(outcome, model=model, samples=samples)
+        raise _unreadable(error) from error
 
 
-class _ModelReader(pickle.Unpickler):
-    """Reads models and refuses every other class by name."""
-
-    def find_class(self, module: str, name: str) -> Any:  # noqa: ANN401 - as pickle has it
-        """Return a class or function that a model may hold.
-
-        Raises:
-            AnswerError: for any other.
-        """
-        known = name in _NAMES.get(module, ())
-        numeric = module.startswith(_NUMPY) and name in _NUMPY_NAMES
-        ours = module.startswith(_OURS) and "." not in name
-        if not (known or numeric or ours):
-            what = f"the updated model holds {module}.{name}"
-            raise AnswerError(f"{what}, which cannot be taken over: expected femubench's own parts")
-        found = super().find_class(module, name)
-        if ours and getattr(found, "__module__", None) != module:
-            raise AnswerError(
-                f"the updated model holds {module}.{name}, which is not defined there"
-            )
-        return found
+def _unreadable(error: Exception) -> AnswerError:
+    what = str(error) if isinstance(error, FemubenchError) else one_line(error)
+    if isinstance(error, StrategyFailure):
+        return AnswerError(what)
+    where = "result cannot be read" if isinstance(error, BytesError) else "updated model"
+    return AnswerError(f"the {where}: {' '.join(what.split())[:_LONGEST_REASON]}")
 
 
-def _checked(head: Mapping[str, Any]) -> JobOutcome:
-    if head["status"] not in get_args(Status):
-        raise ValueError(f"status {head['status']!r}")
+def _checked(status: Status, head: Mapping[str, Any]) -> JobOutcome:
     parameters, history = list(head["parameters"]), list(head["history"])
     if len(parameters) > _MOST_FIGURES or sum(map(len, history)) > _MOST_FIGURES:
-        raise ValueError("more figures than anybody reads")
+        raise BytesError("more figures than anybody reads")
     return JobOutcome(
-        status=head["status"],
-        reason=str(head["reason"])[:_LONGEST_REASON],
-        traceback=str(head["traceback"])[:_LONGEST_TEXT],
+        status=status,
+        reason=_text(head["reason"], _LONGEST_REASON),
+        traceback=_text(head["traceback"], _LONGEST_TEXT),
         seconds=max(_number(head["seconds"]), 0.0),
         evaluations=_count(head["evaluations"]),
         discrepancy_std=_std(head.get("discrepancy_std")),
@@ -150,11 +136,17 @@ def _checked(head: Mapping[str, Any]) -> JobOutcome:
     )
 
 
+def _text(value: object, longest: int = _LONGEST_NAME) -> str:
+    if not isinstance(value, str):
+        raise BytesError(f"{repr(value)[:40]} is no text")
+    return _clean(value, longest)
+
+
 def _count(value: object) -> int | None:
     if value is None:
         return None
     if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < 2**63:
-        raise ValueError(f"{str(value)[:40]} is no count")
+        raise BytesError(f"{repr(value)[:40]} is no count")
     return value
 
 
@@ -163,26 +155,29 @@ def _std(value: object) -> float | None:
         return None
     number = _number(value)
     if not 0.0 <= number < math.inf:
-        raise ValueError(f"{number} is no standard deviation")
+        raise BytesError(f"{number} is no standard deviation")
     return number
 
 
 def _parameter(item: Mapping[str, Any]) -> dict[str, Any]:
     std = item["std"]
     return {
-        "name": str(item["name"])[:_LONGEST_NAME],
+        "name": _text(item["name"]),
         "before": _number(item["before"]),
         "after": _number(item["after"]),
-        "unit": str(item["unit"])[:_LONGEST_NAME],
+        "unit": _text(item["unit"]),
         "std": None if std is None else _number(std),
     }
 
 
 def _figures(item: Mapping[str, Any]) -> dict[str, float]:
-    return {str(name)[:_LONGEST_NAME]: _number(value) for name, value in item.items()}
+    return {_text(name): _number(value) for name, value in item.items()}
 
 
 def _number(value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise TypeError(f"{value!r} is no number")
-    return float(value)
+        raise BytesError(f"{repr(value)[:40]} is no number")
+    try:
+        return float(value)
+    except OverflowError:
+        raise BytesError("a whole number is too large") from None

@@ -32,7 +32,7 @@ from femubench.core.run.jobs import JobOutcome, one_line
 from femubench.core.run.limits import Limits
 from femubench.core.run.provenance import home_of
 from femubench.core.run.schedule import Show, unjudged
-from femubench.core.run.slots import Slot, Start
+from femubench.core.run.slots import Slot, Start, first_seed
 from femubench.core.run.workers import no_script
 from femubench.core.schema.results import JobResult
 from femubench.core.score.scoring import Reference
@@ -153,7 +153,7 @@ class _Flight:
         self._client, self._demand, self._slots = client, demand, slots
         self._references, self._limits, self._show = references, limits, show
         self._name = f"femubench-{secrets.token_hex(4)}"
-        self._shown = min((slot.seed for slot in slots), default=0)
+        self._shown = first_seed(slots)
         self._number = 0
         self._places: dict[str, int] = {}
         # What did not come back is tried once more, last and one at a time.

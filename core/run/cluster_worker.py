@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import threading
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -18,6 +19,7 @@ from femubench.core.run.limits import LEAST, Limits, memory_share, spoken_bytes
 from femubench.core.run.provenance import blas_name, cpu_name, package_version, versions
 from femubench.core.run.schedule import computed
 from femubench.core.run.slots import Slot, Start
+from femubench.core.run.standing_judge import Judges
 from femubench.core.run.workers import adopting
 from femubench.core.schema.results import JobResult
 from femubench.core.score.scoring import Reference
@@ -131,12 +133,21 @@ def run_errand(yardstick: Yardstick, errand: Errand, demand: Demand) -> Arrived:
     slots, references = [Slot(start, name, errand.seed, errand.code)], {start.case.name: reference}
     exhibits: list[Mapping[str, Any]] = []
     show = (lambda _, exhibit: exhibits.append(exhibit)) if errand.shown else None
-    ((_, result),) = computed(slots, [0], references, {name: limits}, 1, show, wanted)
+    found = computed(slots, [0], references, {name: limits}, 1, show, wanted, _judges())
+    ((_, result),) = found
     result = replace(result, provenance={"cpu": cpu_name(), "blas": _blas()})
     return result, exhibits[0] if exhibits else None
 
 
-_OPEN = ExitStack()
+_OPEN, _OF_THREAD = ExitStack(), threading.local()
+
+
+def _judges() -> Judges[Any]:
+    """Return the judges of this thread, which live as long as the worker."""
+    if not hasattr(_OF_THREAD, "judges"):
+        _OF_THREAD.judges = Judges[Any]()
+    found: Judges[Any] = _OF_THREAD.judges
+    return found
 
 
 @cache

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import pickle
 import traceback
 import warnings
 from dataclasses import dataclass, fields, replace
@@ -12,7 +11,7 @@ from typing import Any
 from femubench.core.case.case import Case
 from femubench.core.errors import FemubenchError, StrategyFailure
 from femubench.core.run.answers import AnswerError, packed, unpacked
-from femubench.core.run.jobs import Job, JobOutcome, execute, one_line
+from femubench.core.run.jobs import Job, JobOutcome, one_line, performed
 from femubench.core.run.model_checks import check_model
 from femubench.core.schema.records import result_to_json
 from femubench.core.schema.results import JobResult, Nominal
@@ -27,7 +26,7 @@ class Verdict:
     """What it takes to judge an answer.
 
     Arguments:
-        case: the case and its `Reference`, pickled by this program.
+        case: the case and its `Reference`, pickled by this program; empty where the judge has it.
         answer: of the strategy's worker, from `packed`; nobody has looked into it yet.
         strategy, seed, nominal: of the job.
         exhibited: whether its exhibit is wanted too.
@@ -43,14 +42,13 @@ class Verdict:
 
 def run_strategy(job: Job) -> bytes:
     """Return the packed outcome of a job; runs in a worker."""
-    return packed(execute(job))
+    return packed(*performed(job))
 
 
-def run_judge(verdict: Verdict) -> bytes:
-    """Return the result of a job and its exhibit as JSON; runs in a worker."""
-    case, reference = pickle.loads(verdict.case)
+def run_judge(verdict: Verdict, case: Case, reference: Reference) -> bytes:
+    """Return the result of a job and its exhibit as JSON; runs in a judge's process."""
     try:
-        outcome = unpacked(verdict.answer)
+        outcome = unpacked(verdict.answer, case.model)
     except AnswerError as error:
         outcome = JobOutcome("failed", str(error), traceback.format_exc())
     job = verdict.strategy, verdict.seed, verdict.nominal

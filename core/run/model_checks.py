@@ -35,9 +35,25 @@ def check_model(model: Model, nominal: Model) -> None:
             _check_low_rank(f"{name}_change", change, size)
 
 
-def _check_sparse(name: str, matrix: Any, size: int) -> None:  # noqa: ANN401 - whatever came back
+def check_entries(name: str, matrix: Any) -> None:  # noqa: ANN401 - whatever came back
+    """Check that a matrix is a sparse array of real numbers; raises StrategyFailure."""
     if not sp.issparse(matrix):
         raise StrategyFailure(f"{name} is {type(matrix).__name__}, expected a sparse array")
+    _check_real(name, matrix)
+    if matrix.format not in ("csr", "csc"):
+        _check_indices(name, matrix)
+
+
+def check_change(name: str, change: Any) -> None:  # noqa: ANN401
+    """Check that a change is one of low rank, in real numbers; raises StrategyFailure."""
+    if not isinstance(change, LowRank):
+        raise StrategyFailure(f"{name} is {type(change).__name__}, expected LowRank")
+    for part in ("basis", "core"):
+        _check_real(f"{name}: {part}", np.asarray(getattr(change, part)))
+
+
+def _check_sparse(name: str, matrix: Any, size: int) -> None:  # noqa: ANN401
+    check_entries(name, matrix)
     _check_shape(name, matrix.shape, (size, size))
     _check_indices(name, matrix)
     entries = sp.coo_array(matrix)
@@ -60,8 +76,7 @@ def _check_indices(name: str, matrix: Any) -> None:  # noqa: ANN401
 
 
 def _check_low_rank(name: str, change: Any, size: int) -> None:  # noqa: ANN401
-    if not isinstance(change, LowRank):
-        raise StrategyFailure(f"{name} is {type(change).__name__}, expected LowRank")
+    check_change(name, change)
     basis, core = np.asarray(change.basis), np.asarray(change.core)
     if basis.ndim != 2:
         raise StrategyFailure(f"{name}: basis has {basis.ndim} dimensions, expected 2")
@@ -77,9 +92,13 @@ def _check_shape(name: str, shape: tuple[int, ...], expected: tuple[int, ...]) -
         raise StrategyFailure(f"{name} has shape {tuple(shape)}, expected {expected}")
 
 
-def _check_numbers(name: str, data: Any) -> None:  # noqa: ANN401
+def _check_real(name: str, data: Any) -> None:  # noqa: ANN401
     if not np.issubdtype(data.dtype, np.floating) and not np.issubdtype(data.dtype, np.integer):
         raise StrategyFailure(f"{name} has entries of type {data.dtype}, expected real numbers")
+
+
+def _check_numbers(name: str, data: Any) -> None:  # noqa: ANN401
+    _check_real(name, data)
     bad = int(np.count_nonzero(~np.isfinite(data)))
     if bad:
         raise StrategyFailure(f"{name} has {bad} entries that are not finite, expected none")

@@ -13,18 +13,18 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from functools import cache, lru_cache
 from importlib import metadata
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from femubench.core.case.case import Case
 from femubench.core.modal.factorisation import solver_name, solver_note
+from femubench.core.plugin.foreign import ForeignStrategy
+from femubench.core.plugin.source_files import Stamp, python_files, stamp, stamps
 from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Strategy
 from femubench.core.score.scoring import Reference
 from femubench.core.version import __version__
 
-Stamp = tuple[str, int, int]  # a file, when it was changed, its size
 _OWN = "femubench"
 
 
@@ -56,6 +56,11 @@ def strategy_version(strategy: Strategy) -> str:
 
     The digest is there because a package in the making changes and keeps its number.
     """
+    inner = strategy.base if isinstance(strategy, Variant) else strategy
+    if isinstance(inner, ForeignStrategy):
+        number = inner.handle.origin.distribution.rpartition(" ")[2]
+        files = tuple(one for top in inner.modules for one in stamps(top))
+        return f"{number}+{_digest(files)}"
     top, module = home_of(strategy)
     return f"{_number(top)}+{source_digest(top, module)}"
 
@@ -67,7 +72,10 @@ def comes_along(strategy: Strategy) -> bool:
 
 def home_of(strategy: Strategy) -> tuple[str, str]:
     """Return the package and the module of a strategy."""
-    module = type(strategy.base if isinstance(strategy, Variant) else strategy).__module__
+    inner = strategy.base if isinstance(strategy, Variant) else strategy
+    if isinstance(inner, ForeignStrategy):
+        return inner.modules[0], inner.handle.origin.value.partition(":")[0]
+    module = type(inner).__module__
     return module.partition(".")[0], module
 
 
@@ -82,14 +90,8 @@ def package_version(top: str) -> str:
     Arguments:
         top: name of the package, or of a module that is no package.
     """
-    spec = find_spec(top)
-    if spec is None:
-        return "not installed"
-    folders = spec.submodule_search_locations or ()
-    files = sorted(file for folder in folders for file in _python_files(folder))
-    if spec.origin and not files:
-        files = [spec.origin]
-    return f"{_installed(top, '0')}+{_digest(tuple(map(_stamp, files)))}"
+    found = stamps(top)
+    return f"{_installed(top, '0')}+{_digest(found)}" if found else "not installed"
 
 
 @cache
@@ -107,19 +109,11 @@ def _installed(package: str, missing: str) -> str:
 def _stamps(top: str, module: str) -> Iterator[Stamp]:
     """Yield the Python files of a package, or the file of a lone module, with time and size."""
     folders = getattr(sys.modules.get(top), "__path__", ())
-    files = sorted({file for folder in folders for file in _python_files(folder)})
+    files = sorted({file for folder in folders for file in python_files(folder)})
     own = getattr(sys.modules.get(module), "__file__", None)
     if not files and own:
         files = [own]
-    yield from map(_stamp, files)
-
-
-def _stamp(file: str) -> Stamp:
-    try:
-        found = os.stat(file)
-    except OSError:  # a link that leads nowhere is no source
-        return file, 0, 0
-    return file, found.st_mtime_ns, found.st_size
+    yield from map(stamp, files)
 
 
 @lru_cache(maxsize=64)
@@ -132,16 +126,6 @@ def _digest(stamps: tuple[Stamp, ...]) -> str:
         with suppress(OSError):
             found.update(file.read_bytes())
     return found.hexdigest()[:12]
-
-
-def _python_files(folder: str) -> Iterator[str]:
-    """Yield the paths of the Python files below a folder; strings, since `Path` takes its time."""
-    with suppress(OSError), os.scandir(folder) as entries:
-        for entry in entries:
-            if entry.name.endswith(".py"):
-                yield entry.path
-            elif entry.name != "__pycache__" and entry.is_dir():
-                yield from _python_files(entry.path)
 
 
 def provenance(meta: Mapping[str, Any], digest: str, version: str, seed: int) -> dict[str, Any]:

@@ -10,9 +10,11 @@ from typing import Any, Literal
 
 from femubench.core.drawing.prediction import keep_drawings
 from femubench.core.errors import InputError
+from femubench.core.garbage import uncollected
 from femubench.core.run.schedule import Show
-from femubench.core.run.slots import Slot
+from femubench.core.run.slots import Slot, starts_of
 from femubench.core.run.store import Store
+from femubench.core.run.stored import AnyRecord
 from femubench.core.schema.results import DONE, JobResult
 
 Progress = Callable[[JobResult, int, int], None]
@@ -22,15 +24,26 @@ OVERWRITE: tuple[Overwrite, ...] = ("always", "missing", "failed")
 
 @dataclass(frozen=True)
 class Known:
-    """Results that are in the store, by the key of their job.
+    """Records of results that are in the store, by the key of their job.
 
     Arguments:
         found: those to keep, of this run or of another.
         own: those of this run.
     """
 
-    found: Mapping[str, JobResult] = field(default_factory=dict)
-    own: Mapping[str, JobResult] = field(default_factory=dict)
+    found: dict[str, AnyRecord] = field(default_factory=dict)
+    own: dict[str, AnyRecord] = field(default_factory=dict)
+
+    def take(self, key: str) -> tuple[JobResult | None, bool]:
+        """Return a result to keep, if there is one, and whether this run has it; let go of it."""
+        record, before = self.found.pop(key, None), self.own.pop(key, None)
+        if record is None:
+            return None, False
+        there = before is not None and before.status == record.status
+        try:
+            return (before if before and there else record).result(), there
+        except InputError:
+            return None, False
 
 
 class Results:
@@ -43,7 +56,7 @@ class Results:
         self._found: dict[int, JobResult] = {}
         if store is not None:
             # What is drawn of a case starts from the model that makes the ranks, which comes first.
-            drawn = {slot.case.name: slot.case for slot in reversed(slots)}
+            drawn = {start.case.name: start.case for start in reversed(starts_of(slots))}
             # Under other conditions nothing of it looks otherwise.
             own = [case for case in drawn.values() if not case.conditions(0)]
             keep_drawings(store.exhibits, own)
@@ -70,17 +83,19 @@ class Results:
         if self._store is not None and not slot.stale:
             self._store.exhibits.put(slot.key, exhibit)
 
+    @uncollected()
     def keep(self, known: Known) -> list[int]:
-        """Take the results that the store has; return what is missing."""
+        """Take the results that the store has, which lets go of them; return what is missing."""
         missing = []
+        taken: dict[str, tuple[JobResult | None, bool]] = {}
         for index, slot in enumerate(self._slots):
-            result, before = known.found.get(slot.key), known.own.get(slot.key)
+            # A model as drawn that has all that handbooks give is one job from either start.
+            if slot.key not in taken:
+                taken[slot.key] = known.take(slot.key)
+            result, there = taken[slot.key]
             if result is None:
                 missing.append(index)
                 continue
-            there = before is not None and before.status == result.status
-            # A model as drawn that has all that handbooks give is one job from either start.
-            result = before if before and there else result
             if result.nominal != slot.nominal:
                 result = result.changed(nominal=slot.nominal)
             if self._store is not None and not there:
@@ -118,12 +133,12 @@ def recorded(
         store.begin(meta)
     if keep == "always":
         return meta, Known()
-    own = store.by_key(meta["run"])
-    found = store.by_key(but=meta["run"])
+    own = store.latest(meta["run"])
+    found = store.latest(but=meta["run"])
     # A failure is no later result.
     found |= {key: r for key, r in own.items() if r.status in DONE or key not in found}
     if keep == "failed":
-        found = {key: result for key, result in found.items() if result.status in DONE}
+        found = {key: record for key, record in found.items() if record.status in DONE}
     return meta, Known(found, own)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import pickle
 from collections import Counter, deque
@@ -14,9 +15,10 @@ from typing import Any
 from femubench.core.errors import InputError
 from femubench.core.run.answers import AnswerError, head_of
 from femubench.core.run.jobs import JobOutcome
-from femubench.core.run.judging import Verdict, judged, run_judge, run_strategy
+from femubench.core.run.judging import Verdict, judged, run_strategy
 from femubench.core.run.limits import Limits
-from femubench.core.run.slots import Slot, Start
+from femubench.core.run.slots import Slot, Start, first_seed
+from femubench.core.run.standing_judge import Judges
 from femubench.core.run.workers import Ending, Workers
 from femubench.core.schema.records import result_from_json
 from femubench.core.schema.results import JobResult, Status
@@ -37,6 +39,7 @@ def computed(
     count: int,
     show: Show | None = None,
     pulse: Callable[[], None] = lambda: None,
+    judges: Judges[_Task] | None = None,
 ) -> Iterator[tuple[int, JobResult]]:
     """Yield the result of every wanted slot as it comes, from processes of this machine.
 
@@ -45,20 +48,24 @@ def computed(
         count: number of processes.
         show: takes the exhibit of a job of the first seed, before its result comes.
         pulse: called twice a second and more; what it raises ends the jobs that run.
+        judges: that are there already, and stay; else there are some for this time.
     """
+    if judges is None:
+        with Judges[_Task]() as judges:
+            yield from computed(slots, wanted, references, limits, count, show, pulse, judges)
+        return
 
     bench = _Bench(slots, references, limits, show, iter(wanted))
-    workers = Workers[_Task](count)
-    if not bench.has_work(workers):
+    if not bench.has_work(0):
         return
-    with workers.open():
+    with Workers[_Task](count).open() as workers, judges.at_hand():
         while True:
             pulse()
-            while workers.free and bench.has_work(workers):
-                yield from bench.start(workers)
-            if not workers.busy:
+            while (busy := workers.running + judges.busy) < workers.count and bench.has_work(busy):
+                yield from bench.start(workers, judges)
+            if not (workers.busy or judges.busy):
                 return
-            for task, ending in workers.wait():
+            for task, ending in (*workers.wait(judges.parts), *judges.ended()):
                 yield from bench.taken(task, ending)
 
 
@@ -75,7 +82,7 @@ class _Bench:
     ) -> None:
         self._wanted = wanted
         self._slots, self._references, self._limits = slots, references, limits
-        self._show, self._shown = show, min((slot.seed for slot in slots), default=0)
+        self._show, self._shown = show, first_seed(slots)
         self._case = lru_cache(_MOST_CASES)(self._pickled)
         self._attempts = Counter[int]()
         self._alone: set[int] = set()
@@ -84,13 +91,15 @@ class _Bench:
         # Ended by another job, or they ended others: they run last, one at a time.
         self.lonely: deque[_Task] = deque()
 
-    def has_work(self, workers: Workers[_Task]) -> bool:
-        """Tell whether there is something to start now."""
+    def has_work(self, busy: int) -> bool:
+        """Tell whether there is something to start beside so many that run."""
         if not (self.waiting or self.answers):
             self.waiting.extend((index, b"") for index in islice(self._wanted, 1))
-        return bool(self.waiting or self.answers or (self.lonely and not workers.busy))
+        return bool(self.waiting or self.answers or (self.lonely and not busy))
 
-    def start(self, workers: Workers[_Task]) -> Iterator[tuple[int, JobResult]]:
+    def start(
+        self, workers: Workers[_Task], judges: Judges[_Task]
+    ) -> Iterator[tuple[int, JobResult]]:
         """Start judging an answer or running a job; yield the result of one that cannot start."""
         task = (self.answers or self.waiting or self.lonely).popleft()
         index, answer = task
@@ -102,8 +111,9 @@ class _Bench:
         if answer:
             shown = self._show is not None and slot.seed == self._shown and not slot.varied
             names = slot.strategy, slot.seed, slot.nominal
-            verdict = Verdict(self._case(slot.start), answer, *names, exhibited=shown)
-            ending = workers.start(task, run_judge, verdict, self._judging(slot.strategy))
+            digest, case = self._case(slot.start)
+            verdict = Verdict(case, answer, *names, exhibited=shown)
+            ending = judges.start(task, digest, verdict, self._judging(slot.strategy))
         else:
             ending = workers.start(task, run_strategy, job, self._limits[slot.strategy])
         if ending is not None and not self._again(task):
@@ -126,6 +136,8 @@ class _Bench:
             self.lonely.append(task)
         elif ending.how == "no-start" and self._again(task):
             return
+        elif answer and ending.how == "died" and self._again(task):
+            return  # whoever ended the judge has only delayed its judgement
         elif answer:
             found = self._judgement(self._slots[index], ending)
             yield index, self.unjudged(index, found) if isinstance(found, JobOutcome) else found
@@ -153,9 +165,11 @@ class _Bench:
             self._show(slot, data["exhibit"])
         return result
 
-    def _pickled(self, start: Start) -> bytes:
+    def _pickled(self, start: Start) -> tuple[bytes, bytes]:
+        """Return a case and its reference as the judge reads them, after their digest."""
         pair = start.case, self._references[start.case.name]
-        return pickle.dumps(pair, protocol=pickle.HIGHEST_PROTOCOL)
+        data = pickle.dumps(pair, protocol=pickle.HIGHEST_PROTOCOL)
+        return hashlib.blake2b(data, digest_size=16).digest(), data
 
     def _judging(self, strategy: str) -> Limits:
         limits = self._limits[strategy]

@@ -160,6 +160,16 @@ class Slots(Sequence[Slot]):
         return Slot(start, name, seed, code, key, version, now, self.meta)
 
 
+def first_seed(slots: Sequence[Slot]) -> int:
+    """Return the lowest seed of jobs, of which none is made for it."""
+    return min(slots.seeds if isinstance(slots, Slots) else (s.seed for s in slots), default=0)
+
+
+def starts_of(slots: Sequence[Slot]) -> Sequence[Start]:
+    """Return where jobs start from, in their order; none of them is made for it."""
+    return slots.starts if isinstance(slots, Slots) else [*dict.fromkeys(s.start for s in slots)]
+
+
 class _Lately:
     """A function that looks through files, called once a second at most."""
 

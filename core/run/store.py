@@ -174,8 +174,17 @@ class Store:
         return Run({**meta, "notes": notes}, tuple(listed), beside)
 
     @uncollected()
-    def by_key(self, run_id: str | None = None, *, but: str | None = None) -> dict[str, JobResult]:
-        """Return the latest result of every job that has a key.
+    def by_key(self) -> dict[str, JobResult]:
+        """Return the latest result of every job of any run that has a key and can be read."""
+        found: dict[str, JobResult] = {}
+        for key, record in self.latest().items():
+            with suppress(InputError):
+                found[key] = record.result()
+        return found
+
+    @uncollected()
+    def latest(self, run_id: str | None = None, *, but: str | None = None) -> dict[str, AnyRecord]:
+        """Return the record of the latest result of every job that has a key, yet to be decoded.
 
         A failure after a result is no later one: what made it fail, such as a shorter time limit,
         is not in the key.
@@ -184,15 +193,14 @@ class Store:
             run_id: whose results; None for those of all runs.
             but: a run whose results are left out.
         """
-        found: dict[str, JobResult] = {}
+        found: dict[str, AnyRecord] = {}
         for run in (*self.runs(),) if run_id is None else (run_id,):
             for record in self.records(run, []) if run != but else ():
                 known = found.get(record.key)
                 if not record.key or record.kind != "result":
                     continue
                 if known is None or record.status in DONE or known.status not in DONE:
-                    with suppress(InputError):
-                        found[record.key] = record.result()
+                    found[record.key] = record
         return found
 
     def begun(self, run_id: str | None = None) -> dict[str, Any]:

@@ -77,8 +77,8 @@ def serve(
     os.write(descriptor, READY)
     with warnings.catch_warnings():
         data = function(argument)
-    _write_all(descriptor, len(data).to_bytes(LENGTH_BYTES, "big"))
-    _write_all(descriptor, data)
+    write_all(descriptor, len(data).to_bytes(LENGTH_BYTES, "big"))
+    write_all(descriptor, data)
 
 
 def _leave_the_family(output: Connection, scratch: str) -> None:
@@ -86,7 +86,7 @@ def _leave_the_family(output: Connection, scratch: str) -> None:
     # Ctrl-C goes to the whole foreground group; it is the parent that stops the workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.setsid()
-    _end_with_parent()
+    end_with_parent()
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
     os.close(nothing)
@@ -112,7 +112,8 @@ def _close_all_but(descriptor: int) -> None:
     os.closerange(descriptor + 1, os.sysconf("SC_OPEN_MAX"))
 
 
-def _end_with_parent() -> None:
+def end_with_parent() -> None:
+    """Let this process be ended when its parent ends (Linux)."""
     if sys.platform == "linux":
         _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
@@ -123,10 +124,10 @@ def _set_limits(limits: Limits) -> None:
     # Without this the signal would end the process before the write could fail.
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     if limits.memory is not None:
-        _lower(resource.RLIMIT_AS, _address_space() + limits.memory)
+        _lower(resource.RLIMIT_AS, address_space() + limits.memory)
 
 
-def _address_space() -> int:
+def address_space() -> int:
     """Return the bytes of address space of this process; of Linux without what psutil looks up."""
     if sys.platform != "linux":
         return int(psutil.Process().memory_info().vms)
@@ -140,7 +141,8 @@ def _lower(what: int, wanted: int) -> None:
     resource.setrlimit(what, (most, most))
 
 
-def _write_all(descriptor: int, data: bytes) -> None:
+def write_all(descriptor: int, data: bytes) -> None:
+    """Write bytes, however long it takes."""
     view = memoryview(data)
     while view:
         view = view[os.write(descriptor, view[: 2**20]) :]

@@ -15,10 +15,11 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing import connection, forkserver, get_context, resource_tracker
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, Literal, TypeVar
@@ -282,14 +283,19 @@ class Workers(Generic[Key]):
         self._looked = 0.0
 
     @property
+    def running(self) -> int:
+        """Return how many tasks are running."""
+        return len(self._running)
+
+    @property
     def free(self) -> bool:
         """Tell whether another task can start."""
-        return len(self._running) < self.count
+        return self.running < self.count
 
     @property
     def busy(self) -> bool:
         """Tell whether a task is running."""
-        return bool(self._running)
+        return self.running > 0
 
     @contextmanager
     def open(self) -> Iterator[Workers[Key]]:
@@ -318,16 +324,12 @@ class Workers(Generic[Key]):
             argument: its argument; pickled.
             limits: what it may take.
         """
-        context = get_context("forkserver")
-        scratch = tempfile.mkdtemp(dir=self._root)
+        context, scratch = get_context("forkserver"), tempfile.mkdtemp(dir=self._root)
         answer, send = context.Pipe(duplex=False)
         output, printed = context.Pipe(duplex=False)
         arguments = (function, argument, send, printed, limits, scratch)
-        process = context.Process(target=serve, args=arguments)
         try:
-            _server_mark()  # a job may have ended the server
-            with no_script():
-                process.start()
+            process = forked(serve, *arguments)
         except (OSError, EOFError) as error:
             for end in (answer, output):
                 end.close()
@@ -340,13 +342,18 @@ class Workers(Generic[Key]):
         self._running.append(Task(key, process, answer, output, limits, scratch, _server()))
         return None
 
-    def wait(self) -> list[tuple[Key, Ending]]:
-        """Wait until some task has ended, and return those that have; none after a short while."""
+    def wait(self, beside: Sequence[Any] = ()) -> list[tuple[Key, Ending]]:
+        """Wait until some task has ended, and return those that have; none after a short while.
+
+        Arguments:
+            beside: what else there is to wait for, as `connection.wait` takes it.
+        """
         now = time.monotonic()
         until = [task.deadline for task in self._running]
         known = [moment - now for moment in until if moment is not None]
         pause = max(min([_TICK, *known]), 0.0)
-        connection.wait([part for task in self._running for part in parts_of(task)], pause)
+        own = [part for task in self._running for part in parts_of(task)]
+        connection.wait([*own, *beside], pause)
         look = time.monotonic() - self._looked >= _TICK
         if look:
             self._looked = time.monotonic()
@@ -378,6 +385,22 @@ class Workers(Generic[Key]):
                 self._dying.remove(task)
                 task.process.close()
                 shutil.rmtree(task.scratch, ignore_errors=True)
+
+
+def forked(body: Callable[..., None], *arguments: object) -> BaseProcess:
+    """Start a process from the server of all workers.
+
+    Arguments:
+        body, arguments: what it runs, importable by name, and with what; pickled.
+
+    Raises:
+        OSError, EOFError: when there is none to be had.
+    """
+    process = get_context("forkserver").Process(target=body, args=arguments)
+    _server_mark()  # a job may have ended the server
+    with no_script():
+        process.start()
+    return process
 
 
 def _server_mark() -> str:

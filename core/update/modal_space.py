@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.linalg as la
@@ -22,7 +23,7 @@ from femubench.core.modal.eigen import (
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import WINDOW_WITHOUT_SHAPE, pair_modes
 from femubench.core.modal.sparse_eigen import ShiftedModel
-from femubench.core.typing import FloatArray, IntArray
+from femubench.core.typing import BoolArray, FloatArray, IntArray
 from femubench.core.update.parameter_sets import StiffnessParts
 from femubench.core.update.strategy import ParameterEstimate, UpdateResult
 
@@ -105,31 +106,49 @@ class ModalSpace:
         eigenvalues, vectors = self.eigenpairs(log)
         readings = self.readings @ vectors
         partner = self.partners(eigenvalues, readings)
-        measured, m = self.measurement, len(self.measurement)
-        parts, factors = self.parts, np.exp(log)
-        if not slopes:
-            parts, factors = parts[:0], factors[:0]
-        seen = seen_modes(measured.shapes) & (self.shape_weight > 0.0)
-        rows, shape_rows = np.full(m, _LOST), np.zeros((m, len(readings) if seen.any() else 0))
-        slope, shape_slope = np.zeros((m, len(parts))), np.zeros((*shape_rows.shape, len(parts)))
-        for i in np.flatnonzero(partner >= 0):
+        m, shapes = len(self.measurement), self._unit_shapes
+        rows, shape_rows = np.full(m, _LOST), np.zeros((m, len(readings) if shapes.any() else 0))
+        size = len(log) if slopes else 0
+        slope, shape_slope = np.zeros((m, size)), np.zeros((*shape_rows.shape, size))
+        there = np.flatnonzero(partner >= 0)
+        own = np.sqrt(np.maximum(eigenvalues[partner[there]], 0.0)) / (2.0 * np.pi)
+        rows[there] = 1.0 - own / self.measurement.frequencies[there]
+        for i in there:
             j = partner[i]
-            own = np.sqrt(max(eigenvalues[j], 0.0)) / (2.0 * np.pi)
-            rows[i] = 1.0 - own / measured.frequencies[i]
-            gain = ((parts @ vectors[:, j]) * factors[:, None]) @ vectors  # p, r
-            slope[i] = -(1.0 - rows[i]) * gain[:, j] / (2.0 * eigenvalues[j])
-            if seen[i]:
+            if slopes:
+                gain = ((self.parts @ vectors[:, j]) * np.exp(log)[:, None]) @ vectors  # p, r
+                slope[i] = -(1.0 - rows[i]) * gain[:, j] / (2.0 * eigenvalues[j])
+            if not shapes[i].any():
+                continue
+            read = np.where(self._known[i], readings[:, j], 0.0)
+            scale, shape_rows[i] = _shape_misfit(shapes[i], read)
+            if slopes:
                 gap = eigenvalues[j] - eigenvalues
                 gap[np.abs(gap) < _DEPENDENT * eigenvalues[j]] = np.inf
-                shape_rows[i], shape_slope[i] = _shape_misfit(
-                    measured.shapes[:, i], readings[:, j], readings @ (gain / gap).T
-                )
+                turn = np.where(self._known[i][:, None], readings @ (gain / gap).T, 0.0)
+                shape_slope[i] = _shape_slope(shapes[i], read, turn, scale)
         weight = self.shape_weight
         return ModalFit(
             np.append(rows, weight * shape_rows.ravel()),
-            np.vstack([slope, weight * shape_slope.reshape(shape_rows.size, len(parts))]),
+            np.vstack([slope, weight * shape_slope.reshape(shape_rows.size, size)]),
             int((partner >= 0).sum()),
         )
+
+    @cached_property
+    def _known(self) -> BoolArray:
+        """Tell which components of measured shapes there are, (m, n_sensors)."""
+        return np.isfinite(self.measurement.shapes).T
+
+    @cached_property
+    def _unit_shapes(self) -> FloatArray:
+        """Return the measured shapes at unit length, zero where they do not count, (m, n_sensors).
+
+        They count where they have a weight and the sensors see the mode.
+        """
+        shapes = np.where(self._known, self.measurement.shapes.T, 0.0)
+        counted = seen_modes(self.measurement.shapes) & (self.shape_weight > 0.0)
+        length = [np.linalg.norm(s) if c else np.inf for s, c in zip(shapes, counted, strict=True)]
+        return np.asarray(shapes / np.array(length)[:, None])
 
     def advance(
         self,
@@ -166,23 +185,31 @@ class ModalSpace:
         return log, fit
 
 
-def _shape_misfit(
-    measured: FloatArray, own: FloatArray, turn: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the measured shape at unit length less s times the model's, and its slope.
+def _shape_misfit(shape: FloatArray, own: FloatArray) -> tuple[float, FloatArray]:
+    """Return s and a measured shape less s times the model's.
 
     Arguments:
-        measured: nan where missing, (n_sensors,).
+        shape: measured, at unit length, (n_sensors,).
         own: the partner at the sensors, (n_sensors,).
-        turn: its slope by every factor, (n_sensors, p); s follows.
     """
-    known = np.isfinite(measured)
-    shape, seen = np.where(known, measured, 0.0), np.where(known, own, 0.0)
-    shape, turn = shape / np.linalg.norm(shape), np.where(known[:, None], turn, 0.0)
-    square = max(float(seen @ seen), 1e-300)
-    scale = float(shape @ seen) / square
-    scale_slope = ((shape - 2.0 * scale * seen) @ turn) / square
-    return shape - scale * seen, -scale * turn - np.outer(seen, scale_slope)
+    scale = float(shape @ own) / _square(own)
+    return scale, shape - scale * own
+
+
+def _shape_slope(shape: FloatArray, own: FloatArray, turn: FloatArray, scale: float) -> FloatArray:
+    """Return how that changes with every factor, (n_sensors, p).
+
+    Arguments:
+        shape, own: as before.
+        turn: slope of the partner, (n_sensors, p).
+        scale: s, which follows.
+    """
+    scale_slope = ((shape - 2.0 * scale * own) @ turn) / _square(own)
+    return np.asarray(-scale * turn - np.outer(own, scale_slope))
+
+
+def _square(shape: FloatArray) -> float:
+    return max(float(shape @ shape), 1e-300)
 
 
 def modal_space(

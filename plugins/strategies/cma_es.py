@@ -2,13 +2,47 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
-from typing import ClassVar
+from importlib.abc import MetaPathFinder
+from multiprocessing import parent_process
+from threading import get_ident
+from typing import Any, ClassVar
+from warnings import catch_warnings, simplefilter
 
 import numpy as np
 
 from femubench import Measurement, Model, UpdateResult
 from femubench.update import FactorStrategy, factor_result, modal_space, stiffness_parts
+
+
+class _Hidden(MetaPathFinder):
+    """Makes a package as if it were not installed, for imports by one thread."""
+
+    def __init__(self, package: str) -> None:
+        self.package, self.thread = package, get_ident()
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
+        """Find nothing, and let nobody else find the package."""
+        if get_ident() == self.thread and name.partition(".")[0] == self.package:
+            raise ModuleNotFoundError(f"{name} is left out here", name=name)
+
+
+def _cma() -> Any:  # noqa: ANN401 - a module without types
+    """Import `cma`, in a worker without its plots: matplotlib takes longer than most updates."""
+    if parent_process() is None:  # whoever asks may want to plot later
+        import cma
+
+        return cma
+    hidden = _Hidden("matplotlib")
+    sys.meta_path.insert(0, hidden)
+    try:
+        with catch_warnings():
+            simplefilter("ignore")  # "Could not import matplotlib.pyplot"
+            import cma
+    finally:
+        sys.meta_path.remove(hidden)
+    return cma
 
 
 @dataclass(frozen=True)
@@ -53,9 +87,7 @@ class CmaEs(FactorStrategy):
             NotApplicable: when the model has no such parameters.
             StrategyFailure: when no mode of the model looks like any measured mode.
         """
-        # Here, since it loads what draws and takes longer to import than most updates take.
-        import cma
-
+        cma = _cma()
         parts = stiffness_parts(model, self.parameters)
         space = modal_space(parts, measurement, shape_weight=self.shape_weight, size=self.basis)
         limit = float(np.log(self.largest))

@@ -298,40 +298,32 @@ class Locked(Strategy):
 
 
 class _Trap:
-    def __init__(self, spring: bool = False) -> None:
-        self.spring = spring
-
-    def __getstate__(self) -> dict[str, bool]:
-        if self.spring:
-            raise TypeError("this geometry stays here")
-        return {"spring": True}
-
-    def __setstate__(self, state: object) -> None:
-        raise RuntimeError("opened in the wrong place")
+    def __reduce__(self) -> str:
+        raise TypeError("this geometry stays here")
 
 
-class Unpicklable(Strategy):
+class OwnGeometry(Strategy):
+    """Returns a model that holds something which no other process could be given."""
+
+    name = "own-geometry"
+    citation = "none"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        return UpdateResult(replace(model, geometry=_Trap(), groups={"trap": _Trap()}))  # type: ignore[arg-type]
+
+
+class Unsendable(Strategy):
     """Returns a model that cannot be sent back."""
 
-    name = "unpicklable"
+    name = "unsendable"
     citation = "none"
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator
     ) -> UpdateResult:
-        return UpdateResult(replace(model, geometry=_Trap(spring=True)))
-
-
-class Unreadable(Strategy):
-    """Returns a model that can be sent but not read."""
-
-    name = "unreadable"
-    citation = "none"
-
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
-        return UpdateResult(replace(model, geometry=_Trap()))
+        return UpdateResult(replace(model, mass=model.mass.toarray()))
 
 
 class WrongSize(Strategy):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import mmap
 import os
+import pickle
 import resource
 import signal
 import subprocess
@@ -18,8 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from femubench.core.fem.model import Model
+from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal.measurement import Measurement
+from femubench.core.run import answers
 from femubench.core.update.strategy import Strategy, UpdateResult
 
 MARK = "femubench-zoo-animal"
@@ -173,10 +175,12 @@ class Trojan(Animal):
     """Hands back something that would run a command in the process that reads it."""
 
     name = "trojan"
-    ends = ("failed", "the updated model holds posix.system, which cannot be taken over")
+    ends = ("failed", "the result cannot be read: ")
 
     def harm(self, model: Model) -> Model:
-        return replace(model, groups={"bomb": _Bomb()})
+        code = pickle.dumps(_Bomb())
+        answers._sealed = lambda *_: b"o" + code
+        return model
 
 
 class Vandal(Animal):
@@ -338,8 +342,8 @@ class Colossus(Animal):
     ends = ("crashed", "its result is larger than ")
 
     def harm(self, model: Model) -> Model:
-        groups = {str(i): np.zeros(2**21) for i in range(8)}
-        return replace(model, groups=groups)
+        size = 8 * 2**21 // model.size
+        return replace(model, mass_change=LowRank(np.zeros((model.size, size)), np.eye(1)))
 
 
 class Liar(Animal):

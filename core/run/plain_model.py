@@ -1,0 +1,319 @@
+"""An updated model as plain data: how it differs from the nominal model, and nothing else of it.
+
+Who reads it back has the nominal model. Degrees of freedom, geometry and groups are those of that
+model, or of the frame with its changes meshed anew; nobody asks an answer for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, fields, replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from femubench.core.errors import StrategyFailure
+from femubench.core.fem.beam import BeamProperties
+from femubench.core.fem.model import LowRank, Model, common_dofs, dofs_of
+from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.structure import Structure
+from femubench.core.run.model_checks import check_change, check_entries
+from femubench.core.run.plain_arrays import BytesError, Shelf
+from femubench.core.run.plain_frame import (
+    frame_from_plain,
+    frame_to_plain,
+    parameters_from_plain,
+)
+from femubench.core.typing import AnyArray, IntArray, SparseArray
+
+_MATRICES = ("mass", "stiffness")
+_CHANGES = ("mass_change", "stiffness_change")
+_FORMS = {"csc": sp.csc_array, "csr": sp.csr_array}
+_SAME = 1e-9  # relative: what is computed in another order
+Kept = tuple[Model, tuple[Model, ...]]
+
+
+def model_to_plain(
+    model: Model, samples: Sequence[Model], nominal: Model, shelf: Shelf
+) -> dict[str, Any]:
+    """Return a model and samples of it for `json.dumps`, their arrays on a shelf.
+
+    Raises:
+        StrategyFailure: when it is no model of the structure that the nominal model is of.
+    """
+    model, samples = _in_order(model, samples, nominal)
+    structure = model.structure
+    if structure is None or structure.frame is _frame(nominal):
+        _check_dofs(model, nominal)
+    plain = {"model": _matrices(model, nominal, shelf)}
+    plain["samples"] = [_matrices(sample, model, shelf) for sample in samples]  # type: ignore[assignment]
+    if structure is nominal.structure:
+        return plain
+    return {**plain, "structure": None if structure is None else _plain(structure, nominal, shelf)}
+
+
+def model_from_plain(data: Mapping[str, Any], arrays: Sequence[AnyArray], nominal: Model) -> Kept:
+    """Return a model and samples of it.
+
+    Raises:
+        BytesError, ModelError: when it is no such data, or a frame that cannot be meshed.
+        StrategyFailure: for matrices that are none.
+    """
+    base = nominal
+    if "structure" in data:
+        base = replace(nominal, structure=None)
+        if data["structure"] is not None:
+            base = _on(nominal, _structure(data["structure"], arrays, nominal))
+    model = replace(base, **_read(data["model"], arrays, nominal))
+    return model, tuple(replace(model, **_read(item, arrays, model)) for item in data["samples"])
+
+
+def _frame(nominal: Model) -> object:
+    return None if nominal.structure is None else nominal.structure.frame
+
+
+def _check_dofs(model: Model, nominal: Model) -> None:
+    own, given = model.dofs, nominal.dofs
+    if len(own) != len(given):
+        raise StrategyFailure(
+            f"the updated model has {len(own)} degrees of freedom, expected {len(given)}"
+        )
+    if own is not given and not (
+        own.direction == given.direction and np.array_equal(own.node, given.node)
+    ):
+        raise StrategyFailure(
+            "the updated model has other degrees of freedom than the nominal model, expected "
+            "those of the nominal model in its order"
+        )
+
+
+# --- matrices ---------------------------------------------------------------------------------
+
+
+def _matrices(model: Model, known: Model, shelf: Shelf) -> dict[str, Any]:
+    """Return the matrices of a model; None for one that is that of a model known to the reader."""
+    found: dict[str, Any] = {}
+    for name in _MATRICES:
+        matrix = getattr(model, name)
+        found[name] = None if matrix is getattr(known, name) else _entries(name, matrix, shelf)
+    for name in _CHANGES:
+        change = getattr(model, name)
+        if change is not None:
+            check_change(name, change)
+            pair = np.asarray(change.basis), np.asarray(change.core)
+            found[name] = [shelf.put(array) for array in pair]
+    return found
+
+
+def _entries(name: str, matrix: SparseArray, shelf: Shelf) -> dict[str, Any]:
+    check_entries(name, matrix)
+    if matrix.format not in _FORMS:
+        matrix = sp.csc_array(matrix)
+    parts = (matrix.data, matrix.indices, matrix.indptr)
+    numbers = [shelf.put(part) for part in parts]
+    return {"form": matrix.format, "shape": list(matrix.shape), "parts": numbers}
+
+
+def _read(data: object, arrays: Sequence[AnyArray], known: Model) -> dict[str, Any]:
+    match data:
+        case {"mass": mass, "stiffness": stiffness, **changes} if set(changes) <= set(_CHANGES):
+            pairs = zip(_MATRICES, (mass, stiffness), strict=True)
+        case _:
+            raise BytesError("no mass and stiffness")
+    found: dict[str, Any] = {
+        name: getattr(known, name) if entry is None else _sparse(name, entry, arrays)
+        for name, entry in pairs
+    }
+    for name in _CHANGES:
+        match changes.get(name):
+            case None:
+                found[name] = None
+            case [int(basis), int(core)]:
+                found[name] = LowRank(_taken(arrays, basis), _taken(arrays, core))
+            case _:
+                raise BytesError(f"{name} is no change of low rank")
+    return found
+
+
+def _sparse(name: str, entry: object, arrays: Sequence[AnyArray]) -> SparseArray:
+    match entry:
+        case {
+            "form": "csc" | "csr" as form,
+            "shape": [int(rows), int(columns)],
+            "parts": [int(), int(), int()] as parts,
+        }:
+            data, indices, starts = (_taken(arrays, part) for part in parts)
+        case _:
+            raise BytesError(f"{name} is no sparse array")
+    if not all(array.ndim == 1 and array.dtype.kind == "i" for array in (indices, starts)):
+        raise BytesError(f"{name} is no sparse array: its indices are no whole numbers")
+    if len(starts) != (columns if form == "csc" else rows) + 1:
+        raise BytesError(f"{name} is not a valid sparse array: {len(starts)} starts")
+    try:
+        return _FORMS[form]((data, indices, starts), shape=(rows, columns))
+    except (ValueError, TypeError, IndexError, OverflowError) as error:
+        raise BytesError(f"{name} is not a valid sparse array: {error}") from error
+
+
+def _taken(arrays: Sequence[AnyArray], number: object) -> AnyArray:
+    if type(number) is not int or not 0 <= number < len(arrays):
+        raise BytesError(f"there is no array {str(number)[:30]}")
+    return arrays[number]
+
+
+# --- frames -----------------------------------------------------------------------------------
+
+
+def _plain(structure: Structure, nominal: Model, shelf: Shelf) -> dict[str, Any]:
+    if nominal.structure is None:
+        raise StrategyFailure("the updated model holds a frame, and the nominal model has none")
+    properties = [shelf.put(getattr(structure.properties, f.name)) for f in fields(BeamProperties)]
+    numbers: dict[Parameter, int] = {}
+    each = [numbers.setdefault(parameter, len(numbers)) for parameter, _ in structure.changes]
+    found: dict[str, Any] = {
+        "properties": properties,
+        "springs": shelf.put(structure.springs),
+        "parameters": [asdict(parameter) for parameter in numbers],
+        "changes": [shelf.put(np.array(each, dtype=np.int64))],
+    }
+    values = np.array([value for _, value in structure.changes], dtype=float)
+    found["changes"].append(shelf.put(values))
+    if structure.frame is not nominal.structure.frame:
+        kinematics = structure.kinematics
+        found["fields"] = frame_to_plain(structure.frame, nominal.structure.frame)
+        found["node"] = shelf.put(kinematics.node)
+        found["direction"] = "".join(name.ljust(2) for name in kinematics.direction)
+    return found
+
+
+def _structure(data: object, arrays: Sequence[AnyArray], nominal: Model) -> Structure:
+    """Return a structure whose present properties follow from its frame and its parameters.
+
+    Were they others, a modified structure would not follow from the model that was scored: what
+    is attached splits elements with these properties, or has the frame meshed anew.
+    """
+    if nominal.structure is None:
+        raise BytesError("the updated model holds a frame, and the nominal model has none")
+    if not isinstance(data, dict) or not isinstance(data.get("properties"), list):
+        raise BytesError("no structure")
+    names = [f.name for f in fields(BeamProperties)]
+    columns = [_taken(arrays, number) for number in data["properties"]]
+    count = columns[0].size if columns else 0
+    if len(columns) != len(names) or any(array.shape != (count,) for array in columns):
+        raise BytesError("the properties of its elements are not one a property and element")
+    springs = _taken(arrays, data.get("springs"))
+    plain = nominal.structure
+    if "fields" in data:
+        plain = _meshed(data, arrays, plain, count)
+    elif plain.changes:
+        plain = Structure.build(plain.frame)
+    expected = _with_changes(plain, _changes(data, arrays))
+    if springs.shape != expected.springs.shape or count != len(expected.properties):
+        raise BytesError("its element properties are those of another mesh")
+    present = [getattr(expected.properties, name) for name in names]
+    for name, own, given in zip(
+        (*names, "springs"), (*present, expected.springs), (*columns, springs), strict=True
+    ):
+        if not np.all(np.abs(given - own) <= _SAME * np.abs(own)):
+            raise BytesError(f"its {name} does not follow from its frame and parameters")
+    properties = BeamProperties(**dict(zip(names, columns, strict=True)))
+    return replace(expected, properties=properties, springs=springs)
+
+
+def _meshed(
+    data: Mapping[str, Any], arrays: Sequence[AnyArray], nominal: Structure, count: int
+) -> Structure:
+    found = Structure.build(frame_from_plain(data["fields"], nominal.frame, count))
+    kinematics = found.kinematics
+    direction = "".join(name.ljust(2) for name in kinematics.direction)
+    same = direction == data.get("direction")
+    if not same or not np.array_equal(kinematics.node, _taken(arrays, data.get("node"))):
+        raise BytesError("its degrees of freedom are not those of its frame, meshed anew")
+    return found
+
+
+def _changes(
+    data: Mapping[str, Any], arrays: Sequence[AnyArray]
+) -> list[tuple[int, Parameter, float]]:
+    """Return every parameter that was set, with its number and value, in turn."""
+    parameters = parameters_from_plain(data.get("parameters"))
+    match data.get("changes"):
+        case [int(numbers), int(values)]:
+            each, given = _taken(arrays, numbers), _taken(arrays, values)
+        case _:
+            raise BytesError("no changes of parameters")
+    known = each.dtype.kind == "i" and np.all((each >= 0) & (each < len(parameters)))
+    if not (known and each.ndim == 1 and given.shape == each.shape):
+        raise BytesError("the changes are not one value a parameter")
+    pairs = zip(each.tolist(), given.tolist(), strict=True)
+    return [(number, parameters[number], value) for number, value in pairs]
+
+
+def _with_changes(plain: Structure, changes: Sequence[tuple[int, Parameter, float]]) -> Structure:
+    found = replace(plain)
+    # What is kept of a nominal structure is for its own parameters alone.
+    found.__dict__.update({name: value for name, value in vars(plain).items() if name != "kept"})
+    for turn in _turns(changes):
+        found = found.with_values([each for _, each, _ in turn], [value for *_, value in turn])
+    return found
+
+
+def _turns(
+    changes: Sequence[tuple[int, Parameter, float]],
+) -> Iterator[list[tuple[int, Parameter, float]]]:
+    """Yield the changes in turn, no parameter twice at a time."""
+    turn: list[tuple[int, Parameter, float]] = []
+    seen: set[int] = set()
+    for change in changes:
+        if change[0] in seen:
+            yield turn
+            turn, seen = [], set()
+        turn.append(change)
+        seen.add(change[0])
+    if turn:
+        yield turn
+
+
+def _on(nominal: Model, structure: Structure) -> Model:
+    """Return the nominal model on a structure; its matrices are still to come."""
+    own: dict[str, Any] = {"geometry": structure, "structure": structure}
+    assert nominal.structure is not None
+    if structure.mesh is nominal.structure.mesh:
+        return replace(nominal, **own)
+    return replace(nominal, **own, dofs=dofs_of(structure), groups={}, mass_groups={})
+
+
+def _in_order(model: Model, samples: Sequence[Model], nominal: Model) -> Kept:
+    """Return a model with its dofs in the order in which its frame is meshed.
+
+    The nodes at which `Model.attach` splits elements come behind all others.
+    """
+    structure, samples = model.structure, tuple(samples)
+    if structure is None or nominal.structure is None:
+        return model, samples
+    frame, given = structure.frame, nominal.structure.frame
+    if frame.masses is given.masses and frame.springs is given.springs:
+        return model, samples
+    meshed = Structure.build(frame)
+    place = common_dofs(structure, meshed)
+    if len(place) != len(meshed.kinematics.node):
+        raise StrategyFailure("the updated model is not meshed as its frame is")
+    if np.array_equal(place, np.arange(len(place))):
+        return model, samples
+    order = np.argsort(place)
+    found = replace(meshed, properties=structure.properties, springs=structure.springs)
+    found = replace(found, changes=structure.changes)
+    base: dict[str, Any] = {"dofs": dofs_of(found), "geometry": found, "structure": found}
+    moved = [replace(each, **base, **_turned(each, order)) for each in (model, *samples)]
+    return moved[0], tuple(moved[1:])
+
+
+def _turned(model: Model, order: IntArray) -> dict[str, Any]:
+    found: dict[str, Any] = {
+        name: sp.csc_array(getattr(model, name))[order][:, order] for name in _MATRICES
+    }
+    for name in _CHANGES:
+        change = getattr(model, name)
+        found[name] = None if change is None else LowRank(change.basis[order], change.core)
+    return found
