@@ -72,6 +72,7 @@ if TYPE_CHECKING:
 @click.pass_context
 def run(
     ctx: click.Context,
+    /,
     cases: tuple[str, ...],
     strategies: tuple[str, ...],
     jobs: int | None,

@@ -208,7 +208,7 @@ def _check_board(run: Run, board: object, file: Path) -> None:
     """Check the skills of the leaderboard that comes with a run, where one does."""
     if board is None:
         return
-    skills = dict(leaderboard(run)[["strategy", "skill"]].itertuples(index=False))
+    skills: dict[str, float] = dict(zip(*map(leaderboard(run).get, _TOLD), strict=True))
     rows: Iterable[object] = board if isinstance(board, list) else [board]
     for number, row in enumerate(rows):
         name, told = (row.get(key) if isinstance(row, dict) else None for key in _TOLD)
