@@ -76,6 +76,12 @@ scheduler = click.option(
     help="Run the jobs on the workers of the Dask scheduler there, e.g. tcp://host:8786.",
 )  # fmt: skip
 
+sandbox = click.option(
+    "--sandbox", type=click.Choice(["auto", "require", "off"]), default="auto", show_default=True,
+    help="Run strategies where they see no case, no file of yours, no other process and no network "
+    "(Linux): where that is possible, or not at all, or without.",
+)  # fmt: skip
+
 cluster = click.option(
     "--cluster", metavar="CLUSTER",
     help="Start a Dask cluster for the run: local:N workers here, or slurm:QUEUE.",
