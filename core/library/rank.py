@@ -26,6 +26,7 @@ from femubench.core.run.executor import Executor, executor_of
 from femubench.core.run.frames import modes_frame, results_frame
 from femubench.core.run.recording import Overwrite, Progress
 from femubench.core.run.runner import run_jobs
+from femubench.core.run.sandbox import Sandbox
 from femubench.core.run.starts import Start, Starts
 from femubench.core.run.store import Store
 from femubench.core.schema import records as serial, results
@@ -219,6 +220,7 @@ def rank(
     progress: Progress | None = None,
     scheduler: str | None = None,
     cluster: str | None = None,
+    sandbox: Sandbox = "auto",
 ) -> Run:
     """Run strategies on cases, each job in a process of its own, and rank them.
 
@@ -235,10 +237,10 @@ def rank(
         store: folder that keeps the results, so that a run can be continued; None for none.
         overwrite: which stored results of the same jobs are computed anew: ``always`` all,
             ``missing`` none, ``failed`` the failures. Default: all, of a resumed run the failures.
-        resume: go on with the last run of these jobs in the store; without cases and strategies,
-            with the last run.
+        resume: go on with the last run of these jobs in the store; of any without words for them.
         progress: called with (result, jobs done, jobs in all).
         scheduler, cluster: ``tcp://HOST:PORT`` of Dask; ``local:N`` or ``slurm:QUEUE`` to start.
+        sandbox: of strategies: ``auto``, where that is possible; ``require``; ``off``.
 
     Raises:
         InputError: for an unknown name, an option that does not exist, or a faulty case.
@@ -248,9 +250,8 @@ def rank(
         [0.0, -0.15]
     """
     kept = None if store is None else store_in(store)
-    given = cases, strategies, usable_plugins()
     plan = plan_of(
-        *given,
+        *(cases, strategies, usable_plugins()),
         seeds=seeds,
         seed=seed,
         nominal=nominal,
@@ -259,7 +260,7 @@ def rank(
         memory=memory,
         resumed=kept if resume else None,
     )
-    with executor_of(jobs, scheduler, cluster) as where:
+    with executor_of(jobs, scheduler, cluster, sandbox) as where:
         return plan.run(None, kept, where, overwrite=overwrite, resume=resume, progress=progress)
 
 
