@@ -33,8 +33,7 @@ from femubench.core.inference.static_response import (
     enriched,
     placed,
 )
-from femubench.core.modal import eigen
-from femubench.core.modal.eigen import Modes, modes_of
+from femubench.core.modal.eigen import counted_evaluations, modes_of
 from femubench.effect import Effect
 from femubench.fem import Frame
 from femubench.plugins.effects.added_mass import AddedMass
@@ -282,21 +281,15 @@ class TestCoordinates:
         assert "_factor" not in vars(basis.solver)
         assert_array_equal(basis.solver.solve(force), moved)
 
-    def test_a_large_model_is_solved_once_for_fewer_modes(
-        self, model: Model, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        fresh = Model.of(model.frame_structure.frame)
-        asked: list[int | None] = []
-
-        def counted(model: Model, count: int | None = None) -> Modes:
-            asked.append(count)
-            return solve_modes(model, count)
-
-        monkeypatch.setattr(eigen, "solve_modes", counted)
-        many, few, more = (modes_of(fresh, count) for count in (24, 9, 30))
-        assert asked == [24, 30]
+    def test_a_large_model_is_solved_once_for_fewer_modes(self, model: Model) -> None:
+        fresh, other = (Model.of(model.frame_structure.frame) for _ in range(2))
+        with counted_evaluations() as counter:
+            many, few = (modes_of(fresh, count) for count in (24, 9))
+            assert counter.count == 1
+            more = modes_of(fresh, 30)
+            assert counter.count == 2
         assert (len(many), len(few), len(more)) == (24, 9, 30)
-        assert_allclose(few.eigenvalues[3:], solve_modes(fresh, 9).eigenvalues[3:], rtol=1e-9)
+        assert_allclose(few.eigenvalues[3:], solve_modes(other, 9).eigenvalues[3:], rtol=1e-9)
 
     def test_complete_coordinates_stay_as_they_are(self, ladder: FrameBuilder) -> None:
         small = Model.of(ladder())

@@ -22,7 +22,7 @@ from femubench.core import errors
 from femubench.core.errors import FemubenchError, InputError
 from femubench.core.run import cluster
 from femubench.core.run.cluster import DaskWorkers, slurm_cluster
-from femubench.core.run.executor import executor_of
+from femubench.core.run.executor import LocalProcesses, executor_of
 from femubench.core.run.runner import run_jobs
 from femubench.core.run.store import Store
 from femubench.core.schema.results import JobResult
@@ -47,6 +47,13 @@ def two() -> Iterator[DaskWorkers]:
         yield executor
 
 
+@pytest.fixture
+def open_two(two: DaskWorkers, monkeypatch: pytest.MonkeyPatch) -> DaskWorkers:
+    """The same without a sandbox: strategies tell of themselves in files, and end their workers."""
+    monkeypatch.setattr(two, "sandbox", "off")
+    return two
+
+
 def pids_of(executor: DaskWorkers) -> list[int]:
     return list(executor._client.run(os.getpid).values())
 
@@ -62,17 +69,17 @@ def check_kills(executor: DaskWorkers, jobs: int, folder: Path) -> None:
             victims.append(pids_of(executor)[0])
             os.kill(victims[-1], signal.SIGKILL)
 
-    for name, place, progress in (("cluster", executor, kill), ("serial", None, None)):
+    here = LocalProcesses(2, "off")
+    for name, place, progress in (("cluster", executor, kill), ("serial", here, None)):
         runs[name] = run_jobs(
             cases,
             [toys.Told(str(file))],
             seeds=range(jobs // 2),
-            jobs=2,
             store=Store(folder / name),
             executor=place,
             progress=progress,
         )
-        if place is not None:
+        if place is executor:
             # What was on its way to a killed worker, and no other job, is done again.
             assert jobs <= len(file.read_text().splitlines()) <= jobs + 2 * 2 * cluster._AHEAD
     assert len(set(victims)) == 2
@@ -83,19 +90,21 @@ def check_kills(executor: DaskWorkers, jobs: int, folder: Path) -> None:
 
 
 def test_a_run_whose_workers_are_killed_twice_ends_like_one_of_this_machine(
-    two: DaskWorkers, tmp_path: Path
+    open_two: DaskWorkers, tmp_path: Path
 ) -> None:
-    check_kills(two, JOBS, tmp_path)
+    check_kills(open_two, JOBS, tmp_path)
 
 
 @pytest.mark.sweep
-def test_ten_thousand_jobs_with_two_kills(two: DaskWorkers, tmp_path: Path) -> None:
-    check_kills(two, 10_000, tmp_path)
+def test_ten_thousand_jobs_with_two_kills(open_two: DaskWorkers, tmp_path: Path) -> None:
+    check_kills(open_two, 10_000, tmp_path)
 
 
-def test_a_job_that_ends_its_workers_is_crashed_and_the_others_are_not(two: DaskWorkers) -> None:
+def test_a_job_that_ends_its_workers_is_crashed_and_the_others_are_not(
+    open_two: DaskWorkers,
+) -> None:
     strategies = [toys.Unchanged(), toys.Murderous(), toys.Softer()]
-    run = run_jobs([toys.tiny_case()], strategies, executor=two, seeds=(0,))
+    run = run_jobs([toys.tiny_case()], strategies, executor=open_two, seeds=(0,))
     found = {item.strategy: (item.status, item.reason) for item in run.results}
     assert found == {
         "unchanged": ("ok", ""),

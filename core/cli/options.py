@@ -77,6 +77,12 @@ scheduler = click.option(
     help="Run the jobs on the workers of the Dask scheduler there, e.g. tcp://host:8786.",
 )  # fmt: skip
 
+sandbox = click.option(
+    "--sandbox", type=click.Choice(["auto", "require", "off"]), default="auto", show_default=True,
+    help="Run strategies where they see no case, no file of yours, no other process and no network "
+    "(Linux): where that is possible, or not at all, or without.",
+)  # fmt: skip
+
 cluster = click.option(
     "--cluster", metavar="CLUSTER",
     help="Start a Dask cluster for the run: local:N workers here, or slurm:QUEUE.",
@@ -110,7 +116,7 @@ def of_jobs(json: str) -> Option:
     Arguments:
         json: what is in the file of JSON.
     """
-    where, limits = (jobs, scheduler, cluster), (_timeouts, _memory)
+    where, limits = (jobs, scheduler, cluster), (sandbox, _timeouts, _memory)
     files = (json_file(json), _csv_file, store("Keep results there."), _report_file, quiet)
 
     def with_all(command: Callable[..., Any]) -> Callable[..., Any]:

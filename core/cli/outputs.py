@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 import click
 
+from femubench.core.cli.registry import wrapped
 from femubench.core.errors import InputError, OutputError, PluginError
 from femubench.core.files import write_atomically
 
 if TYPE_CHECKING:
     from femubench.core.plugin.loader import Plugins
     from femubench.core.roles import Reporter
+    from femubench.core.run.executor import Executor
     from femubench.core.run.store import Store
     from femubench.core.schema.results import Run
 
@@ -31,6 +33,14 @@ def outputs_of(
             raise InputError("is to hold two outputs", file=path, expected="a file for each")
         outputs[path] = reporter(plugins, name) if name else reporter_for(plugins, path)
     return outputs
+
+
+def announce(line: str, executor: Executor) -> None:
+    """Show what begins, and say on standard error where a sandbox is not possible."""
+    found = executor.enclosure()
+    if found.sandbox == "none" and executor.sandbox != "off":
+        click.echo(f"strategies run without a sandbox: {found.reason}", err=True)
+    click.echo(wrapped(line, hanging=2))
 
 
 def finish(

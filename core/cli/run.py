@@ -10,7 +10,7 @@ import click
 
 from femubench.core.cli import options
 from femubench.core.cli.ending import telling
-from femubench.core.cli.outputs import finish, outputs_of
+from femubench.core.cli.outputs import announce, finish, outputs_of
 from femubench.core.cli.progress import progress_bar
 from femubench.core.cli.quantities import spoken, twins_of
 from femubench.core.cli.registry import plugins_for, wrapped
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from femubench.core.library.rank import Plan
     from femubench.core.plugin.loader import Plugins
     from femubench.core.run.recording import Overwrite
+    from femubench.core.run.sandbox import Sandbox
     from femubench.core.run.store import Store
     from femubench.core.schema.results import Run
 
@@ -78,6 +79,7 @@ def run(
     jobs: int | None,
     scheduler: str | None,
     cluster: str | None,
+    sandbox: Sandbox,
     resume: bool,
     overwrite: Overwrite | None,
     locked: str | None,
@@ -106,18 +108,13 @@ def run(
     screen = None if quiet else reporter(plugins, "terminal")
     with (
         telling(kept, plan.jobs, screen, *_going_on(ctx)),
-        executor_of(jobs, scheduler, cluster) as executor,
+        executor_of(jobs, scheduler, cluster, sandbox) as executor,
     ):
         if not quiet:
-            click.echo(wrapped(_header(plan, executor.spoken), hanging=2))
+            announce(_header(plan, executor.spoken), executor)
         with progress_bar(quiet=quiet) as progress:
-            outcome = plan.run(
-                store=kept,
-                overwrite=overwrite,
-                resume=resume,
-                progress=progress,
-                executor=executor,
-            )
+            how: dict[str, Any] = {"overwrite": overwrite, "resume": resume, "progress": progress}
+            outcome = plan.run(None, kept, executor, **how)
     code = finish(ctx, outcome, outputs, plugins, kept, kept.exhibits)
     return code if old is None else _compare(old, outcome)
 

@@ -10,7 +10,7 @@ import click
 
 from femubench.core.cli import options
 from femubench.core.cli.ending import telling
-from femubench.core.cli.outputs import finish, outputs_of
+from femubench.core.cli.outputs import announce, finish, outputs_of
 from femubench.core.cli.progress import progress_bar
 from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
@@ -18,6 +18,7 @@ from femubench.core.display import counted
 if TYPE_CHECKING:
     from femubench.core.library.study import StudyPlan
     from femubench.core.run.recording import Overwrite
+    from femubench.core.run.sandbox import Sandbox
     from femubench.core.run.store import Store
 
 
@@ -41,6 +42,7 @@ def study(
     jobs: int | None,
     scheduler: str | None,
     cluster: str | None,
+    sandbox: Sandbox,
     timeouts: dict[str, float],
     memory: int | None,
     overwrite: Overwrite,
@@ -70,9 +72,12 @@ def study(
         return 0
     limits = dict(timeouts)
     screen = None if quiet else reporter(plugins, "terminal")
-    with telling(kept, plan.jobs, screen), executor_of(jobs, scheduler, cluster) as executor:
+    with (
+        telling(kept, plan.jobs, screen),
+        executor_of(jobs, scheduler, cluster, sandbox) as executor,
+    ):
         if not quiet:
-            click.echo(wrapped(f"{_title(plan)}, {executor.spoken}", hanging=2))
+            announce(f"{_title(plan)}, {executor.spoken}", executor)
         with progress_bar(quiet=quiet) as progress:
             found = plan.run(
                 executor,

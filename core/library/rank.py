@@ -28,6 +28,7 @@ from femubench.core.run.executor import Executor, executor_of
 from femubench.core.run.frames import modes_frame, results_frame
 from femubench.core.run.recording import Overwrite, Progress
 from femubench.core.run.runner import run_jobs
+from femubench.core.run.sandbox import Sandbox
 from femubench.core.run.starts import Start, Starts
 from femubench.core.run.store import Store
 from femubench.core.schema import records as serial, results
@@ -234,6 +235,7 @@ def rank(
     scheduler: str | None = None,
     cluster: str | None = None,
     twins: Twins = 0,
+    sandbox: Sandbox = "auto",
 ) -> Run:
     """Run strategies on cases, each job in a process of its own, and rank them.
 
@@ -252,6 +254,7 @@ def rank(
         jobs: number of worker processes, or of Slurm jobs; None for one a processor.
         scheduler, cluster: ``tcp://HOST:PORT`` of Dask; ``local:N`` or ``slurm:QUEUE`` to start.
         twins: number of each case whose truth was computed, or that and a seed.
+        sandbox: of strategies: ``auto``, where that is possible; ``require``; ``off``.
 
     Raises:
         InputError: for an unknown name, an option that does not exist, or a faulty case.
@@ -272,7 +275,7 @@ def rank(
         resumed=kept if resume else None,
         twins=twins,
     )
-    with executor_of(jobs, scheduler, cluster) as where:
+    with executor_of(jobs, scheduler, cluster, sandbox) as where:
         return plan.run(None, kept, where, overwrite=overwrite, resume=resume, progress=progress)
 
 

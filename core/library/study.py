@@ -27,6 +27,7 @@ from femubench.core.roles import Strategy
 from femubench.core.run.executor import Executor, executor_of
 from femubench.core.run.recording import Overwrite, Progress
 from femubench.core.run.runner import run_jobs
+from femubench.core.run.sandbox import Sandbox
 from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Start, Starts
 from femubench.core.run.store import Store
@@ -145,6 +146,7 @@ def study(
     jobs: int | None = None,
     scheduler: str | None = None,
     cluster: str | None = None,
+    sandbox: Sandbox = "auto",
     timeout: float | None = None,
     timeouts: Mapping[str, float] | None = None,
     memory: int | None = None,
@@ -160,6 +162,7 @@ def study(
         file: a study file; see docs/studies.md.
         jobs: number of worker processes; None for one a processor.
         scheduler, cluster: where the jobs run instead, as in `femubench.rank`.
+        sandbox: ``auto``, ``require`` or ``off``, as there.
         timeout: seconds that a job may take; 600 by default.
         timeouts: the same for single strategies, by name, with or without options.
         memory: bytes that a job may take; None for an even share of the machine's.
@@ -180,7 +183,7 @@ def study(
         [1, 1]
     """
     plan = study_plan(read_study(file), usable_plugins())
-    with executor_of(jobs, scheduler, cluster) as executor:
+    with executor_of(jobs, scheduler, cluster, sandbox) as executor:
         return plan.run(
             executor,
             None if store is None else store_in(store),

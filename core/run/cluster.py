@@ -12,6 +12,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from functools import partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -31,6 +32,7 @@ from femubench.core.run.cluster_worker import (
 from femubench.core.run.jobs import JobOutcome, one_line
 from femubench.core.run.limits import Limits
 from femubench.core.run.provenance import home_of
+from femubench.core.run.sandbox import OFF, Enclosure, Sandbox, enclosure
 from femubench.core.run.schedule import Show, unjudged
 from femubench.core.run.slots import Slot, Start, first_seed
 from femubench.core.run.workers import no_script
@@ -57,12 +59,16 @@ class DaskWorkers:
         client: connected to the scheduler.
         where: what a user calls it.
         waits: whether workers may come later, as those of a queue do.
+        sandbox: whether strategies run in one; each machine finds out for itself.
     """
 
     share = None
 
-    def __init__(self, client: Client, where: str, *, waits: bool) -> None:
+    def __init__(
+        self, client: Client, where: str, *, waits: bool, sandbox: Sandbox = "auto"
+    ) -> None:
         self._client, self._where, self._waits = client, where, waits
+        self.sandbox: Sandbox = sandbox
         self._demand = Demand((), (), None)
 
     @property
@@ -85,12 +91,24 @@ class DaskWorkers:
             self._meet()
         homes = {home_of(strategy)[0] for strategy in strategies}
         packages = tuple(sorted({"femubench", *homes} - {"__main__"}))
-        self._demand = Demand(all_versions(packages), packages, memory)
+        self._demand = Demand(all_versions(packages), packages, memory, self.sandbox)
         found = self._client.run(unfit, self._demand, on_error="return")
         for worker, reason in found.items():
             if reason is not None:
                 text = one_line(reason) if isinstance(reason, Exception) else reason
                 raise _unlike(f"worker {worker}: {text}")
+
+    def enclosure(self) -> Enclosure:
+        """Return how strategies run on the workers: in a sandbox where each of them has one."""
+        if self.sandbox != "auto":
+            return Enclosure(*(("namespaces",) if self.sandbox == "require" else ("none", OFF)))
+        found: Mapping[str, Enclosure] = self._client.run(enclosure, self.sandbox)
+        for worker, how in found.items():
+            if how.sandbox == "none":
+                return replace(how, reason=f"worker {worker}: {how.reason}")
+        if not found:
+            return Enclosure("none", "no worker is there yet; every result says how it ran")
+        return Enclosure("namespaces")
 
     def _meet(self) -> None:
         try:
@@ -255,12 +273,15 @@ class _Flight:
 
 
 @contextmanager
-def connected(address: str, jobs: int | None = None) -> Iterator[DaskWorkers]:
+def connected(
+    address: str, jobs: int | None = None, sandbox: Sandbox = "auto"
+) -> Iterator[DaskWorkers]:
     """Give the workers of a scheduler that runs somewhere.
 
     Arguments:
         address: ``tcp://HOST:PORT``, or ``tls://`` with certificates in Dask's configuration.
         jobs: must be None.
+        sandbox: whether strategies run in one.
 
     Raises:
         InputError: where nobody answers there.
@@ -272,16 +293,19 @@ def connected(address: str, jobs: int | None = None) -> Iterator[DaskWorkers]:
         expected = "tcp://HOST:PORT"
         raise InputError(f"{address!r} is no address", key="scheduler", expected=expected)
     with _quiet(), _client(address) as client:
-        yield DaskWorkers(client, address, waits=False)
+        yield DaskWorkers(client, address, waits=False, sandbox=sandbox)
 
 
 @contextmanager
-def started(words: str, jobs: int | None = None) -> Iterator[DaskWorkers]:
+def started(
+    words: str, jobs: int | None = None, sandbox: Sandbox = "auto"
+) -> Iterator[DaskWorkers]:
     """Give the workers of a cluster that is started here and ended with the block.
 
     Arguments:
         words: ``local:N`` or ``slurm:QUEUE``.
         jobs: number of Slurm jobs; must be None with ``local:N``.
+        sandbox: whether strategies run in one.
 
     Raises:
         InputError: for other words, or where it cannot be started.
@@ -311,7 +335,7 @@ def started(words: str, jobs: int | None = None) -> Iterator[DaskWorkers]:
         size = {"jobs": jobs} if queued else {"n": jobs}
         stack.enter_context(_kept(partial(cluster.scale, **size)))
         client = stack.enter_context(_client(cluster))
-        yield DaskWorkers(client, words, waits=queued)
+        yield DaskWorkers(client, words, waits=queued, sandbox=sandbox)
 
 
 def _local(count: int) -> Cluster:

@@ -17,6 +17,7 @@ from femubench.core.errors import FemubenchError
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.limits import LEAST, Limits, memory_share, spoken_bytes
 from femubench.core.run.provenance import blas_name, cpu_name, package_version, versions
+from femubench.core.run.sandbox import Sandbox, enclosure, missing
 from femubench.core.run.schedule import computed
 from femubench.core.run.slots import Slot, Start
 from femubench.core.run.standing_judge import Judges
@@ -37,11 +38,13 @@ class Demand:
         versions: names and versions, from `all_versions`.
         packages: of those, the packages that strategies are imported from.
         memory: bytes that one job may take; None for a share of what the worker has.
+        sandbox: whether strategies run in one.
     """
 
     versions: tuple[tuple[str, str], ...]
     packages: tuple[str, ...]
     memory: int | None
+    sandbox: Sandbox = "auto"
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,9 @@ def unfit(demand: Demand, dask_worker: Any) -> str | None:  # noqa: ANN401 - a d
     ]
     if there:
         return ", ".join(there)
+    lacking = missing() if demand.sandbox == "require" else None
+    if lacking is not None:
+        return f"no sandbox: {lacking}"
     threads, cores = dask_worker.state.nthreads, len(os.sched_getaffinity(0))
     if threads > cores:
         return f"{threads} threads on {cores} cores, and every job takes a core"
@@ -135,7 +141,8 @@ def run_errand(yardstick: Yardstick, errand: Errand, demand: Demand) -> Arrived:
     show = (lambda _, exhibit: exhibits.append(exhibit)) if errand.shown else None
     found = computed(slots, [0], references, {name: limits}, 1, show, wanted, _judges())
     ((_, result),) = found
-    result = replace(result, provenance={"cpu": cpu_name(), "blas": _blas()})
+    how = {"cpu": cpu_name(), "blas": _blas(), "sandbox": enclosure(limits.sandbox).sandbox}
+    result = replace(result, provenance=how)
     return result, exhibits[0] if exhibits else None
 
 

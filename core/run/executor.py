@@ -12,6 +12,7 @@ from femubench.core.display import counted
 from femubench.core.errors import InputError, require
 from femubench.core.roles import Strategy
 from femubench.core.run.limits import Limits, memory_share
+from femubench.core.run.sandbox import Enclosure, Sandbox, enclosure
 from femubench.core.run.schedule import Show, computed
 from femubench.core.run.slots import Slot
 from femubench.core.schema.results import JobResult
@@ -32,6 +33,17 @@ class Executor(Protocol):
     @property
     def share(self) -> int | None:
         """Return the bytes that a job may take; None where each machine has its own answer."""
+
+    @property
+    def sandbox(self) -> Sandbox:
+        """Return whether strategies run in a sandbox."""
+
+    def enclosure(self) -> Enclosure:
+        """Return how strategies run: in a sandbox, or why not.
+
+        Raises:
+            InputError: where one is required and is not possible.
+        """
 
     def admit(self, strategies: Sequence[Strategy], memory: int | None) -> None:
         """Make sure that jobs of these strategies with so much memory each can run.
@@ -63,9 +75,11 @@ class LocalProcesses:
 
     Arguments:
         workers: number of them.
+        sandbox: whether strategies run in one.
     """
 
     workers: int
+    sandbox: Sandbox = "auto"
 
     @property
     def spoken(self) -> str:
@@ -76,6 +90,10 @@ class LocalProcesses:
     def share(self) -> int:
         """Return an even share of the machine's memory in bytes."""
         return memory_share(self.workers)
+
+    def enclosure(self) -> Enclosure:
+        """Return how strategies run on this machine."""
+        return enclosure(self.sandbox)
 
     def admit(self, strategies: Sequence[Strategy], memory: int | None) -> None:
         """Find nothing to object to: the workers are copies of this process."""
@@ -94,7 +112,10 @@ class LocalProcesses:
 
 @contextmanager
 def executor_of(
-    jobs: int | None = None, scheduler: str | None = None, cluster: str | None = None
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    cluster: str | None = None,
+    sandbox: Sandbox = "auto",
 ) -> Iterator[Executor]:
     """Give what runs jobs: worker processes here, unless a scheduler or a cluster is named.
 
@@ -103,12 +124,13 @@ def executor_of(
             that of the Slurm jobs.
         scheduler: address of a Dask scheduler, ``tcp://HOST:PORT``.
         cluster: one to start, ``local:N`` or ``slurm:QUEUE``.
+        sandbox: strategies run in one where that is possible, ``auto``; or ``require``, ``off``.
 
     Raises:
         InputError: for both, for words that mean neither, or where nobody answers.
     """
     if scheduler is None and cluster is None:
-        yield LocalProcesses(worker_count(jobs))
+        yield LocalProcesses(worker_count(jobs), sandbox)
         return
     if scheduler is not None and cluster is not None:
         what = "--scheduler and --cluster are two places for the same jobs"
@@ -116,7 +138,10 @@ def executor_of(
     require("distributed", "cluster", f"--{'cluster' if scheduler is None else 'scheduler'}")
     from femubench.core.run.cluster import connected, started
 
-    opened = connected(scheduler, jobs) if scheduler is not None else started(str(cluster), jobs)
+    if scheduler is not None:
+        opened = connected(scheduler, jobs, sandbox)
+    else:
+        opened = started(str(cluster), jobs, sandbox)
     with opened as executor:
         yield executor
 

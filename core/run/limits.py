@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import psutil
 
+from femubench.core.run.sandbox import Sandbox
+
 MIB = 2**20
 _SHARE = 0.9  # of the memory that is there, for all workers together
 LEAST = 512 * MIB
@@ -22,6 +24,10 @@ class Limits:
         output: bytes that it may print.
         answer: bytes that it may hand back.
         file: size of the largest file that it may write.
+        processes: that it may have, where there is a sandbox with their threads.
+        sandbox: whether it runs in one.
+        hidden: folders that it does not see there, wherever they are.
+        shown: files of code that it sees there besides what can be imported.
     """
 
     seconds: float | None = 600.0
@@ -29,6 +35,10 @@ class Limits:
     output: int = 16 * MIB
     answer: int = 1024 * MIB
     file: int = 1024 * MIB
+    processes: int = 512
+    sandbox: Sandbox = "off"
+    hidden: tuple[str, ...] = ()
+    shown: tuple[str, ...] = ()
 
 
 def memory_share(workers: int, given: int | None = None) -> int:

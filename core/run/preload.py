@@ -6,7 +6,10 @@ in the process of its own job alone.
 
 from __future__ import annotations
 
+import ctypes
 import gc
+import sys
+import warnings
 from collections.abc import Iterator
 from contextlib import suppress
 from importlib import import_module
@@ -24,6 +27,7 @@ import femubench.core.plugin.variants
 import femubench.core.run.judging
 import femubench.core.run.worker  # noqa: F401 - loaded for its time
 
+_PR_SET_CHILD_SUBREAPER = 36
 _OWN = ("strategies", "effects", "faults")
 
 
@@ -37,6 +41,10 @@ def own_plugins() -> Iterator[str]:
 for module in own_plugins():
     with suppress(Exception):  # a job that needs it says what is wrong with it
         import_module(module)
+# What a job leaves behind becomes a child of this process, whose other children are known.
+if sys.platform == "linux":
+    ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    warnings.filterwarnings("ignore", "forkserver: waitpid returned unexpected pid")
 threadpool_limits(1)
 # Else the first search for garbage in a worker writes to, and so copies, every page of the server.
 gc.collect()

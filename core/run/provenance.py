@@ -141,6 +141,7 @@ def provenance(meta: Mapping[str, Any], digest: str, version: str, seed: int) ->
         **meta["versions"],
         "blas": machine["blas"],
         "cpu": machine["cpu"],
+        "sandbox": meta["sandbox"],
         "git": meta["git_commit"],
         "case": digest,
         "strategy": version,

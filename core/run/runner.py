@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from threadpoolctl import threadpool_limits
@@ -14,8 +17,9 @@ from femubench.core.errors import InputError
 from femubench.core.roles import Strategy
 from femubench.core.run.executor import Executor, LocalProcesses, worker_count
 from femubench.core.run.limits import Limits
-from femubench.core.run.provenance import plan_digest, run_meta
+from femubench.core.run.provenance import home_of, plan_digest, run_meta
 from femubench.core.run.recording import Overwrite, Progress, Results, ended, recorded
+from femubench.core.run.sandbox import Sandbox
 from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Starts
 from femubench.core.run.stopping import stopping
@@ -69,12 +73,13 @@ def run_jobs(
     place = executor or LocalProcesses(worker_count(jobs))
     place.admit(strategies, memory)
     share = place.share if memory is None else memory
-    limits = {s.name: Limits((timeouts or {}).get(s.name, timeout), share) for s in strategies}
-    asked = {"seed": run_seed, "timeout": timeout, "memory": share, "request": dict(request or {})}
+    asked = {"seed": run_seed, "timeout": timeout, "memory": share, **_about(place, request)}
+    own = {s.name: (timeouts or {}).get(s.name, timeout) for s in strategies}
+    limits = _limits(own, share, place.sandbox, _unseen(cases, store), _modules(strategies))
     with threadpool_limits(1), ExitStack() as stack:
         references = _references(cases, starts)
         slots = Slots(starts.of_all(cases), strategies, seeds)
-        slots.meta = _meta(cases, slots, references, {**asked, "jobs": place.workers}, starts)
+        slots.meta = _meta(cases, slots, references, asked, starts)
         meta, known = recorded(stack, store, slots.meta, overwrite, resume)
         ending = stack.enter_context(ended(store, meta["run"]))
         results = Results(slots, store, meta["run"], progress)
@@ -95,6 +100,39 @@ def _run(meta: Mapping[str, Any], results: Sequence[JobResult]) -> Run:
 def _only_now(run: Run) -> dict[str, Any]:
     """Return meta data that are known only when all jobs are done."""
     return {"unsteady": unsteady(run)} if origins_of(run.meta, "again") else {}
+
+
+def _about(place: Executor, request: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return how and where strategies run, and what was asked for."""
+    how = place.enclosure()
+    why = {"sandbox_reason": how.reason} if how.reason else {}
+    own = {"jobs": place.workers, "sandbox": how.sandbox, **why}
+    return {"request": dict(request or {}), **own}
+
+
+def _limits(
+    seconds: Mapping[str, float | None],
+    memory: int | None,
+    sandbox: Sandbox,
+    hidden: tuple[str, ...],
+    shown: tuple[str, ...],
+) -> dict[str, Limits]:
+    """Return the limits by strategy: what each may take, and what it sees."""
+    sight = partial(replace, sandbox=sandbox, hidden=hidden, shown=shown)
+    return {name: sight(Limits(own, memory)) for name, own in seconds.items()}
+
+
+def _unseen(cases: Sequence[Case], store: Store | None) -> tuple[str, ...]:
+    """Return the folders of the cases and of the results, which no strategy is to see."""
+    found = {case.folder.absolute() for case in cases if (case.folder / "case.toml").is_file()}
+    return tuple(sorted(map(str, found | ({store.folder.absolute()} if store else set()))))
+
+
+def _modules(strategies: Sequence[Strategy]) -> tuple[str, ...]:
+    """Return the files of the modules of strategies, one of which may be in no folder of code."""
+    names = {home_of(strategy)[1] for strategy in strategies} - {"__main__"}
+    files = {getattr(sys.modules.get(name), "__file__", None) for name in names}
+    return tuple(sorted(os.path.abspath(file) for file in files if file))
 
 
 def _meta(

@@ -174,7 +174,7 @@ class _Bench:
     def _judging(self, strategy: str) -> Limits:
         limits = self._limits[strategy]
         seconds = None if limits.seconds is None else max(_LEAST_JUDGING, limits.seconds)
-        return replace(limits, seconds=seconds)
+        return replace(limits, seconds=seconds, sandbox="off")
 
 
 def unjudged(slot: Slot, reference: Reference, outcome: JobOutcome) -> JobResult:

@@ -20,6 +20,9 @@ from typing import Any
 import psutil
 
 from femubench.core.run.limits import Limits
+from femubench.core.run.namespaces import FOLDER, Walls, go_apart
+from femubench.core.run.sandbox import bare_environment
+from femubench.core.run.syscall_filter import refuse_system_calls
 
 READY = b"\1"
 LENGTH_BYTES = 8
@@ -31,6 +34,8 @@ _THREADS = (
     "VECLIB_MAXIMUM_THREADS",
     "NUMEXPR_NUM_THREADS",
 )
+_MOST_FILES = 1024  # open at a time: what pipes and sockets hold is in no count of memory
+_ENVIRONMENT_START = 47  # word of /proc/self/stat behind the name: proc_pid_stat(5), field 50
 _PR_SET_PDEATHSIG = 1
 _LIBC = ctypes.CDLL(None)
 # Where multiprocessing's server and tracker keep how to reach them.
@@ -60,6 +65,7 @@ def serve(
     output: Connection,
     limits: Limits,
     scratch: str,
+    walls: Walls | None = None,
 ) -> None:
     """Run one function, send its bytes and end; the body of every worker process.
 
@@ -68,11 +74,15 @@ def serve(
         answer: a byte when ready, then the length of the answer and the answer.
         output: takes what is printed.
         limits: on memory and files; time and volume are for the parent to watch.
-        scratch: working and temporary folder, which the parent removes.
+        scratch: working and temporary folder, which the parent removes; in a sandbox an empty
+            one, where its root is made.
+        walls: of the sandbox; None for none.
     """
     descriptor = answer.fileno()
     _leave_the_family(output, scratch)
     _close_all_but(descriptor)
+    if walls is not None:
+        _enter(walls, scratch, limits)
     _set_limits(limits)
     os.write(descriptor, READY)
     with warnings.catch_warnings():
@@ -99,6 +109,29 @@ def _leave_the_family(output: Connection, scratch: str) -> None:
     sys.argv = [""]
     # PYTHONWARNINGS and -W of the parent are for the parent.
     sys.warnoptions = []
+
+
+def _enter(walls: Walls, scratch: str, limits: Limits) -> None:
+    """Go on in a process within walls, where no secret of the environment is left."""
+    room = limits.file if limits.memory is None else min(limits.file, limits.memory)
+    go_apart(walls, scratch, room, limits.processes)
+    _forget_environment()
+    os.environ["HOME"] = os.environ["TMPDIR"] = tempfile.tempdir = FOLDER
+    _lower(resource.RLIMIT_NOFILE, _MOST_FILES)
+    refuse_system_calls()
+
+
+def _forget_environment() -> None:
+    """Keep of the environment what programs need, also in the memory where it came from."""
+    kept = {name: os.environ[name] for name in bare_environment(os.environ)}
+    for name in tuple(os.environ):
+        del os.environ[name]
+    # Put there anew, the text lies elsewhere than what the first process was given.
+    os.environ.update(kept)
+    with open("/proc/self/stat", "rb") as stream:
+        words = stream.read().rpartition(b")")[2].split()
+    start, end = int(words[_ENVIRONMENT_START]), int(words[_ENVIRONMENT_START + 1])
+    ctypes.memset(start, 0, end - start)
 
 
 def _close_all_but(descriptor: int) -> None:

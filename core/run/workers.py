@@ -7,6 +7,7 @@ nothing of what an earlier job did to its process.
 from __future__ import annotations
 
 import ctypes
+import multiprocessing.process
 import os
 import secrets
 import shutil
@@ -15,7 +16,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from multiprocessing import connection, forkserver, get_context, resource_tracker
@@ -27,7 +28,9 @@ from typing import Any, Generic, Literal, TypeVar
 import psutil
 
 from femubench.core.run.limits import Limits, spoken_bytes
+from femubench.core.run.namespaces import FOLDER, Walls
 from femubench.core.run.provenance import source_digest
+from femubench.core.run.sandbox import enclosure, walls_around
 from femubench.core.run.worker import LENGTH_BYTES, READY, environment, scratch_root, serve
 
 MARK = "FEMUBENCH_WORKERS"
@@ -60,15 +63,60 @@ def end_group(leader: int) -> None:
             end(leader, signal.SIGKILL)
 
 
-def descendants_memory(leader: int) -> int:
-    """Return the resident memory of a worker and all processes below it in bytes."""
-    total = 0
+def processes_of(leader: int, *, walled: bool) -> list[psutil.Process]:
+    """Return a worker and all processes below it.
+
+    Arguments:
+        leader: the worker.
+        walled: whether it only waits for the one in its sandbox.
+    """
     with suppress(psutil.Error):
         top = psutil.Process(leader)
-        for process in (top, *top.children(recursive=True)):
-            with suppress(psutil.Error):
-                total += process.memory_info().rss
+        below = top.children(recursive=True)
+        return below if walled else [top, *below]
+    return []
+
+
+def memory_of(processes: Iterable[psutil.Process], root: str | None) -> int:
+    """Return the bytes that processes hold in memory, with files that exist there alone.
+
+    Arguments:
+        root: of their sandbox, whose temporary folder is in memory; None for none.
+    """
+    total, seen = 0, set[int]()
+    for process in processes:
+        with suppress(psutil.Error, OSError):
+            total += _resident(process)
+            total += sum(_unmapped(f"/proc/{process.pid}/fd", seen))
+    with suppress(OSError):
+        # As a worker starts its root is still that of this process.
+        if root is not None and not os.path.samefile(root, "/"):
+            held = os.statvfs(root + FOLDER)
+            total += (held.f_blocks - held.f_bfree) * held.f_frsize
     return total
+
+
+def _resident(process: psutil.Process) -> int:
+    """Return the bytes of a process in memory; on Linux without pages of files, which it shares."""
+    if sys.platform != "linux":
+        return int(process.memory_info().rss)
+    with open(f"/proc/{process.pid}/status", "rb") as lines:
+        known = [line.split() for line in lines if line.startswith((b"RssAnon", b"RssShmem"))]
+    return sum(1024 * int(words[1]) for words in known)
+
+
+def _unmapped(folder: str, seen: set[int]) -> Iterator[int]:
+    """Yield the sizes of anonymous files that are open, which count in no process (memfd)."""
+    if sys.platform != "linux":
+        return
+    for name in os.listdir(folder):
+        path = f"{folder}/{name}"
+        with suppress(OSError):
+            if os.readlink(path).startswith(("/memfd:", "/dev/shm/")):
+                found = os.stat(path)
+                if found.st_ino not in seen:
+                    seen.add(found.st_ino)
+                    yield 512 * found.st_blocks
 
 
 def alive(process: int | None) -> bool:
@@ -76,6 +124,24 @@ def alive(process: int | None) -> bool:
     with suppress(psutil.Error):
         return process is not None and psutil.Process(process).status() != psutil.STATUS_ZOMBIE
     return False
+
+
+def end_orphans(server: int | None) -> None:
+    """End what jobs have left to the server of all workers, which adopts it (Linux)."""
+    if server is None or sys.platform != "linux":
+        return
+    with _starting, suppress(psutil.Error, ProcessLookupError):
+        known = {process.pid for process in multiprocessing.process._children}  # type: ignore[attr-defined]
+        family = os.getpgid(server)
+        for child in psutil.Process(server).children():
+            with suppress(psutil.Error, ProcessLookupError):
+                # One that was forked just now, for another thread, is of the server's group yet.
+                if child.pid not in known and os.getpgid(child.pid) != family:
+                    for process in (child, *_below(child)):
+                        end_group(process.pid)
+
+
+_starting = threading.Lock()
 
 
 def end_strays(mark: str, root: Path, spared: frozenset[int]) -> None:
@@ -151,6 +217,7 @@ class Task(Generic[Key]):
     output: connection.Connection
     limits: Limits
     scratch: str
+    walled: bool = False
     server: int | None = None
     started: float = field(default_factory=time.monotonic)
     ready: float | None = None
@@ -206,11 +273,20 @@ def progress_of(task: Task[Key], *, look: bool) -> Ending | None:
             return Ending("no-start", reason=f"the worker process was not ready in {_START:g} s")
         limit = limits.seconds or 0.0
         return Ending("timeout", reason=f"no result within {limit:g} s", seconds=limit)
-    if look and limits.memory is not None:
-        used = descendants_memory(task.process.pid)
+    excess = _excess(task) if look else None
+    return None if excess is None else Ending("memory", reason=excess, seconds=seconds)
+
+
+def _excess(task: Task[Key]) -> str | None:
+    """Return of what a task has more than it may, None where it keeps its limits."""
+    limits, leader = task.limits, task.process.pid
+    processes = processes_of(leader, walled=task.walled)
+    if len(processes) > limits.processes:
+        return f"has {len(processes)} processes, allowed {limits.processes}"
+    if limits.memory is not None:
+        used = memory_of(processes, f"/proc/{leader}/root" if task.walled else None)
         if used > limits.memory + _BASE:
-            what = f"used {spoken_bytes(used)} of memory, allowed {spoken_bytes(limits.memory)}"
-            return Ending("memory", reason=what, seconds=seconds)
+            return f"used {spoken_bytes(used)} of memory, allowed {spoken_bytes(limits.memory)}"
     return None
 
 
@@ -281,6 +357,7 @@ class Workers(Generic[Key]):
         self._mark = ""
         self._root = Path()
         self._looked = 0.0
+        self._around: dict[tuple[tuple[str, ...], tuple[str, ...]], Walls] = {}
 
     @property
     def running(self) -> int:
@@ -310,6 +387,7 @@ class Workers(Generic[Key]):
                 while self._running:
                     self._close(self._running[-1])
                 self._bury(wait=True)
+                end_orphans(_server())
                 end_strays(self._mark, self._root, _ours())
                 shutil.rmtree(self._root, ignore_errors=True)
 
@@ -324,10 +402,11 @@ class Workers(Generic[Key]):
             argument: its argument; pickled.
             limits: what it may take.
         """
-        context, scratch = get_context("forkserver"), tempfile.mkdtemp(dir=self._root)
+        context, walls = get_context("forkserver"), self._walls(limits)
+        scratch = self._scratch()
         answer, send = context.Pipe(duplex=False)
         output, printed = context.Pipe(duplex=False)
-        arguments = (function, argument, send, printed, limits, scratch)
+        arguments = (function, argument, send, printed, limits, scratch, walls)
         try:
             process = forked(serve, *arguments)
         except (OSError, EOFError) as error:
@@ -339,8 +418,26 @@ class Workers(Generic[Key]):
             printed.close()
         for end in (answer, output):
             os.set_blocking(end.fileno(), False)
-        self._running.append(Task(key, process, answer, output, limits, scratch, _server()))
+        walled = walls is not None
+        task = Task(key, process, answer, output, limits, scratch, walled, _server())
+        self._running.append(task)
         return None
+
+    def _walls(self, limits: Limits) -> Walls | None:
+        if limits.sandbox == "off" or enclosure(limits.sandbox).sandbox == "none":
+            return None
+        parts = limits.hidden, limits.shown
+        if parts not in self._around:
+            self._around[parts] = walls_around(*parts)
+        return self._around[parts]
+
+    def _scratch(self) -> str:
+        """Make a folder for a task; without a sandbox a job may have removed the one above."""
+        try:
+            return tempfile.mkdtemp(dir=self._root)
+        except FileNotFoundError:
+            self._root.mkdir(mode=0o700, parents=True)
+            return tempfile.mkdtemp(dir=self._root)
 
     def wait(self, beside: Sequence[Any] = ()) -> list[tuple[Key, Ending]]:
         """Wait until some task has ended, and return those that have; none after a short while.
@@ -365,6 +462,7 @@ class Workers(Generic[Key]):
                 ended.append((task.key, ending))
         self._bury(wait=False)
         if look:
+            end_orphans(_server())
             end_strays(self._mark, self._root, _ours())
         return ended
 
@@ -398,7 +496,7 @@ def forked(body: Callable[..., None], *arguments: object) -> BaseProcess:
     """
     process = get_context("forkserver").Process(target=body, args=arguments)
     _server_mark()  # a job may have ended the server
-    with no_script():
+    with _starting, no_script():
         process.start()
     return process
 
@@ -421,7 +519,12 @@ _source = ""  # what the server has loaded
 
 def _end_old_server() -> None:
     """End the server where the source that it has loaded has changed since."""
-    if alive(_server()) and _source != source_digest():
+    if _source != source_digest():
+        _end_server()
+
+
+def _end_server() -> None:
+    if alive(_server()):
         forkserver._forkserver._stop()  # type: ignore[attr-defined]
 
 

@@ -33,6 +33,8 @@ class Animal(Strategy):
 
     citation = "none"
     ends = ("ok", "")
+    # The same without a sandbox: None where it would do harm to this machine.
+    loose: tuple[str, str] | None = ("same", "")
 
     def harm(self, model: Model) -> Model:
         """Do it; return a model."""
@@ -248,7 +250,9 @@ class Regicide(Animal):
     """Ends the process that started it, and with it all other workers."""
 
     name = "regicide"
-    ends = ("crashed", "the process from which all workers are started was ended")
+    # In a sandbox its parent is nobody, number 0, which stands for its own group.
+    ends = ("crashed", "the worker process was ended by SIGKILL")
+    loose = ("crashed", "the process from which all workers are started was ended")
 
     def harm(self, model: Model) -> Model:
         os.kill(os.getppid(), signal.SIGKILL)
@@ -368,19 +372,515 @@ class Gaoler(Animal):
     """Stops the process from which all workers are forked."""
 
     name = "gaoler"
-    ends = ("ok", "")
+    ends = ("timeout", "no result within ")
+    loose = ("ok", "")
 
     def harm(self, model: Model) -> Model:
         os.kill(os.getppid(), signal.SIGSTOP)
         return model
 
 
+ESCAPED = ("failed", "RuntimeError: escaped")
+# What the test has put up for burglars: a port, names, words.
+TARGET: dict[str, Any] = {}
+_LIBC = ctypes.CDLL(None, use_errno=True)
+
+
+class Burglar(Animal):
+    """Tries what a sandbox prevents; `tries` returns whether it could."""
+
+    loose = ESCAPED
+
+    def __init__(self) -> None:
+        self.target = dict(TARGET)
+
+    def tries(self) -> bool:
+        """Try it."""
+        raise NotImplementedError
+
+    def harm(self, model: Model) -> Model:
+        try:
+            found = self.tries()
+        except OSError:
+            found = False
+        if found:
+            raise RuntimeError(f"escaped: {self.name}")
+        return model
+
+
+class HomeReader(Burglar):
+    name = "home-reader"
+
+    def tries(self) -> bool:
+        return any(path.is_file() for path in Path(self.target["home"]).iterdir())
+
+
+class FolderReader(Burglar):
+    """Reads what is in the folder where the run was started."""
+
+    name = "folder-reader"
+
+    def tries(self) -> bool:
+        return any(path.is_file() for path in Path(self.target["folder"]).iterdir())
+
+
+class ScenarioReader(Burglar):
+    """Reads the measured values that come with femubench, wherever that may lie."""
+
+    name = "scenario-reader"
+
+    def tries(self) -> bool:
+        import femubench
+
+        package = Path(femubench.__file__).parent
+        for folder in (package / "scenarios", package.resolve().parent / "scenarios"):
+            if any(folder.rglob("*.csv")) or any(folder.rglob("case.toml")):
+                return True
+        return False
+
+
+class PaperReader(Burglar):
+    name = "paper-reader"
+
+    def tries(self) -> bool:
+        import femubench
+
+        package = Path(femubench.__file__).parent
+        places = (package / "papers", package.resolve().parent / "papers")
+        return any(any(folder.rglob("*.toml")) for folder in places)
+
+
+class Neighbour(Burglar):
+    """Sees other processes."""
+
+    name = "neighbour"
+
+    def tries(self) -> bool:
+        return len([name for name in os.listdir("/proc") if name.isdigit()]) > 2
+
+
+class MemoryReader(Burglar):
+    """Reads the memory of the process that asked for the run."""
+
+    name = "memory-reader"
+
+    def tries(self) -> bool:
+        with open(f"/proc/{self.target['process']}/mem", "rb"):
+            return True
+
+
+class Tracer(Burglar):
+    """Takes hold of the first process with ptrace."""
+
+    name = "tracer"
+    loose = None
+
+    def tries(self) -> bool:
+        return _LIBC.ptrace(16, 1, None, None) == 0
+
+
+class KillAll(Animal):
+    """Sends every process that it can see a signal that ends it."""
+
+    name = "kill-all"
+    loose = None
+
+    def harm(self, model: Model) -> Model:
+        subprocess.Popen(_SLEEPER)
+        os.kill(-1, signal.SIGKILL)
+        os.kill(1, signal.SIGKILL)
+        return model
+
+
+class ForkBomb(Animal):
+    name = "fork-bomb"
+    ends = ("failed", "BlockingIOError: [Errno 11]")
+    loose = None
+
+    def harm(self, model: Model) -> Model:
+        for _ in range(4000):
+            os.posix_spawn("/bin/sleep", ["sleep", "900"], {})
+        return model
+
+
+class MemoryFile(Animal):
+    """Holds in memory a file that has no name, and in its own memory nothing."""
+
+    name = "memory-file"
+    ends = ("failed", "PermissionError: [Errno 1]")
+    loose = ("crashed", "used ")
+
+    def harm(self, model: Model) -> Model:
+        descriptor = os.memfd_create("hoard")
+        for _ in range(12):
+            os.write(descriptor, b"x" * 2**26)
+        time.sleep(900.0)
+        return model
+
+
+class SharedMemoryHog(Animal):
+    """Fills /dev/shm."""
+
+    name = "shared-memory-hog"
+    ends = ("failed", "OSError: [Errno 28] No space left")
+    loose = None
+
+    def harm(self, model: Model) -> Model:
+        with open(f"/dev/shm/{MARK}", "wb", buffering=0) as stream:
+            for _ in range(64):
+                stream.write(b"x" * 2**24)
+        return model
+
+
+class FolderFiller(Animal):
+    """Fills its temporary folder, no file of which is large."""
+
+    name = "folder-filler"
+    ends = ("failed", "OSError: [Errno 28] No space left")
+    loose = None
+
+    def harm(self, model: Model) -> Model:
+        for number in range(1024):
+            Path(f"{number}").write_bytes(b"x" * 2**22)
+        return model
+
+
+class Caller(Burglar):
+    """Calls a server on this machine."""
+
+    name = "caller"
+
+    def tries(self) -> bool:
+        import socket
+
+        socket.create_connection(("127.0.0.1", self.target["port"]), 2.0).close()
+        return True
+
+
+class AbstractCaller(Burglar):
+    """Calls a socket that has a name and no file."""
+
+    name = "abstract-caller"
+
+    def tries(self) -> bool:
+        import socket
+
+        with socket.socket(socket.AF_UNIX) as caller:
+            caller.connect(self.target["abstract"])
+        return True
+
+
+class Forger(Burglar):
+    """Writes into a library."""
+
+    name = "forger"
+
+    def tries(self) -> bool:
+        made = Path(np.__file__).parent / f"{MARK}.py"
+        made.write_text("")
+        made.unlink()
+        return True
+
+
+class HomeForger(Burglar):
+    """Writes into the code of femubench itself."""
+
+    name = "home-forger"
+
+    def tries(self) -> bool:
+        import femubench.core.run.judging as judging
+
+        with open(judging.__file__, "r+"):
+            return True
+
+
+class Mounter(Burglar):
+    name = "mounter"
+    loose = None
+
+    def tries(self) -> bool:
+        return _LIBC.mount(b"tmpfs", b"/own", b"tmpfs", ctypes.c_ulong(0), None) == 0
+
+
+class Unmounter(Burglar):
+    name = "unmounter"
+    loose = None
+
+    def tries(self) -> bool:
+        return _LIBC.umount2(b"/usr", 2) == 0 or _LIBC.umount2(b"/own", 2) == 0
+
+
+class Nester(Burglar):
+    """Makes a namespace of users, in which it would be root."""
+
+    name = "nester"
+
+    def tries(self) -> bool:
+        # With unshare, and with clone, which libraries call.
+        flags = 0x10000000
+        return _LIBC.unshare(flags) == 0
+
+
+class Cloner(Burglar):
+    """The same with clone3 and clone, which return twice."""
+
+    name = "cloner"
+    loose = None
+
+    def tries(self) -> bool:
+        import platform
+
+        clone = {"x86_64": 56, "aarch64": 220}[platform.machine()]
+        made = _LIBC.syscall(clone, ctypes.c_ulong(0x10000000 | signal.SIGCHLD), 0, 0, 0, 0)
+        if made == 0:
+            os._exit(0)
+        words = (ctypes.c_uint64 * 11)(0x10000000, 0, 0, 0, signal.SIGCHLD)
+        again = _LIBC.syscall(435, words, ctypes.sizeof(words))
+        if again == 0:
+            os._exit(0)
+        return bool(made > 0 or again > 0)
+
+
+class Joiner(Burglar):
+    """Joins the namespaces of the first process."""
+
+    name = "joiner"
+    loose = None
+
+    def tries(self) -> bool:
+        kinds = ("user", "mnt", "pid", "net")
+        return any(_joined(f"/proc/1/ns/{kind}") for kind in kinds)
+
+
+def _joined(path: str) -> bool:
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        return bool(_LIBC.setns(descriptor, 0) == 0)
+    finally:
+        os.close(descriptor)
+
+
+class Climber(Burglar):
+    """Leaves its root with chroot, the oldest way."""
+
+    name = "climber"
+    loose = None
+
+    def tries(self) -> bool:
+        os.mkdir("rope")
+        os.chroot("rope")
+        return True
+
+
+class Detached(Animal):
+    """Leaves a process with nothing: no environment, session, folder or open file of its own."""
+
+    name = "detached"
+
+    def harm(self, model: Model) -> Model:
+        if os.fork() == 0:
+            os.setsid()
+            if os.fork() == 0:
+                os.chdir("/")
+                os.closerange(0, 256)
+                os.execve(_SLEEPER[0], _SLEEPER, {})
+            os._exit(0)
+        os.wait()
+        time.sleep(0.2)
+        return model
+
+
+class Sharer(Burglar):
+    """Leaves shared memory of System V behind."""
+
+    name = "sharer"
+
+    def tries(self) -> bool:
+        found = _LIBC.shmget(0, 4096, 0o1600)
+        if found >= 0:
+            _LIBC.shmctl(found, 0, None)
+        return bool(found >= 0)
+
+
+class Messenger(Burglar):
+    """Leaves a queue of messages behind."""
+
+    name = "messenger"
+
+    def tries(self) -> bool:
+        found = _LIBC.msgget(0, 0o1600)
+        if found >= 0:
+            _LIBC.msgctl(found, 0, None)
+        return bool(found >= 0)
+
+
+class KeyKeeper(Burglar):
+    """Keeps a word in a key ring of the kernel, for the next one."""
+
+    name = "key-keeper"
+    loose = None
+
+    def tries(self) -> bool:
+        import platform
+
+        add = {"x86_64": 248, "aarch64": 217}[platform.machine()]
+        return _LIBC.syscall(add, b"user", MARK.encode(), b"word", 4, -4) >= 0
+
+
+class Spectator(Animal):
+    """Watches files."""
+
+    name = "spectator"
+
+    def harm(self, model: Model) -> Model:
+        watch = _LIBC.inotify_init()
+        _LIBC.inotify_add_watch(watch, b"/", 0xFFF)
+        return model
+
+
+class DeviceMaker(Burglar):
+    name = "device-maker"
+    loose = None
+
+    def tries(self) -> bool:
+        import stat
+
+        os.mknod("disk", stat.S_IFBLK | 0o600, os.makedev(254, 0))
+        return True
+
+
+class Tuner(Burglar):
+    """Opens the switches of the kernel for writing."""
+
+    name = "tuner"
+    loose = None
+
+    def tries(self) -> bool:
+        switches = ("sys/kernel/core_pattern", "sysrq-trigger", "sys/kernel/hostname")
+        return any(_writable(f"/proc/{switch}") for switch in switches)
+
+
+def _writable(path: str) -> bool:
+    try:
+        os.close(os.open(path, os.O_WRONLY))
+    except OSError:
+        return False
+    return True
+
+
+class Renamer(Burglar):
+    """Gives the machine another name, or knows its own."""
+
+    name = "renamer"
+    loose = None
+
+    def tries(self) -> bool:
+        return os.uname().nodename == self.target["host"] or _LIBC.sethostname(b"x", 1) == 0
+
+
+class Feller(Animal):
+    """Removes its folder, and without a sandbox the one above, where those of all jobs are."""
+
+    name = "feller"
+
+    def harm(self, model: Model) -> Model:
+        import shutil
+
+        above = Path.cwd().parent
+        for folder in (Path.cwd(), above if above.name.startswith("femubench-") else None):
+            if folder is not None:
+                shutil.rmtree(folder, ignore_errors=True)
+        return model
+
+
+class EnvironmentReader(Burglar):
+    """Reads the environment: what it has, and what its first process was given."""
+
+    name = "environment-reader"
+
+    def tries(self) -> bool:
+        given = Path("/proc/self/environ").read_bytes()
+        return any(self.target["word"] in text for text in (str(os.environ), str(given)))
+
+
+class RingMaker(Burglar):
+    """Makes a ring of io_uring, whose calls no filter sees."""
+
+    name = "ring-maker"
+    loose = None
+
+    def tries(self) -> bool:
+        return _LIBC.syscall(425, 4, ctypes.create_string_buffer(120)) >= 0
+
+
+class Descriptors(Burglar):
+    """Finds more open files than the one to answer."""
+
+    name = "descriptors"
+    loose = ("ok", "")
+
+    def tries(self) -> bool:
+        found = [int(name) for name in os.listdir("/proc/self/fd")]
+        links = [f"/proc/self/fd/{number}" for number in found if number > 2]
+        return len([link for link in links if os.path.exists(link)]) > 1
+
+
+class SelfKiller(Animal):
+    name = "self-killer"
+    ends = ("crashed", "the worker process was ended by SIGKILL")
+
+    def harm(self, model: Model) -> Model:
+        os.kill(os.getpid(), signal.SIGKILL)
+        return model
+
+
+class Aborter(Animal):
+    """Ends with a core, which would be large."""
+
+    name = "aborter"
+    ends = ("crashed", "the worker process was ended by SIGABRT")
+
+    def harm(self, model: Model) -> Model:
+        os.abort()
+
+
+class ExitThree(Animal):
+    name = "exit-three"
+    ends = ("crashed", "the worker process ended with exit code 3")
+
+    def harm(self, model: Model) -> Model:
+        os._exit(3)
+
+
+BURGLARS: tuple[type[Animal], ...] = (
+    *(HomeReader, FolderReader, ScenarioReader, PaperReader, Neighbour, MemoryReader, Tracer),
+    *(KillAll, ForkBomb, MemoryFile, SharedMemoryHog, FolderFiller, Caller, AbstractCaller),
+    *(Forger, HomeForger, Mounter, Unmounter, Nester, Cloner, Joiner, Climber, Detached, Sharer),
+    *(Messenger, KeyKeeper, Spectator, DeviceMaker, Tuner, Renamer, Feller, EnvironmentReader),
+    *(RingMaker, Descriptors, SelfKiller, Aborter, ExitThree),
+)
 ANIMALS: tuple[type[Animal], ...] = (
     *(Segfault, Exit, EndlessLoop, DeafLoop, Sleeper, MemoryHog, MemoryHogs, Chatterbox),
     *(DiskFiller, UnpicklableError, Trojan, Vandal, Deserter, Daemon, Litterer, Lingerer),
     *(Gaoler, NotFinite, Skewed, WildIndices, Colossus, Liar),
     *(Stranger, Regicide, Babbler, Boaster),
+    *BURGLARS,
 )
+
+
+def _objects() -> set[str]:
+    """Return the objects of System V on this machine: kind and number."""
+    found = set()
+    for table in Path("/proc/sysvipc").glob("*"):
+        rows = table.read_text().splitlines()[1:]
+        found.update(f"{table.name} {row.split()[1]}" for row in rows)
+    return found
+
+
+_BEFORE = _objects()
 
 
 def leftovers() -> Iterator[str]:
@@ -392,6 +892,7 @@ def leftovers() -> Iterator[str]:
     for process in psutil.process_iter(["cmdline"]):
         if any(MARK in word for word in process.info["cmdline"] or ()):
             yield f"process {process.pid}"
+    yield from sorted(_objects() - _BEFORE)
     for folder in (Path(tempfile.gettempdir()), Path.cwd(), Path.home()):
         yield from (str(path) for path in folder.glob(f"*{MARK}*"))
     yield from map(str, Path(tempfile.gettempdir()).glob(f"femubench-{os.getpid()}-*"))

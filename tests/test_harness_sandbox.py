@@ -1,0 +1,317 @@
+"""What a strategy finds that looks everywhere: in the sandbox nothing, without it what is there."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import secrets
+import socket
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from click.testing import CliRunner
+
+import femubench
+from femubench.core.cli.main import bench
+from femubench.core.errors import InputError
+from femubench.core.run import cluster_worker, sandbox, syscall_filter, workers
+from femubench.core.run.executor import LocalProcesses
+from femubench.core.run.limits import MIB, Limits
+from femubench.core.run.runner import run_jobs
+from femubench.core.run.sandbox import Enclosure, Sandbox, enclosure, walls_around
+from femubench.core.run.workers import Ending, Workers
+from femubench.core.schema.results import JobResult
+
+sys.path.insert(0, str(Path(__file__).parent / "toys"))
+import harness_toys as toys
+import scanner
+import zoo
+
+needed = pytest.mark.skipif(sandbox.missing() is not None, reason=f"{sandbox.missing()}")
+
+
+def scanned(mode: Sandbox, folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[JobResult, str]:
+    """Plant a word that nobody knows everywhere; return what a scanner says that looks for it."""
+    word = f"{scanner.HEAD}{secrets.token_hex(8)}"
+    case = folder / "case"
+    case.mkdir()
+    (case / "case.toml").write_text(f'[case]\nname = "{word}"\n')
+    (case / "modes.csv").write_text(f"mode,frequency\n1,{word}\n")
+    monkeypatch.setenv("FEMUBENCH_PLANTED", word)
+    held = [word.encode() * 1000]
+    workers._end_server()  # it has the environment from when it was started
+    with Served(word) as port:
+        strategy = scanner.Scanner(port, os.getpid(), scanner.digest_of(word))
+        run = run_jobs(
+            [replace(toys.tiny_case(), folder=case)],
+            [strategy],
+            timeout=200.0,
+            executor=LocalProcesses(1, mode),
+        )
+    assert held
+    workers._end_server()
+    assert run.meta["sandbox"] == ("none" if mode == "off" else "namespaces")
+    return run.results[0], word
+
+
+class Served:
+    """A server on this machine that tells a word to everybody who calls."""
+
+    def __init__(self, word: str) -> None:
+        self._socket, self._word = socket.create_server(("127.0.0.1", 0)), word
+
+    def __enter__(self) -> int:
+        threading.Thread(target=self._answer, daemon=True).start()
+        return int(self._socket.getsockname()[1])
+
+    def _answer(self) -> None:
+        with suppress(OSError):
+            while True:
+                caller, _ = self._socket.accept()
+                with caller:
+                    caller.sendall(self._word.encode())
+
+    def __exit__(self, *_: object) -> None:
+        self._socket.close()
+
+
+@needed
+def test_a_scanner_finds_nothing_in_the_sandbox(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result, _ = scanned("require", tmp_path, monkeypatch)
+    assert (result.status, result.reason) == ("ok", "")
+    assert result.provenance["sandbox"] == "namespaces"
+
+
+def test_the_same_scanner_finds_what_was_planted_without(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result, word = scanned("off", tmp_path, monkeypatch)
+    assert result.status == "failed"
+    for place in ("disk", "environment", "network"):
+        assert f"{place}: {word}" in result.reason
+    scope = Path("/proc/sys/kernel/yama/ptrace_scope")
+    if os.geteuid() == 0 or not scope.exists() or scope.read_text().strip() == "0":
+        assert f"memory: {word}" in result.reason
+    assert result.provenance["sandbox"] == "none"
+
+
+@pytest.fixture
+def nowhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine without namespaces."""
+    monkeypatch.setattr(sandbox, "missing", lambda: "this machine has none")
+
+
+def test_where_there_is_none_a_run_says_so_once(
+    nowhere: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    words = ["run", "frame", "-s", "unchanged", "-j1", "--json", "run.json"]
+    done = CliRunner().invoke(bench, words)
+    assert done.exit_code == 0, done.output
+    assert done.stderr == "strategies run without a sandbox: this machine has none\n"
+    kept = json.loads(Path("run.json").read_text())
+    assert kept["meta"]["sandbox"] == "none"
+    assert kept["meta"]["sandbox_reason"] == "this machine has none"
+
+
+@pytest.mark.parametrize("verb", ["run", "study"])
+def test_one_that_is_required_and_missing_is_wrong_input(
+    nowhere: None, verb: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    study = '[axes]\ncases = ["frame"]\n[[strategies]]\nname = "unchanged"\n'
+    Path("study.toml").write_text(study)
+    given = ["frame", "-s", "unchanged"] if verb == "run" else ["study.toml"]
+    done = CliRunner().invoke(bench, [verb, *given, "--sandbox", "require"])
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert done.stderr.count("\n") == 1
+    assert "no sandbox: this machine has none" in done.stderr
+
+
+def test_modes_and_machines() -> None:
+    assert enclosure("off") == Enclosure("none", sandbox.OFF)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sandbox, "missing", lambda: None)
+        assert enclosure("auto") == enclosure("require") == Enclosure("namespaces")
+        patch.setattr(sandbox, "missing", lambda: "why")
+        assert enclosure("auto") == Enclosure("none", "why")
+        with pytest.raises(InputError, match="no sandbox: why"):
+            enclosure("require")
+
+
+@pytest.mark.parametrize(
+    ("where", "said"),
+    [
+        ({"platform": "darwin"}, "namespaces are of Linux"),
+        ({"release": "5.4.0-generic"}, "Linux 5.4.0-generic is older than 5.14"),
+        ({"machine": "riscv64"}, "the system calls of riscv64 are not known"),
+    ],
+)
+def test_why_there_is_none(
+    where: dict[str, str], said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in where.items():
+        if name == "platform":
+            monkeypatch.setattr(sys, name, value)
+        else:
+            monkeypatch.setattr(f"platform.{name}", lambda value=value: value)
+    found = sandbox.missing()
+    assert found is not None
+    assert found.startswith(said)
+
+
+@needed
+def test_a_machine_that_refuses_says_what(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sandbox, "walls_around", lambda _: sandbox.Walls(("/no/such/folder",)))
+    sandbox._tried.cache_clear()
+    try:
+        found = sandbox.missing()
+    finally:
+        sandbox._tried.cache_clear()
+    assert found is not None
+    assert "No such file or directory" in found
+
+
+class TestWalls:
+    def test_code_is_there_and_data_is_not(self) -> None:
+        walls = walls_around(())
+        package = Path(femubench.__file__).parent
+        assert _sees(walls, package / "core" / "run" / "worker.py")
+        assert _sees(walls, (package / "core").resolve() / "errors.py")
+        for data in ("scenarios", "papers"):
+            for folder in (package / data, (package / data).resolve()):
+                assert not _sees(walls, folder / "frame" / "case.toml")
+        clone = (package / "core").resolve().parent
+        for name in ("docs", "benchmarks", "examples", ".git"):
+            assert not _sees(walls, clone / name / "index.md")
+        assert not _sees(walls, Path.home() / ".bash_history")
+
+    def test_of_a_folder_on_the_search_path_what_can_be_imported(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        for name in ("own.py", "package/__init__.py", "package/part.py", "plain/part.py"):
+            _made(tmp_path / name)
+        for name in ("modes.csv", "case/case.toml", "plain/case/case.toml", "package/c/case.toml"):
+            _made(tmp_path / name)
+        monkeypatch.syspath_prepend(str(tmp_path))
+        walls = walls_around((str(tmp_path / "package" / "c"),))
+        for name in ("own.py", "package/part.py", "plain/part.py"):
+            assert _sees(walls, tmp_path / name), name
+        for name in ("modes.csv", "case/case.toml", "plain/case/case.toml", "package/c/case.toml"):
+            assert not _sees(walls, tmp_path / name), name
+
+    def test_a_case_with_code_in_it_is_not_shown_for_its_code(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        _made(tmp_path / "__init__.py")
+        _made(tmp_path / "case.toml")
+        monkeypatch.syspath_prepend(str(tmp_path))
+        assert not _sees(walls_around((str(tmp_path),)), tmp_path / "case.toml")
+
+
+def _made(path: Path) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("")
+
+
+def _sees(walls: sandbox.Walls, path: Path) -> bool:
+    shown, hidden = (
+        any(path.is_relative_to(f) for f in part) for part in (walls.shown, walls.hidden)
+    )
+    return shown and not hidden
+
+
+def ended(function: object, limits: Limits, argument: object = None) -> Ending:
+    with Workers[int](1).open() as pool:
+        assert pool.start(1, function, argument, limits) is None  # type: ignore[arg-type]
+        found: list[tuple[int, Ending]] = []
+        while not found:
+            found = pool.wait()
+    return found[0][1]
+
+
+@pytest.mark.parametrize("mode", ["require", "off"])
+def test_more_processes_than_allowed_end_a_job(mode: Sandbox) -> None:
+    if mode == "require" and sandbox.missing() is not None:
+        pytest.skip("no sandbox here")
+    limits = Limits(60.0, 400 * MIB, processes=12, sandbox=mode)
+    ending = ended(scanner.many_processes, limits, 20)
+    # As another user than root the system refuses the processes before anybody counts them.
+    assert (ending.how, ending.reason[:4]) == ("memory", "has ") or b"Errno 11" in ending.answer
+
+
+@needed
+def test_no_namespace_and_no_process_is_left_when_a_worker_is_killed() -> None:
+    before = _namespaces()
+    for _ in range(3):
+        limits = Limits(1.5, 400 * MIB, sandbox="require")
+        assert ended(scanner.sleeping_family, limits).how == "timeout"
+    assert _namespaces() <= before
+    assert list(zoo.leftovers()) == []
+
+
+def _namespaces() -> set[str]:
+    """Return the namespaces of processes that some process is in."""
+
+    def found() -> Iterator[str]:
+        for name in os.listdir("/proc"):
+            if name.isdigit():
+                with suppress(OSError):
+                    yield os.readlink(f"/proc/{name}/ns/pid")
+
+    return set(found())
+
+
+def test_a_worker_of_a_cluster_without_one_is_refused_where_it_is_required(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(cluster_worker, "missing", lambda: "why")
+    there = SimpleNamespace(
+        state=SimpleNamespace(nthreads=1), memory_manager=SimpleNamespace(memory_limit=0)
+    )
+    found = {
+        mode: cluster_worker.unfit(cluster_worker.Demand((), (), None, mode), there)
+        for mode in ("require", "auto", "off")
+    }
+    assert found == {"require": "no sandbox: why", "auto": None, "off": None}
+
+
+def test_the_numbers_of_refused_calls_are_those_of_the_kernel() -> None:
+    folder = Path("/usr/include")
+    headers = {
+        "x86_64": sorted(folder.glob("*/asm/unistd_64.h")),
+        "aarch64": sorted(folder.glob("asm-generic/unistd.h")),
+    }
+    for machine, found in headers.items():
+        if not found:
+            pytest.skip(f"no header of Linux for {machine}")
+        known = dict(re.findall(r"#define __NR(?:3264)?_(\w+)\s+(\d+)", found[0].read_text()))
+        _, clone, own = syscall_filter._OWN[machine]
+        for name, number in {**own, **syscall_filter._COMMON, "clone": clone}.items():
+            assert int(known[name]) == number, (machine, name)
+
+
+@needed
+def test_a_strategy_from_a_folder_on_the_path_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As that of an editable clone below home does, whose other files are not there."""
+    project = tmp_path / "project"
+    project.mkdir()
+    code = "from harness_toys import Unchanged\n\n\nclass Mine(Unchanged):\n    name = 'mine'\n"
+    (project / "my_strategy.py").write_text(code)
+    monkeypatch.syspath_prepend(str(project))
+    import my_strategy  # type: ignore[import-not-found]
+
+    executor = LocalProcesses(1, "require")
+    run = run_jobs([toys.tiny_case()], [my_strategy.Mine()], executor=executor)
+    assert [result.status for result in run.results] == ["ok"]

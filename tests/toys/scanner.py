@@ -1,0 +1,154 @@
+"""A strategy that looks for a word everywhere, and what else a sandbox has to hold."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from femubench.core.fem.model import Model
+from femubench.core.modal.measurement import Measurement
+from femubench.core.update.strategy import Strategy, UpdateResult
+
+HEAD = "zoo-" + "planted-"
+_WORD = re.compile(HEAD.encode() + rb"[0-9a-f]{16}")
+_CHUNK = 2**22
+_LARGEST = 2**20  # bytes of a file that is read
+_PATIENCE = 40.0  # s on the disk, and as much on memory
+_SKIPPED = {"proc", "sys", "dev", "usr", "lib", "lib64", "bin", "sbin", "boot", "snap"}
+
+
+class Scanner(Strategy):
+    """Fails with every place where it has found the word."""
+
+    name = "scanner"
+    citation = "none"
+
+    def __init__(self, port: int, asking: int, digest: str) -> None:
+        self.port, self.asking, self.digest = port, asking, digest
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        """Look."""
+        places = {
+            "disk": _disk(),
+            "environment": _environments(),
+            "network": _network(self.port),
+            "descriptors": _descriptors(),
+            "memory": _memory(self.asking),
+        }
+        found = {place: self._first(words) for place, words in places.items()}
+        said = [f"{place}: {word}" for place, word in found.items() if word is not None]
+        if said:
+            raise RuntimeError("; ".join(said))
+        return UpdateResult(model)
+
+    def _first(self, words: Iterator[str]) -> str | None:
+        """Return the word that was planted now, not one of an earlier test."""
+        return next((word for word in words if digest_of(word) == self.digest), None)
+
+
+def digest_of(word: str) -> str:
+    """Return what tells a word to somebody who has it, and to nobody else."""
+    return hashlib.sha256(word.encode()).hexdigest()
+
+
+def _words(data: bytes) -> Iterator[str]:
+    for match in _WORD.finditer(data):
+        yield match.group().decode()
+
+
+def _disk() -> Iterator[str]:
+    until = time.monotonic() + _PATIENCE
+    tops = sorted(set(os.listdir("/")) - _SKIPPED, key=lambda name: name != "tmp")
+    for top in tops:
+        for folder, _, names in os.walk(f"/{top}"):
+            for name in names:
+                if time.monotonic() > until:
+                    return
+                yield from _in_file(os.path.join(folder, name))
+
+
+def _in_file(path: str) -> Iterator[str]:
+    with suppress(OSError):
+        if os.path.isfile(path) and os.path.getsize(path) <= _LARGEST:
+            with open(path, "rb") as stream:
+                yield from _words(stream.read())
+
+
+def _processes() -> list[str]:
+    return [name for name in os.listdir("/proc") if name.isdigit()]
+
+
+def _environments() -> Iterator[str]:
+    yield from _words(str(dict(os.environ)).encode())
+    for process in _processes():
+        for name in ("environ", "cmdline"):
+            with suppress(OSError):
+                yield from _words(Path(f"/proc/{process}/{name}").read_bytes())
+
+
+def _network(port: int) -> Iterator[str]:
+    with suppress(OSError), socket.create_connection(("127.0.0.1", port), 2.0) as caller:
+        yield from _words(caller.recv(1000))
+
+
+def _descriptors() -> Iterator[str]:
+    for process in _processes():
+        with suppress(OSError):
+            for name in os.listdir(f"/proc/{process}/fd"):
+                yield from _in_file(f"/proc/{process}/fd/{name}")
+
+
+def _memory(asking: int) -> Iterator[str]:
+    """Look through the memory of this process, of the one that asked, and of all others."""
+    until = time.monotonic() + _PATIENCE
+    for process in dict.fromkeys(["self", str(asking), *_processes()]):
+        with suppress(OSError), open(f"/proc/{process}/mem", "rb", buffering=0) as memory:
+            for start, end in _regions(process):
+                if time.monotonic() > until:
+                    return
+                for at in range(start, end, _CHUNK):
+                    with suppress(OSError, ValueError, OverflowError):
+                        memory.seek(at)
+                        yield from _words(memory.read(min(_CHUNK, end - at)))
+
+
+def _regions(process: str) -> list[tuple[int, int]]:
+    lines = Path(f"/proc/{process}/maps").read_text().splitlines()
+    writable = [line.split()[0] for line in lines if line.split()[1].startswith("rw")]
+    return [(int(a, 16), int(b, 16)) for a, b in (words.split("-") for words in writable)]
+
+
+def many_processes(count: int) -> bytes:
+    """Start processes and wait."""
+    try:
+        for _ in range(count):
+            os.posix_spawn("/bin/sleep", ["sleep", "900"], {})
+        time.sleep(900.0)
+    except OSError as error:
+        return str(error).encode()
+    return b""
+
+
+def sleeping_family(_: object) -> bytes:
+    """Leave a sleeper in a session of its own, and sleep."""
+    from zoo import _SLEEPER
+
+    subprocess.Popen(_SLEEPER, start_new_session=True)
+    if os.fork() == 0:
+        os.setsid()
+        time.sleep(900.0)
+    sys.stdout.flush()
+    time.sleep(900.0)
+    return b""
