@@ -247,8 +247,7 @@ def rank(
         nominal: the model to start from, ``drawn``, ``textbook`` (handbook values) or ``both``.
         timeout, timeouts: seconds that a job may take, 600 by default; of single strategies.
         memory, store: bytes that a job may take; folder that keeps the results.
-        overwrite: stored results of the same jobs that are computed anew: ``always``, ``missing``
-            none, ``failed`` the failures; all by default, of a resumed run the failures.
+        overwrite: computes anew ``always`` (default), ``missing`` nothing, ``failed`` (resumed).
         resume: go on with the last run of these jobs in the store; of any without words for them.
         progress: called with (result, jobs done, jobs in all).
         jobs: number of worker processes, or of Slurm jobs; None for one a processor.
