@@ -432,3 +432,16 @@ def test_the_command_prints_the_seed(tmp_path: Path) -> None:
     answer = CliRunner().invoke(bench, [*words, "--store", str(tmp_path / "s")])
     assert answer.exit_code == 0, answer.output
     assert "1 twin (seed 77)" in " ".join(answer.output.split())
+
+
+def test_no_strategy_of_ours_is_marked_where_order_and_rounding_decide() -> None:
+    names = ["local", "offset", "sparse", "eigensensitivity", "baruch"]
+    cases = ["suite/mast-on-pad", "suite/arch", "frame-solid"]
+    run = rank(cases, names, twins=(2, 21), nominal="textbook", jobs=2)
+    found = twin_skills(run)
+    assert sorted(found) == sorted(names)
+    assert not any(item.suspicious for item in found.values())
+    assert unsteady(run) == {}
+    # Without chance and without a choice among equals the skills are the same.
+    for name in ("eigensensitivity", "baruch"):
+        assert found[name].skill == pytest.approx(found[name].original_skill, abs=1e-6)
