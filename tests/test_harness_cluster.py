@@ -364,3 +364,5 @@ def test_what_is_submitted_to_slurm() -> None:
     own = {f"jobqueue.slurm.{key}": value for key, value in (("cores", 4), ("memory", "8GiB"))}
     with dask.config.set(own), slurm_cluster("long") as queue:
         assert "--nthreads 4 --memory-limit 8.00GiB" in queue.job_script()
+    # dask_jobqueue takes it as it is imported.
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

@@ -35,6 +35,7 @@ from femubench.core.run.provenance import home_of
 from femubench.core.run.sandbox import OFF, Enclosure, Sandbox, enclosure
 from femubench.core.run.schedule import Show, unjudged
 from femubench.core.run.slots import Slot, Start, first_seed
+from femubench.core.run.stopping import interrupts_kept
 from femubench.core.run.workers import no_script
 from femubench.core.schema.results import JobResult
 from femubench.core.score.scoring import Reference
@@ -374,7 +375,9 @@ def slurm_cluster(queue: str) -> Cluster:
         queue: the partition.
     """
     import dask
-    from dask_jobqueue import SLURMCluster
+
+    with interrupts_kept():
+        from dask_jobqueue import SLURMCluster
 
     own = {"cores": 1, "processes": 1, "memory": "2GiB"}
     missing = {

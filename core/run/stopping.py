@@ -43,6 +43,17 @@ class Stopping:
 
 
 @contextmanager
+def interrupts_kept() -> Iterator[None]:
+    """Let Ctrl-C do after the block what it did before: some libraries take it on import."""
+    before = signal.getsignal(signal.SIGINT)
+    try:
+        yield
+    finally:
+        if signal.getsignal(signal.SIGINT) is not before:
+            signal.signal(signal.SIGINT, before)
+
+
+@contextmanager
 def stopping() -> Iterator[Stopping]:
     """Let the first Ctrl-C be told by what is yielded, while the block runs.
 
