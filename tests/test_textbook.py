@@ -14,10 +14,11 @@ import femubench
 from femubench import NotApplicable
 from femubench.core.cli.main import bench
 from femubench.core.library.rank import request_of
-from femubench.core.plugin.loader import registered_effects
+from femubench.core.plugin.loader import load_plugins, registered_effects
 from femubench.effect import textbook_model, textbook_values
 from femubench.fem import bredt
 from femubench.results import score_model
+from tests.test_cli import put_distribution
 
 sys.path.insert(0, str(Path(__file__).parent))
 from effect_checks import as_matrices
@@ -117,19 +118,35 @@ def test_a_run_starts_from_both_models_and_ranks_from_the_textbook_one(tmp_path:
     assert again.results == both.results
 
 
-def test_no_plugin_moves_what_all_are_measured_against(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Stranger:
-        name = "lead-filling"
+STRANGER = """
+import femubench
 
-        def places(self, model: object) -> list[str]:
-            return ["all"]
+class Lead:
+    name = "lead-filling"
+    citation = "A. Stranger (2026), Lead."
 
-        def parameters(self, model: object, place: str) -> list[object]:
-            raise AssertionError("asked for its textbook values")
+    def places(self, model):
+        return ["all"]
 
+    def parameters(self, model, place):
+        raise AssertionError("asked for its textbook values")
+
+    def extend(self, model, place, values):
+        return model
+
+@femubench.hookimpl
+def femubench_effects():
+    return [Lead()]
+"""
+
+
+def test_no_plugin_moves_what_all_are_measured_against(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     plain = femubench.rank("frame", "unchanged", jobs=1).meta["reference"]
-    loader = "femubench.core.plugin.loader.registered_effects"
-    monkeypatch.setattr(loader, lambda: (*EFFECTS, Stranger()))
+    monkeypatch.syspath_prepend(tmp_path)
+    put_distribution(tmp_path, "lead", STRANGER)
+    assert "lead-filling" in load_plugins().effects
     assert femubench.rank("frame", "unchanged", jobs=1).meta["reference"] == plain
 
 
