@@ -218,7 +218,6 @@ class TestWalls:
         monkeypatch.syspath_prepend(str(tmp_path))
         assert not _sees(walls_around((str(tmp_path),)), tmp_path / "case.toml")
 
-
     def test_data_are_hidden_under_every_name_of_a_folder(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
