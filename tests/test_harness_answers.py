@@ -274,6 +274,7 @@ def test_the_pickles_of_the_test_would_do_harm() -> None:
 
 HUGE = json.dumps(HEAD).replace('"evaluations": 3', '"evaluations": 1' + "0" * 5000).encode()
 TWICE = json.dumps(HEAD).replace('"seconds"', '"seconds": 1, "seconds"').encode()
+LONG_PARAMETER = {"name": "n" * 500, "before": 1.0, "after": 1.0, "unit": "", "std": None}
 PAIR = [["<f8", [1], "C"]]
 
 
@@ -287,7 +288,12 @@ PAIR = [["<f8", [1], "C"]]
         (sent([]), "the head is list"),
         (sent({**HEAD, "seconds": "0"}), "'0' is no number"),
         (sent({**HEAD, "seconds": 10**400}), "too large"),
+        (sent({**HEAD, "seconds": float("inf")}), "inf is no time"),
+        # A result without a time is one that no report of the run reads.
+        (sent({**HEAD, "seconds": float("nan")}, status=b"f"), "nan is no time"),
         (sent({**HEAD, "evaluations": -1}), "-1 is no count"),
+        (sent({**HEAD, "parameters": [LONG_PARAMETER] * 10_000}), "characters of figures"),
+        (sent({**HEAD, "samples": [HEAD["model"]] * 65}), "65 samples, allowed 64"),
         (sent({**HEAD, "history": [1]}), "updated model|cannot be read"),
         (sent({**HEAD, "diagnostics": {"x": None}}), "None is no number"),
         (sent({**HEAD, "reason": 3}), "3 is no text"),

@@ -26,6 +26,7 @@ from femubench.core.run.plain_frame import (
     parameters_from_plain,
 )
 from femubench.core.typing import AnyArray, IntArray, SparseArray
+from femubench.core.update.uncertainty import MOST_SAMPLES
 
 _MATRICES = ("mass", "stiffness")
 _CHANGES = ("mass_change", "stiffness_change")
@@ -65,6 +66,8 @@ def model_from_plain(data: Mapping[str, Any], arrays: Sequence[AnyArray], nomina
         base = replace(nominal, structure=None)
         if data["structure"] is not None:
             base = _on(nominal, _structure(data["structure"], arrays, nominal))
+    if len(data["samples"]) > MOST_SAMPLES:
+        raise BytesError(f"{len(data['samples'])} samples, allowed {MOST_SAMPLES}")
     model = replace(base, **_read(data["model"], arrays, nominal))
     return model, tuple(replace(model, **_read(item, arrays, model)) for item in data["samples"])
 
