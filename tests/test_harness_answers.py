@@ -321,6 +321,18 @@ def test_what_is_no_outcome_is_refused_in_one_line(data: bytes, says: str) -> No
     assert len(str(caught.value)) < 3000
 
 
+@pytest.mark.parametrize("status", [b"o", b"f", b"n"])
+def test_no_word_of_a_strategy_is_obeyed_by_a_terminal(status: bytes) -> None:
+    evil = "\x1b[2J\x07 and\nmore \u202e"
+    estimate = {**LONG_PARAMETER, "name": evil, "unit": evil}
+    said = {"reason": evil, "traceback": evil, "parameters": [estimate], "diagnostics": {evil: 1.0}}
+    found = unpacked(sent({**HEAD, **said, "history": [{evil: 1.0}]}, status=status), NOMINAL)
+    (parameter,), (figures,) = found.parameters, found.history
+    texts = [found.reason, parameter["name"], parameter["unit"], *figures, *found.diagnostics]
+    assert texts == ["\\x1b[2J\\x07 and more \\u202e"] * 5
+    assert found.traceback == "\\x1b[2J\\x07 and\nmore \\u202e"
+
+
 def test_words_of_another_encoding_arrive_in_one_that_can_be_written() -> None:
     outcome = JobOutcome("failed", "\ud800 why", "\udfff")
     assert head_of(packed(outcome)).reason == "? why"

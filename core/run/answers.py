@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any
 
-from femubench.core.errors import FemubenchError, StrategyFailure
+from femubench.core.errors import FemubenchError, StrategyFailure, harmless
 from femubench.core.fem.model import Model
 from femubench.core.run.jobs import JobOutcome, one_line
 from femubench.core.run.plain_arrays import BytesError, Shelf, opened
@@ -135,7 +135,7 @@ def _checked(status: Status, head: Mapping[str, Any]) -> JobOutcome:
     return JobOutcome(
         status=status,
         reason=_text(head["reason"], _LONGEST_REASON),
-        traceback=_text(head["traceback"], _LONGEST_TEXT),
+        traceback=_lines(head["traceback"]),
         seconds=_seconds(head["seconds"]),
         evaluations=_count(head["evaluations"]),
         discrepancy_std=_std(head.get("discrepancy_std")),
@@ -145,9 +145,21 @@ def _checked(status: Status, head: Mapping[str, Any]) -> JobOutcome:
 
 
 def _text(value: object, longest: int = _LONGEST_NAME) -> str:
+    """Return a text on one line, which no terminal obeys."""
+    return harmless(_said(value)[:longest])[:longest]
+
+
+def _lines(value: object) -> str:
+    """Return a text of several lines, which no terminal obeys; of a long one the end."""
+    lines = _said(value)[-_LONGEST_TEXT:].split("\n")
+    clean = ("".join(c if c.isprintable() else ascii(c)[1:-1] for c in line) for line in lines)
+    return "\n".join(clean)[-_LONGEST_TEXT:]
+
+
+def _said(value: object) -> str:
     if not isinstance(value, str):
         raise BytesError(f"{repr(value)[:40]} is no text")
-    return _clean(value, longest)
+    return value.encode("utf-8", "replace").decode("utf-8")
 
 
 def _count(value: object) -> int | None:
