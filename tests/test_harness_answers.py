@@ -433,6 +433,20 @@ def test_the_answer_that_is_forged_would_be_good() -> None:
     assert verdict_on(forged(lambda head, arrays: None))["status"] == "ok"
 
 
+def test_parts_of_an_entry_that_cancel_hide_nothing() -> None:
+    """Beside entries of 1e22 every lack of symmetry is small."""
+    triplet = sp.coo_array(NOMINAL.stiffness)
+    column, row = triplet.col, triplet.row
+    data = np.where(row > column, 0.5, 1.0) * triplet.data
+    hidden = np.r_[data, 1e22, -1e22], np.r_[row, 3, 3], np.r_[column, 2, 2]
+    starts = np.r_[0, np.cumsum(np.bincount(hidden[2], minlength=NOMINAL.size))]
+    place = np.argsort(hidden[2], kind="stable")
+    matrix = sp.csc_array((hidden[0][place], hidden[1][place], starts), shape=(NOMINAL.size,) * 2)
+    forged_model = replace(NOMINAL, stiffness=matrix)
+    result = verdict_on(packed(JobOutcome("ok", model=forged_model), NOMINAL))
+    assert (result["status"], result["reason"][:26]) == ("failed", "stiffness is not symmetric")
+
+
 def verdict_on(data: bytes) -> dict[str, Any]:
     """Return what the judge makes of an answer."""
     try:
