@@ -274,6 +274,7 @@ def test_the_pickles_of_the_test_would_do_harm() -> None:
 
 HUGE = json.dumps(HEAD).replace('"evaluations": 3', '"evaluations": 1' + "0" * 5000).encode()
 TWICE = json.dumps(HEAD).replace('"seconds"', '"seconds": 1, "seconds"').encode()
+LONG_PARAMETER = {"name": "n" * 500, "before": 1.0, "after": 1.0, "unit": "", "std": None}
 PAIR = [["<f8", [1], "C"]]
 
 
@@ -287,7 +288,12 @@ PAIR = [["<f8", [1], "C"]]
         (sent([]), "the head is list"),
         (sent({**HEAD, "seconds": "0"}), "'0' is no number"),
         (sent({**HEAD, "seconds": 10**400}), "too large"),
+        (sent({**HEAD, "seconds": float("inf")}), "inf is no time"),
+        # A result without a time is one that no report of the run reads.
+        (sent({**HEAD, "seconds": float("nan")}, status=b"f"), "nan is no time"),
         (sent({**HEAD, "evaluations": -1}), "-1 is no count"),
+        (sent({**HEAD, "parameters": [LONG_PARAMETER] * 10_000}), "characters of figures"),
+        (sent({**HEAD, "samples": [HEAD["model"]] * 65}), "65 samples, allowed 64"),
         (sent({**HEAD, "history": [1]}), "updated model|cannot be read"),
         (sent({**HEAD, "diagnostics": {"x": None}}), "None is no number"),
         (sent({**HEAD, "reason": 3}), "3 is no text"),
@@ -313,6 +319,18 @@ def test_what_is_no_outcome_is_refused_in_one_line(data: bytes, says: str) -> No
         unpacked(data, NOMINAL)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 3000
+
+
+@pytest.mark.parametrize("status", [b"o", b"f", b"n"])
+def test_no_word_of_a_strategy_is_obeyed_by_a_terminal(status: bytes) -> None:
+    evil = "\x1b[2J\x07 and\nmore \u202e"
+    estimate = {**LONG_PARAMETER, "name": evil, "unit": evil}
+    said = {"reason": evil, "traceback": evil, "parameters": [estimate], "diagnostics": {evil: 1.0}}
+    found = unpacked(sent({**HEAD, **said, "history": [{evil: 1.0}]}, status=status), NOMINAL)
+    (parameter,), (figures,) = found.parameters, found.history
+    texts = [found.reason, parameter["name"], parameter["unit"], *figures, *found.diagnostics]
+    assert texts == ["\\x1b[2J\\x07 and more \\u202e"] * 5
+    assert found.traceback == "\\x1b[2J\\x07 and\nmore \\u202e"
 
 
 def test_words_of_another_encoding_arrive_in_one_that_can_be_written() -> None:
@@ -413,6 +431,20 @@ def test_lies_fail_in_one_line(change: Callable[..., None], says: str) -> None:
 
 def test_the_answer_that_is_forged_would_be_good() -> None:
     assert verdict_on(forged(lambda head, arrays: None))["status"] == "ok"
+
+
+def test_parts_of_an_entry_that_cancel_hide_nothing() -> None:
+    """Beside entries of 1e22 every lack of symmetry is small."""
+    triplet = sp.coo_array(NOMINAL.stiffness)
+    column, row = triplet.col, triplet.row
+    data = np.where(row > column, 0.5, 1.0) * triplet.data
+    hidden = np.r_[data, 1e22, -1e22], np.r_[row, 3, 3], np.r_[column, 2, 2]
+    starts = np.r_[0, np.cumsum(np.bincount(hidden[2], minlength=NOMINAL.size))]
+    place = np.argsort(hidden[2], kind="stable")
+    matrix = sp.csc_array((hidden[0][place], hidden[1][place], starts), shape=(NOMINAL.size,) * 2)
+    forged_model = replace(NOMINAL, stiffness=matrix)
+    result = verdict_on(packed(JobOutcome("ok", model=forged_model), NOMINAL))
+    assert (result["status"], result["reason"][:26]) == ("failed", "stiffness is not symmetric")
 
 
 def verdict_on(data: bytes) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import secrets
 import socket
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -217,6 +218,51 @@ class TestWalls:
         monkeypatch.syspath_prepend(str(tmp_path))
         assert not _sees(walls_around((str(tmp_path),)), tmp_path / "case.toml")
 
+    def test_data_are_hidden_under_every_name_of_a_folder(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """An environment shows its lib as lib64 too; a project may be reached through a link."""
+        site = tmp_path / "env/lib/python3.11/site-packages"
+        for name in ("femubench/scenarios/frame/modes.csv", "femubench/core/errors.py"):
+            _made(site / name)
+        (tmp_path / "env/lib64").symlink_to("lib")
+        _made(tmp_path / "project/package/__init__.py")
+        _made(tmp_path / "project/package/case/case.toml")
+        (tmp_path / "linked").symlink_to("project")
+        monkeypatch.setattr(sys, "prefix", str(tmp_path / "env"))
+        monkeypatch.syspath_prepend(str(tmp_path / "linked"))
+        walls = walls_around((str(tmp_path / "project/package/case"),))
+        other = tmp_path / "env/lib64/python3.11/site-packages"
+        assert _sees(walls, tmp_path / "linked/package/__init__.py")
+        assert not _sees(walls, tmp_path / "linked/package/case/case.toml")
+        for place in (site, other):
+            assert _sees(walls, place / "femubench/core/errors.py")
+            assert not _sees(walls, place / "femubench/scenarios/frame/modes.csv")
+
+
+@needed
+def test_the_first_process_leads_to_nothing_outside() -> None:
+    """A strategy of the same user may follow its folder, whatever root it has itself."""
+    with Workers[int](1).open() as pool:
+        limits = Limits(60.0, 400 * MIB, sandbox="require")
+        assert pool.start(1, scanner.ready_and_waiting, None, limits) is None
+        (task,) = pool._running
+        until = time.monotonic() + 30.0
+        while not (task.printed or time.monotonic() > until):
+            pool.wait()
+        inside = workers.processes_of(task.process.pid, walled=True)
+        assert len(inside) == 2
+        for process in inside:
+            home = Path(f"/proc/{process.pid}")
+            assert Path(os.readlink(home / "cwd")) in (Path("/"), Path("/own"))
+            assert os.path.samefile(home / "cwd/..", home / "root")
+
+
+@needed
+def test_devices_and_sockets_of_the_machine_are_out_of_reach() -> None:
+    ending = ended(scanner.reached_outside, Limits(60.0, 400 * MIB, sandbox="require"))
+    assert (ending.how, ending.answer) == ("answer", b"")
+
 
 def _made(path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -295,8 +341,9 @@ def test_the_numbers_of_refused_calls_are_those_of_the_kernel() -> None:
         if not found:
             pytest.skip(f"no header of Linux for {machine}")
         known = dict(re.findall(r"#define __NR(?:3264)?_(\w+)\s+(\d+)", found[0].read_text()))
-        _, clone, own = syscall_filter._OWN[machine]
-        for name, number in {**own, **syscall_filter._COMMON, "clone": clone}.items():
+        _, judged, own = syscall_filter._OWN[machine]
+        looked_at = dict(zip(("clone", "socket", "socketpair"), judged, strict=True))
+        for name, number in {**own, **syscall_filter._COMMON, **looked_at}.items():
             assert int(known[name]) == number, (machine, name)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
 from pathlib import Path
 
@@ -44,3 +46,32 @@ def test_a_server_of_an_older_source_is_not_used(monkeypatch: pytest.MonkeyPatch
     with workers.Workers[int](1).open() as pool:
         assert workers._server() != first
         assert "femubench.core.run.judging" in answer(pool)
+
+
+def test_a_server_that_starts_does_not_hear_ctrl_c() -> None:
+    """A terminal sends it to all; its imports would end in a traceback."""
+    workers._end_server()
+    workers._server_mark()
+    server = workers._server()
+    assert server is not None
+    for _ in range(20):
+        os.kill(server, signal.SIGINT)
+    process = workers.forked(_nothing)
+    process.join(60.0)
+    assert process.exitcode == 0
+    assert workers._server() == server
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    mask = (
+        next(
+            line
+            for line in Path(f"/proc/{server}/status").read_text().splitlines()
+            if "SigBlk" in line
+        )
+        if sys.platform == "linux"
+        else "SigBlk: 0"
+    )
+    assert int(mask.split()[1], 16) == 0
+
+
+def _nothing() -> None:
+    pass

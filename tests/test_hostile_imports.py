@@ -440,10 +440,13 @@ def test_an_effect_and_a_reader_are_imported_by_who_uses_them(fine: Path) -> Non
     assert MODULE in sys.modules
 
 
+HOOKED = ("strategies", "scenarios", "effects", "faults", "readers", "reporters")
 FORGED: Mapping[str, tuple[object, str]] = {
     "no object": ([1], "what it told is no JSON object"),
     "no offers": ({"broken": [], "loaded": True}, "its description is none: 'offers'"),
     "numbers": ({"broken": 3, "offers": {}}, "its description is none: faults was told as int"),
+    "no fault": ({"fault": 3}, "what it told is no fault"),
+    "half a fault": ({"fault": ["ValueError"]}, "what it told is no fault"),
 }
 
 
@@ -521,3 +524,30 @@ def test_many_bytes_are_not_taken(hostile: Path, monkeypatch: pytest.MonkeyPatch
     assert apart.ask([question], 10.0, 20) == ["what it told was larger than 20 bytes"]
     with pytest.raises(PluginError, match=r"plugin 'x' \(x 1\.0\): its process"):
         apart.Origin("x", "os_exit_hostile", "x 1.0").ask(loader.DESCRIBE, seconds=10.0, most=99)
+
+
+def test_entry_points_that_are_none_cost_their_plugin_alone(tmp_path: Path) -> None:
+    site = tmp_path / "site"
+    site.mkdir()
+    install(site, "odd", "")
+    (info,) = site.glob("*.dist-info")
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: odd\x1b[2J\nVersion: 1.0\x07\n")
+    points = ("a = ../../x", "b = ", "c = two words", "d\x1b[2J = os:_exit")
+    (info / "entry_points.txt").write_text("\n".join(("[femubench]", *points)))
+    code, listed, said, _ = bench("plugins", "list", cwd=tmp_path, site=site)
+    assert code == 0
+    assert "unchanged" in listed
+    assert said.count("expected 'module:object'") == 3
+    assert not {"\x1b", "\x07"} & {*listed, *said}
+
+
+def test_a_plugin_with_many_faults_tells_of_the_first(
+    fine: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = {"loaded": True, "broken": [], "offers": dict.fromkeys(HOOKED, [3] * 10_000)}
+    monkeypatch.setattr(apart, "ask", lambda questions: [told for _ in questions])
+    loader._known.clear()
+    faults = [one for one in load_plugins().broken if one.plugin == "fine"]
+    loader._known.clear()
+    assert len(faults) == 51
+    assert faults[-1].message == f"and {10_000 * len(HOOKED) - 50} more faults"

@@ -135,4 +135,11 @@ def _read(item: Mapping[str, str]) -> Any:  # noqa: ANN401 - plain data
         found = json.loads(text)
     except (ValueError, RecursionError):
         return "what it told is no JSON"
-    return found if isinstance(found, dict) else "what it told is no JSON object"
+    match found:
+        case {"fault": [str(), str()]}:
+            return found
+        case {"fault": _}:
+            return "what it told is no fault"
+        case {}:
+            return found
+    return "what it told is no JSON object"

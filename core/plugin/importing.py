@@ -106,8 +106,17 @@ class Source:
         return Origin(self.name, point.value, self.distribution)
 
     def load(self) -> object:
-        """Return the module or the object."""
-        return self.given if self.entry_point is None else self.entry_point.load()
+        """Return the module or the object.
+
+        Raises:
+            PluginError: where the entry point names neither.
+        """
+        point = self.entry_point
+        if point is None:
+            return self.given
+        if EntryPoint.pattern.match(point.value) is None:
+            raise PluginError(f"its entry point is {point.value!r}, expected 'module:object'")
+        return point.load()
 
 
 @dataclass(frozen=True)

@@ -35,6 +35,7 @@ from femubench.core.version import __version__
 
 DESCRIBE = "femubench.core.plugin.describing:described"
 _LONGEST_MESSAGE = 2000  # characters
+_MOST_FAULTS = 50  # of one plugin that are told
 
 
 @dataclass(frozen=True)
@@ -144,11 +145,13 @@ def _believed(
     except (KeyError, TypeError, PluginError) as fault:
         broken.append(_wrong(origin, "", f"its description is none: {fault}"))
         return
-    broken += faults
     offers = {
-        kind: tuple(_described(origin, kind, offered[kind], taken, broken))
+        kind: tuple(_described(origin, kind, offered[kind], taken, faults))
         for kind, taken in found.items()
     }
+    broken += faults[:_MOST_FAULTS]
+    if len(faults) > _MOST_FAULTS:
+        broken.append(_wrong(origin, "", f"and {len(faults) - _MOST_FAULTS} more faults"))
     if told.get("loaded") is True:
         yield LoadedPlugin(origin.plugin, origin.distribution, offers, own=False)
 
@@ -232,9 +235,12 @@ def _installed(points: Iterable[EntryPoint]) -> list[Source]:
         if point.dist is not None:
             about = point.dist.metadata  # read once: a look at the name alone reads the file too
             name = str(about["Name"])
-            distribution = f"{name} {about['Version']}"
-        own = point.module.partition(".")[0] == PROJECT and name in ("", PROJECT)
-        found.append((not own, name, Source(point.name, distribution, point, own=own)))
+            distribution = harmless(f"{name} {about['Version']}")
+        module = EntryPoint.pattern.match(point.value)
+        top = module and module["module"].partition(".")[0]
+        own = top == PROJECT and name in ("", PROJECT)
+        source = Source(harmless(point.name), distribution, point, own=own)
+        found.append((not own, name, source))
     return [one[2] for one in sorted(found, key=lambda one: (*one[:2], one[2].name))]
 
 

@@ -6,6 +6,7 @@ of numbers, read with a schema; the model is told as its difference from the nom
 
 from __future__ import annotations
 
+import json
 import math
 import traceback
 import warnings
@@ -13,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any
 
-from femubench.core.errors import FemubenchError, StrategyFailure
+from femubench.core.errors import FemubenchError, StrategyFailure, harmless
 from femubench.core.fem.model import Model
 from femubench.core.run.jobs import JobOutcome, one_line
 from femubench.core.run.plain_arrays import BytesError, Shelf, opened
@@ -30,6 +31,7 @@ _LONGEST_TEXT = 100_000
 _LONGEST_NAME = 500
 _LONGEST_REASON = 2_000
 _MOST_FIGURES = 200_000
+_LONGEST_FIGURES = 4 * 2**20  # characters: a file of a run has room for many results
 
 
 class AnswerError(FemubenchError):
@@ -122,24 +124,42 @@ def _checked(status: Status, head: Mapping[str, Any]) -> JobOutcome:
     parameters, history = list(head["parameters"]), list(head["history"])
     if len(parameters) > _MOST_FIGURES or sum(map(len, history)) > _MOST_FIGURES:
         raise BytesError("more figures than anybody reads")
+    found = {
+        "parameters": tuple(_parameter(item) for item in parameters),
+        "history": tuple(_figures(item) for item in history),
+        "diagnostics": _figures(head["diagnostics"]),
+    }
+    length = len(json.dumps(found))
+    if length > _LONGEST_FIGURES:
+        raise BytesError(f"{length} characters of figures, allowed {_LONGEST_FIGURES}")
     return JobOutcome(
         status=status,
         reason=_text(head["reason"], _LONGEST_REASON),
-        traceback=_text(head["traceback"], _LONGEST_TEXT),
-        seconds=max(_number(head["seconds"]), 0.0),
+        traceback=_lines(head["traceback"]),
+        seconds=_seconds(head["seconds"]),
         evaluations=_count(head["evaluations"]),
         discrepancy_std=_std(head.get("discrepancy_std")),
         parameter_count=_count(head["parameter_count"]),
-        parameters=tuple(_parameter(item) for item in parameters),
-        history=tuple(_figures(item) for item in history),
-        diagnostics=_figures(head["diagnostics"]),
+        **found,  # type: ignore[arg-type]
     )
 
 
 def _text(value: object, longest: int = _LONGEST_NAME) -> str:
+    """Return a text on one line, which no terminal obeys."""
+    return harmless(_said(value)[:longest])[:longest]
+
+
+def _lines(value: object) -> str:
+    """Return a text of several lines, which no terminal obeys; of a long one the end."""
+    lines = _said(value)[-_LONGEST_TEXT:].split("\n")
+    clean = ("".join(c if c.isprintable() else ascii(c)[1:-1] for c in line) for line in lines)
+    return "\n".join(clean)[-_LONGEST_TEXT:]
+
+
+def _said(value: object) -> str:
     if not isinstance(value, str):
         raise BytesError(f"{repr(value)[:40]} is no text")
-    return _clean(value, longest)
+    return value.encode("utf-8", "replace").decode("utf-8")
 
 
 def _count(value: object) -> int | None:
@@ -148,6 +168,13 @@ def _count(value: object) -> int | None:
     if not isinstance(value, int) or isinstance(value, bool) or not 0 <= value < 2**63:
         raise BytesError(f"{repr(value)[:40]} is no count")
     return value
+
+
+def _seconds(value: object) -> float:
+    number = _number(value)
+    if not math.isfinite(number):
+        raise BytesError(f"{number} is no time")
+    return max(number, 0.0)
 
 
 def _std(value: object) -> float | None:

@@ -41,7 +41,7 @@ def check_entries(name: str, matrix: Any) -> None:  # noqa: ANN401 - whatever ca
         raise StrategyFailure(f"{name} is {type(matrix).__name__}, expected a sparse array")
     _check_real(name, matrix)
     if matrix.format not in ("csr", "csc"):
-        _check_indices(name, matrix)
+        check_indices(name, matrix)
 
 
 def check_change(name: str, change: Any) -> None:  # noqa: ANN401
@@ -55,15 +55,19 @@ def check_change(name: str, change: Any) -> None:  # noqa: ANN401
 def _check_sparse(name: str, matrix: Any, size: int) -> None:  # noqa: ANN401
     check_entries(name, matrix)
     _check_shape(name, matrix.shape, (size, size))
-    _check_indices(name, matrix)
+    check_indices(name, matrix)
     entries = sp.coo_array(matrix)
     _check_numbers(name, entries.data)
     transposed = sp.csr_array(entries).T
     _check_symmetry(name, sp.csr_array(entries) - transposed, entries.data)
 
 
-def _check_indices(name: str, matrix: Any) -> None:  # noqa: ANN401
-    """Make sure that no index points outside: compiled code would follow it."""
+def check_indices(name: str, matrix: Any) -> None:  # noqa: ANN401
+    """Make sure that no index points outside, which compiled code would follow.
+
+    Raises:
+        StrategyFailure: where one does.
+    """
     try:
         if matrix.format in ("csr", "csc", "bsr"):
             matrix.check_format(full_check=True)

@@ -110,6 +110,8 @@ def _first_process() -> tuple[int, int]:
     Returns:
         its number, and what keeps it alive as long as somebody holds it open.
     """
+    # Whoever may look at it goes where its folder leads. From the root it moves to the new one.
+    os.chdir("/")
     reads, alive = os.pipe()
     for descriptor in range(3, alive):
         with suppress(OSError):
@@ -162,9 +164,11 @@ def _build(walls: Walls, at: str, room: int) -> None:
     with suppress(FileExistsError):
         os.symlink(FOLDER, f"{at}/tmp")
     os.symlink("/proc/self/fd", f"{at}/dev/fd")
-    _lock(at)
+    _lock(at, _ATTR_READ_ONLY | _ATTR_NO_SUID | _ATTR_NO_DEV)
     for name in _DEVICES:
         _mount(f"/dev/{name}", f"{at}/dev/{name}", flags=_BIND)
+        # It can be written to all the same, but whose it is and who may use it stays.
+        _lock(f"{at}/dev/{name}", _ATTR_READ_ONLY | _ATTR_NO_SUID)
     limits = f"mode=700,size={room},nr_inodes={_INODES}"
     _mount("tmpfs", at + FOLDER, "tmpfs", _NO_SUID | _NO_DEV, limits)
     _mount("proc", f"{at}/proc", "proc", _READ_ONLY | _NO_SUID | _NO_DEV | _NO_EXEC)
@@ -173,6 +177,10 @@ def _build(walls: Walls, at: str, room: int) -> None:
     _call("umount2", "the old root", b".", _DETACH)
     os.umask(mask)
     os.chdir(FOLDER)
+    # What is open was opened outside, where it is not read-only.
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
 
 
 def _point(path: str, *, folder: bool) -> None:
@@ -189,9 +197,9 @@ def _accounts(folder: str) -> None:
     _write(f"{folder}/group", f"judge:x:{group}:\n")
 
 
-def _lock(at: str) -> None:
-    """Make everything mounted so far read-only, without set-user-id and devices."""
-    wanted = struct.pack("=QQQQ", _ATTR_READ_ONLY | _ATTR_NO_SUID | _ATTR_NO_DEV, 0, 0, 0)
+def _lock(at: str, attributes: int) -> None:
+    """Give attributes to everything that is mounted at a path and below."""
+    wanted = struct.pack("=QQQQ", attributes, 0, 0, 0)
     path, flags = os.fsencode(at), ctypes.c_uint(_WHOLE_TREE)
     size = ctypes.c_size_t(len(wanted))
     _call("syscall", "mount_setattr", _MOUNT_SETATTR, _HERE, path, flags, wanted, size)

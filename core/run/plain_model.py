@@ -18,7 +18,7 @@ from femubench.core.fem.beam import BeamProperties
 from femubench.core.fem.model import LowRank, Model, common_dofs, dofs_of
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.structure import Structure
-from femubench.core.run.model_checks import check_change, check_entries
+from femubench.core.run.model_checks import check_change, check_entries, check_indices
 from femubench.core.run.plain_arrays import BytesError, Shelf
 from femubench.core.run.plain_frame import (
     frame_from_plain,
@@ -26,6 +26,7 @@ from femubench.core.run.plain_frame import (
     parameters_from_plain,
 )
 from femubench.core.typing import AnyArray, IntArray, SparseArray
+from femubench.core.update.uncertainty import MOST_SAMPLES
 
 _MATRICES = ("mass", "stiffness")
 _CHANGES = ("mass_change", "stiffness_change")
@@ -65,6 +66,8 @@ def model_from_plain(data: Mapping[str, Any], arrays: Sequence[AnyArray], nomina
         base = replace(nominal, structure=None)
         if data["structure"] is not None:
             base = _on(nominal, _structure(data["structure"], arrays, nominal))
+    if len(data["samples"]) > MOST_SAMPLES:
+        raise BytesError(f"{len(data['samples'])} samples, allowed {MOST_SAMPLES}")
     model = replace(base, **_read(data["model"], arrays, nominal))
     return model, tuple(replace(model, **_read(item, arrays, model)) for item in data["samples"])
 
@@ -151,9 +154,17 @@ def _sparse(name: str, entry: object, arrays: Sequence[AnyArray]) -> SparseArray
     if len(starts) != (columns if form == "csc" else rows) + 1:
         raise BytesError(f"{name} is not a valid sparse array: {len(starts)} starts")
     try:
-        return _FORMS[form]((data, indices, starts), shape=(rows, columns))
+        found = _FORMS[form]((data, indices, starts), shape=(rows, columns))
     except (ValueError, TypeError, IndexError, OverflowError) as error:
         raise BytesError(f"{name} is not a valid sparse array: {error}") from error
+    check_indices(name, found)
+    if not found.has_canonical_format:
+        tidy = found.copy()
+        tidy.sum_duplicates()
+        # Parts of an entry that cancel would hide a lack of symmetry, and their sum depends on
+        # what is added to them.
+        found = found if tidy.nnz == found.nnz else tidy
+    return found
 
 
 def _taken(arrays: Sequence[AnyArray], number: object) -> AnyArray:

@@ -127,9 +127,11 @@ def walls_around(hidden: Iterable[str], code: Iterable[str] = ()) -> Walls:
     shown.update(path for path in code if os.path.isfile(path))
     both = shown | {os.path.realpath(path) for path in shown}
     own = Path(__file__).absolute().parents[2]
-    covers = {str(folder / name) for folder in _own_folders(own) for name in _DATA}
+    known = {*_own_folders(own), *_other_own()}
+    covers = {str(folder / name) for folder in known for name in _DATA}
     covers.update(path for given in hidden for path in (given, os.path.realpath(given)))
     outermost = tuple(path for path in _outermost(both) if path not in covers)
+    covers.update(_elsewhere(covers, outermost))
     inside = (path for path in covers if _below(path, outermost))
     return Walls(outermost, links, tuple(_outermost(inside)))
 
@@ -151,6 +153,13 @@ def _environment(prefix: Path) -> Iterator[str]:
 def _own_folders(package: Path) -> set[Path]:
     """Return where femubench lies: its package, and the clone that its links lead to."""
     return {package, package.resolve(), *(path.resolve().parent for path in package.iterdir())}
+
+
+def _other_own() -> Iterator[Path]:
+    """Yield where femubench is installed besides, in a place whose other packages are shown."""
+    for prefix in dict.fromkeys((sys.prefix, sys.base_prefix, "/usr", "/usr/local")):
+        yield from Path(prefix).glob("lib*/python3*/*-packages/femubench")
+    yield from (Path(entry or os.curdir).absolute() / "femubench" for entry in sys.path)
 
 
 def _own_code() -> Iterator[Path]:
@@ -206,6 +215,16 @@ def _outermost(paths: Iterable[str]) -> Iterator[str]:
         if last is None or not Path(path).is_relative_to(last):
             last = path
             yield path
+
+
+def _elsewhere(paths: Iterable[str], shown: Iterable[str]) -> Iterator[str]:
+    """Yield where paths also lie, in what is shown by another name: of lib as lib64, say."""
+    listed = tuple(paths)
+    for other in shown:
+        real = os.path.realpath(other)
+        for path in listed if real != other else ():
+            if Path(path).is_relative_to(real):
+                yield os.path.normpath(os.path.join(other, os.path.relpath(path, real)))
 
 
 def _below(path: str, folders: Iterable[str]) -> bool:

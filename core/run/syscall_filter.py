@@ -1,7 +1,8 @@
 """System calls that a strategy has no use for, refused by the kernel.
 
 They make namespaces and mounts, hold memory that no count of a process shows (memfd, System V
-shared memory, message queues, io_uring), reach into other processes or the kernel's key rings.
+shared memory, message queues, io_uring), reach into other processes or the kernel's key rings, or
+make sockets that know no namespace of networks (those between virtual machines, say).
 
 Source: Linux, Documentation/userspace-api/seccomp_filter.rst; numbers from asm/unistd_64.h (x86-64)
 and asm-generic/unistd.h (AArch64).
@@ -17,17 +18,18 @@ import sys
 
 _PR_SET_SECCOMP, _MODE_FILTER, _PR_SET_NO_NEW_PRIVS = 22, 2, 38
 _LOAD, _EQUAL, _AT_LEAST, _ANY_BIT, _RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
-_NUMBER_AT, _ARCH_AT, _FLAGS_AT = 0, 4, 16  # in struct seccomp_data
+_NUMBER_AT, _ARCH_AT, _FIRST_AT = 0, 4, 16  # in struct seccomp_data
 _ALLOW, _ERROR = 0x7FFF0000, 0x00050000
 _X32 = 0x40000000  # numbers from here on are the calls of another interface
 _NEW_NAMESPACE = 0x7E020000  # every CLONE_NEW... flag of clone
+_FAMILIES = (1, 2, 10, 16)  # AF_UNIX, AF_INET, AF_INET6, AF_NETLINK
 _CLONE3 = 435  # its flags lie in memory, where a filter cannot look; glibc falls back to clone
 
-# Audit architecture, number of clone, and numbers of what is refused.
+# Audit architecture, numbers of clone, socket and socketpair, and numbers of what is refused.
 _OWN = {
     "x86_64": (
         0xC000003E,
-        56,
+        (56, 41, 53),
         {
             **{"unshare": 272, "setns": 308, "mount": 165, "umount2": 166, "pivot_root": 155},
             **{"chroot": 161, "memfd_create": 319, "shmget": 29, "msgget": 68, "semget": 64},
@@ -39,7 +41,7 @@ _OWN = {
     ),
     "aarch64": (
         0xC00000B7,
-        220,
+        (220, 198, 199),
         {
             **{"unshare": 97, "setns": 268, "mount": 40, "umount2": 39, "pivot_root": 41},
             **{"chroot": 51, "memfd_create": 279, "shmget": 194, "msgget": 186, "semget": 190},
@@ -82,11 +84,13 @@ def refuse_system_calls() -> None:
 
 def _program() -> bytes:
     """Return the filter: refused calls fail with EPERM, and clone3 as if there were none."""
-    arch, clone, own = _OWN[platform.machine()]
+    arch, (clone, *sockets), own = _OWN[platform.machine()]
     numbers = sorted({**own, **_COMMON}.values())
     # The lines after the head and the numbers, to which is jumped.
-    flags = 6 + len(numbers)
-    allow, refuse, missing = flags + 2, flags + 3, flags + 4
+    flags = 6 + len(sockets) + len(numbers)
+    family = flags + 2
+    allow = family + 1 + len(_FAMILIES)
+    refuse, missing = allow + 1, allow + 2
     lines: list[tuple[int, int, int | None, int | None]] = [
         (_LOAD, _ARCH_AT, None, None),
         (_EQUAL, arch, None, refuse),
@@ -94,12 +98,18 @@ def _program() -> bytes:
         (_AT_LEAST, _X32, refuse, None),
         (_EQUAL, _CLONE3, missing, None),
         (_EQUAL, clone, flags, None),
+        *((_EQUAL, number, family, None) for number in sockets),
         *((_EQUAL, number, refuse, None) for number in numbers),
     ]
     lines[-1] = (*lines[-1][:3], allow)
     lines += [
-        (_LOAD, _FLAGS_AT, None, None),
+        (_LOAD, _FIRST_AT, None, None),
         (_ANY_BIT, _NEW_NAMESPACE, refuse, allow),
+        (_LOAD, _FIRST_AT, None, None),
+        *((_EQUAL, known, allow, None) for known in _FAMILIES),
+    ]
+    lines[-1] = (*lines[-1][:3], refuse)
+    lines += [
         (_RETURN, _ALLOW, None, None),
         (_RETURN, _ERROR | errno.EPERM, None, None),
         (_RETURN, _ERROR | errno.ENOSYS, None, None),

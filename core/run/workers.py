@@ -508,9 +508,20 @@ def _server_mark() -> str:
     if not alive(_server()):
         _source = source_digest()
         get_context("forkserver").set_forkserver_preload(["femubench.core.run.preload"])
-        with environment(**{MARK: _mark}):
+        resource_tracker.ensure_running()  # it lets Ctrl-C through again
+        with environment(**{MARK: _mark}), _ctrl_c_later():
             forkserver.ensure_running()
     return _mark
+
+
+@contextmanager
+def _ctrl_c_later() -> Iterator[None]:
+    """Keep Ctrl-C back while the block runs; from what it starts until `preload` is through."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 _mark = ""

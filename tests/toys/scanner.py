@@ -141,6 +141,38 @@ def many_processes(count: int) -> bytes:
     return b""
 
 
+def ready_and_waiting(_: object) -> bytes:
+    """Say so, and sleep."""
+    print("ready", flush=True)
+    time.sleep(900.0)
+    return b""
+
+
+def reached_outside(_: object) -> bytes:
+    """Return what could be done to devices of the machine, and to sockets without a namespace."""
+    found = []
+    for what in ("/dev/null", "/dev/zero", "/dev/urandom", 0):
+        with suppress(OSError):
+            os.chmod(what, os.stat(what).st_mode & 0o7777)
+            found.append(f"chmod {what}")
+        with suppress(OSError):
+            os.utime(what)
+            found.append(f"utime {what}")
+    for family in (38, 40, 44):  # AF_ALG, AF_VSOCK, AF_XDP
+        try:
+            socket.socket(family, socket.SOCK_STREAM).close()
+        except PermissionError:
+            continue
+        except OSError:
+            pass
+        found.append(f"socket of family {family}")
+    with open(os.devnull, "w") as nothing:
+        nothing.write("can be written to")
+    for one in socket.socketpair():
+        one.close()
+    return ", ".join(found).encode()
+
+
 def sleeping_family(_: object) -> bytes:
     """Leave a sleeper in a session of its own, and sleep."""
     from zoo import _SLEEPER
