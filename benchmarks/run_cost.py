@@ -1,6 +1,6 @@
 """What a run costs beside its eigenvalue solutions, and what a job costs that does nothing.
 
-    python benchmarks/run_cost.py [CASE ...] [-s STRATEGY ...]
+    python benchmarks/run_cost.py [CASE ...] [-s STRATEGY ...] [--sandbox off]
 
 Without cases the default set, without strategies all but `diagnosed`, whose search has a benchmark
 of its own. Prints the processor time of the run in this process, in the server of its workers and
@@ -29,8 +29,10 @@ from femubench.core.library.cases import usable_plugins
 from femubench.core.library.rank import Plan, plan_of
 from femubench.core.modal import eigen
 from femubench.core.run.answers import packed, unpacked
+from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.jobs import Job, performed
 from femubench.core.run.judging import judged
+from femubench.core.run.sandbox import Sandbox
 from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Starts
 from femubench.core.run.store import Store
@@ -64,11 +66,12 @@ class Cost:
         return self.parent + self.server + self.workers
 
 
-def run_cost(plan: Plan, workers: int = 1) -> Cost:
+def run_cost(plan: Plan, workers: int = 1, sandbox: Sandbox = "auto") -> Cost:
     """Run a plan in workers, the server started before, and return what it cost."""
+    place = LocalProcesses(workers, sandbox)
     with tempfile.TemporaryDirectory() as folder:
         before, clock = _times(), time.perf_counter()
-        run = plan.run(workers, Store(folder))
+        run = plan.run(None, Store(folder), place)
         wall, after = time.perf_counter() - clock, _times()
     parent, server, below = (b - a for a, b in zip(before, after, strict=True))
     return Cost(len(run.results), parent, server, below, wall)
@@ -130,10 +133,10 @@ def solutions(plan: Plan) -> Solutions:
     return found
 
 
-def null_job(jobs: int = NULL_JOBS, workers: int = 1) -> Cost:
+def null_job(jobs: int = NULL_JOBS, workers: int = 1, sandbox: Sandbox = "auto") -> Cost:
     """Return what a run costs whose strategy does nothing, without pictures: seeds on `frame`."""
     plan = plan_of("frame", "unchanged", usable_plugins(), seeds=jobs, nominal="drawn")
-    return run_cost(plan, workers)
+    return run_cost(plan, workers, sandbox)
 
 
 def main(words: Sequence[str] | None = None) -> None:
@@ -141,18 +144,19 @@ def main(words: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("cases", nargs="*")
     parser.add_argument("-s", "--strategies", nargs="*", default=[])
+    parser.add_argument("--sandbox", choices=["auto", "require", "off"], default="auto")
     asked = parser.parse_args(words)
     plugins = usable_plugins()
     chosen = asked.strategies or [name for name in plugins.strategies if name != "diagnosed"]
     start_server()
-    costs = [null_job() for _ in range(3)]
+    costs = [null_job(sandbox=asked.sandbox) for _ in range(3)]
     for name in ("parent", "server", "workers", "whole", "wall"):
         least = min(getattr(cost, name) / cost.jobs for cost in costs)
         print(f"null job, {name:8}{1000.0 * least:8.1f} ms")
     spread = statistics.pstdev(1000.0 * cost.whole / cost.jobs for cost in costs)
     print(f"asked for {THIRTY:g} ms; repetitions differ by {spread:.1f} ms")
     plan = plan_of(asked.cases, chosen, plugins)
-    cost = run_cost(plan)
+    cost = run_cost(plan, sandbox=asked.sandbox)
     found = solutions(plan)
     print(f"{cost.jobs} jobs, {found.count} eigenvalue solutions of {found.seconds:.1f} s together")
     for name in ("parent", "server", "workers", "whole", "wall"):
