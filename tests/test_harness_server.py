@@ -73,5 +73,9 @@ def test_a_server_that_starts_does_not_hear_ctrl_c() -> None:
     assert int(mask.split()[1], 16) == 0
 
 
+def test_whoever_imports_what_the_server_loads_hears_ctrl_c() -> None:
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
 def _nothing() -> None:
     pass

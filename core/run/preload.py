@@ -47,9 +47,10 @@ if sys.platform == "linux":
     ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     warnings.filterwarnings("ignore", "forkserver: waitpid returned unexpected pid")
 threadpool_limits(1)
-# Ctrl-C, kept back so far, is for the parent.
-signal.signal(signal.SIGINT, signal.SIG_IGN)
-signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT,))
+# Ctrl-C, kept back so far, is for the parent; whoever else imports this goes on hearing it.
+if signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, ()):
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT,))
 # Else the first search for garbage in a worker writes to, and so copies, every page of the server.
 gc.collect()
 gc.freeze()
