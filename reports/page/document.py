@@ -8,7 +8,7 @@ from typing import Any
 
 from femubench.reports.templating import asset, templates
 
-STYLES = ("run.css", "case.css")
+STYLES = ("page.css", "run.css", "case.css")
 # One classic script; each file adds to what those before it have made.
 SCRIPTS = (
     *("core.js", "charts.js", "heat.js", "scene.js", "structure.js", "element_map.js"),
