@@ -12,12 +12,19 @@ import pytest
 from femubench import Case, Diagnosis, Measurement, Model, diagnose
 from femubench.core.case.case import Modification
 from femubench.core.challenge.structures import structure_named
-from femubench.core.diagnosis.proof import Unseen, gain_of, held_out, left_out, modified
+from femubench.core.diagnosis.proof import (
+    Unseen,
+    gain_of,
+    held_out,
+    left_out,
+    modified,
+    rms_gain_of,
+)
 from femubench.core.inference.examine import examine, posed
 from femubench.core.inference.fit import Fit, state_at
 from femubench.core.inference.hypothesis import hypotheses_of
 from femubench.core.inference.mesh_error import refined
-from femubench.core.schema.diagnosis import Cause
+from femubench.core.schema.diagnosis import Cause, Gain
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block
 from femubench.core.score.scoring import score_model
@@ -193,6 +200,12 @@ def test_the_gain_is_that_of_the_models_themselves() -> None:
     before, after = score_model(case, case.model), score_model(case, found.extended)
     gain = gain_of(before, after, None)
     assert found.gain == gain
+    assert found.gain_rms == Gain(
+        *(
+            (before[name].rms_percent, after[name].rms_percent)
+            for name in ("used", "higher", "modified")
+        )
+    )
     assert gain.held_out_percent is not None
     assert gain.modified_percent is not None
     for first, second in (gain.used_percent, gain.held_out_percent, gain.modified_percent):
@@ -204,6 +217,16 @@ def test_the_gain_is_that_of_the_models_themselves() -> None:
     )
 
 
+def test_root_mean_squares_are_those_of_a_run_and_of_modes_left_out() -> None:
+    before, after = Block(8.5, None), Block(0.5, None)
+    blocks = {"used": before, "modified": before}, {"used": after, "modified": after}
+    gain = rms_gain_of(*blocks, unseen([0.03, -0.04], [0.0, 0.01]))
+    assert (gain.used_percent, gain.held_out_percent) == ((8.5, 0.5), None)
+    assert gain.modified_percent == (8.5, 0.5)
+    assert gain.cross_validated_percent == pytest.approx((12.5**0.5, 0.5**0.5))
+    assert rms_gain_of(*blocks, None).cross_validated_percent is None
+
+
 def test_without_held_out_data_modes_are_left_out_in_turn() -> None:
     case = replace(made(("member-mass", "front-left", 0.2)), held_out=(), modifications=())
     found = found_in(case)
@@ -212,6 +235,10 @@ def test_without_held_out_data_modes_are_left_out_in_turn() -> None:
     assert found.gain.cross_validated_percent is not None
     before, after = found.gain.cross_validated_percent
     assert after < 0.5 * before
+    assert found.gain_rms is not None
+    assert found.gain_rms.cross_validated_percent is not None
+    first, second = found.gain_rms.cross_validated_percent
+    assert second < 0.5 * first
     assert any("holds nothing back" in note for note in found.notes)
     assert "left out in turn" in found.sentence
 

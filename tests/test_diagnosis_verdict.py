@@ -15,6 +15,7 @@ import pytest
 from femubench import Case, Diagnosis, InputError, Measurement, Model, diagnose
 from femubench.core.case.modes import NO_SENSORS
 from femubench.core.challenge.structures import structure_named
+from femubench.core.diagnosis.scatter import overstatement, scatter_rows
 from femubench.core.diagnosis.verdict import (
     Decision,
     angle_between,
@@ -22,7 +23,6 @@ from femubench.core.diagnosis.verdict import (
     inseparable,
     most_believed,
     mostly_common,
-    overstatement,
 )
 from femubench.core.inference.hypothesis import by_themselves
 from femubench.core.inference.posterior import Posterior
@@ -114,6 +114,41 @@ def test_deviations_that_are_far_too_large_are_seen_with_their_factor(
     assert overstatement(state, "frequencies") == 1.0
     state.residual[: len(data.measurement)] /= 100.0
     assert overstatement(state, "frequencies") > 50.0
+
+
+def test_both_tails_of_chi_square_are_told_with_their_numbers(data: Data) -> None:
+    state = left(noise(data, np.random.default_rng(2)), data)
+    state.x = np.zeros(0)
+    whole, *parts = scatter_rows(state)
+    assert [row.kind for row in (whole, *parts)] == ["all", "frequencies", "shapes"]
+    assert (whole.dof, parts[0].dof) == (len(data) - data.scale_count, len(data.measurement))
+    assert whole.chi2 == pytest.approx(state.residual @ state.residual)
+    assert whole.less_p + whole.more_p == pytest.approx(1.0)
+    assert not any(row.warning for row in (whole, *parts))
+    state.residual *= 0.25
+    few = {row.kind: row for row in scatter_rows(state)}
+    assert few["shapes"].factor == pytest.approx(4.0, rel=0.15)
+    assert "so little with probability" in few["shapes"].warning
+    assert "times too large" in few["shapes"].warning
+    assert few["all"].warning == ""  # a kind by itself says more
+    state.residual *= 16.0
+    much = {row.kind: row for row in scatter_rows(state)}
+    assert much["shapes"].more_p < 1e-12
+    assert "so much with probability" in much["shapes"].warning
+    assert "4 times too small" in much["shapes"].warning.replace("3.9", "4").replace("4.1", "4")
+
+
+def test_all_data_are_warned_of_where_no_kind_by_itself_is(data: Data) -> None:
+    residual = np.full(len(data), 0.74)
+    residual[: len(data.measurement)] = 0.3
+    state = left(residual, data)
+    state.x = np.zeros(0)
+    whole, *parts = scatter_rows(state)
+    assert whole.less_p < 1e-3 < min(row.less_p for row in parts)
+    assert "all data together is far too little" in whole.warning
+    assert not any(row.warning for row in parts)
+    state.x = np.zeros(len(data))
+    assert scatter_rows(state) == ()
 
 
 # --- decisions --------------------------------------------------------------------------------
@@ -401,7 +436,7 @@ def test_a_stated_scatter_that_is_far_too_large_is_said(factor: float, said: boo
     m = case.measurement
     loose = replace(m, frequency_std=factor * m.frequency_std, shape_std=factor * m.shape_std)
     found = diagnosed(replace(case, measurement=loose), faults=False, pairs=False, tolerance=0.0)
-    notes = [note for note in found.notes if "times too large" in note]
+    notes = [row.warning for row in found.scatter if "times too large" in row.warning]
     assert bool(notes) is said
     if said:
         assert "about 5" in notes[0] or "about 4" in notes[0]

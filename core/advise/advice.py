@@ -259,9 +259,9 @@ def advise(
 
     A separation is the squared distance of the two predictions in standard deviations, of the
     first explanation from the one that the measurement tells least from it. Where it tells the
-    first from some only, the text says from which, and it comes after all that tell the first
-    from every other by three standard deviations. A second level of excitation comes last: it
-    tells a softer structure from one that softens, which is no matter between the explanations.
+    first from some only, the text says from which, and it gives way to all that tell the first
+    from every other by three standard deviations where there is no room for all. A second level of
+    excitation tells a softer structure from one that softens: it always has a place.
 
     Arguments:
         model: the nominal model.
@@ -270,7 +270,7 @@ def advise(
         tolerance: standard deviation of the relative scatter of every element.
 
     Returns:
-        up to eight, best first; at least one where anything can be measured.
+        up to eight, largest separation first; at least one where anything can be measured.
 
     Source: Box & Hill (1967), Technometrics 9, 57-71.
     """
@@ -291,7 +291,7 @@ def advise(
 def _ranked(
     options: Sequence[Option], labels: Sequence[str], level: Option | None
 ) -> tuple[Advice, ...]:
-    """Return the best options; those that clearly tell the first explanation from all lead."""
+    """Return the best options; those that clearly tell the first explanation from all stay."""
     rows = [(option, *_told(option, labels)) for option in options]
     # Clearly all comes before very clearly some.
     rows = in_order(rows, lambda row: -row[2])
@@ -302,10 +302,11 @@ def _ranked(
         seen[option.kind] = seen.get(option.kind, 0) + 1
         if (size >= _WORTH and seen[option.kind] <= _OF_A_KIND) or not chosen:
             chosen.append(Advice(text, size))
-    last: list[Advice] = []
+    beside: list[Advice] = []
     if level is not None and min(level.distances) >= _WORTH:
-        last.append(Advice(level.text, min(level.distances)))
-    return (*chosen[: _MOST - len(last)], *last)
+        beside.append(Advice(level.text, min(level.distances)))
+    kept = [*chosen[: _MOST - len(beside)], *beside]
+    return tuple(in_order(kept, lambda advice: -advice.separation))
 
 
 def _told(option: Option, labels: Sequence[str]) -> tuple[str, float]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -18,9 +17,11 @@ from femubench.core.diagnosis.proof import (
     extended_by,
     gain_of,
     left_out,
+    rms_gain_of,
     unseen_of,
 )
 from femubench.core.diagnosis.result import Diagnosis
+from femubench.core.diagnosis.scatter import scatter_rows
 from femubench.core.diagnosis.tables import (
     error_scales,
     evidence_rows,
@@ -31,7 +32,7 @@ from femubench.core.diagnosis.tables import (
     smallest_visible,
     tied_places,
 )
-from femubench.core.diagnosis.verdict import Decision, decide, elsewhere, overstatement
+from femubench.core.diagnosis.verdict import Decision, decide, elsewhere
 from femubench.core.diagnosis.words import sentence_of
 from femubench.core.fem.model import Model
 from femubench.core.inference.effort import Effort
@@ -65,7 +66,7 @@ class _Proof:
         leader: the best guess, or what unseen data bear out where they refute that.
         model: the extended model.
         unseen: errors of the unseen data.
-        gain: before and after.
+        gain, gain_rms: before and after, as medians and as root mean squares.
         crossed: whether used modes were left out in turn, for want of unseen ones.
         confirmed: whether unseen data bear the leader out.
     """
@@ -74,6 +75,7 @@ class _Proof:
     model: Model
     unseen: tuple[Unseen, ...]
     gain: Gain
+    gain_rms: Gain
     crossed: bool
     confirmed: bool
 
@@ -174,8 +176,9 @@ def _proof(
         crossed = left_out(examination, effects, effort)
         unseen = (crossed,)
         confirmed = crossed.confirms(len(best.parts))
-    gain = gain_of(score_model(given, given.model), after, crossed)
-    return _Proof(best, model, unseen, gain, crossed is not None, confirmed)
+    before = score_model(given, given.model)
+    gains = (of(before, after, crossed) for of in (gain_of, rms_gain_of))
+    return _Proof(best, model, unseen, *gains, crossed is not None, confirmed)
 
 
 def _written(
@@ -208,7 +211,8 @@ def _written(
         verdict="named" if any(faults) and decision.verdict == "none" else decision.verdict,
         sentence=with_faults(
             sentence_of(
-                decision, causes, options, top, proof.gain, reference=case.reference is not None
+                *(decision, causes, options, top, proof.gain_rms),
+                reference=case.reference is not None,
             ),
             mended,
             loose,
@@ -220,7 +224,9 @@ def _written(
         smallest_visible=smallest_visible(examination.found[0]),
         residuals=residual_rows(before, after),
         gain=proof.gain,
+        gain_rms=proof.gain_rms,
         chi2=(before.chi2, after.chi2),
+        scatter=scatter_rows(after),
         data_count=len(examination.problem.data),
         adequacy_p=adequate,
         nothing=decision.nothing,
@@ -284,24 +290,11 @@ def _advice(examination: Examination, group: Sequence[Explanation]) -> tuple[Adv
     return advise(examination.model, problems, fits, tolerance=examination.tolerance)
 
 
-def _overstated(best: Explanation) -> list[str]:
-    """Return a note on every kind of data whose stated deviations are far too large."""
-    kinds: tuple[Literal["frequencies", "shapes"], ...] = ("frequencies", "shapes")
-    factors = {kind: overstatement(best.fit.state, kind) for kind in kinds}
-    return [
-        f"What is left of the {kind} is far less than their stated scatter leaves by chance: "
-        f"their standard deviations (or the tolerance) seem about {factor:.2g} times too large, "
-        "which hides causes and widens every margin."
-        for kind, factor in factors.items()
-        if factor > 1.0
-    ]
-
-
 def _notes(
     case: Case, examination: Examination, proof: _Proof, shown: Sequence[Explanation]
 ) -> tuple[str, ...]:
     best = proof.leader
-    notes = _overstated(best)
+    notes: list[str] = []
     if case.band is not None and best.parts:
         found = look_at_band(Seen(proof.model, case.measurement), case.band)
         notes += [f"With the causes in it: {warning.what}" for warning in found]

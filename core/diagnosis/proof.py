@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import log
@@ -28,6 +28,8 @@ from femubench.core.schema.diagnosis import Gain
 from femubench.core.schema.results import Block
 from femubench.core.score.scoring import frequency_error, many_modifications, modified_modes
 from femubench.core.typing import BoolArray, FloatArray
+
+Blocks = Mapping[str, Block]
 
 # Below this many deviations unseen data cannot tell one model from another.
 _CLEARLY = 3.0
@@ -302,7 +304,24 @@ def left_out(
     return Unseen(np.array(before), np.array(after), np.array(std))
 
 
-def gain_of(before: dict[str, Block], after: dict[str, Block], crossed: Unseen | None) -> Gain:
+def rms_gain_of(before: Blocks, after: Blocks, crossed: Unseen | None) -> Gain:
+    """Return root mean squares of relative frequency errors in percent, before and after.
+
+    The measure of `Block`: a measured mode without a partner counts 100 %.
+    """
+    pairs = {
+        name: (before[name].rms_percent, after[name].rms_percent)
+        for name in ("used", "higher", "modified")
+        if name in before and name in after
+    }
+    cross = None
+    if crossed is not None and len(crossed.before):
+        mean = [float(np.mean(np.square(e))) for e in (crossed.before, crossed.after)]
+        cross = 100.0 * mean[0] ** 0.5, 100.0 * mean[1] ** 0.5
+    return Gain(pairs["used"], pairs.get("higher"), pairs.get("modified"), cross)
+
+
+def gain_of(before: Blocks, after: Blocks, crossed: Unseen | None) -> Gain:
     """Return medians of absolute frequency errors in percent, before and after.
 
     Of modes that have a partner in both models; nan where there is none.

@@ -20,6 +20,7 @@ from femubench.core.schema.diagnosis import (
     LookWarning,
     ResidualRow,
     Rival,
+    Scatter,
     SmallestVisible,
     Verdict,
 )
@@ -43,7 +44,8 @@ class Diagnosis(Shown):
         advice: measurements that would separate them, best first.
         smallest_visible: one row an effect.
         residuals: every datum.
-        gain: before and after.
+        gain: medians before and after.
+        gain_rms: the same as root mean squares, as `bench run` has them; None in older files.
         chi2: before and after, in the metric of the noise model.
         data_count: number of data behind chi2.
         adequacy_p: probability of a chi-square as large as the one after.
@@ -59,6 +61,7 @@ class Diagnosis(Shown):
             structure is taken for a beam model.
         like_a_beam: probability that it is one, but for ordinary scatter.
         subject: the case itself, for drawings of its structure.
+        scatter: whether what is left is as much as the stated deviations let expect.
         examination: every explanation that was tried; None where it was read from a file.
     """
 
@@ -85,6 +88,8 @@ class Diagnosis(Shown):
     evidence: tuple[Evidence, ...] = ()
     model_error: tuple[ErrorScale, ...] = ()
     like_a_beam: float = 1.0
+    gain_rms: Gain | None = None
+    scatter: tuple[Scatter, ...] = ()
     subject: Case | None = field(default=None, repr=False)
     examination: Examination | None = field(default=None, repr=False, compare=False)
 
@@ -99,9 +104,11 @@ class Diagnosis(Shown):
                 for r in self.rivals[: max(0, 3 - len(self.causes))]
             ),
         ]
-        for name, pair in asdict(self.gain).items():
+        for name, pair in asdict(self.gain_rms or self.gain).items():
             if isinstance(pair, tuple) and None not in pair:
-                found.append((name.replace("_percent", ""), f"{pair[0]:.2f} % -> {pair[1]:.2f} %"))
+                measure = "median" if self.gain_rms is None else "rms"
+                label = f"{name.replace('_percent', '')}, {measure}"
+                found.append((label, f"{pair[0]:.2f} % -> {pair[1]:.2f} %"))
         return [*found, ("adequacy", f"p = {self.adequacy_p:.2g}")]
 
     def frame(self, table: str) -> pd.DataFrame:
@@ -109,7 +116,7 @@ class Diagnosis(Shown):
 
         Arguments:
             table: ``causes``, ``rivals``, ``evidence``, ``model_error``, ``advice``,
-                ``smallest_visible``, ``residuals``, ``looks`` or ``locations``.
+                ``smallest_visible``, ``residuals``, ``scatter``, ``looks`` or ``locations``.
 
         Raises:
             KeyError: when there is no such table.
@@ -131,6 +138,7 @@ _TABLES: dict[str, Any] = {
     "advice": Advice,
     "smallest_visible": SmallestVisible,
     "residuals": ResidualRow,
+    "scatter": Scatter,
     "looks": LookWarning,
     "locations": LocationRow,
 }

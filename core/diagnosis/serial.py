@@ -26,6 +26,7 @@ from femubench.core.schema.diagnosis import (
     LookWarning,
     ResidualRow,
     Rival,
+    Scatter,
     SmallestVisible,
 )
 from femubench.core.schema.validation import validated
@@ -143,7 +144,7 @@ _UNTOLD = ("extended", "subject", "examination")
 # What older versions did not write, by the data class; a type goes with what is no field of it.
 _OPTIONAL: dict[Any, dict[str, Any]] = {
     **{k: {} for k in (Advice, Cause, CauseParameter, Evidence, Gain)},
-    **{k: {} for k in (LocationRow, ResidualRow, Rival)},
+    **{k: {} for k in (LocationRow, ResidualRow, Rival, Scatter)},
     SmallestVisible: {"place": ""},
     LookWarning: {"changes": (list[_Change], [])},
     Diagnosis: {

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import scipy.linalg as la
-from scipy.special import chdtr, expit
+from scipy.special import expit
 
+from femubench.core.diagnosis.scatter import overstatement
 from femubench.core.effect.places import bare_place
-from femubench.core.inference.fit import State
 from femubench.core.inference.posterior import (
     LIKELY_NOTHING,
     Explanation,
@@ -34,7 +33,6 @@ _LARGEST_GROUP = 6
 # A rival this near in ln likelihood, with hardly more or fewer values fitted, is excluded by its
 # prior alone: 6 of chi-square.
 _AS_WELL, _MORE_VALUES = 3.0, 2
-_LEAST = 1e-9  # of chi-square, for simulated data without scatter
 _CREDIBLE = 0.95
 
 
@@ -178,26 +176,6 @@ def inseparable(
     first = posterior.key(leader)
     keys = (first, *(key for key in group if key != first))
     return keys, (0.0, *(angle_between(leader, posterior.best(key)) for key in keys[1:]))
-
-
-def overstatement(state: State, kind: Literal["all", "frequencies", "shapes"] = "all") -> float:
-    """Return by what factor stated deviations seem too large; 1 where chance may have done it.
-
-    The lower tail of chi-square, as its upper tail is used for what is left.
-
-    Arguments:
-        state: after the fit.
-        kind: of the data.
-    """
-    data = state.problem.data
-    first, last = len(data.measurement), len(data.measurement) + len(data.shape_rows[0])
-    rows = {"all": slice(None), "frequencies": slice(first), "shapes": slice(first, last)}[kind]
-    rest = state.residual[rows]
-    scales = 0 if kind == "frequencies" else data.scale_count
-    dof, chi2 = len(rest) - len(state.x) - scales, float(rest @ rest)
-    if dof < 1 or chdtr(dof, chi2) >= _NOISE:
-        return 1.0
-    return float(np.sqrt(dof / max(chi2, _LEAST)))
 
 
 def fits_as_well(posterior: Posterior, best: Explanation, key: Key) -> bool:

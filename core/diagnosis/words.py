@@ -66,7 +66,7 @@ def sentence_of(
         causes: named, or best guess.
         options: the causes of every explanation that stands.
         probability: of the first name.
-        gain: before and after.
+        gain: before and after, as root mean squares.
         reference: whether it is what differs from a reference that was sought.
     """
     names = listed(named(cause) for cause in causes)
@@ -118,5 +118,6 @@ def _gain(gain: Gain) -> str:
         ("modes left out in turn", gain.cross_validated_percent),
     ):
         if pair is not None:
-            return f"; the error on {label} falls from {pair[0]:.3g} to {pair[1]:.3g} %"
+            turn = "falls" if pair[1] <= pair[0] else "rises"
+            return f"; the rms error on {label} {turn} from {pair[0]:.3g} to {pair[1]:.3g} %"
     return ""

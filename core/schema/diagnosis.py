@@ -174,8 +174,30 @@ class LocationRow:
 
 
 @dataclass(frozen=True)
+class Scatter:
+    """Whether what is left of one kind of data is as much as their stated scatter lets expect.
+
+    Arguments:
+        kind: ``all``, ``frequencies`` or ``shapes``.
+        chi2: of what is left, noise model included.
+        dof: data less what was fitted to them: the chi-square that is to be expected.
+        less_p, more_p: probability that chance alone leaves so little, or so much.
+        factor: by how much the standard deviations seem too large; below 1 too small.
+        warning: one sentence where either is far too improbable, else empty.
+    """
+
+    kind: str
+    chi2: float
+    dof: int
+    less_p: float
+    more_p: float
+    factor: float
+    warning: str = ""
+
+
+@dataclass(frozen=True)
 class Gain:
-    """Medians of absolute frequency errors over paired modes in percent, before and after.
+    """Frequency errors in percent, before and after: medians, or root mean squares.
 
     Arguments:
         held_out, modified: None where the case holds none back.
