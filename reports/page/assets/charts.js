@@ -1,311 +1,324 @@
-// Charts in SVG: lines, bars, scatter, performance profiles. Every chart is one stop of the keyboard:
-// the arrow keys step through its points, whose text stands below; a table holds all numbers.
+// Figures on Observable Plot and d3, all of one schema (docs/plot.md). Every figure is one stop of the
+// keyboard: the arrow keys step through its points, whose text stands below; a table holds all numbers.
 {
   const { el, svg, number } = bench;
   const LETTER = 6.6; // px a letter takes at 12 px, about
   const MOST_MARKERS = 9;
+  const MOST_LABELS = 60;
+  const FAR = 4; // an axis leaves out what lies farther away than so many times the spread of the rest
+  const SYMBOLS = {
+    circle: d3.symbolCircle, square: d3.symbolSquare, triangle: d3.symbolTriangle, diamond: d3.symbolDiamond,
+    cross: d3.symbolTimes, plus: d3.symbolPlus, down: d3.symbolWye, star: d3.symbolAsterisk,
+  };
+  const LINES = new Set(["line", "steps", "calibration"]);
 
-  // A logarithmic axis of less than about a decade has the ticks of a linear one.
-  function ticksOf(low, high, log, wanted, least = 0) {
-    const found = [];
-    const decades = log ? Math.log10(high / low) : 0;
-    for (let stride = Math.ceil(decades / wanted); stride > 0 && found.length < 2; stride -= 1) {
-      const steps = decades * 3 <= wanted + 1 ? [1, 2, 5] : [1];
-      found.length = 0;
-      for (let e = Math.floor(Math.log10(low)); e <= Math.ceil(Math.log10(high)); e += 1)
-        for (const s of steps) if (e % stride === 0 && within(s * 10 ** e, low, high)) found.push(s * 10 ** e);
+  // What a marker looks like, whoever draws it.
+  const markOf = (style, r) => ({
+    symbol: SYMBOLS[style.marker], r, stroke: style.colour, strokeWidth: 1.6,
+    fill: /cross|plus|star/.test(style.marker) ? "none" : style.hollow ? "var(--panel)" : style.colour,
+  });
+
+  // Return a marker at a point; the style comes from bench.palette.
+  bench.marker = (style, x, y, r = 4) => {
+    const { symbol, fill, stroke, strokeWidth } = markOf(style, r);
+    return svg("path", { d: d3.symbol(symbol, Math.PI * r * r)(), transform: `translate(${x} ${y})`, fill, stroke, "stroke-width": strokeWidth });
+  };
+
+  const tickText = (v) => number(Number(v.toPrecision(3)), 3).replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");
+  const named = (axis) => (axis.unit ? `${axis.label}, ${axis.unit}` : axis.label);
+  const say = (v) => (typeof v === "number" ? number(v, 4) : String(v ?? "–"));
+  const usable = (v, axis) => v !== null && Number.isFinite(v) && (!axis.log || v > 0);
+
+  // Return [low, high] of an axis: what was asked for, else that of the values but the few far off the rest.
+  // core/plot/chart.py has the same rule.
+  function rangeOf(values, axis, { pad, few, zero }) {
+    const log = axis.log;
+    const sorted = d3.sort(values.filter((v) => usable(v, axis)).map((v) => (log ? Math.log10(v) : v)));
+    if (!sorted.length) sorted.push(log ? -1 : 0, log ? 0 : 1);
+    const last = sorted.length - 1;
+    let [low, high] = [sorted[0], sorted[last]];
+    if (last >= 4) {
+      const [a, b] = [sorted[few], sorted[last - few]];
+      if (high - b > FAR * (b - a) && b > a) high = b;
+      if (a - low > FAR * (b - a) && b > a) low = a;
     }
-    if (found.length > 2 || decades > 1.3) return found;
-    found.length = 0;
-    const raw = Math.max((high - low) / Math.max(wanted, 2), least);
-    const base = 10 ** Math.floor(Math.log10(raw));
-    const step = [1, 2, 5, 10].map((s) => s * base).find((s) => s >= raw * 0.999);
-    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + step * 1e-9; k += 1) found.push(k * step);
-    return found;
+    if (zero && !log) [low, high] = [Math.min(low, 0), Math.max(high, 0)];
+    const grow = low === high ? (log ? 0.3 : Math.abs(low) * 0.1 || 1) : (high - low) * pad;
+    if (!(zero && low === 0)) low -= grow;
+    if (!(zero && high === 0)) high += grow;
+    const back = (v) => (log ? 10 ** v : v);
+    return [axis.low ?? back(low), axis.high ?? back(high)];
   }
-  function within(v, low, high) {
-    return v >= low * 0.999 && v <= high * 1.001;
+
+  // A logarithmic axis of little more than a decade has the ticks of a linear one.
+  function ticksOf([low, high], log, wanted, whole) {
+    const linear = d3.ticks(low, high, wanted).filter((t) => !whole || Number.isInteger(t));
+    if (!log) return linear;
+    const all = d3.scaleLog([low, high], [0, 1]).ticks(wanted);
+    const lists = [/^[1-9]e/, /^[125]e/, /^1e/].map((lead) => all.filter((t) => lead.test(t.toExponential())));
+    const fit = lists.find((list) => list.length <= wanted + 1) ?? lists[2];
+    return fit.length > 2 || high > 20 * low ? fit : linear;
   }
-  function usable(value, log) {
-    return value !== null && Number.isFinite(value) && (!log || value > 0);
-  }
-  function rangeOf(values, log, pad, floor) {
-    const good = values.filter((v) => usable(v, log));
-    let low = good.length ? Math.min(...good) : log ? 0.1 : 0;
-    let high = good.length ? Math.max(...good) : 1;
-    if (floor !== undefined) low = Math.min(low, floor);
-    if (log) {
-      const grow = low === high ? 2 : (high / low) ** pad;
-      return [low / grow, high * grow];
+
+  // Return how an axis is cut up: its names where it has any, else its numbers.
+  function axisOf(figure, key, room, values, options) {
+    const axis = figure[key];
+    const names = axis.names ?? null;
+    if (!names) {
+      const domain = rangeOf(values, axis, options);
+      const ticks = ticksOf(domain, axis.log, Math.max(2, Math.floor(room / (key === "x" ? 75 : 55))), values.every(Number.isInteger));
+      return { domain, type: axis.log ? "log" : "linear", ticks, tickFormat: tickText, longest: d3.max(ticks, (t) => tickText(t).length) ?? 1 };
     }
-    const grow = low === high ? Math.abs(low) * 0.1 || 1 : (high - low) * pad;
-    return [floor === low ? low : low - grow, high + grow];
-  }
-  function scaleOf([low, high], from, to, log) {
-    const f = log ? Math.log10 : (v) => v;
-    const [a, b] = [f(low), f(high)];
-    return (v) => from + ((f(v) - a) / (b - a || 1)) * (to - from);
-  }
-  // A tick's text, with no more digits than it needs.
-  function tickText(v) {
-    return number(Number(v.toPrecision(3)), 3).replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");
+    const size = key === "x" ? 18 : Math.min(30, Math.floor(room / 3 / LETTER));
+    const texts = names.map((name) => bench.shortened(String(name), size, true));
+    const longest = d3.max(texts, (t) => t.length) ?? 1;
+    const turned = key === "x" && longest * LETTER > room / names.length - 4;
+    const every = Math.max(1, Math.ceil((13 * names.length) / room));
+    return { domain: key === "x" ? [-0.5, names.length - 0.5] : [names.length - 0.5, -0.5], type: "linear", names, turned,
+      ticks: d3.range(0, names.length, every), tickFormat: (k) => texts[k], longest };
   }
 
-  // Draw the frame: grid, ticks, names of the axes. Returns {node, x, y, box}.
-  function frame(spec, width, ranges, names = null) {
-    const height = spec.height || 320;
-    const yTicks = ticksOf(...ranges.y, spec.logY, Math.max(3, Math.floor(height / 60)));
-    const left = 34 + Math.max(...yTicks.map((t) => tickText(t).length)) * LETTER;
-    const tilt = names && names.some((n) => n.length * LETTER > (width - left - 14) / names.length - 4);
-    const longest = tilt ? Math.min(Math.max(...names.map((n) => n.length)), 18) * LETTER * 0.72 : 0;
-    const box = { left, right: width - 14, top: 10, bottom: height - 46 - longest };
-    const x = names
-      ? scaleOf([-0.5, names.length - 0.5], box.left, box.right, false)
-      : scaleOf(ranges.x, box.left, box.right, spec.logX);
-    const y = scaleOf(ranges.y, box.bottom, box.top, spec.logY);
-    const node = svg("svg", { viewBox: `0 0 ${width} ${height}`, width, height, class: "canvas" });
-    for (const t of yTicks)
-      node.append(
-        svg("line", { class: "grid", x1: box.left, x2: box.right, y1: y(t), y2: y(t) }),
-        svg("text", { class: "tick end", x: box.left - 6, y: y(t) + 4 }, tickText(t)),
-      );
-    const wanted = Math.max(2, Math.floor((box.right - box.left) / 75));
-    const counted = spec.series.every((s) => s.x.every(Number.isInteger));
-    const xTicks = names ? [] : ticksOf(...ranges.x, spec.logX, wanted, counted ? 1 : 0);
-    for (const t of xTicks)
-      node.append(
-        svg("line", { class: "grid", x1: x(t), x2: x(t), y1: box.top, y2: box.bottom }),
-        svg("text", { class: "tick mid", x: x(t), y: box.bottom + 17 }, tickText(t)),
-      );
-    (names || []).forEach((name, k) => {
-      const at = { x: x(k), y: box.bottom + 15 };
-      const turned = tilt ? { transform: `rotate(-45 ${at.x} ${at.y})`, class: "tick end" } : { class: "tick mid" };
-      node.append(svg("text", { ...at, ...turned }, bench.shortened(name, tilt ? 18 : 60)));
-    });
-    node.append(
-      svg("line", { class: "axis", x1: box.left, x2: box.right, y1: box.bottom, y2: box.bottom }),
-      svg("line", { class: "axis", x1: box.left, x2: box.left, y1: box.top, y2: box.bottom }),
-      svg("text", { class: "name mid", x: (box.left + box.right) / 2, y: height - 8 }, spec.xLabel || ""),
-      svg("text", { class: "name mid", transform: `translate(13 ${(box.top + box.bottom) / 2}) rotate(-90)` }, spec.yLabel || ""),
-    );
-    return { node, x, y, box };
-  }
+  // Every kind returns what Plot draws of a series, given its points and its style.
+  const curve = (figure, points, style, k) => {
+    const every = Math.max(1, Math.ceil(points.length / MOST_MARKERS));
+    const first = Math.floor((every * k) / figure.series.length) % every;
+    return [
+      points.some((p) => p.low !== null) && Plot.areaY(points, { x: "x", y1: "low", y2: "high", fill: style.colour, fillOpacity: 0.15, clip: true }),
+      Plot.line(points, { x: "x", y: "y", stroke: style.colour, strokeWidth: style.width, strokeDasharray: style.dash || null,
+        curve: figure.kind === "steps" ? "step-after" : "linear", className: "curve", clip: true }),
+      Plot.dot(points.filter((p, i) => p.good && i % every === first), { x: "atX", y: "atY", ...markOf(style, points.length > 40 ? 3.2 : 3.8) }),
+    ];
+  };
+  const KINDS = {
+    line: curve, steps: curve, calibration: curve,
+    scatter: (figure, points, style) => [Plot.dot(points, { x: "atX", y: "atY", ...markOf(style, 4.5) })],
+    bars: (figure, points, style, k, base) => {
+      const wide = 0.8 / figure.series.length;
+      const marks = [Plot.rect(points, { x1: (p) => p.atX - wide * 0.45, x2: (p) => p.atX + wide * 0.45, y1: base, y2: "atY",
+        fill: style.colour, fillOpacity: style.hollow ? 0.12 : 0.55, stroke: style.colour, strokeWidth: 1.5, strokeDasharray: style.dash || null })];
+      return figure.series.length > 1 ? [...marks, Plot.dot(points, { x: "atX", y: "atY", ...markOf(style, 3) })] : marks;
+    },
+    interval: (figure, points, style) => [
+      Plot.link(points.filter((p) => p.low !== null), { x1: "low", x2: "high", y1: "atY", y2: "atY", stroke: style.colour, strokeWidth: 2.2, strokeOpacity: 0.6, clip: true }),
+      Plot.dot(points, { x: "atX", y: "atY", ...markOf(style, 4.5) }),
+    ],
+  };
 
-  function stylesOf(spec) {
-    let free = 0;
-    return spec.series.map((s) => {
-      const own = s.role === "measured" || s.role === "nominal";
-      return bench.palette.style(s.style !== undefined ? s.style : own ? 0 : free++, s.role);
+  // Return the points of a series where they are drawn: on the edge where they lie beyond it.
+  function pointsOf(figure, s, k, x, y) {
+    const inside = (v, { domain }) => Math.max(Math.min(...domain), Math.min(Math.max(...domain), v));
+    const shift = figure.kind === "bars" ? ((k - (figure.series.length - 1) / 2) * 0.8) / figure.series.length : 0;
+    const own = { x: (i) => (x.names ? x.names.indexOf(s.x[i]) + shift : s.x[i]), y: (i) => (y.names ? y.names.indexOf(s.y[i]) : s.y[i]) };
+    return s.x.map((_, i) => {
+      const [vx, vy] = [own.x(i), own.y(i)];
+      const good = usable(vx, figure.x) && usable(vy, figure.y);
+      const [atX, atY] = [inside(vx, x), inside(vy, y)];
+      const beyond = !good ? "" : vy > atY ? "▲" : vy < atY ? "▼" : vx > atX ? "▶" : vx < atX ? "◀" : "";
+      return { i, s: k, good, atX, atY, beyond, x: good ? vx : NaN, y: good ? vy : NaN, low: s.low?.[i] ?? null, high: s.high?.[i] ?? null,
+        text: s.names?.[i] ?? s.name, value: beyond === "▶" || beyond === "◀" ? vx : vy };
     });
   }
 
-  function drawLines(spec, width, styles) {
-    const all = (key) => spec.series.flatMap((s) => s[key]);
-    const ranges = {
-      x: spec.xRange || rangeOf(all("x"), spec.logX, 0),
-      y: spec.yRange || rangeOf(all("y"), spec.logY, 0.05),
-    };
-    const { node, x, y } = frame(spec, width, ranges);
-    const points = spec.series.map((s, k) => {
-      const found = [];
-      let path = "";
-      let pen = false;
-      s.x.forEach((value, i) => {
-        if (!usable(value, spec.logX) || !usable(s.y[i], spec.logY)) return void (pen = false);
-        const [px, py] = [x(value), y(s.y[i])];
-        const to = `${px.toFixed(1)} ${py.toFixed(1)}`;
-        path += pen ? (spec.steps ? `H${px.toFixed(1)}V${py.toFixed(1)}` : `L${to}`) : `M${to}`;
-        pen = true;
-        found.push({ px, py, i, s: k });
-      });
-      const st = styles[k];
-      node.append(
-        svg("path", { class: "curve", d: path || "M0 0", stroke: st.colour, "stroke-dasharray": st.dash || null, "stroke-width": st.width }),
-      );
-      const every = Math.max(1, Math.ceil(found.length / MOST_MARKERS));
-      const first = Math.floor((every * k) / Math.max(spec.series.length, 1));
-      found.forEach((p, i) => {
-        if (i % every === first % every) node.append(bench.marker(st, p.px, p.py, found.length > 40 ? 3.2 : 3.8));
-      });
-      return found;
+  function plotOf(figure, width, styles) {
+    const bars = figure.kind === "bars";
+    const flat = (key) => figure.series.flatMap((s) => s[key] ?? []);
+    const cat = (key) => (figure[key].names || (key === "x" ? bars : figure.kind === "interval") ? { ...figure[key], names: figure[key].names ?? [...new Set(flat(key))] } : figure[key]);
+    figure = { ...figure, x: cat("x"), y: cat("y") };
+    const height = figure.height ?? (figure.y.names ? 24 * figure.y.names.length + 64 : 320);
+    const spread = [...flat("low"), ...flat("high")];
+    const few = LINES.has(figure.kind) ? 1 : Math.max(1, Math.floor(flat("x").length / 10));
+    const more = figure.kind === "scatter" ? 0.12 : 0.05;
+    const y = axisOf(figure, "y", height - 70, [...flat("y"), ...(figure.kind === "interval" ? [] : spread)], { pad: more, few, zero: bars });
+    const left = 16 + y.longest * LETTER;
+    const x = axisOf(figure, "x", width - left - 16, [...flat("x"), ...(figure.kind === "interval" ? spread : [])], { pad: LINES.has(figure.kind) ? 0 : more, few, zero: false });
+    const points = figure.series.map((s, k) => pointsOf(figure, s, k, x, y));
+    const base = y.domain[0] > 0 || figure.y.log ? y.domain[0] : 0;
+    const outside = points.flatMap((row) => LINES.has(figure.kind) ? d3.groups(row.filter((p) => p.beyond), (p) => p.beyond).map(([, some]) => d3.greatest(some, (p) => Math.abs(p.value))) : row.filter((p) => p.beyond));
+    const lines = (figure.marks ?? []).filter((m) => m.value >= Math.min(...(m.axis === "x" ? x : y).domain) && m.value <= Math.max(...(m.axis === "x" ? x : y).domain));
+    const across = (m) => (m.axis === "x" ? Plot.ruleX : Plot.ruleY)([m.value], { className: "mark" });
+    const axis = ({ ticks, tickFormat, turned }) => ({ ticks, tickFormat, tickSize: 0, tickPadding: 6, className: "tick", ...(turned ? { tickRotate: -45 } : {}) });
+    const node = Plot.plot({
+      className: "canvas", width, height, marginLeft: left, marginRight: 16, marginTop: 28,
+      marginBottom: 42 + (x.turned ? x.longest * LETTER * 0.72 : 0), style: { background: "none" },
+      x: { domain: x.domain, type: x.type, label: named(figure.x) }, y: { domain: y.domain, type: y.type, label: named(figure.y) },
+      marks: [
+        x.names ? null : Plot.gridX(x.ticks, { className: "grid", strokeOpacity: 1 }), y.names ? null : Plot.gridY(y.ticks, { className: "grid", strokeOpacity: 1 }),
+        Plot.axisX(axis(x)), Plot.axisY(axis(y)), Plot.ruleY([y.names ? y.domain[0] : base], { className: "axis" }),
+        lines.map(across), figure.kind === "calibration" ? Plot.line([[0, 0], [1, 1]], { className: "mark" }) : null,
+        points.map((row, k) => KINDS[figure.kind](figure, LINES.has(figure.kind) ? row : row.filter((p) => p.good), styles[k], k, base)),
+      ].flat(2).filter(Boolean),
     });
-    return { node, points };
-  }
-
-  function drawBars(spec, width, styles) {
-    const names = [...new Set(spec.series.flatMap((s) => s.x.map(String)))];
-    const values = spec.series.flatMap((s) => s.y);
-    const y = spec.yRange || rangeOf(values, spec.logY, 0.05, spec.logY ? undefined : 0);
-    if (!spec.logY && Math.max(...values.map((v) => v || 0)) <= 0) y[1] = 0;
-    const drawn = frame(spec, width, { y }, names);
-    const room = ((drawn.x(1) - drawn.x(0)) * 0.8) / Math.max(spec.series.length, 1);
-    const zero = drawn.y(spec.logY ? y[0] : Math.max(0, y[0]));
-    const points = spec.series.map((s, k) =>
-      s.x.flatMap((name, i) => {
-        if (!usable(s.y[i], spec.logY)) return [];
-        const px = drawn.x(names.indexOf(String(name))) + (k - (spec.series.length - 1) / 2) * room;
-        const py = drawn.y(s.y[i]);
-        const shape = { x: px - room * 0.45, y: Math.min(py, zero), width: room * 0.9, height: Math.max(Math.abs(py - zero), 1) };
-        const st = styles[k];
-        drawn.node.append(
-          svg("rect", { ...shape, fill: st.colour, "fill-opacity": st.hollow ? 0.12 : 0.55, stroke: st.colour, "stroke-width": 1.5, "stroke-dasharray": st.dash || null }),
-        );
-        if (room > 9) drawn.node.append(bench.marker(st, px, py, 3));
-        return [{ px, py, i, s: k }];
-      }),
-    );
-    return { node: drawn.node, points };
-  }
-
-  let pen = null;
-  function widthOf(text) {
-    if (!pen) {
-      pen = document.createElement("canvas").getContext("2d");
-      pen.font = `12px ${getComputedStyle(document.body).fontFamily}`;
+    // Not left to a policy that may refuse styles: the page's own sheet says the same.
+    node.querySelector("style").remove();
+    const [fx, fy] = [node.scale("x").apply, node.scale("y").apply];
+    const shown = points.map((row) => row.filter((p) => p.good).map((p) => ({ ...p, px: fx(p.atX), py: fy(p.atY) })));
+    const box = { left, right: width - 8, top: 22, bottom: fy(y.domain[0]) };
+    for (const m of lines) node.append(svg("text", m.axis === "x" ? { class: "tick label", x: fx(m.value) + 4, y: 36 } : { class: "tick label end", x: width - 20, y: fy(m.value) - 5 }, m.label));
+    for (const p of outside) {
+      const start = fx(p.atX) < width / 2;
+      node.append(svg("text", { class: start ? "label" : "label end", x: fx(p.atX) + (start ? 7 : -7), y: fy(p.atY) + (p.beyond === "▼" ? -4 : 10) }, `${p.beyond} ${tickText(p.value)}`));
     }
-    return pen.measureText(text).width;
+    const flatPoints = shown.flat();
+    if (figure.kind === "scatter" && flatPoints.length <= MOST_LABELS) placeLabels(node, box, d3.sort(flatPoints, (p) => p.px), flatPoints);
+    if (LINES.has(figure.kind) && figure.series.length <= 6 && figure.series.length > 1) placeLabels(node, box, shown.map((row) => row.at(-1)).filter(Boolean), flatPoints, 16);
+    return { node, points: shown };
   }
 
-  // Place labels beside points where nothing is in the way; those that find no room get a line.
-  function placeLabels(node, box, points) {
-    const taken = points.map((p) => ({ l: p.px - 6, r: p.px + 6, t: p.py - 6, b: p.py + 6 }));
-    const free = (r) =>
-      r.l >= box.left && r.r <= box.right && r.t >= box.top && r.b <= box.bottom &&
-      !taken.some((o) => r.l < o.r && r.r > o.l && r.t < o.b && r.b > o.t);
+  // Write names beside points where nothing is in the way; those that find no room near get a line.
+  function placeLabels(node, box, points, others, farthest = 86) {
+    const pen = document.createElement("canvas").getContext("2d");
+    pen.font = `12px ${getComputedStyle(document.body).fontFamily}`;
+    const taken = others.map((p) => ({ l: p.px - 6, r: p.px + 6, t: p.py - 6, b: p.py + 6 }));
+    const free = (r) => r.l >= box.left && r.r <= box.right && r.t >= box.top && r.b <= box.bottom && !taken.some((o) => r.l < o.r && r.r > o.l && r.t < o.b && r.b > o.t);
     for (const p of points) {
-      const w = widthOf(p.text) + 3;
-      for (const far of [8, 16, 26, 38, 52, 68, 86]) {
-        const spots = [0, 180, 90, 270, 45, 315, 135, 225, 20, 160, 200, 340].map((angle) => {
-          const [c, s] = [Math.cos((angle * Math.PI) / 180), Math.sin((angle * Math.PI) / 180)];
-          const l = p.px + c * far - (c < -0.5 ? w : Math.abs(c) <= 0.5 ? w / 2 : 0);
-          const mid = p.py - s * (far + (Math.abs(c) < 0.9 ? 3 : 0));
-          return { l, r: l + w, t: mid - 7, b: mid + 7 };
-        });
-        const spot = spots.find(free);
-        if (!spot) continue;
-        taken.push(spot);
-        if (far > 16) {
-          const to = Math.max(spot.l, Math.min(spot.r, p.px));
-          node.prepend(svg("line", { class: "leader", x1: p.px, y1: p.py, x2: to, y2: p.py < spot.t ? spot.t : p.py > spot.b ? spot.b : p.py }));
-        }
-        node.append(svg("text", { class: "label", x: spot.l + 1, y: spot.b - 3 }, p.text));
-        break;
-      }
+      const text = bench.shortened(p.text, 22);
+      const w = pen.measureText(text).width + 3;
+      const spots = d3.cross([8, 16, 26, 38, 52, 68, 86].filter((far) => far <= farthest), [0, 180, 90, 270, 45, 315, 135, 225, 20, 160, 200, 340], (far, angle) => {
+        const [c, s] = [Math.cos((angle * Math.PI) / 180), Math.sin((angle * Math.PI) / 180)];
+        const l = p.px + c * far - (c < -0.5 ? w : Math.abs(c) <= 0.5 ? w / 2 : 0);
+        const mid = p.py - s * (far + (Math.abs(c) < 0.9 ? 3 : 0));
+        return { far, l, r: l + w, t: mid - 7, b: mid + 7 };
+      });
+      const spot = spots.find(free);
+      if (!spot) continue;
+      taken.push(spot);
+      const to = Math.max(spot.l, Math.min(spot.r, p.px));
+      if (spot.far > 16) node.prepend(svg("line", { class: "leader", x1: p.px, y1: p.py, x2: to, y2: Math.max(spot.t, Math.min(spot.b, p.py)) }));
+      node.append(svg("text", { class: "label", x: spot.l + 1, y: spot.b - 3 }, text));
     }
   }
 
-  function drawScatter(spec, width, styles) {
-    const ranges = {
-      x: spec.xRange || rangeOf(spec.series.flatMap((s) => s.x), spec.logX, 0.12),
-      y: spec.yRange || rangeOf(spec.series.flatMap((s) => s.y), spec.logY, 0.12),
-    };
-    const { node, x, y, box } = frame(spec, width, ranges);
-    for (const line of spec.lines || [])
-      if (usable(line.y, spec.logY) && line.y >= ranges.y[0] && line.y <= ranges.y[1])
-        node.append(
-          svg("line", { class: "mark", x1: box.left, x2: box.right, y1: y(line.y), y2: y(line.y) }),
-          svg("text", { class: "tick end", x: box.right - 4, y: y(line.y) - 5 }, line.label),
-        );
-    const points = spec.series.map((s, k) =>
-      s.x.flatMap((value, i) =>
-        usable(value, spec.logX) && usable(s.y[i], spec.logY)
-          ? [{ px: x(value), py: y(s.y[i]), i, s: k, text: bench.shortened((s.names && s.names[i]) || s.label, 22) }]
-          : [],
-      ),
-    );
-    const flat = points.flat().sort((a, b) => a.px - b.px);
-    for (const p of flat) node.append(bench.marker(styles[p.s], p.px, p.py, 4.5));
-    if (flat.length <= 60) placeLabels(node, box, flat);
-    return { node, points };
+  const scheme = matchMedia("(prefers-color-scheme: dark)");
+  // Viridis stays in order in grey and for the colour-blind: dark is large on a light page, bright on a dark one.
+  const shadeOf = (share, dark = scheme.matches) => d3.interpolateViridis(dark ? share : 1 - share);
+
+  // A matrix: one picture under its axes, numbers where they have room, and the scale of the colours.
+  function cellsOf(figure, width) {
+    const { x: across, y: down, value, values } = figure;
+    const flat = values.flat().map((v) => (usable(v, value) ? v : null));
+    const x = axisOf(figure, "x", width - 120, [], {});
+    const rowsTall = Math.max(down.names.length > 40 ? 2 : 13, Math.min(40, (width - 120) / across.names.length));
+    const y = axisOf(figure, "y", rowsTall * down.names.length, [], {});
+    const left = 16 + y.longest * LETTER;
+    const domain = rangeOf(flat, value, { pad: 0, few: Math.max(1, Math.floor(flat.length / 10)) });
+    const color = { type: value.log ? "log" : "linear", domain, interpolate: (share) => shadeOf(share), clamp: true };
+    const roomy = rowsTall > 15 && (width - left - 16) / across.names.length > 34;
+    const axis = ({ ticks, tickFormat, turned }) => ({ ticks, tickFormat, tickSize: 0, tickPadding: 6, className: "tick", ...(turned ? { tickRotate: -45 } : {}) });
+    const bottom = 42 + (x.turned ? x.longest * LETTER * 0.72 : 0);
+    const cells = flat.map((v, k) => ({ v, x: k % across.names.length, y: Math.floor(k / across.names.length) }));
+    const node = Plot.plot({ className: "canvas", width, height: 28 + bottom + rowsTall * down.names.length, marginLeft: left, marginRight: 16, marginTop: 28, marginBottom: bottom, style: { background: "none" },
+      x: { domain: x.domain, type: "linear", label: named(across) }, y: { domain: y.domain, type: "linear", label: named(down) }, color,
+      marks: [
+        Plot.raster(flat, { width: across.names.length, height: down.names.length, x1: -0.5, x2: across.names.length - 0.5, y1: -0.5, y2: down.names.length - 0.5, fill: (v) => v, imageRendering: "pixelated" }),
+        Plot.frame({ className: "axis" }), Plot.axisX(axis(x)), Plot.axisY(axis(y)),
+        roomy ? Plot.text(cells.filter((c) => c.v !== null), { x: "x", y: "y", text: (c) => number(c.v, 2), className: "in-cell" }) : null,
+      ] });
+    node.querySelector("style").remove();
+    node.querySelectorAll(".in-cell text").forEach((text, k) => {
+      const shade = node.scale("color").apply(cells.filter((c) => c.v !== null)[k].v);
+      text.style.fill = d3.lab(shade).l > 60 ? "#000" : "#fff";
+    });
+    const bar = Plot.legend({ color, label: named(value), tickFormat: tickText, width: Math.min(280, width), className: "canvas" });
+    bar.querySelector("style").remove();
+    const [fx, fy] = [node.scale("x").apply, node.scale("y").apply];
+    const points = values.map((row, s) => row.map((v, i) => ({ i, s, px: fx(i), py: fy(s), value: v })));
+    return { node, points, bar };
   }
 
-  function pointText(spec, p) {
-    const s = spec.series[p.s];
-    const say = (v) => (typeof v === "number" ? number(v, 4) : String(v));
-    const name = (s.names && s.names[p.i]) || s.label;
-    return `${name}: ${spec.xLabel} ${say(s.x[p.i])}, ${spec.yLabel} ${say(s.y[p.i])}`;
+  function pointText(figure, p) {
+    if (figure.kind === "cells") return `${figure.y.names[p.s]} – ${figure.x.names[p.i]}: ${say(p.value)} ${figure.value.unit}`;
+    const s = figure.series[p.s];
+    const range = s.low && s.low[p.i] !== null ? ` (${say(s.low[p.i])} to ${say(s.high[p.i])})` : "";
+    return `${s.names?.[p.i] ?? s.name}: ${named(figure.x)} ${say(s.x[p.i])}, ${named(figure.y)} ${say(s.y[p.i])}${range}`;
   }
 
   // Let the arrow keys and the pointer step through the points; returns what to do after drawing.
-  function stepping(spec, plot, readout) {
-    let points = [];
-    let at = [0, 0];
-    const show = (p) => {
+  function stepping(figure, plot, readout) {
+    let rows = [];
+    let at = null;
+    const show = (row, column) => {
+      at = [row, column];
+      const p = rows[row][column];
       plot.querySelectorAll(".cursor").forEach((node) => node.remove());
-      plot.firstChild.append(svg("circle", { class: "cursor", cx: p.px, cy: p.py, r: 8 }));
-      readout.textContent = pointText(spec, p);
+      plot.querySelector("svg").append(svg("circle", { class: "cursor", cx: p.px, cy: p.py, r: 8 }));
+      readout.textContent = pointText(figure, p);
     };
     plot.addEventListener("keydown", (event) => {
       const move = { ArrowRight: [0, 1], ArrowLeft: [0, -1], ArrowDown: [1, 0], ArrowUp: [-1, 0], Home: [0, -1e9], End: [0, 1e9] }[event.key];
-      const rows = points.filter((row) => row.length);
       if (!move || !rows.length) return;
       event.preventDefault();
+      if (!at) return show(0, 0);
       const row = (at[0] + move[0] + rows.length) % rows.length;
-      at = [row, Math.max(0, Math.min(rows[row].length - 1, at[1] + move[1]))];
-      show(rows[row][at[1]]);
+      show(row, Math.max(0, Math.min(rows[row].length - 1, at[1] + move[1])));
     });
     plot.addEventListener("pointermove", (event) => {
-      const rect = plot.firstChild.getBoundingClientRect();
-      const [x, y] = [event.clientX - rect.left, event.clientY - rect.top];
-      let best = null;
-      for (const p of points.flat()) {
-        const d = (p.px - x) ** 2 + (p.py - y) ** 2;
-        if (!best || d < best.d) best = { d, p };
-      }
-      if (best && best.d < 1600) show(best.p);
+      const [x, y] = d3.pointer(event, plot.querySelector("svg"));
+      const far = (p) => (p.px - x) ** 2 + (p.py - y) ** 2;
+      const best = d3.least(rows.flat(), far);
+      if (best && far(best) < 1600) for (const [k, row] of rows.entries()) if (row.includes(best)) show(k, row.indexOf(best));
     });
-    return (found) => void (points = found);
+    return (found) => {
+      rows = found.filter((row) => row.length);
+      if (at && rows[at[0]]?.[at[1]]) show(...at);
+    };
   }
 
-  function legend(spec, styles) {
-    const items = spec.series.map((s, k) => {
+  function legend(figure, styles) {
+    const items = figure.series.map((s, k) => {
       const st = styles[k];
-      const line = spec.kind === "scatter" || spec.kind === "bars" ? null
-        : svg("line", { x1: 1, x2: 35, y1: 7, y2: 7, stroke: st.colour, "stroke-width": st.width, "stroke-dasharray": st.dash || null });
-      return el("li", {}, svg("svg", { width: 36, height: 14, "aria-hidden": "true" }, line, bench.marker(st, 18, 7, 3.8)), s.label);
+      const line = LINES.has(figure.kind) && svg("line", { x1: 1, x2: 35, y1: 7, y2: 7, stroke: st.colour, "stroke-width": st.width, "stroke-dasharray": st.dash || null });
+      return el("li", {}, svg("svg", { width: 36, height: 14, "aria-hidden": "true" }, line, bench.marker(st, 18, 7, 3.8)), s.name);
     });
     return el("ul", { class: "legend", "aria-label": "Legend" }, items);
   }
 
-  function numbersOf(spec) {
-    const say = (v) => (typeof v === "number" ? number(v, 4) : String(v === null ? "–" : v));
-    const rows = spec.series.flatMap((s) =>
-      s.x.map((x, i) =>
-        el("tr", {}, el("th", { scope: "row" }, (s.names && s.names[i]) || s.label), el("td", {}, say(x)), el("td", {}, say(s.y[i]))),
-      ),
-    );
-    const heads = ["Series", spec.xLabel, spec.yLabel].map((h) => el("th", { scope: "col" }, h));
-    return bench.scroll(`Numbers of: ${spec.title}`, el("table", { class: "plain" }, el("thead", {}, el("tr", {}, heads)), el("tbody", {}, rows)));
+  function numbersOf(figure) {
+    const cells = figure.kind === "cells";
+    const ranges = !cells && figure.series.some((s) => s.low);
+    const heads = cells ? [named(figure.y), ...figure.x.names] : ["Series", named(figure.x), named(figure.y), ...(ranges ? ["low", "high"] : [])];
+    const lines = cells ? figure.values.map((row, k) => [figure.y.names[k], ...row])
+      : figure.series.flatMap((s) => s.x.map((x, i) => [s.names?.[i] ?? s.name, x, s.y[i], ...(ranges ? [s.low?.[i], s.high?.[i]] : [])]));
+    const row = ([name, ...rest]) => el("tr", {}, el("th", { scope: "row" }, name), rest.map((v) => el("td", { "data-value": v ?? null }, say(v))));
+    return bench.scroll(`Numbers of: ${figure.title}`, el("table", { class: "plain" }, el("thead", {}, el("tr", {}, heads.map((h) => el("th", { scope: "col" }, h)))), el("tbody", {}, lines.map(row))));
   }
 
-  function chart(kind, draw, given) {
-    const spec = { ...given, kind };
-    const styles = stylesOf(spec);
-    const readout = el("p", { class: "readout", "aria-live": "polite" }, spec.hint || "Point at the chart, or focus it and use the arrow keys, to read its values.");
-    const label = `${spec.title}. ${spec.yLabel} over ${spec.xLabel}. Arrow keys step through the points.`;
+  // Return a <figure> that draws itself to the width it is given; the schema is that of docs/plot.md.
+  bench.draw = (figure) => {
+    const series = figure.series ?? [];
+    let free = 0;
+    const styles = series.map((s) => bench.palette.style(s.style ?? (s.role === "measured" || s.role === "nominal" ? 0 : free++), s.role));
+    const readout = el("p", { class: "readout", "aria-live": "polite" }, figure.hint || "Point at the chart, or focus it and use the arrow keys, to read its values.");
+    const label = `${figure.title}. ${figure.kind === "cells" ? named(figure.value) : `${named(figure.y)} over ${named(figure.x)}`}. Arrow keys step through the points.`;
     const plot = el("div", { class: "plot", tabindex: "0", role: "application", "aria-roledescription": "chart", "aria-label": label });
-    const found = stepping(spec, plot, readout);
-    const details = el("details", { class: "numbers", ontoggle: () => details.children.length < 2 && details.append(numbersOf(spec)) }, el("summary", {}, "Numbers"));
-    const figure = el("figure", { class: "chart" },
-      el("figcaption", {}, el("strong", {}, spec.title), spec.note ? el("span", {}, spec.note) : null),
-      spec.series.length > 1 && !spec.noLegend ? legend(spec, styles) : null, plot, readout, details);
+    const found = stepping(figure, plot, readout);
+    const details = el("details", { class: "numbers", ontoggle: () => details.children.length < 2 && details.append(numbersOf(figure)) }, el("summary", {}, "Numbers"));
+    const node = el("figure", { class: "chart" },
+      el("figcaption", {}, el("strong", {}, figure.title), figure.note ? el("span", {}, figure.note) : null),
+      series.length > 1 ? legend(figure, styles) : null, plot, readout, details);
     let width = 0;
     const redraw = (room) => {
-      if (!room || Math.abs(room - width) < 2) return;
       width = room;
-      const { node, points } = draw(spec, width, styles);
-      plot.replaceChildren(node);
-      found(points);
+      const drawn = figure.kind === "cells" ? cellsOf(figure, width) : plotOf(figure, width, styles);
+      plot.replaceChildren(...[drawn.bar, drawn.node].filter(Boolean));
+      found(drawn.points);
     };
-    redraw(640);
-    new ResizeObserver((entries) => redraw(Math.floor(entries[0].contentRect.width))).observe(plot);
-    return figure;
-  }
-
-  bench.charts = {
-    line: (spec) => chart("line", drawLines, spec),
-    bars: (spec) => chart("bars", drawBars, spec),
-    scatter: (spec) => chart("scatter", drawScatter, spec),
-    profile: (spec) => chart("profile", drawLines, { logX: true, steps: true, yRange: [0, 1.02], ...spec }),
+    new ResizeObserver(([entry]) => {
+      const room = Math.floor(entry.contentRect.width);
+      if (room > 40 && Math.abs(room - width) > 1) redraw(room);
+    }).observe(plot);
+    // A picture of a matrix has the colours that it was painted with.
+    if (figure.kind === "cells") plot.addEventListener("recolour", () => width && redraw(width));
+    return node;
   };
+  scheme.addEventListener("change", () => document.querySelectorAll(".plot").forEach((plot) => plot.dispatchEvent(new Event("recolour"))));
+  bench.shade = shadeOf;
+
+  // The older way to ask for a chart: names of the axes with their units inside, series by label.
+  const old = (kind, more = {}) => (given) => {
+    const spec = { ...more, ...given };
+    const axis = (key, label) => ({ label, unit: "", log: Boolean(spec[`log${key}`]), low: spec[`${key.toLowerCase()}Range`]?.[0], high: spec[`${key.toLowerCase()}Range`]?.[1] });
+    return bench.draw({ ...spec, kind, x: axis("X", spec.xLabel), y: axis("Y", spec.yLabel), series: spec.series.map((s) => ({ ...s, name: s.label })),
+      marks: (spec.lines ?? []).map((line) => ({ axis: "y", value: line.y, label: line.label })) });
+  };
+  bench.charts = { line: old("line"), bars: old("bars"), scatter: old("scatter"), profile: old("steps", { logX: true, yRange: [0, 1.02] }) };
 }

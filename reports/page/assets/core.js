@@ -46,7 +46,12 @@ const bench = {};
     return minus(Number.isInteger(value) ? String(value) : value.toFixed(1));
   };
   bench.plural = (n, one, many) => `${bench.count(n)} ${n === 1 ? one : many || `${one}s`}`;
-  bench.shortened = (text, width) => (text.length <= width ? text : `${text.slice(0, width - 1)}…`);
+  bench.shortened = (text, width, end = false) => {
+    // A place on a member, "name@0.25", is told from the next one by its end.
+    const tail = end && text.includes("@") ? text.slice(text.lastIndexOf("@")) : "";
+    if (text.length <= width) return text;
+    return tail.length < width - 2 ? `${text.slice(0, width - tail.length - 1)}…${tail}` : `${text.slice(0, width - 1)}…`;
+  };
 
   function minus(text) {
     return text.replace(/-/g, "−");
@@ -89,26 +94,6 @@ const bench = {};
       return { colour: `var(--${COLOURS[k]})`, dash: DASHES[k], marker: MARKERS[k], width: 1.9, hollow: n % 16 >= 8 };
     },
   };
-  const PATHS = {
-    circle: (r) => `M${-r} 0a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0Z`,
-    square: (r) => `M${-r * 0.9} ${-r * 0.9}h${1.8 * r}v${1.8 * r}h${-1.8 * r}Z`,
-    triangle: (r) => `M0 ${-1.2 * r}L${1.15 * r} ${0.9 * r}H${-1.15 * r}Z`,
-    down: (r) => `M0 ${1.2 * r}L${1.15 * r} ${-0.9 * r}H${-1.15 * r}Z`,
-    diamond: (r) => `M0 ${-1.3 * r}L${1.3 * r} 0L0 ${1.3 * r}L${-1.3 * r} 0Z`,
-    cross: (r) => `M${-r} ${-r}L${r} ${r}M${-r} ${r}L${r} ${-r}`,
-    plus: (r) => `M${-1.2 * r} 0H${1.2 * r}M0 ${-1.2 * r}V${1.2 * r}`,
-    star: (r) => `M${-1.2 * r} 0H${1.2 * r}M${-0.6 * r} ${-r}L${0.6 * r} ${r}M${-0.6 * r} ${r}L${0.6 * r} ${-r}`,
-  };
-  // Return a marker at a point; the style comes from bench.palette.
-  bench.marker = (style, x, y, radius = 4) =>
-    bench.svg("path", {
-      d: PATHS[style.marker](radius),
-      transform: `translate(${x.toFixed(1)} ${y.toFixed(1)})`,
-      fill: style.hollow || /cross|plus|star/.test(style.marker) ? "var(--panel)" : style.colour,
-      stroke: style.colour,
-      "stroke-width": 1.6,
-    });
-
   // Addresses: #board and #case/<name>, the name as a URI component.
   bench.caseHref = (name) => `#case/${encodeURIComponent(name)}`;
   bench.route = (hash = location.hash) => {
