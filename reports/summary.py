@@ -4,12 +4,23 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from femubench.reports.cells import plain
-from femubench.results import JobResult, PairedMode, Run, frequency_error, scored_on
+from femubench.reports.cells import interval, plain
+from femubench.results import (
+    JobResult,
+    PairedMode,
+    Run,
+    frequency_error,
+    interval_kind,
+    scored_on,
+    structures_of,
+)
+
+if TYPE_CHECKING:
+    from femubench.core.score.statistics import Groups
 
 FINE = ("ok", "not-applicable")
 _HEADER = (
@@ -159,6 +170,67 @@ def lead(run: Run) -> str:
     if not unseen:
         told.append("No case holds data back, so that nothing here shows what was learnt.")
     return " ".join(told)
+
+
+def finding(run: Run, board: Sequence[Mapping[Any, Any]], tested: Groups) -> list[str]:
+    """Return what a run shows, in sentences made from its figures; the first is the headline.
+
+    Arguments:
+        board: rows of its leaderboard.
+        tested: which strategies differ.
+    """
+    possible = [row for row in board if row["ok"] and not row["unphysical"]]
+    if not possible:
+        return ["No strategy gave a possible model."] if board else []
+    best, yardstick = possible[0], "textbook" if run.meta.get("yardstick") else "nominal"
+    name, skill, low = plain(best["strategy"]), best["skill"], best["skill_low"]
+    kind = interval_kind(run)
+    over = (
+        seeds_of(run) if kind == "seeds" else {structures_of(run).get(c, c) for c in cases_of(run)}
+    )
+    sure = f", 95 % interval {interval(low, best['skill_high'])} over {len(over)} {kind}" * bool(
+        kind
+    )
+    data = "unseen data" if scored_on(run) == "unseen" else "the given modes"
+    headline = (
+        f"{name} leads: it takes away {100.0 * skill:.0f} % of the {yardstick} models' error on "
+        f"{data} (skill {skill:.3f}{sure})."
+        if skill > 0.0
+        else f"No strategy improves on the {yardstick} models on {data}; the best, {name}, has a "
+        f"skill of {skill:.3f}{sure}."
+    )
+    told = [headline, _how_sure(name, tested, len(board))]
+    if skill > 0.0 >= low:
+        told.append(f"Its interval holds 0: an improvement on the {yardstick} models is not shown.")
+    left = next(
+        (row["skill_drawn"] for row in board if row["strategy"] == run.meta.get("baseline")), None
+    )
+    if left is not None and math.isfinite(left):
+        told.append(
+            f"Without data the {yardstick} models stand at 0 and the models as drawn at "
+            f"{left:.3f}; started from the latter {name} reaches {best['skill_drawn']:.3f}."
+        )
+    if math.isfinite(best["skill_tests"]):
+        told.append(
+            f"On tests alone, without computed truths, its skill is {best['skill_tests']:.3f}."
+        )
+    return [sentence.replace(" -", " \u2212") for sentence in told]
+
+
+def _how_sure(name: str, tested: Groups, count: int) -> str:
+    """Return how many strategies are not shown to differ from the best."""
+    if not tested.tiers:
+        return "Whether the others differ from it is not tested." if count > 1 else ""
+    beside = [plain(other) for other in tested.tiers[0] if plain(other) != name]
+    if len(beside) == count - 1:
+        return "No other strategy is shown to differ from it: all are in tier 1."
+    if not beside:
+        return "It is alone in tier 1: all others are shown to be worse."
+    more = f" and {len(beside) - 4} more" if len(beside) > 4 else ""
+    return (
+        f"Beside it in tier 1, not shown to differ from it: {', '.join(beside[:4])}{more}; "
+        f"{count - 1 - len(beside)} of {count} are below."
+    )
 
 
 def notes_of(run: Run) -> list[str]:

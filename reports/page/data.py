@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 from femubench.reports.cells import plain, shortened
+from femubench.reports.csvs import CsvReporter
+from femubench.reports.jsons import JsonReporter
 from femubench.reports.page.papers import papers_of, started_as_drawn
 from femubench.reports.page.rounding import clean, plain_data, rounded
 from femubench.reports.summary import (
     cases_of,
+    finding,
     first_seed,
     header,
     lead,
-    measured_modes,
     notes_of,
     seeds_of,
     strategies_of,
@@ -26,22 +31,30 @@ from femubench.results import (
     SCORE_OF_FAILURE,
     TIE,
     JobResult,
+    Reporter,
     Run,
     interval_tail,
     is_test,
     leaderboard,
     predictive,
     rank_results,
+    scored_on,
     structures_of,
     tell_apart,
     unsteady,
 )
 
-VERSION = 1
 BLOCKS = ("used", "higher", "modified")
-# Bytes of the details of all results together; a page has to open in a moment.
-MOST_DETAILS = 6_000_000
+# Bytes of the details of all results together, and of the files to be downloaded once they are
+# packed; a page has to open in a moment.
+MOST_DETAILS = 5_500_000
+MOST_DOWNLOADS = 1_000_000
 _LONGEST_REASON = 500
+_FILES: tuple[tuple[str, str, Reporter], ...] = (
+    ("Jobs (CSV)", "text/csv", CsvReporter()),
+    ("Results (JSON)", "application/json", JsonReporter()),
+)
+_Named = Mapping[str, Any]
 
 
 class Exhibits(Protocol):
@@ -64,76 +77,98 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
     Arguments:
         exhibits: what the store has to draw.
     """
-    reference, baseline = run.meta.get("reference") or None, run.meta.get("baseline")
-    board, notes, about = leaderboard(run), notes_of(run), lead(run)
-    drawn_models, told = started_as_drawn(run), suspicions(run)
-    twins, differing = twins_by_strategy(run), unsteady(run)
-    run = Run(run.meta, rank_results(run.ranked, reference, baseline))
+    board = leaderboard(run).to_dict("records")
+    tested = tell_apart(run, [row["strategy"] for row in board])
+    shared = {
+        "finding": finding(run, board, tested),
+        "lead": lead(run),
+        "scored_on": "unseen data" if scored_on(run) == "unseen" else "the modes that were given",
+        "yardstick": run.meta.get("yardstick"),
+        "as_drawn": started_as_drawn(run),
+        "strategies": _strategies(run),
+    }
+    downloads, too_large = _downloads(run)
+    notes = [*notes_of(run), *suspicions(run), *map(plain, getattr(exhibits, "notes", ()))]
+    baseline = run.meta.get("baseline")
+    run = Run(run.meta, rank_results(run.ranked, run.meta.get("reference") or None, baseline))
     cases, strategies = cases_of(run), strategies_of(run)
-    ranking = board.to_dict("records")
     listed = [_case(run, case, exhibits) for case in cases]
     stages = {case["name"]: case["stage"] for case in listed}
     details, left_out = _details(run, strategies, stages, exhibits)
-    drawn = getattr(exhibits, "notes", ()) if exhibits is not None else ()
     return {
-        "version": VERSION,
+        **shared,
         "run": plain(run.meta.get("run", "")),
         "header": [list(item) for item in header(run)],
-        "lead": about,
-        "notes": [*notes, *told, *(plain(note) for note in drawn), *left_out],
+        "notes": [*notes, *left_out, *too_large],
         "blocks": list(BLOCKS),
         "offset_percent": OFFSET_PERCENT,
         "score_of_failure": SCORE_OF_FAILURE,
         "tie": TIE,
         "seeds": seeds_of(run),
-        "scenarios": list(dict.fromkeys(_scenario(case) for case in cases)),
+        "scenarios": list(dict.fromkeys(case["scenario"] for case in listed)),
         "baseline": baseline,
-        "strategies": [
-            {**item, **_odd(item["name"], twins, differing)} for item in _strategies(run, ranking)
-        ],
         "cases": listed,
         "results": [
             _result(found, cases.index(found.case), strategies.index(found.strategy))
             for found in run.results
         ],
-        "board": [{str(key): clean(value) for key, value in row.items()} for row in ranking],
-        "statistics": _statistics(run, list(board["strategy"])),
+        "board": [{str(key): clean(value) for key, value in row.items()} for row in board],
+        "statistics": {
+            "pairs": [
+                [strategies.index(a), strategies.index(b), rounded(p, 4)]
+                for a, b, p in tested.pairs
+            ],
+            "groups": [list(map(strategies.index, group)) for group in tested.groups],
+            "tiers": [list(map(strategies.index, tier)) for tier in tested.tiers],
+            "note": tested.note,
+            "fewest": FEWEST,
+            "tails": [interval_tail(n) if n >= FEWEST else None for n in range(len(cases) + 1)],
+        },
         "details": details,
         "papers": papers_of(run),
-        "as_drawn": drawn_models,
+        "downloads": downloads,
     }
 
 
-def _scenario(case: str) -> str:
-    return case.partition("/")[0]
+def _downloads(run: Run) -> tuple[list[dict[str, str]], list[str]]:
+    """Return the files that come with the page, compressed, and what is too large for it."""
+    found, notes, room = [], [], MOST_DOWNLOADS
+    for title, kind, reporter in _FILES:
+        packed = gzip.compress(reporter.render(run).encode(), 6, mtime=0)
+        if len(packed) > room:
+            notes.append(
+                f"{title}: too large for the page; `bench report -f {reporter.name}` has it"
+            )
+            continue
+        room -= len(packed)
+        name = f"{plain(run.meta.get('run', '')) or 'run'}{reporter.suffix}"
+        text = base64.b64encode(packed).decode("ascii")
+        found.append({"title": title, "name": name, "type": kind, "gzip": text})
+    return found, notes
 
 
-def _strategies(run: Run, board: Iterable[Mapping[Any, Any]]) -> list[dict[str, Any]]:
-    """Return the strategies with what they cite, their version and how many unknowns they had."""
-    citations = run.meta.get("citations") or {}
-    counts = {row["strategy"]: row["parameters"] for row in board}
-    versions: dict[str, str] = {}
-    for result in run.results:
-        version = result.provenance.get("strategy")
-        if version is not None:
-            versions.setdefault(result.strategy, plain(version))
+def _strategies(run: Run) -> list[dict[str, Any]]:
+    """Return the strategies with what they cite, their version, and what twins and repeats say."""
+    citations, twins, differing = (
+        run.meta.get("citations") or {},
+        twins_by_strategy(run),
+        unsteady(run),
+    )
+    versions = {
+        result.strategy: plain(result.provenance["strategy"])
+        for result in reversed(run.results)
+        if result.provenance.get("strategy") is not None
+    }
     return [
         {
             "name": name,
             "citation": citations.get(name, ""),
             "version": versions.get(name, ""),
-            "parameters": clean(counts.get(name)),
+            **({"twins": twins[name]} if name in twins else {}),
+            **({"unsteady": plain(differing[name])} if name in differing else {}),
         }
         for name in strategies_of(run)
     ]
-
-
-def _odd(
-    name: str, twins: Mapping[str, Mapping[str, Any]], differing: Mapping[str, str]
-) -> dict[str, Any]:
-    """Return what twins and jobs that were run again say of a strategy; nothing without them."""
-    found: dict[str, Any] = {"twins": twins[name]} if name in twins else {}
-    return {**found, **({"unsteady": plain(differing[name])} if name in differing else {})}
 
 
 def _case(run: Run, case: str, exhibits: Exhibits | None) -> dict[str, Any]:
@@ -141,31 +176,28 @@ def _case(run: Run, case: str, exhibits: Exhibits | None) -> dict[str, Any]:
     digest = (run.meta.get("drawings") or {}).get(case, about.get("digest"))
     stage = exhibits.case(digest) if exhibits is not None and isinstance(digest, str) else None
     if stage is not None:
-        stage = {**stage, "nominal": _fitting(stage.get("nominal"), stage)}
+        stage = {**_with_short_points(stage), "nominal": _fitting(stage.get("nominal"), stage)}
     reference = (run.meta.get("reference") or {}).get(case) or {}
-    measured = [
-        {"mode": mode.number, "block": block, "hz": rounded(mode.measured_hz, 7)}
-        for block, mode in measured_modes(run, case)
-    ]
     return {
         "name": case,
-        "scenario": _scenario(case),
+        "scenario": case.partition("/")[0],
         "structure": structures_of(run).get(case, case),
         "test": is_test((run.meta.get("classes") or {}).get(case)),
         "title": about.get("title") or "",
         "reference": {name: reference[name] for name in BLOCKS if name in reference},
-        "stage": plain_data(None if stage is None else _with_short_points(stage)),
-        "tables": {"measured": measured},
+        "stage": plain_data(stage),
     }
 
 
-def _with_short_points(stage: Mapping[str, Any]) -> dict[str, Any]:
+def _with_short_points(stage: _Named) -> dict[str, Any]:
     """Return the structure of a case with four digits of every coordinate."""
-    found = {**stage, "nodes": [[rounded(v, 4) for v in xyz] for xyz in stage.get("nodes", ())]}
+
+    def short(xyz: Sequence[float]) -> list[Any]:
+        return [rounded(value, 4) for value in xyz]
+
+    found = {**stage, "nodes": [short(xyz) for xyz in stage.get("nodes", ())]}
     for name in {"joints", "sensors", "masses", "springs", "supports"} & set(stage):
-        found[name] = [
-            {**item, "xyz": [rounded(v, 4) for v in item["xyz"]]} for item in stage[name]
-        ]
+        found[name] = [{**item, "xyz": short(item["xyz"])} for item in stage[name]]
     return found
 
 
@@ -182,7 +214,6 @@ def _result(result: JobResult, case: int, strategy: int) -> dict[str, Any]:
         "rms": [None if block is None else clean(block.rms_percent) for block in blocks],
         "seconds": rounded(result.seconds, 4),
         "parameters": result.parameter_count,
-        "evaluations": result.evaluations,
         "lost": max(lost, 0) if result.status == "ok" else 0,
         "negative": result.negative_eigenvalues or 0,
         "unphysical": result.unphysical,
@@ -191,35 +222,24 @@ def _result(result: JobResult, case: int, strategy: int) -> dict[str, Any]:
     }
 
 
-def _forecast(result: JobResult, name: str) -> list[float | None] | None:
-    """Return number of unseen modes of a block, those in their 90 % interval, and summed CRPS."""
+def _forecast(result: JobResult, name: str) -> dict[str, Any] | None:
+    """Return of a block's unseen modes the number, the summed CRPS, and what intervals reach them.
+
+    The level of the interval that just reaches a mode is rounded up, so that it lies in no interval
+    that does not hold it.
+    """
     found = predictive.Forecasts.of([result], {}, blocks=(name,))
     if not len(found.error):
         return None
-    stated = bool(found.stated.any())
+    levels = [math.ceil(1e6 * level) / 1e6 for level in found.level] if found.stated.any() else None
     crps = float(predictive.crps_normal(found.error, found.std).sum())
-    covered = int((found.level <= predictive.LEVEL).sum()) if stated else None
-    return [len(found.error), covered, clean(crps)]
-
-
-def _statistics(run: Run, order: list[str]) -> dict[str, Any]:
-    """Return tiers and groups, and what the page needs for intervals of a part of the run."""
-    count = len(cases_of(run))
-    found, names = tell_apart(run, order), strategies_of(run)
-    return {
-        "pairs": [[names.index(a), names.index(b), rounded(p, 4)] for a, b, p in found.pairs],
-        "groups": [[names.index(name) for name in group] for group in found.groups],
-        "tiers": [[names.index(name) for name in tier] for tier in found.tiers],
-        "note": found.note,
-        "fewest": FEWEST,
-        "tails": [interval_tail(n) if n >= FEWEST else None for n in range(count + 1)],
-    }
+    return {"modes": len(found.error), "levels": levels, "crps": clean(crps)}
 
 
 def _details(
     run: Run,
     strategies: list[str],
-    stages: Mapping[str, Mapping[str, Any] | None],
+    stages: Mapping[str, _Named | None],
     exhibits: Exhibits | None,
 ) -> tuple[dict[str, Any], list[str]]:
     """Return the details of the first seed's results, the best ones first, and what is missing."""
@@ -257,9 +277,7 @@ def _details(
     return found, notes
 
 
-def _fitting(
-    exhibit: Mapping[str, Any] | None, stage: Mapping[str, Any] | None
-) -> Mapping[str, Any] | None:
+def _fitting(exhibit: _Named | None, stage: _Named | None) -> _Named | None:
     """Return an exhibit if it is one of the structure of a stage, None otherwise."""
     if exhibit is None or stage is None:
         return exhibit
@@ -292,7 +310,6 @@ def _detail(result: JobResult) -> dict[str, Any]:
             }
             for item in result.parameters
         ],
-        "diagnostics": _numbers(result.diagnostics),
     }
 
 

@@ -11,8 +11,9 @@ from femubench.reports.templating import asset, templates
 STYLES = ("page.css", "run.css", "case.css")
 # One classic script; each file adds to what those before it have made.
 SCRIPTS = (
+    *("vendor/d3.min.js", "vendor/plot.umd.min.js"),
     *("core.js", "charts.js", "heat.js", "scene.js", "structure.js", "element_map.js"),
-    *("ranking.js", "filters.js", "overview.js", "board.js"),
+    *("ranking.js", "filters.js", "overview.js", "case_matrix.js", "board.js"),
     *("case_tables.js", "case.js", "app.js"),
 )
 # What could end the element that holds the data, or a line of script.
@@ -31,6 +32,7 @@ def document(data: Mapping[str, Any], *, title: str) -> str:
     page = templates().overlay(keep_trailing_newline=True).get_template("run.html")
     return page.render(
         title=title,
+        run=data["run"],
         style=Markup("\n".join(asset(name) for name in STYLES)),
         script=Markup("\n".join(asset(name) for name in SCRIPTS)),
         data=Markup(embedded_json(data)),

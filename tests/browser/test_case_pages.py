@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
 from femubench.core.run.store import Store
 from femubench.reports.htmls import HtmlReporter
@@ -55,12 +55,13 @@ def test_frequencies_are_those_of_the_json(
     rows = page.evaluate(
         """() => {
           const table = document.querySelector(".case-frequencies");
-          const printed = (th) => th.querySelector(".case-mark")?.textContent === "as printed";
-          const heads = [...table.querySelectorAll("thead th")].map(
-            (th) => (printed(th) ? "printed " : "") + th.firstChild.textContent);
-          return [...table.querySelectorAll("tbody tr")].map((tr) => [...tr.children])
-            .filter((cells) => cells.length === heads.length)
-            .map((cells) => Object.fromEntries(cells.map((td, k) => [heads[k], td.textContent])));
+          const [, modes, measured] = table.tHead.rows;
+          const keys = [...modes.cells].map((th, k) => th.dataset.mode ?? `rms ${k}`);
+          const cells = (tr) => Object.fromEntries(
+            [...tr.cells].slice(1).map((td, k) => [keys[k + 1], td.textContent]));
+          const rows = [...table.querySelectorAll("[data-strategy]")];
+          return [["measured", "", cells(measured)],
+            ...rows.map((tr) => [tr.dataset.strategy, tr.dataset.said, cells(tr)])];
         }"""
     )
     results = [
@@ -69,56 +70,69 @@ def test_frequencies_are_those_of_the_json(
         if result["case"] == case and result["status"] == "ok"
     ]
     assert len(results) == (5 if case == "hframe" else 6)
-    rms = iter([row for row in rows if row["Mode"] == "rms, %"])
-    modes = iter([row for row in rows if row["Mode"] != "rms, %"])
-    count = 0
-    for block in ("used", "higher", "modified"):
-        if results[0][block] is None:
-            continue
-        row = next(rms)
-        for result in results:
-            value, text = result[block]["rms_percent"], row[result["strategy"]]
+    own = {strategy: cells for strategy, said, cells in rows if not said}
+    assert set(own) == {"measured", *(result["strategy"] for result in results)}
+    for result in results:
+        found, blocks = dict(own[result["strategy"]]), ("used", "higher", "modified")
+        rms = [found.pop(key) for key in list(found) if key.startswith("rms")]
+        given = [result[block]["rms_percent"] for block in blocks if result[block]]
+        for value, text in zip(given, rms, strict=True):
             assert (
-                (text == "<0.001")
+                (text == "< 0.001")
                 if value < 0.001
                 else float(text) == pytest.approx(value, rel=6e-3)
             )
-        for k, mode in enumerate(results[0][block]["modes"]):
-            row = next(modes)
-            assert float(row["Measured"]) == pytest.approx(mode["measured_hz"], abs=0.0501)
-            for result in results:
-                ours, text = result[block]["modes"][k]["predicted_hz"], row[result["strategy"]]
+        for block in blocks:
+            for mode in result[block]["modes"] if result[block] else ():
+                key = f"{block}|{mode['modification'] or ''}|{mode['mode']}"
+                text, ours = found.pop(key), mode["predicted_hz"]
+                measured = float(own["measured"][key])
+                assert measured == pytest.approx(mode["measured_hz"], abs=0.0501)
                 assert (
                     text == "none"
                     if ours is None
                     else float(text) == pytest.approx(ours, abs=0.0501)
                 )
-                count += 1
-    assert next(modes, None) is next(rms, None) is None
-    assert count >= 5 * len(results)
-    printed = {name for row in rows for name in row if name.startswith("printed ")}
-    assert bool(printed) == (case != "frame-solid")
+        assert found == {}
+    assert any(said == "as printed" for _, said, _ in rows) == (case != "frame-solid")
 
 
-def test_the_papers_column_stands_beside_ours(shown: Callable[..., Page]) -> None:
+def test_the_papers_row_stands_below_ours(shown: Callable[..., Page]) -> None:
     page = shown("frame")
-    row = page.locator(".case-frequencies tbody tr", has_text="861.5").inner_text().split()
-    assert "911.3" in row  # as the paper has it
-    assert "911.1" in row
+    rows = page.locator(".case-frequencies [data-strategy=baruch]")
+    assert rows.evaluate_all("(rows) => rows.map((tr) => tr.dataset.said)") == ["", "as printed"]
+    ours, theirs = (row.split() for row in rows.all_inner_texts())
+    assert "911.1" in ours
+    assert "911.3" in theirs  # as the paper has it
+
+
+def test_measured_frequencies_and_the_baseline_stay_in_view(shown: Callable[..., Page]) -> None:
+    page = shown("frame", size=(390, 500))
+    table = page.locator(".wide:has(.case-frequencies)")
+    table.evaluate("(box) => box.scrollTo(200, 400)")
+    assert table.evaluate("(box) => box.scrollLeft") > 50
+    table.scroll_into_view_if_needed()
+    box = table.bounding_box()
+    names = table.locator("thead th:first-child, thead [data-strategy=unchanged] th")
+    places = [place.bounding_box() for place in names.all()]
+    assert len(places) >= 3
+    for place in places:
+        assert abs(place["x"] - box["x"]) < 2
+        assert box["y"] <= place["y"] < box["y"] + box["height"]
 
 
 def test_more_of_the_table_on_request(shown: Callable[..., Page]) -> None:
     page = shown("frame")
     table = page.locator(".case-frequencies")
-    columns = table.locator("thead th").count()
+    rows = table.locator("[data-strategy]").count()
     page.get_by_label("Errors in %").check()
-    assert table.locator(".case-under").first.inner_text().endswith("%")
+    assert table.locator("td .case-under").first.inner_text().endswith("%")
     page.get_by_label("MAC", exact=True).check()
     assert "MAC" in table.locator(".case-under", has_text="MAC").first.inner_text()
     page.get_by_label("A and B alone").check()
-    assert table.locator("thead th").count() < columns
+    assert table.locator("[data-strategy]").count() < rows
     page.get_by_label("Strategy A").select_option("baruch")
-    assert "baruch" in table.locator("thead").inner_text()
+    assert "baruch" in table.locator("tbody").inner_text()
 
 
 def test_modes_and_strategies_can_be_picked(shown: Callable[..., Page]) -> None:
@@ -295,15 +309,15 @@ def test_addresses_lead_to_pages_and_back(shown: Callable[..., Page]) -> None:
     page = shown("hframe")
     assert "H-frame" in page.locator("h1").inner_text()
     page.locator("#pages a", has_text="frame-solid").click()
-    page.wait_for_function("document.title.startsWith('frame-solid')")
+    expect(page).to_have_title(re.compile("^frame-solid"))
     assert page.evaluate("location.hash") == "#case/frame-solid"
     assert page.evaluate("document.activeElement.tagName") == "H1"
     assert page.locator("#pages a[aria-current=page]").inner_text() == "frame-solid"
     page.go_back()
-    page.wait_for_function("document.title.startsWith('hframe')")
+    expect(page).to_have_title(re.compile("^hframe"))
     page.evaluate("location.hash = '#board'")
     page.wait_for_selector("#board-table")
     page.go_back()
-    page.wait_for_function("document.title.startsWith('hframe')")
+    expect(page).to_have_title(re.compile("^hframe"))
     page.evaluate("location.hash = '#case/%E0%A4%A'")
-    page.wait_for_function("document.querySelector('h1').textContent === 'Nothing to show'")
+    expect(page.locator("h1")).to_have_text("Nothing to show")

@@ -1,39 +1,26 @@
-// The shell: header, notes, navigation, and which page is shown.
+// The shell: notes, navigation, facts and downloads at the foot, and which page is shown.
 {
   const { el, data } = bench;
-  const pages = new Map();
+  const put = (id, ...children) => document.getElementById(id).append(...children.flat());
+  let board = null;
 
-  function facts() {
-    const box = document.getElementById("facts");
-    for (const [title, text] of data.header || []) box.append(el("div", {}, el("dt", {}, title), el("dd", {}, text)));
-  }
-  function notes() {
-    if (!(data.notes || []).length) return;
-    const box = document.getElementById("notes");
-    box.hidden = false;
-    box.append(el("h2", {}, "Notes on this run"), el("ul", {}, data.notes.map((note) => el("li", {}, note))));
-  }
-  function navigation() {
-    const list = document.getElementById("pages");
-    const link = (href, text, title) => el("li", {}, el("a", { href, title: title || null }, text));
-    list.append(link("#board", "Leaderboard"));
-    if (bench.casePage) list.append(...data.cases.map((item) => link(bench.caseHref(item.name), item.name, item.title)));
+  // Hand a file over that came with the page, compressed and in base64.
+  async function download({ name, type, gzip }) {
+    const bytes = Uint8Array.from(atob(gzip), (letter) => letter.charCodeAt(0));
+    const file = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).blob();
+    const href = URL.createObjectURL(new Blob([file], { type }));
+    const link = document.createElement("a");
+    Object.assign(link, { href, download: name });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(href), 1000);
   }
   function missing(text) {
     return el("section", {}, el("h1", {}, "Nothing to show"), el("p", {}, text), el("p", {}, el("a", { href: "#board" }, "To the leaderboard")));
   }
   function pageOf({ page, name }) {
-    if (page === "board") return pages.get("board") || keep("board", bench.board.page());
+    if (page === "board") return (board ??= bench.board.page());
     const index = data.cases.findIndex((item) => item.name === name);
-    if (index < 0) return missing(`There is no case “${name}”.`);
-    if (!bench.casePage) return missing("This page has no case pages.");
-    const root = el("section", { class: "case" });
-    bench.casePage(root, index);
-    return root;
-  }
-  function keep(key, node) {
-    pages.set(key, node);
-    return node;
+    return index < 0 ? missing(`There is no case “${name}”.`) : bench.casePage(index);
   }
   function show(moved) {
     const route = bench.route();
@@ -46,35 +33,34 @@
     }
     const href = route.page === "board" ? "#board" : bench.caseHref(route.name);
     for (const a of document.querySelectorAll("#pages a")) {
-      if (a.getAttribute("href") === href) {
-        a.setAttribute("aria-current", "page");
-        if (a.parentNode.parentNode.scrollWidth > a.parentNode.parentNode.clientWidth) a.parentNode.parentNode.scrollLeft = a.offsetLeft - 40;
-      } else a.removeAttribute("aria-current");
+      a.toggleAttribute("aria-current", false);
+      if (a.getAttribute("href") !== href) continue;
+      a.setAttribute("aria-current", "page");
+      a.closest("ul").scrollLeft = a.offsetLeft - 40;
     }
     document.title = `${route.page === "board" ? "Leaderboard" : route.name} · femubench ${data.run}`;
     if (!moved) return;
-    const title = main.querySelector("h1, h2");
-    if (title) {
-      title.setAttribute("tabindex", "-1");
-      title.focus({ preventScroll: true });
-    }
+    const title = main.querySelector("h1");
+    title.setAttribute("tabindex", "-1");
+    title.focus({ preventScroll: true });
     window.scrollTo(0, Math.max(0, main.getBoundingClientRect().top + window.scrollY - 16));
   }
 
-  function start() {
+  document.addEventListener("DOMContentLoaded", () => {
     performance.mark("bench-start");
     document.querySelector(".skip").addEventListener("click", (event) => {
       event.preventDefault();
       document.getElementById("main").focus();
     });
-    facts();
-    notes();
-    navigation();
+    put("facts", data.header.map(([title, text]) => [el("dt", {}, title), el("dd", {}, text)]).flat());
+    put("downloads", data.downloads.map((file) => el("button", { type: "button", class: "button", "data-file": file.name, onclick: () => download(file) }, file.title)));
+    put("notes", el("h2", {}, "Notes on this run"), el("ul", {}, data.notes.map((note) => el("li", {}, note))));
+    document.getElementById("notes").hidden = !data.notes.length;
+    put("pages", [["#board", "Leaderboard"], ...data.cases.map(({ name, title }) => [bench.caseHref(name), name, title])].map(([href, text, title]) => el("li", {}, el("a", { href, title: title || null }, text))));
     show(false);
     window.addEventListener("hashchange", () => show(true));
     performance.mark("bench-drawn");
     performance.measure("bench", "bench-start", "bench-drawn");
     document.documentElement.dataset.ready = "yes";
-  }
-  document.addEventListener("DOMContentLoaded", start);
+  });
 }

@@ -1,5 +1,6 @@
 /* The case page: everything that a run knows of one case, two strategies side by side. */
 {
+  const { el, data } = bench;
   const NO_PICTURES = "Pictures are not stored with this run.";
   const PLANES = {
     "out-of-plane": "frame in the x-y plane, moving out of plane (z, rx, ry)",
@@ -8,155 +9,106 @@
     matrices: "mass and stiffness matrices",
   };
   const HISTORY_CHARTS = 4;
-
-  /** Return the lowest seed that there is a result of, the one that the details are of. */
-  const firstSeed = () => bench.data.results.reduce((least, { seed }) => Math.min(least, seed), Infinity);
+  // The details are of the lowest seed that there is a result of.
+  const seed = d3.min(data.results, (result) => result.seed);
 
   /** Return what the run holds of every strategy on a case (first seed), the best first. */
   const entriesOf = (c) => {
-    const { data } = bench;
-    const seed = firstSeed();
-    return data.results.filter((result) => result.c === c && result.seed === seed).map((result) => {
+    const entries = data.results.filter((result) => result.c === c && result.seed === seed).map((result) => {
       const detail = data.details[`${c}:${result.s}`] ?? null;
-      return { name: data.strategies[result.s].name, s: result.s, result, detail, ok: result.status === "ok" && detail !== null,
-        exhibit: detail ? (detail.exhibit ?? null) : null };
-    }).sort((a, b) => (a.ok ? 0 : 1) - (b.ok ? 0 : 1) || (a.result.score ?? Infinity) - (b.result.score ?? Infinity));
+      return { name: data.strategies[result.s].name, result, detail, ok: result.status === "ok" && detail !== null, exhibit: detail?.exhibit ?? null };
+    });
+    return d3.sort(entries, (entry) => !entry.ok, (entry) => entry.result.score ?? Infinity);
   };
 
-  const factsOf = (item) => {
-    const { stage } = item;
-    const facts = [["Case", item.name]];
-    if (item.scenario !== item.name) facts.push(["Scenario", item.scenario]);
-    const source = item.source ?? (item.tables ?? {}).source;
-    if (source) facts.push(["Source", source]);
-    if (stage) {
-      facts.push(["Model", PLANES[stage.plane] ?? stage.plane]);
-      facts.push(["Mesh", stage.thinned ? `${stage.thinned[0]} nodes, ${stage.thinned[1]} elements; drawings are thinned out to ${stage.nodes.length} nodes`
-        : `${stage.nodes.length} nodes, ${stage.elements.length} elements, ${stage.members.length} members`]);
-      const count = (block) => stage.measured.filter((mode) => mode.block === block).length;
-      const changed = count("modified") ? `, ${count("modified")} after a design change` : "";
-      facts.push(["Measured", `${count("used")} modes used, ${count("higher")} higher ones held out${changed}; ${stage.sensors.length} sensors`]);
-    }
-    const { seeds } = bench.data;
-    if (seeds.length > 1 || seeds[0] > 0) facts.push(["Noise", `seed ${firstSeed()} is shown, one of ${bench.plural(seeds.length, "draw")}; the strategies were given the measured modes with noise`]);
-    const reference = Object.entries(item.reference ?? {}).map(([block, rms]) => `${block} ${bench.number(rms, 3)} %`);
-    if (reference.length) facts.push(["Nominal model", `rms frequency error ${reference.join(", ")}`]);
-    return bench.el("dl", { class: "case-facts" }, facts.map(([name, text]) => [bench.el("dt", {}, name), bench.el("dd", {}, String(text))]));
+  const factsOf = ({ name, scenario, stage, reference }) => {
+    const count = (block) => stage.measured.filter((mode) => mode.block === block).length;
+    const errors = Object.entries(reference).map(([block, rms]) => `${block} ${bench.number(rms)} %`);
+    const facts = [
+      ["Case", name], scenario !== name && ["Scenario", scenario],
+      stage && ["Model", PLANES[stage.plane] ?? stage.plane],
+      stage && ["Mesh", stage.thinned ? `${stage.thinned[0]} nodes, ${stage.thinned[1]} elements; drawings are thinned out to ${stage.nodes.length} nodes`
+        : `${stage.nodes.length} nodes, ${stage.elements.length} elements, ${stage.members.length} members`],
+      stage && ["Measured", `${count("used")} modes used, ${count("higher")} higher ones held out${count("modified") ? `, ${count("modified")} after a design change` : ""}; ${stage.sensors.length} sensors`],
+      (data.seeds.length > 1 || data.seeds[0] > 0) && ["Noise", `seed ${seed} is shown, one of ${bench.plural(data.seeds.length, "draw")}; the strategies were given the measured modes with noise`],
+      errors.length && ["Nominal model", `rms frequency error ${errors.join(", ")}`],
+    ].filter(Boolean);
+    return el("dl", { class: "facts case-facts" }, facts.map(([title, text]) => [el("dt", {}, title), el("dd", {}, text)]));
   };
 
   const picker = (label, entries, chosen, change) => {
-    const options = entries.map((entry) => {
-      const end = entry.ok ? `error left ${bench.number(entry.result.score, 3)}${entry.result.unphysical ? ", unphysical" : ""}` : bench.statusWord(entry.result.status);
-      const option = bench.el("option", { value: entry.name }, `${entry.name} (${end})`);
-      option.selected = entry.name === chosen;
-      return option;
-    });
-    const select = bench.el("select", { "aria-label": `Strategy ${label}`, onchange: () => change(select.value) }, options);
-    return bench.el("label", { class: "case-field" }, `${label} `, select);
+    const select = el("select", { "aria-label": `Strategy ${label}`, onchange: () => change(select.value) }, entries.map(({ name, ok, result }) =>
+      el("option", { value: name, selected: name === chosen }, `${name} (${ok ? `error left ${bench.number(result.score)}${result.unphysical ? ", unphysical" : ""}` : bench.statusWord(result.status)})`)));
+    return el("label", {}, `${label} `, select);
   };
-
-  const tick = (label, on, change) => {
-    const box = bench.el("input", { type: "checkbox", onchange: () => change(box.checked) });
-    box.checked = on;
-    return bench.el("label", { class: "case-check" }, box, ` ${label}`);
+  const tick = (label, change) => {
+    const box = el("input", { type: "checkbox", onchange: () => change(box.checked) });
+    return el("label", {}, box, ` ${label}`);
   };
-
-  const section = (title, ...content) => bench.el("section", { class: "case-section" }, bench.el("h2", {}, title), content);
-  const note = (text) => bench.el("p", { class: "case-note" }, text);
-  const beside = (...nodes) => bench.el("div", { class: "case-beside" }, nodes);
-
+  const section = (title, ...content) => el("section", { class: "case-section" }, el("h2", {}, title), content);
+  const note = (text) => el("p", {}, text);
+  const columns = (...nodes) => el("div", { class: "columns" }, nodes);
   const reasonOf = ({ name, result }) => result.status === "ok" ? `${name}: details were left out to keep the page small`
     : `${name} ${bench.statusWord(result.status)}: ${result.reason || "no reason given"}`;
 
   /** Return why there is nothing to show of a strategy, or null where there is. */
-  const lack = (entry, what) => {
-    if (!entry.ok) return note(reasonOf(entry));
-    return what ? null : note(`${entry.name}: pictures of this strategy are not stored with this run.`);
-  };
-
-  const twoOf = (state) => (state.a === state.b ? [state.a] : [state.a, state.b]);
-
-  const markOf = (entry, state) => [entry === state.a && "A", entry === state.b && "B", entry.result.unphysical && "unphysical"].filter(Boolean).join(", ");
-
+  const lack = (entry, what) => (!entry.ok ? note(reasonOf(entry)) : what ? null : note(`${entry.name}: pictures of this strategy are not stored with this run.`));
+  const twoOf = (state) => [...new Set([state.a, state.b])];
   // The nominal model: the strategy that leaves it as it is or, where that did not run, the case's own.
-  const nominalOf = (stage, entries) => entries.find((entry) => entry.name === bench.data.baseline && entry.exhibit)
-    ?? (stage && stage.nominal ? { name: "nominal model", exhibit: stage.nominal, nominal: true } : null);
-
+  const nominalOf = (stage, entries) => entries.find((entry) => entry.name === data.baseline && entry.exhibit)
+    ?? (stage?.nominal ? { name: "nominal model", exhibit: stage.nominal, nominal: true } : null);
   // A strategy looks alike in every chart.
-  const lookOf = (entry, state) => (entry.nominal || entry.name === bench.data.baseline ? { role: "nominal" } : { role: "predicted", style: entry === state.a ? 0 : 1 });
+  const lookOf = (entry, state) => (entry.nominal || entry.name === data.baseline ? { role: "nominal" } : { role: "predicted", style: entry === state.a ? 0 : 1 });
 
-  const failures = (entries) => {
-    const failed = entries.filter((entry) => !entry.ok);
-    if (!failed.length) return null;
-    const { el } = bench;
-    const items = failed.map((entry) => el("li", {}, reasonOf(entry)));
-    return el("details", { class: "case-failures", open: failed.length <= 3 }, el("summary", {}, `${bench.plural(failed.length, "strategy", "strategies")} not in the table`), el("ul", {}, items));
-  };
-
-  const frequencySection = (item, entries, state) => {
-    const { el, data } = bench;
-    const papers = (data.papers ?? {})[item.name] ?? {};
-    const drawn = (data.as_drawn ?? {})[item.name] ?? {};
-    const box = el("div", {});
-    const options = { errors: false, mac: false, all: true };
+  const frequencies = (item, entries, state) => {
+    const [box, options] = [el("div", {}), { errors: false, mac: false, few: false }];
     const fill = () => {
-      const wanted = options.all ? entries : twoOf(state);
-      const columns = wanted.filter((entry) => entry.ok).map((entry) => ({ ...entry, mark: markOf(entry, state) }));
-      box.replaceChildren(columns.length ? bench.caseTables.frequencies(columns, [[drawn, "from drawn"], [papers, "as printed"]], options) : note("No strategy gave a model."));
+      const shown = entries.filter((entry) => entry.ok && (!options.few || entry === state.a || entry === state.b || entry.name === data.baseline))
+        .map((entry) => ({ ...entry, mark: [entry === state.a && "A", entry === state.b && "B", entry.result.unphysical && "unphysical"].filter(Boolean).join(", ") }));
+      box.replaceChildren(...(shown.length ? bench.frequencies(shown, [[data.as_drawn[item.name] ?? {}, "from drawn"], [data.papers[item.name] ?? {}, "as printed"]], options) : [note("No strategy gave a model.")]));
     };
-    const flip = (name, turn = (on) => on) => (on) => {
-      options[name] = turn(on);
+    const flip = (name) => (on) => {
+      options[name] = on;
       fill();
     };
-    const controls = el("div", { class: "case-controls" }, tick("Errors in %", false, flip("errors")), tick("MAC", false, flip("mac")),
-      tick("A and B alone", false, flip("all", (on) => !on)));
+    const failed = entries.filter((entry) => !entry.ok);
+    const failures = failed.length ? el("details", { open: failed.length <= 3 }, el("summary", {}, `${bench.plural(failed.length, "strategy", "strategies")} not in the table`), el("ul", {}, failed.map((entry) => el("li", {}, reasonOf(entry))))) : null;
     fill();
-    return [section("Natural frequencies", controls, box, failures(entries)), fill];
+    return [section("Natural frequencies", el("div", { class: "controls" }, tick("Errors in %", flip("errors")), tick("MAC", flip("mac")), tick("A and B alone", flip("few"))), box, failures), fill];
   };
 
   const macTable = (entry) => {
-    const missing = lack(entry, entry.exhibit && entry.exhibit.mac);
+    const missing = lack(entry, entry.exhibit?.mac);
     if (missing) return missing;
     const { mac, modes } = entry.exhibit;
-    const tested = modes.filter((mode) => !mode.modification);
     const pairs = mac.rows.map((row) => {
-      const partner = tested.find((mode) => mode.paired === row);
-      const near = partner ? mac.columns.map((hz) => Math.abs(hz - partner.hz)) : [];
-      return partner ? near.indexOf(Math.min(...near)) : null;
+      const partner = modes.find((mode) => !mode.modification && mode.paired === row);
+      return partner ? d3.leastIndex(mac.columns, (hz) => Math.abs(hz - partner.hz)) : null;
     });
     return bench.heat.table({ caption: `${entry.name}: MAC of measured and predicted mode shapes; framed: the pairs`, rowTitle: "Mode", columnTitle: "Hz",
       rows: mac.rows.map(String), columns: mac.columns.map(bench.hertz), values: mac.values, pairs });
   };
 
-  const receptanceCharts = (stage, entries, state) => {
-    const data = stage && stage.receptance;
-    if (!data) return note(NO_PICTURES);
-    const nominal = nominalOf(stage, entries);
-    const shown = twoOf(state);
-    if (nominal && !shown.includes(nominal)) shown.push(nominal);
-    const keys = Object.keys(data.measured);
-    const all = keys.flatMap((key) => [data.measured[key], ...shown.map((entry) => entry.exhibit && (entry.exhibit.receptance ?? {})[key])]).flat().filter((value) => Number.isFinite(value));
-    const yRange = [Math.floor(Math.min(...all) / 10) * 10, Math.ceil(Math.max(...all) / 10) * 10];
+  const receptances = (stage, entries, state) => {
+    const given = stage?.receptance;
+    if (!given) return note(NO_PICTURES);
+    const shown = [...new Set([...twoOf(state), nominalOf(stage, entries)])].filter(Boolean);
+    const keys = Object.keys(given.measured);
+    const all = keys.flatMap((key) => [given.measured[key], ...shown.map((entry) => entry.exhibit?.receptance?.[key] ?? [])]).flat().filter(Number.isFinite);
+    const yRange = [Math.floor(d3.min(all) / 10) * 10, Math.ceil(d3.max(all) / 10) * 10];
     const charts = keys.map((key) => {
-      const series = [{ label: "measured", x: data.hz, y: data.measured[key], role: "measured" }];
-      for (const entry of shown) {
-        const y = entry.exhibit && (entry.exhibit.receptance ?? {})[key];
-        if (y) series.push({ label: entry.name, x: data.hz, y, ...lookOf(entry, state) });
-      }
+      const curves = shown.filter((entry) => entry.exhibit?.receptance?.[key]).map((entry) => ({ label: entry.name, x: given.hz, y: entry.exhibit.receptance[key], ...lookOf(entry, state) }));
       return bench.charts.line({ title: key ? `After the design change \u201c${key}\u201d` : keys.length > 1 ? "Before the design change" : "Structure as tested",
-        xLabel: "Frequency, Hz", yLabel: "Receptance, dB re 1 m/N", series, height: 320, yRange });
+        xLabel: "Frequency, Hz", yLabel: "Receptance, dB re 1 m/N", series: [{ label: "measured", x: given.hz, y: given.measured[key], role: "measured" }, ...curves], height: 320, yRange });
     });
-    const where = `At the drive sensor ${stage.drive}, with a damping ratio of ${bench.number(data.damping, 2)} in every mode. `;
-    const text = data.note || "The measured curve is synthesised from the measured modes, scaled to mass by the paired modes of the nominal model.";
-    return [note(where + text), charts, twoOf(state).map((entry) => lack(entry, entry.exhibit))];
+    const text = given.note || "The measured curve is synthesised from the measured modes, scaled to mass by the paired modes of the nominal model.";
+    return [note(`At the drive sensor ${stage.drive}, with a damping ratio of ${bench.number(given.damping, 2)} in every mode. ${text}`), charts, twoOf(state).map((entry) => lack(entry, entry.exhibit))];
   };
 
   const changes = (stage, state) => {
     if (!stage) return note(NO_PICTURES);
-    const two = twoOf(state);
-    const values = two.flatMap((entry) => (entry.exhibit && entry.exhibit.elements) || []).filter((value) => value !== null);
-    const top = Math.max(...values, 0);
-    return beside(two.map((entry) => {
+    const top = d3.max(twoOf(state).flatMap((entry) => entry.exhibit?.elements ?? [])) ?? 0;
+    return columns(twoOf(state).map((entry) => {
       const missing = lack(entry, entry.exhibit);
       if (missing) return missing;
       const { elements, difference } = entry.exhibit;
@@ -168,78 +120,69 @@
     }));
   };
 
-  const historyCharts = (state) => {
+  const histories = (state) => {
     const told = twoOf(state).filter((entry) => entry.ok && entry.detail.history.length > 1);
     if (!told.length) return note("No iterations were recorded.");
-    const names = (entry) => new Set(entry.detail.parameters.map((item) => item.name));
+    const chart = (more) => bench.charts.line({ xLabel: "Iteration (1)", height: 240, ...more });
+    const first = (entry) => entry.detail.history[0];
+    const named = (entry) => new Set(entry.detail.parameters.map((item) => item.name));
     const steps = (entry) => entry.detail.history.map((row, i) => row.iteration ?? i);
-    const keys = [...new Set(told.flatMap((entry) => Object.keys(entry.detail.history[0]).filter((key) => key !== "iteration" && !names(entry).has(key))))];
-    const plain = keys.slice(0, HISTORY_CHARTS).map((key) => {
-      const series = told.filter((entry) => key in entry.detail.history[0]).map((entry) => ({ label: entry.name, x: steps(entry), y: entry.detail.history.map((row) => row[key] ?? null), ...lookOf(entry, state) }));
-      const values = series.flatMap((one) => one.y).filter((value) => value > 0);
-      const logY = Math.max(...values) / Math.min(...values) > 50;
+    const keys = d3.union(...told.map((entry) => Object.keys(first(entry)).filter((key) => key !== "iteration" && !named(entry).has(key))));
+    const plain = [...keys].slice(0, HISTORY_CHARTS).map((key) => {
+      const series = told.filter((entry) => key in first(entry)).map((entry) => ({ label: entry.name, x: steps(entry), y: entry.detail.history.map((row) => row[key] ?? null), ...lookOf(entry, state) }));
+      const [low, high] = d3.extent(series.flatMap((one) => one.y).filter((value) => value > 0));
       const title = key.replace(/_/g, " ");
-      return bench.charts.line({ title: `${title}: ${series.map((one) => one.label).join(", ")}`, xLabel: "Iteration", yLabel: title, series, logY, height: 240 });
+      return chart({ title: `${title}: ${series.map((one) => one.label).join(", ")}`, yLabel: title, series, logY: high / low > 50 });
     });
     const moving = told.map((entry) => {
-      const own = Object.keys(entry.detail.history[0]).filter((key) => names(entry).has(key) && entry.detail.history[0][key]);
-      const series = own.slice(0, 8).map((key) => ({ label: key, x: steps(entry), y: entry.detail.history.map((row) => row[key] / entry.detail.history[0][key]), role: "other" }));
-      return series.length ? bench.charts.line({ title: `Parameters of ${entry.name}`, xLabel: "Iteration", yLabel: "Value over start", series, height: 240 }) : null;
+      const own = Object.keys(first(entry)).filter((key) => named(entry).has(key) && first(entry)[key]).slice(0, 8);
+      return own.length ? chart({ title: `Parameters of ${entry.name}`, yLabel: "Value over start (1)", series: own.map((key) => ({ label: key, x: steps(entry), y: entry.detail.history.map((row) => row[key] / first(entry)[key]) })) }) : null;
     });
-    return beside(plain, moving);
+    return columns(plain, moving);
   };
 
-  const parameterTables = (state) => beside(twoOf(state).map((entry) => lack(entry, true) ?? bench.caseTables.parameters(entry.name, entry.detail.parameters)));
-
-  /** Show a case in root, or in a new element where only the index is given; returns the element. */
-  bench.casePage = (given, index) => {
-    const { el } = bench;
-    const [root, caseIndex] = index === undefined ? [el("section", { class: "case-page" }), given] : [given, index];
-    const item = bench.data.cases[caseIndex];
-    const entries = entriesOf(caseIndex);
-    const { stage } = item;
-    root.replaceChildren(el("h1", { class: "case-title", tabindex: "-1" }, item.title || item.name), factsOf(item));
+  /** Return the page of a case. */
+  bench.casePage = (index) => {
+    const item = data.cases[index];
+    const [entries, { stage }] = [entriesOf(index), item];
+    const root = el("section", { class: "case" }, el("h1", { class: "case-title", tabindex: "-1" }, item.title || item.name), factsOf(item));
     if (!entries.length) {
       root.append(note("This run has no results of the case."));
       return root;
     }
     const find = (name) => entries.find((entry) => entry.name === name);
-    // The best whose model is a possible structure.
+    // The best whose model is a possible structure, beside the baseline.
     const best = entries.find((entry) => entry.ok && !entry.result.unphysical) ?? entries[0];
-    const state = { a: best, b: find(bench.data.baseline) ?? entries[1] ?? entries[0] };
-    if (state.b === state.a) state.b = entries.find((entry) => entry !== best) ?? best;
-    const [table, refill] = frequencySection(item, entries, state);
+    const state = { a: best, b: [find(data.baseline), ...entries].find((entry) => entry && entry !== best) ?? best };
+    const [table, refill] = frequencies(item, entries, state);
     const parts = [
-      ["Mode shapes compared (MAC)", () => beside(twoOf(state).map(macTable))],
-      ["Receptances", () => receptanceCharts(stage, entries, state)],
+      ["Mode shapes compared (MAC)", () => columns(twoOf(state).map(macTable))],
+      ["Receptances", () => receptances(stage, entries, state)],
       ["Change of the stiffness", () => changes(stage, state)],
-      ["Iterations", () => historyCharts(state)],
-      ["Parameters", () => parameterTables(state)],
+      ["Iterations", () => histories(state)],
+      ["Parameters", () => columns(twoOf(state).map((entry) => lack(entry, true) ?? bench.parameters(entry.name, entry.detail.parameters)))],
     ].map(([title, build]) => {
       const box = el("div", {});
-      return { node: section(title, box), build, box };
+      return { node: section(title, box), fill: () => box.replaceChildren(...[build()].flat(Infinity).filter(Boolean)) };
     });
-    const fill = () => parts.forEach(({ build, box }) => box.replaceChildren(...[build()].flat(Infinity).filter(Boolean)));
     let view = null;
     const choose = (side) => (name) => {
       state[side] = find(name);
       refill();
-      fill();
+      for (const { fill } of parts) fill();
       if (view && side === "a") view.pick(name);
     };
-    root.append(el("div", { class: "case-pickers", role: "group", "aria-label": "Strategies to compare" },
-      picker("A", entries, state.a.name, choose("a")), picker("B", entries, state.b.name, choose("b"))), table);
     const place = el("div", {});
-    root.append(section("Structure and mode shapes", place));
-    if (stage && stage.nodes && stage.nodes.length) {
+    root.append(el("div", { class: "case-pickers controls", role: "group", "aria-label": "Strategies to compare" }, picker("A", entries, state.a.name, choose("a")), picker("B", entries, state.b.name, choose("b"))),
+      table, section("Structure and mode shapes", place), ...parts.map(({ node }) => node));
+    if (stage?.nodes.length) {
       const models = entries.filter((entry) => entry.ok).map((entry) => ({ name: entry.name, exhibit: entry.exhibit, modes: entry.detail.modes }));
       const nominal = nominalOf(stage, entries);
-      if (nominal && nominal.nominal) models.push({ ...nominal, modes: [] });
+      if (nominal?.nominal) models.push({ ...nominal, modes: [] });
       view = bench.structure(place, stage, models);
       view.pick(state.a.name);
     } else place.append(note(stage ? "The case came as matrices without a geometry." : NO_PICTURES));
-    root.append(...parts.map(({ node }) => node));
-    fill();
+    for (const { fill } of parts) fill();
     return root;
   };
 }

@@ -35,8 +35,9 @@ const bench = {};
     const whole = Math.floor(Math.log10(Number(size.toPrecision(digits)))) + 1;
     return minus(value.toFixed(Math.max(digits - whole, 0)));
   };
-  bench.percent = (value, digits = 3) => unit(bench.number(value, digits), "%");
-  bench.seconds = (value) => unit(bench.number(value, value >= 0.001 ? 3 : 1), "s");
+  // Parts of a whole have three decimals; rounding errors are none, and nothing either.
+  bench.share = (value) => (value === null || value === undefined ? NOTHING : minus(value.toFixed(3).replace(/^-(?=0\.000$)/, "")));
+  bench.small = (value) => (value !== null && value > 0 && value < 0.001 ? "< 0.001" : bench.number(value));
   bench.hertz = (value) => {
     if (value === null || value === undefined) return NOTHING;
     return value < 0 ? `${(-value).toFixed(1)} i` : value.toFixed(1);
@@ -55,9 +56,6 @@ const bench = {};
 
   function minus(text) {
     return text.replace(/-/g, "−");
-  }
-  function unit(text, name) {
-    return text === NOTHING ? text : `${text} ${name}`;
   }
 
   // Return the letter of a group: a to z, then aa, ab, ...
@@ -107,7 +105,7 @@ const bench = {};
 
   // Return a region that scrolls sideways by itself, by keyboard too.
   bench.scroll = (label, ...children) =>
-    bench.el("div", { class: "scroll", role: "region", tabindex: "0", "aria-label": label }, children);
+    bench.el("div", { class: "wide", role: "region", tabindex: "0", "aria-label": label }, children);
 
   bench.median = (values) => {
     if (!values.length) return null;

@@ -1,48 +1,74 @@
-// What stands below the leaderboard: performance profiles, accuracy against cost, groups.
+// Charts of the run page: skills with intervals, calibration, profiles, cost, mean ranks with groups.
 {
-  const { el, svg, data } = bench;
+  const { el, data, ranking } = bench;
   const MOST_CURVES = 8;
-  const MOST_RANKED = 60;
+  const MOST_ROWS = 40;
   const FARTHEST = 1000;
+  const LEVELS = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95];
+  const { tiers, groups, note, pairs } = data.statistics;
+  const tierOf = new Map(tiers.flatMap((tier, t) => tier.map((s) => [s, t + 1])));
+  const lettersOf = d3.rollup(groups.flatMap((group, g) => group.map((s) => [s, bench.letter(g)])), (own) => own.map(([, letter]) => letter).join(" "), ([s]) => s);
+
+  // Return the first rows, and the baseline with them.
+  function first(rows, most) {
+    const baseline = rows.find((row) => row.strategy === data.baseline);
+    return rows.length <= most || rows.indexOf(baseline) < most ? rows.slice(0, most) : [...rows.slice(0, most - 1), baseline].filter(Boolean);
+  }
+  const left = (rows, shown) => (rows.length > shown.length ? ` Drawn: ${shown.length} of ${rows.length}; filter the strategies to see others.` : "");
+
+  function skills(rows) {
+    const shown = first(rows, MOST_ROWS);
+    const name = (row) => `${row.strategy}${tiers.length > 1 && tierOf.has(row.index) ? `, tier ${tierOf.get(row.index)}` : ""}${row.unphysical ? " ▲" : ""}`;
+    const kind = ranking.intervalKind(rows);
+    const drawn = shown.filter((row) => row.skill_drawn !== null);
+    const given = data.yardstick === "textbook" ? "textbook models" : "nominal models";
+    return bench.draw({
+      kind: "interval", title: `Skill on ${data.scored_on} of every strategy`,
+      note: `${kind ? `The line is the 95 % interval over ${kind}. ` : ""}0: the ${given}, which no data have changed; 1: no error left.${shown.some((row) => row.unphysical) ? " ▲: unphysical." : ""}${left(rows, shown)}`,
+      x: { label: "skill, part of the error taken away (1)", unit: "", low: Math.max(-2, d3.min(shown.flatMap((row) => [-0.2, row.skill, row.skill_drawn]))), high: 1 },
+      y: { label: "", unit: "", names: shown.map(name) },
+      series: [
+        { name: `from the ${given}`, x: shown.map((row) => row.skill), y: shown.map(name), low: shown.map((row) => row.skill_low), high: shown.map((row) => row.skill_high), names: shown.map(name) },
+        ...(drawn.length ? [{ name: "from the models as drawn", role: "nominal", x: drawn.map((row) => row.skill_drawn), y: drawn.map(name), names: drawn.map(name) }] : []),
+      ],
+      marks: [{ axis: "x", value: 0, label: "without data" }],
+      height: 17 * shown.length + 70,
+    });
+  }
+
+  function calibration(rows) {
+    const shown = rows.filter((row) => row.stated.length).slice(0, MOST_CURVES);
+    if (!shown.length) return null;
+    return bench.draw({
+      kind: "calibration", title: "Are stated uncertainties true?",
+      note: `Share of unseen modes inside the interval of each level that a strategy states; over ${d3.extent(shown, (row) => d3.sum(row.stated, (f) => f.modes)).filter((n, k, both) => !k || n > both[0]).join(" to ")} modes, every structure counts alike. On the diagonal: true; below it: too sure; above: too cautious.`,
+      x: { label: "stated level", unit: "1", low: 0, high: 1 }, y: { label: "share of unseen modes inside", unit: "1", low: 0, high: 1 },
+      series: shown.map((row) => ({ name: row.strategy, x: LEVELS, y: LEVELS.map((level) => ranking.covered(row, level)) })),
+      height: 330,
+    });
+  }
 
   // Return the share of problems within a factor of the best, strategy by strategy.
   function profile(rows, filter) {
-    const shown = rows.slice(0, MOST_CURVES);
-    const nominal = rows.find((row) => row.strategy === data.baseline);
-    if (nominal && !shown.includes(nominal)) shown.splice(-1, 1, nominal);
-    const problems = bench.ranking.problems(rows, filter);
+    const shown = first(rows, MOST_CURVES);
+    const problems = ranking.problems(rows, filter);
     if (!problems.length) return null;
     const offset = data.offset_percent;
-    const ratios = rows.map((_, k) =>
-      problems.map(({ errors }) => {
-        const best = Math.min(...errors.filter((e) => e !== null));
-        return errors[k] === null ? Infinity : (errors[k] + offset) / (best + offset);
-      }).sort((a, b) => a - b),
-    );
-    const finite = ratios.flat().filter(Number.isFinite);
-    const most = Math.max(...finite, 2);
-    const decade = 10 ** Math.floor(Math.log10(most));
-    const end = Math.min(FARTHEST, [1, 2, 5, 10].map((k) => k * decade).find((v) => v >= most));
+    const ratios = d3.transpose(problems.map((errors) => {
+      const best = d3.min(errors.filter((e) => e !== null));
+      return errors.map((e) => (e === null ? Infinity : (e + offset) / (best + offset)));
+    })).map((own) => d3.sort(own));
+    const most = d3.max(ratios.flat().filter(Number.isFinite)) ?? 2;
+    const end = Math.min(FARTHEST, d3.nice(1, Math.max(most, 2), 4)[1]);
     const series = shown.map((row) => {
       const own = ratios[rows.indexOf(row)];
-      const [x, y] = [[], []];
-      const push = (tau, count) => void (x.push(tau), y.push(count / own.length));
-      if (!(own[0] <= 1 + 1e-9)) push(1, 0);
-      own.forEach((tau, i) => {
-        if (tau <= end && !(own[i + 1] <= tau * (1 + 1e-9))) push(tau, i + 1);
-      });
-      if (x[x.length - 1] < end) push(end, own.filter((tau) => tau <= end).length);
-      return { label: row.strategy, x, y, role: row.strategy === data.baseline ? "nominal" : "other" };
+      const x = [1, ...new Set(own.filter((tau) => tau > 1 && tau < end)), end];
+      return { label: row.strategy, x, y: x.map((tau) => d3.bisectRight(own, tau * (1 + 1e-9)) / own.length), role: row.strategy === data.baseline ? "nominal" : "other" };
     });
-    const left = rows.length > shown.length ? ` Shown: the ${shown.length - (nominal && rows.indexOf(nominal) >= MOST_CURVES ? 1 : 0)} best${nominal ? " and the nominal model" : ""}; filter the strategies to see others.` : "";
     return bench.charts.profile({
       title: "Performance profiles",
-      note: `How often is a strategy within a factor τ of the best one? ${bench.plural(problems.length, "problem")}, one a case and block; errors with ${offset} % added as in the score. Left edge: how often it is the best; high and left is good.${left}`,
-      xLabel: "factor τ of the best rms error",
-      yLabel: "share of problems",
-      xRange: [1, end],
-      series,
-      height: 360,
+      note: `How often is a strategy within a factor τ of the best one? ${bench.plural(problems.length, "problem")}, one a case and block; rms errors with ${offset} % added as in the score. Left edge: how often it is the best; high and left is good.${left(rows, shown)}`,
+      xLabel: "factor τ of the best rms error (1)", yLabel: "share of problems (1)", xRange: [1, end], series, height: 360,
     });
   }
 
@@ -55,131 +81,45 @@
     });
     return bench.charts.scatter({
       title: "Accuracy against cost",
-      note: "What is left of the error (1 - skill; 1 = the textbook model) against wall time, median over the cases. Low and left is good.",
-      xLabel: "wall time in s", yLabel: "error left",
-      logX: true, logY: true, height: 360,
-      lines: [{ y: 1, label: "textbook model" }],
-      series: series.filter((s) => s.x.length),
+      note: "What is left of the error (1 − skill; 1 = the textbook model) against wall time, median over the cases. Low and left is good.",
+      xLabel: "wall time, s, median over the cases", yLabel: "error left (1)", logX: true, logY: true, height: 360,
+      lines: [{ y: 1, label: "textbook model" }], series: series.filter((s) => s.x.length),
     });
   }
 
-  // Return the groups without a difference shown; the n-th has the n-th letter.
-  function groups() {
-    return (data.statistics && data.statistics.groups) || [];
-  }
-
-  // Return the mean rank of every strategy over the structures by its score, equal scores share ranks.
+  // Return the mean rank of every strategy over the structures by its score; equal scores share ranks.
   function meanRanks() {
-    const rows = bench.ranking.rows(bench.ranking.everything());
-    if (!rows.length) return [];
-    const cases = rows[0].structures.length;
-    const totals = new Map(rows.map((row) => [row.index, 0]));
-    for (let c = 0; c < cases; c += 1) {
-      const values = rows.map((row) => bench.median(row.perStructure.map((l) => l[c])));
-      rows.forEach((row, k) => {
-        const below = values.filter((v) => v < values[k] - data.tie).length;
-        const same = values.filter((v) => Math.abs(v - values[k]) <= data.tie).length;
-        totals.set(row.index, totals.get(row.index) + below + (same + 1) / 2);
-      });
-    }
-    return [...totals].map(([s, total]) => ({ s, rank: total / cases })).sort((a, b) => a.rank - b.rank || a.s - b.s);
-  }
-
-  function sentence() {
-    const { note, pairs } = data.statistics;
-    const apart = (pairs || []).filter(([, , p]) => p < 0.05).length;
-    return [note, pairs && pairs.length ? `${apart} of ${bench.plural(pairs.length, "pair")} differ.` : ""].filter(Boolean).join(" ");
-  }
-
-  // Draw mean ranks with a bar for every group, as a critical-difference diagram turned by 90 degrees.
-  function rankChart(width) {
-    const ranks = meanRanks().slice(0, MOST_RANKED);
-    const bars = groups();
-    const place = new Map(ranks.map((item, k) => [item.s, k]));
-    const names = Math.min(190, width * 0.36);
-    const column = Math.max(10, Math.min(22, (width * 0.3) / Math.max(bars.length, 1)));
-    const shown = bars.slice(0, Math.floor((width * 0.3) / column));
-    const [row, top] = [22, 26];
-    const right = width - shown.length * column - 16;
-    const height = top + ranks.length * row + 40;
-    const last = Math.max(...ranks.map((item) => item.rank), 2);
-    const x = (rank) => names + 14 + ((rank - 1) / (last - 1)) * (right - names - 30);
-    const y = (k) => top + k * row + row / 2;
-    const node = svg("svg", { viewBox: `0 0 ${width} ${height}`, width, height, class: "canvas", "aria-hidden": "true" });
-    const step = [1, 2, 5, 10, 20, 50, 100, 200].find((s) => last / s <= (right - names) / 40) || 500;
-    const ticks = [1];
-    for (let t = step > 1 ? step : 2; t <= last; t += step) if (t - 1 > step / 2) ticks.push(t);
-    for (const t of ticks)
-      node.append(
-        svg("line", { class: "grid", x1: x(t), x2: x(t), y1: top, y2: height - 36 }),
-        svg("text", { class: "tick mid", x: x(t), y: height - 22 }, t),
-      );
-    node.append(svg("text", { class: "name mid", x: (names + right) / 2, y: height - 5 }, "mean rank over the structures (1 is best)"));
-    ranks.forEach((item, k) => {
-      const name = bench.shortened(data.strategies[item.s].name, Math.floor(names / 6.6));
-      node.append(
-        svg("line", { class: "grid", x1: names + 6, x2: width - 10, y1: y(k), y2: y(k) }),
-        svg("text", { class: "label end", x: names, y: y(k) + 4 }, name),
-        bench.marker(bench.palette.style(0), x(item.rank), y(k), 4.5),
-      );
+    const rows = ranking.rows(ranking.everything());
+    const places = (rows[0]?.structures ?? []).map((_, c) => {
+      const values = rows.map((row) => bench.median(row.perStructure.map((logs) => logs[c])));
+      return values.map((v) => d3.sum(values, (w) => (w < v - data.tie ? 1 : w <= v + data.tie ? 0.5 : 0)) + 0.5);
     });
-    shown.forEach((group, g) => {
-      const at = group.map((s) => place.get(s)).filter((k) => k !== undefined).sort((a, b) => a - b);
-      if (!at.length) return;
-      const cx = right + 10 + g * column + column / 2;
-      node.append(svg("text", { class: "label mid", x: cx, y: top - 10 }, bench.letter(g)));
-      node.append(svg("line", { class: "bar", x1: cx, x2: cx, y1: y(at[0]) - 5, y2: y(at[at.length - 1]) + 5 }));
-      for (const k of at) node.append(svg("circle", { class: "member", cx, cy: y(k), r: 4.5 }));
-    });
-    return node;
+    return d3.sort(rows.map((row, k) => ({ s: row.index, name: row.strategy, rank: d3.mean(places, (own) => own[k]) })), (item) => item.rank, (item) => item.s);
   }
 
   function comparison() {
-    if (!data.statistics) return null;
-    const plot = el("div", { class: "plot" });
-    let width = 0;
-    const redraw = (room) => {
-      if (!room || Math.abs(room - width) < 2) return;
-      width = room;
-      plot.replaceChildren(rankChart(width));
-    };
-    if (data.strategies.length > 1) {
-      redraw(640);
-      new ResizeObserver((entries) => redraw(Math.floor(entries[0].contentRect.width))).observe(plot);
-    }
-    const ranked = meanRanks();
-    const listed = groups().map((group, g) => {
-      const names = ranked.filter((item) => group.includes(item.s)).map((item) => data.strategies[item.s].name);
-      return el("li", {}, el("b", {}, `${bench.letter(g)}: `), names.join(", "));
+    const ranks = meanRanks();
+    if (ranks.length < 2) return null;
+    const shown = ranks.slice(0, MOST_ROWS);
+    const named = ({ s, name }) => (lettersOf.has(s) ? `${name} · ${lettersOf.get(s)}` : name);
+    const apart = pairs.filter(([, , p]) => p < 0.05).length;
+    const chart = bench.draw({
+      kind: "interval", title: "Which strategies differ by more than chance",
+      note: [note, pairs.length ? `${apart} of ${bench.plural(pairs.length, "pair")} differ. Strategies that share a letter: no difference shown.` : "", `Ranks are by score alone, and for the whole run whatever the filter.${left(ranks, shown)}`].filter(Boolean).join(" "),
+      x: { label: "mean rank over the structures (1 is best)", unit: "", low: 1 }, y: { label: "", unit: "", names: shown.map(named) },
+      series: [{ name: "mean rank", x: shown.map((item) => item.rank), y: shown.map(named), names: shown.map(named) }],
+      height: 19 * shown.length + 70,
     });
-    const means = ranked.map((item) => el("li", {}, `${data.strategies[item.s].name}: ${item.rank.toFixed(2)}`));
-    return el("figure", { class: "chart wide" },
-      el("figcaption", {}, el("strong", {}, "Which strategies differ by more than chance"), el("span", {}, sentence()),
-        listed.length ? el("span", {}, "A bar joins strategies without a difference shown; its dots are the members. Ranks are by score alone, and for the whole run whatever the filter.", ranked.length > MOST_RANKED ? ` Drawn: the first ${MOST_RANKED} of ${ranked.length}.` : "") : null,
-        listed.length ? el("details", { class: "numbers" }, el("summary", {}, "Groups in words"), el("ul", { class: "groups" }, listed)) : null,
-        means.length ? el("details", { class: "numbers" }, el("summary", {}, "Mean ranks"), el("ol", { class: "groups" }, means)) : null),
-      plot);
+    const listed = groups.map((group, g) => el("li", {}, el("b", {}, `${bench.letter(g)}: `), ranks.filter((item) => group.includes(item.s)).map((item) => item.name).join(", ")));
+    if (listed.length) chart.append(el("details", { class: "numbers" }, el("summary", {}, "Groups in words"), el("ul", {}, listed)));
+    return chart;
   }
 
   let whole = null;
   bench.overview = {
-    groups,
-    // Return the tier of every strategy by its index, null where nothing was tested.
-    tiers() {
-      const found = data.strategies.map(() => null);
-      ((data.statistics && data.statistics.tiers) || []).forEach((tier, t) => tier.forEach((s) => (found[s] = t + 1)));
-      return found;
-    },
-    // Return the letters of every strategy, by its index.
-    letters() {
-      const found = data.strategies.map(() => "");
-      groups().forEach((group, g) => group.forEach((s) => (found[s] += (found[s] ? " " : "") + bench.letter(g))));
-      return found;
-    },
-    // Return the figures for the rows of a filtered board, as a list of elements.
-    figures(rows, filter) {
-      whole = whole || comparison();
-      return [profile(rows, filter), cost(rows), whole].filter(Boolean);
-    },
+    tierOf,
+    letters: (s) => lettersOf.get(s) ?? (groups.length ? "alone" : "–"),
+    top: (rows) => [skills(rows), calibration(rows)].filter(Boolean),
+    figures: (rows, filter) => [profile(rows, filter), cost(rows), (whole ??= comparison())].filter(Boolean),
   };
 }
