@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -13,8 +12,7 @@ from femubench.reports.page.papers import papers_of, started_as_drawn
 from femubench.reports.summary import (
     Trouble,
     cases_of,
-    change_errors,
-    changes_of,
+    finding,
     first_seed,
     header,
     lead,
@@ -31,6 +29,7 @@ from femubench.results import (
     Run,
     interval_kind,
     leaderboard,
+    modes_frame,
     ranks_by_floor,
     tell_apart,
     twin_skills,
@@ -93,7 +92,7 @@ class MarkdownReporter:
                 )
                 for case in cases_of(run)
             ),
-            *chain.from_iterable(_changes(ranked, *item) for item in changes_of(ranked).items()),
+            *_changes(ranked),
             *_citations(run.meta.get("citations") or {}),
         ]
         return "\n\n".join(sections)
@@ -117,6 +116,7 @@ def _leaderboard(run: Run) -> Iterator[str]:
     board = leaderboard(run)
     tested = tell_apart(run, list(board["strategy"]))
     tiers, letters = tested.tier_of(), tested.letters()
+    yield " ".join(map(escape, finding(run, board.to_dict("records"), tested)))
     headers = [
         *("rank", "strategy", "skill", "from drawn", "tests", "higher %", "modified %", "given %"),
         *("in 90 %", "CRPS %", "rigid lost", "negative", "parameters", "evaluations", "seconds"),
@@ -291,28 +291,29 @@ def _mac(modes: Iterable[PairedMode]) -> str:
     return f"{sum(values) / len(values):.3f}" if values else NOTHING
 
 
-def _changes(run: Run, scenario: str, columns: Sequence[tuple[str, str]]) -> Iterator[str]:
-    """Return the errors after each design change of a scenario, a strategy a row."""
-    seed = first_seed(run)
-    yield f"## Design changes of {escape(scenario)}"
-    yield f"Rms frequency error in percent of the modes after each change; seed {seed}."
-    yield "\n".join(
-        f"{number}. {escape(case)}: {escape(name)}"
-        for number, (case, name) in enumerate(columns, start=1)
+def _changes(run: Run) -> Iterator[str]:
+    """Return the errors after every design change, a table a scenario, a strategy a row."""
+    modes, seed = modes_frame(run), first_seed(run)
+    modes = modes[(modes["block"] == "modified") & (modes["seed"] == seed)]
+    modes = modes.assign(
+        square=modes["counted_percent"] ** 2, name=modes["modification"].fillna("")
     )
-    rows = []
-    for strategy in strategies_of(run):
-        errors = {
-            (result.case, name): error
-            for result in run.results
-            if result.strategy == strategy and result.seed == seed
-            for name, error in change_errors(result).items()
-        }
-        if errors:
-            values = [errors.get(column, math.nan) for column in columns]
-            rows.append([escape(strategy), *(fixed(value, 2, 7) for value in values)])
-    headers = ["strategy", *(str(number) for number in range(1, len(columns) + 1))]
-    yield table(headers, rows, "l" + "r" * len(columns))
+    for scenario, own in modes.groupby(modes["case"].str.split("/").str[0], sort=False):
+        # Changes and strategies in the order in which they were run.
+        changes = list(dict.fromkeys(zip(own["case"], own["name"], strict=True)))
+        means = own.groupby(["strategy", "case", "name"])["square"].mean().pow(0.5).to_dict()
+        present = set(own["strategy"])
+        rows = (
+            [escape(name), *(fixed(means.get((name, *change)), 2, 7) for change in changes)]
+            for name in strategies_of(run)
+            if name in present
+        )
+        yield f"## Design changes of {escape(scenario)}"
+        yield f"Rms frequency error in percent of the modes after each change; seed {seed}."
+        told = (f"{escape(case)}: {escape(name)}" for case, name in changes)
+        yield "\n".join(f"{number}. {text}" for number, text in enumerate(told, start=1))
+        headers = ["strategy", *map(str, range(1, len(changes) + 1))]
+        yield table(headers, rows, "l" + "r" * len(changes))
 
 
 def _citations(citations: Mapping[str, str]) -> Iterator[str]:

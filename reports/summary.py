@@ -13,7 +13,6 @@ from femubench.results import (
     JobResult,
     PairedMode,
     Run,
-    frequency_error,
     interval_kind,
     scored_on,
     structures_of,
@@ -95,37 +94,6 @@ def strategies_of(run: Run) -> list[str]:
     return list(dict.fromkeys([*named, *(result.strategy for result in run.results)]))
 
 
-def changes_of(run: Run) -> dict[str, list[tuple[str, str]]]:
-    """Return (case, modification) of all design changes by scenario."""
-    found: dict[str, list[tuple[str, str]]] = {}
-    for result in run.results:
-        scenario = result.case.partition("/")[0]
-        for name in _modified(result):
-            column = (result.case, name)
-            if column not in found.setdefault(scenario, []):
-                found[scenario].append(column)
-    return {scenario: columns for scenario, columns in found.items() if columns}
-
-
-def change_errors(result: JobResult) -> dict[str, float]:
-    """Return the rms relative frequency error in percent by modification."""
-    return {name: rms_percent(modes) for name, modes in _modified(result).items()}
-
-
-def rms_percent(modes: Iterable[PairedMode]) -> float:
-    """Return the rms relative frequency error in percent; nan without modes."""
-    squares = [frequency_error(mode) ** 2 for mode in modes]
-    return 100.0 * math.sqrt(sum(squares) / len(squares)) if squares else math.nan
-
-
-def _modified(result: JobResult) -> dict[str, list[PairedMode]]:
-    groups: dict[str, list[PairedMode]] = {}
-    block = result.blocks.get("modified")
-    for mode in block.modes if block is not None else ():
-        groups.setdefault(mode.modification or "", []).append(mode)
-    return groups
-
-
 def header(run: Run) -> Iterator[tuple[str, str]]:
     """Return what a reader needs to repeat a run: seeds, versions, machine."""
     meta = run.meta
@@ -153,14 +121,17 @@ def measured_modes(run: Run, case: str) -> list[tuple[str, PairedMode]]:
     return [(name, mode) for (name, _), mode in found.items()]
 
 
+def _yardstick(run: Run) -> str:
+    return "textbook" if run.meta.get("yardstick") == "textbook" else "nominal"
+
+
 def lead(run: Run) -> str:
     """Return what the skill of a run says, and from where its strategies started."""
-    yardstick = "textbook" if run.meta.get("yardstick") == "textbook" else "nominal"
     unseen = scored_on(run) == "unseen"
     what = "unseen data" if unseen else "the modes that were given"
     told = [
-        f"Skill is the part of the {yardstick} model's error on {what} that a strategy takes away: "
-        "1 is all of it, 0 none, less than 0 is worse."
+        f"Skill is the part of the {_yardstick(run)} model's error on {what} that a strategy takes "
+        "away: 1 is all of it, 0 none, less than 0 is worse."
     ]
     if len(run.nominals) > 1:
         told.append("Ranks are from the textbook models; beside it the start from the drawn ones.")
@@ -179,58 +150,51 @@ def finding(run: Run, board: Sequence[Mapping[Any, Any]], tested: Groups) -> lis
         board: rows of its leaderboard.
         tested: which strategies differ.
     """
-    possible = [row for row in board if row["ok"] and not row["unphysical"]]
-    if not possible:
+    best = next((row for row in board if row["ok"] and not row["unphysical"]), None)
+    if best is None:
         return ["No strategy gave a possible model."] if board else []
-    best, yardstick = possible[0], "textbook" if run.meta.get("yardstick") else "nominal"
-    name, skill, low = plain(best["strategy"]), best["skill"], best["skill_low"]
-    kind = interval_kind(run)
-    over = (
-        seeds_of(run) if kind == "seeds" else {structures_of(run).get(c, c) for c in cases_of(run)}
-    )
-    sure = f", 95 % interval {interval(low, best['skill_high'])} over {len(over)} {kind}" * bool(
-        kind
-    )
-    data = "unseen data" if scored_on(run) == "unseen" else "the given modes"
-    headline = (
-        f"{name} leads: it takes away {100.0 * skill:.0f} % of the {yardstick} models' error on "
-        f"{data} (skill {skill:.3f}{sure})."
+    name, skill, models = plain(best["strategy"]), best["skill"], f"{_yardstick(run)} models"
+    sure, data = "", "unseen data" if scored_on(run) == "unseen" else "the given modes"
+    if kind := interval_kind(run):
+        cases = {structures_of(run).get(case, case) for case in cases_of(run)}
+        count = len(seeds_of(run) if kind == "seeds" else cases)
+        ends = interval(best["skill_low"], best["skill_high"])
+        sure = f", 95 % interval {ends} over {count} {kind}"
+    told = [
+        f"{name} leads: it takes away {100.0 * skill:.0f} % of the {models}' error on {data} "
+        f"(skill {skill:.3f}{sure})."
         if skill > 0.0
-        else f"No strategy improves on the {yardstick} models on {data}; the best, {name}, has a "
-        f"skill of {skill:.3f}{sure}."
-    )
-    told = [headline, _how_sure(name, tested, len(board))]
-    if skill > 0.0 >= low:
-        told.append(f"Its interval holds 0: an improvement on the {yardstick} models is not shown.")
-    left = next(
-        (row["skill_drawn"] for row in board if row["strategy"] == run.meta.get("baseline")), None
-    )
-    if left is not None and math.isfinite(left):
+        else f"No strategy improves on the {models} on {data}; the best, {name}, has a skill of "
+        f"{skill:.3f}{sure}.",
+        *_how_sure(name, tested, len(board)),
+    ]
+    if skill > 0.0 >= best["skill_low"]:
+        told.append(f"Its interval holds 0: an improvement on the {models} is not shown.")
+    idle = [row["skill_drawn"] for row in board if row["strategy"] == run.meta.get("baseline")]
+    if idle and math.isfinite(idle[0]):
         told.append(
-            f"Without data the {yardstick} models stand at 0 and the models as drawn at "
-            f"{left:.3f}; started from the latter {name} reaches {best['skill_drawn']:.3f}."
+            f"Without data the {models} stand at 0 and the models as drawn at {idle[0]:.3f}; "
+            f"started from the latter {name} reaches {best['skill_drawn']:.3f}."
         )
     if math.isfinite(best["skill_tests"]):
-        told.append(
-            f"On tests alone, without computed truths, its skill is {best['skill_tests']:.3f}."
-        )
+        told.append(f"On tests alone, no computed truths, its skill is {best['skill_tests']:.3f}.")
     return [sentence.replace(" -", " \u2212") for sentence in told]
 
 
-def _how_sure(name: str, tested: Groups, count: int) -> str:
-    """Return how many strategies are not shown to differ from the best."""
-    if not tested.tiers:
-        return "Whether the others differ from it is not tested." if count > 1 else ""
-    beside = [plain(other) for other in tested.tiers[0] if plain(other) != name]
-    if len(beside) == count - 1:
-        return "No other strategy is shown to differ from it: all are in tier 1."
-    if not beside:
-        return "It is alone in tier 1: all others are shown to be worse."
-    more = f" and {len(beside) - 4} more" if len(beside) > 4 else ""
-    return (
-        f"Beside it in tier 1, not shown to differ from it: {', '.join(beside[:4])}{more}; "
-        f"{count - 1 - len(beside)} of {count} are below."
-    )
+def _how_sure(name: str, tested: Groups, count: int) -> Iterator[str]:
+    """Return how many of the strategies are not shown to differ from the best."""
+    beside = [plain(other) for other in (tested.tiers or ((),))[0] if plain(other) != name]
+    if count > 1 and not tested.tiers:
+        yield "Whether the others differ from it is not tested."
+    elif count > 1 and not beside:
+        yield "It is alone in tier 1: all others are shown to be worse."
+    elif len(beside) == count - 1 > 0:
+        yield "No other strategy is shown to differ from it: all are in tier 1."
+    elif beside:
+        more = f" and {len(beside) - 4} more" if len(beside) > 4 else ""
+        below = f"{count - 1 - len(beside)} of {count} are below"
+        named = ", ".join(beside[:4])
+        yield f"Beside it in tier 1, not shown to differ from it: {named}{more}; {below}."
 
 
 def notes_of(run: Run) -> list[str]:
