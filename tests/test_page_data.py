@@ -23,7 +23,7 @@ from femubench.reports.page import data as page
 from femubench.reports.page.data import page_data
 from femubench.reports.page.document import SCRIPTS, STYLES, asset, embedded_json
 from femubench.reports.page.papers import papers_of
-from femubench.reports.page.rounding import plain_data, rounded
+from femubench.reports.page.rounding import compact_json, plain_data, rounded
 from femubench.results import (
     Block,
     JobResult,
@@ -118,7 +118,7 @@ class TestNumbers:
     def test_a_page_keeps_to_its_size(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(page, "MOST_DETAILS", 20_000)
         found = page_data(SMALL)
-        assert 0 < len(json.dumps(found["details"])) <= 20_000
+        assert 0 < len(compact_json(found["details"])) <= 20_000
         assert any("to keep the page small" in note for note in found["notes"])
         ranks = {(r.case, r.strategy): r.rank for r in SMALL.results if r.seed == 1}
         kept = [tuple(map(int, key.split(":"))) for key in found["details"]]

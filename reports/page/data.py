@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import gzip
-import json
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
@@ -13,7 +12,7 @@ from femubench.reports.cells import plain, shortened
 from femubench.reports.csvs import CsvReporter
 from femubench.reports.jsons import JsonReporter
 from femubench.reports.page.papers import papers_of, started_as_drawn
-from femubench.reports.page.rounding import clean, plain_data, rounded
+from femubench.reports.page.rounding import clean, compact_json, plain_data, rounded
 from femubench.reports.summary import (
     cases_of,
     finding,
@@ -47,7 +46,7 @@ from femubench.results import (
 BLOCKS = ("used", "higher", "modified")
 # Bytes of the details of all results together, and of the files to be downloaded once they are
 # packed; a page has to open in a moment.
-MOST_DETAILS = 5_500_000
+MOST_DETAILS = 5_700_000
 MOST_DOWNLOADS = 1_000_000
 _LONGEST_REASON = 500
 _FILES: tuple[tuple[str, str, Reporter], ...] = (
@@ -94,7 +93,7 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
     cases, strategies = cases_of(run), strategies_of(run)
     listed = [_case(run, case, exhibits) for case in cases]
     stages = {case["name"]: case["stage"] for case in listed}
-    details, left_out = _details(run, strategies, stages, exhibits)
+    details, left_out = _details(run, stages, exhibits)
     return {
         **shared,
         "run": plain(run.meta.get("run", "")),
@@ -237,42 +236,43 @@ def _forecast(result: JobResult, name: str) -> dict[str, Any] | None:
 
 
 def _details(
-    run: Run,
-    strategies: list[str],
-    stages: Mapping[str, _Named | None],
-    exhibits: Exhibits | None,
+    run: Run, stages: Mapping[str, _Named | None], exhibits: Exhibits | None
 ) -> tuple[dict[str, Any], list[str]]:
-    """Return the details of the first seed's results, the best ones first, and what is missing."""
-    seed, room, cases = first_seed(run), MOST_DETAILS, list(stages)
-    shown = [result for result in run.results if result.seed == seed and result.status == "ok"]
-    found: dict[str, Any] = {}
-    undrawn = full = 0
-    for result in sorted(shown, key=lambda result: result.rank or 0):
-        exhibit = exhibits.of(result.key) if exhibits is not None and result.key else None
-        exhibit = _fitting(exhibit, stages[result.case])
-        entry = {**_detail(result), "exhibit": plain_data(exhibit)}
-        size = len(json.dumps(entry))
-        if size > room and exhibit is not None:
-            entry["exhibit"] = exhibit = None
-            size = len(json.dumps(entry))
-        if size > room:
-            full += 1
-            continue
-        undrawn += exhibit is None
-        room -= size
-        found[f"{cases.index(result.case)}:{strategies.index(result.strategy)}"] = entry
+    """Return the details of the first seed's results, the best ones first, and what is missing.
+
+    Figures come before drawings.
+    """
+    seed, room = first_seed(run), MOST_DETAILS
+    cases, strategies = list(stages), strategies_of(run)
+    done = [result for result in run.results if result.seed == seed and result.status == "ok"]
+    shown = {
+        f"{cases.index(result.case)}:{strategies.index(result.strategy)}": result
+        for result in sorted(done, key=lambda result: result.rank or 0)
+    }
+    found: dict[str, dict[str, Any]] = {}
+    for key, result in shown.items():
+        entry = {**_detail(result), "exhibit": None}
+        if (size := len(compact_json({key: entry}))) <= room:
+            found[key], room = entry, room - size
+    drawn = 0
+    for key, entry in found.items():
+        name = shown[key].key
+        exhibit = exhibits.of(name) if exhibits is not None and name else None
+        picture = plain_data(_fitting(exhibit, stages[shown[key].case]))
+        if picture is not None and (size := len(compact_json(picture))) <= room:
+            entry["exhibit"], room, drawn = picture, room - size, drawn + 1
     notes = []
-    if undrawn and undrawn == len(shown):
+    if shown and not drawn:
         notes.append("no shapes, receptances and element changes to draw come with these results")
-    elif undrawn:
+    elif drawn < len(shown):
         notes.append(
-            f"{undrawn} of {len(shown)} models of seed {seed} have no shapes, receptances and "
-            "changes to draw: they are not in the store, or there was no room for them"
+            f"{len(shown) - drawn} of {len(shown)} models of seed {seed} have no shapes, "
+            "receptances and changes to draw: they are not in the store, or there was no room"
         )
-    if full:
+    if len(found) < len(shown):
         notes.append(
-            f"{full} of {len(shown)} models of seed {seed} are without modes, history and "
-            "parameters, to keep the page small; those with the best scores have them"
+            f"{len(shown) - len(found)} of {len(shown)} models of seed {seed} are without modes, "
+            "history and parameters, to keep the page small; those with the best scores have them"
         )
     return found, notes
 

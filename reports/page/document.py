@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
+from femubench.reports.page.rounding import compact_json
 from femubench.reports.templating import asset, templates
 
 STYLES = ("page.css", "run.css", "case.css")
@@ -41,5 +41,4 @@ def document(data: Mapping[str, Any], *, title: str) -> str:
 
 def embedded_json(data: Any) -> str:  # noqa: ANN401 - JSON data of any form
     """Return JSON that can end neither a script element nor a line of it."""
-    text = json.dumps(data, allow_nan=False, separators=(",", ":"))
-    return text.translate(_ESCAPES)
+    return compact_json(data).translate(_ESCAPES)

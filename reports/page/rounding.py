@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -22,7 +23,13 @@ def plain_data(data: Any, depth: int = 8) -> Any:  # noqa: ANN401 - JSON data of
         return {str(k): plain_data(v, depth - 1) for k, v in data.items()} if depth else None
     if isinstance(data, (list, tuple)):
         return [plain_data(value, depth - 1) for value in data] if depth else None
-    return clean(data)
+    value = clean(data)
+    return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def compact_json(data: Any) -> str:  # noqa: ANN401 - JSON data of any form
+    """Return strict JSON without a space that needs not be."""
+    return json.dumps(data, allow_nan=False, separators=(",", ":"))
 
 
 def rounded(value: Any, digits: int) -> Any:  # noqa: ANN401 - a number of a stranger's result
