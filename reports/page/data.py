@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 from femubench.reports.cells import plain, shortened
@@ -175,7 +175,7 @@ def _case(run: Run, case: str, exhibits: Exhibits | None) -> dict[str, Any]:
     digest = (run.meta.get("drawings") or {}).get(case, about.get("digest"))
     stage = exhibits.case(digest) if exhibits is not None and isinstance(digest, str) else None
     if stage is not None:
-        stage = {**_with_short_points(stage), "nominal": _fitting(stage.get("nominal"), stage)}
+        stage = {**stage, "nominal": _fitting(stage.get("nominal"), stage)}
     reference = (run.meta.get("reference") or {}).get(case) or {}
     return {
         "name": case,
@@ -186,18 +186,6 @@ def _case(run: Run, case: str, exhibits: Exhibits | None) -> dict[str, Any]:
         "reference": {name: reference[name] for name in BLOCKS if name in reference},
         "stage": plain_data(stage),
     }
-
-
-def _with_short_points(stage: _Named) -> dict[str, Any]:
-    """Return the structure of a case with four digits of every coordinate."""
-
-    def short(xyz: Sequence[float]) -> list[Any]:
-        return [rounded(value, 4) for value in xyz]
-
-    found = {**stage, "nodes": [short(xyz) for xyz in stage.get("nodes", ())]}
-    for name in {"joints", "sensors", "masses", "springs", "supports"} & set(stage):
-        found[name] = [{**item, "xyz": short(item["xyz"])} for item in stage[name]]
-    return found
 
 
 def _result(result: JobResult, case: int, strategy: int) -> dict[str, Any]:

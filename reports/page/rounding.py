@@ -18,13 +18,15 @@ def clean(value: Any) -> Any:  # noqa: ANN401 - a cell of a table
 
 
 def plain_data(data: Any, depth: int = 8) -> Any:  # noqa: ANN401 - JSON data of any form
-    """Return plain data with None for numbers that JSON does not know and for what lies deeper."""
+    """Return plain data with seven digits of every number.
+
+    Numbers that JSON does not know, and what lies deeper, are None.
+    """
     if isinstance(data, Mapping):
         return {str(k): plain_data(v, depth - 1) for k, v in data.items()} if depth else None
     if isinstance(data, (list, tuple)):
         return [plain_data(value, depth - 1) for value in data] if depth else None
-    value = clean(data)
-    return int(value) if isinstance(value, float) and value.is_integer() else value
+    return rounded(data, 7) if isinstance(data, (float, np.floating)) else clean(data)
 
 
 def compact_json(data: Any) -> str:  # noqa: ANN401 - JSON data of any form
