@@ -103,9 +103,14 @@ const bench = {};
     }
   };
 
-  // Return a region that scrolls sideways by itself, by keyboard too.
-  bench.scroll = (label, ...children) =>
-    bench.el("div", { class: "wide", role: "region", tabindex: "0", "aria-label": label }, children);
+  // Return a region that scrolls sideways by itself, by keyboard too; where all fits it does not, so that
+  // heads of tables stick to the window.
+  bench.scroll = (label, child) => {
+    const region = bench.el("div", { class: "wide", role: "region", tabindex: "0", "aria-label": label }, child);
+    const watch = new ResizeObserver(() => region.classList.toggle("fits", child.offsetWidth <= region.clientWidth));
+    for (const node of [region, child]) watch.observe(node);
+    return region;
+  };
 
   bench.median = (values) => {
     if (!values.length) return null;
