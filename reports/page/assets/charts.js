@@ -25,7 +25,7 @@
   };
 
   const tickText = (v) => number(Number(v.toPrecision(3)), 3).replace(/(\.\d*?)0+$/, "$1").replace(/\.$/, "");
-  const named = (axis) => (axis.unit ? `${axis.label}, ${axis.unit}` : axis.label);
+  const named = (axis) => (!axis.label ? null : axis.unit ? `${axis.label}, ${axis.unit}` : axis.label);
   const say = (v) => (typeof v === "number" ? number(v, 4) : String(v ?? "–"));
   const usable = (v, axis) => v !== null && Number.isFinite(v) && (!axis.log || v > 0);
 
@@ -69,7 +69,7 @@
       const ticks = ticksOf(domain, axis.log, Math.max(2, Math.floor(room / (key === "x" ? 75 : 55))), values.every(Number.isInteger));
       return { domain, type: axis.log ? "log" : "linear", ticks, tickFormat: tickText, longest: d3.max(ticks, (t) => tickText(t).length) ?? 1 };
     }
-    const size = key === "x" ? 18 : Math.min(30, Math.floor(room / 3 / LETTER));
+    const size = key === "x" ? 18 : Math.min(30, Math.floor(options.width / 3 / LETTER));
     const texts = names.map((name) => bench.shortened(String(name), size, true));
     const longest = d3.max(texts, (t) => t.length) ?? 1;
     const turned = key === "x" && longest * LETTER > room / names.length - 4;
@@ -128,7 +128,7 @@
     const spread = [...flat("low"), ...flat("high")];
     const few = LINES.has(figure.kind) ? 1 : Math.max(1, Math.floor(flat("x").length / 10));
     const more = figure.kind === "scatter" ? 0.12 : 0.05;
-    const y = axisOf(figure, "y", height - 70, [...flat("y"), ...(figure.kind === "interval" ? [] : spread)], { pad: more, few, zero: bars });
+    const y = axisOf(figure, "y", height - 70, [...flat("y"), ...(figure.kind === "interval" ? [] : spread)], { pad: more, few, zero: bars, width });
     const left = 16 + y.longest * LETTER;
     const x = axisOf(figure, "x", width - left - 16, [...flat("x"), ...(figure.kind === "interval" ? spread : [])], { pad: LINES.has(figure.kind) ? 0 : more, few, zero: false });
     const points = figure.series.map((s, k) => pointsOf(figure, s, k, x, y));
@@ -150,6 +150,7 @@
     });
     // Not left to a policy that may refuse styles: the page's own sheet says the same.
     node.querySelector("style").remove();
+    node.setAttribute("aria-hidden", "true");
     const [fx, fy] = [node.scale("x").apply, node.scale("y").apply];
     const shown = points.map((row) => row.filter((p) => p.good).map((p) => ({ ...p, px: fx(p.atX), py: fy(p.atY) })));
     const box = { left, right: width - 8, top: 22, bottom: fy(y.domain[0]) };
@@ -198,7 +199,7 @@
     const flat = values.flat().map((v) => (usable(v, value) ? v : null));
     const x = axisOf(figure, "x", width - 120, [], {});
     const rowsTall = Math.max(down.names.length > 40 ? 2 : 13, Math.min(40, (width - 120) / across.names.length));
-    const y = axisOf(figure, "y", rowsTall * down.names.length, [], {});
+    const y = axisOf(figure, "y", rowsTall * down.names.length, [], { width });
     const left = 16 + y.longest * LETTER;
     const domain = rangeOf(flat, value, { pad: 0, few: Math.max(1, Math.floor(flat.length / 10)) });
     const color = { type: value.log ? "log" : "linear", domain, interpolate: (share) => shadeOf(share), clamp: true };
@@ -214,6 +215,7 @@
         roomy ? Plot.text(cells.filter((c) => c.v !== null), { x: "x", y: "y", text: (c) => number(c.v, 2), className: "in-cell" }) : null,
       ] });
     node.querySelector("style").remove();
+    node.setAttribute("aria-hidden", "true");
     node.querySelectorAll(".in-cell text").forEach((text, k) => {
       const shade = node.scale("color").apply(cells.filter((c) => c.v !== null)[k].v);
       text.style.fill = d3.lab(shade).l > 60 ? "#000" : "#fff";
@@ -229,7 +231,7 @@
     if (figure.kind === "cells") return `${figure.y.names[p.s]} – ${figure.x.names[p.i]}: ${say(p.value)} ${figure.value.unit}`;
     const s = figure.series[p.s];
     const range = s.low && s.low[p.i] !== null ? ` (${say(s.low[p.i])} to ${say(s.high[p.i])})` : "";
-    return `${s.names?.[p.i] ?? s.name}: ${named(figure.x)} ${say(s.x[p.i])}, ${named(figure.y)} ${say(s.y[p.i])}${range}`;
+    return `${s.names?.[p.i] ?? s.name}: ${named(figure.x)} ${say(s.x[p.i])}${figure.kind === "interval" ? "" : `, ${named(figure.y)} ${say(s.y[p.i])}`}${range}`;
   }
 
   // Let the arrow keys and the pointer step through the points; returns what to do after drawing.
@@ -288,7 +290,7 @@
     let free = 0;
     const styles = series.map((s) => bench.palette.style(s.style ?? (s.role === "measured" || s.role === "nominal" ? 0 : free++), s.role));
     const readout = el("p", { class: "readout", "aria-live": "polite" }, figure.hint || "Point at the chart, or focus it and use the arrow keys, to read its values.");
-    const label = `${figure.title}. ${figure.kind === "cells" ? named(figure.value) : `${named(figure.y)} over ${named(figure.x)}`}. Arrow keys step through the points.`;
+    const label = `${figure.title}. ${figure.kind === "cells" ? named(figure.value) : [named(figure.y), named(figure.x)].filter(Boolean).join(" over ")}. Arrow keys step through the points.`;
     const plot = el("div", { class: "plot", tabindex: "0", role: "application", "aria-roledescription": "chart", "aria-label": label });
     const found = stepping(figure, plot, readout);
     const details = el("details", { class: "numbers", ontoggle: () => details.children.length < 2 && details.append(numbersOf(figure)) }, el("summary", {}, "Numbers"));
