@@ -6,6 +6,7 @@ function raises `InputError` for what it cannot draw.
 
 from femubench.core.drawing.wireframe import Wireframe, wireframe_of
 from femubench.core.plot.calibration import calibration
+from femubench.core.plot.chart import Axis, Chart, Mark, Series
 from femubench.core.plot.cost import error_against_cost
 from femubench.core.plot.diagnosis import (
     MOST_ROWS,
@@ -27,7 +28,11 @@ from femubench.core.plot.updating import convergence, parameters
 
 __all__ = [
     "MOST_ROWS",
+    "Axis",
+    "Chart",
+    "Mark",
     "ResidualDot",
+    "Series",
     "Spot",
     "Wireframe",
     "calibration",

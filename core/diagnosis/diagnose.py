@@ -177,8 +177,8 @@ def _proof(
         unseen = (crossed,)
         confirmed = crossed.confirms(len(best.parts))
     before = score_model(given, given.model)
-    gains = (of(before, after, crossed) for of in (gain_of, rms_gain_of))
-    return _Proof(best, model, unseen, *gains, crossed is not None, confirmed)
+    median, rms = (of(before, after, crossed) for of in (gain_of, rms_gain_of))
+    return _Proof(best, model, unseen, median, rms, crossed is not None, confirmed)
 
 
 def _written(

@@ -128,9 +128,9 @@
     const spread = [...flat("low"), ...flat("high")];
     const few = LINES.has(figure.kind) ? 1 : Math.max(1, Math.floor(flat("x").length / 10));
     const more = figure.kind === "scatter" ? 0.12 : 0.05;
-    const y = axisOf(figure, "y", height - 70, [...flat("y"), ...(figure.kind === "interval" ? [] : spread)], { pad: more, few, zero: bars, width });
+    const y = axisOf(figure, "y", height - 70, [...flat("y"), ...(figure.kind === "interval" ? [] : spread)], { pad: more, few: figure.kind === "interval" || !spread.length ? few : 3 * few, zero: bars, width });
     const left = 16 + y.longest * LETTER;
-    const x = axisOf(figure, "x", width - left - 16, [...flat("x"), ...(figure.kind === "interval" ? spread : [])], { pad: LINES.has(figure.kind) ? 0 : more, few, zero: false });
+    const x = axisOf(figure, "x", width - left - 16, [...flat("x"), ...(figure.kind === "interval" ? spread : [])], { pad: LINES.has(figure.kind) ? 0 : more, few: figure.kind === "interval" && spread.length ? 3 * few : few, zero: false });
     const points = figure.series.map((s, k) => pointsOf(figure, s, k, x, y));
     const base = y.domain[0] > 0 || figure.y.log ? y.domain[0] : 0;
     const outside = points.flatMap((row) => LINES.has(figure.kind) ? d3.groups(row.filter((p) => p.beyond), (p) => p.beyond).map(([, some]) => d3.greatest(some, (p) => Math.abs(p.value))) : row.filter((p) => p.beyond));
