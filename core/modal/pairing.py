@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -39,10 +39,12 @@ class Pairing:
     Arguments:
         index: column of the predicted mode, -1 where there is none, (m,).
         mac: of the pair; nan where there is none or the shapes could not be compared, (m,).
+        choices: number of predicted modes that could be the partner, (m,).
     """
 
     index: IntArray
     mac: FloatArray
+    choices: IntArray
 
     def __len__(self) -> int:
         return len(self.index)
@@ -89,7 +91,7 @@ def pair_modes(
     predicted = np.asarray(predicted_frequencies, dtype=float)
     m, p = len(measured), len(predicted)
     if m == 0 or p == 0:
-        return Pairing(np.full(m, -1, dtype=np.int64), np.full(m, np.nan))
+        return Pairing(np.full(m, -1), np.full(m, np.nan), np.zeros(m, dtype=np.int64))
     distance = _distance(measured, predicted)
     shaped = seen_modes(measured_shapes)[:, None]
     likeness = np.where(seen_modes(predicted_shapes), mac(measured_shapes, predicted_shapes), 0.0)
@@ -106,7 +108,7 @@ def pair_modes(
     index[rows[taken]] = columns[taken]
     score = likeness[np.arange(m), index]
     known = (index >= 0) & by_shape[np.arange(m), index]
-    return Pairing(index, np.where(known, score, np.nan))
+    return Pairing(index, np.where(known, score, np.nan), np.count_nonzero(gain > 0.0, axis=1))
 
 
 def pair_measured(measurement: Measurement, modes: Modes, readings: FloatArray) -> Pairing:
@@ -129,7 +131,7 @@ def pair_measured(measurement: Measurement, modes: Modes, readings: FloatArray) 
         modes.natural_frequencies[elastic],
         np.asarray(readings)[:, elastic],
     )
-    return Pairing(np.append(elastic, -1)[found.index], found.mac)
+    return replace(found, index=np.append(elastic, -1)[found.index])
 
 
 def _distance(measured: FloatArray, predicted: FloatArray) -> FloatArray:

@@ -20,8 +20,8 @@ def results_frame(run: Run) -> pd.DataFrame:
 
     Columns: case strategy seed nominal status reason seconds; ``used_percent``, ``used_mac`` and
     the same for ``higher`` and ``modified`` (nan where the case has no such block);
-    rigid_body_modes rigid_body_modes_expected negative_eigenvalues unphysical parameter_count
-    evaluations score rank. Of a study also the values of its axes: ``plain_case`` and
+    rigid_body_modes rigid_body_modes_expected negative_eigenvalues surplus_partners unphysical
+    parameter_count evaluations score rank. Of a study also the values of its axes: ``plain_case`` and
     ``plain_strategy``, noise, sensors_left_out, and every option as ``STRATEGY.OPTION``.
 
     Examples:
@@ -97,8 +97,8 @@ def _signed(measured: float, predicted: float | None) -> float | None:
 _JOB = ("case", "strategy", "seed", "nominal", "status", "reason", "seconds")
 _PLAIN = {"case": "plain_case", "strategy": "plain_strategy"}  # without conditions and options
 _COUNTS = (
-    *("rigid_body_modes", "rigid_body_modes_expected", "negative_eigenvalues", "unphysical"),
-    *("parameter_count", "evaluations", "score", "rank"),
+    *("rigid_body_modes", "rigid_body_modes_expected", "negative_eigenvalues", "surplus_partners"),
+    *("unphysical", "parameter_count", "evaluations", "score", "rank"),
 )
 _ERRORS = tuple(f"{name}_{what}" for name in BLOCKS for what in ("percent", "mac"))
 _FLOATS = ("seconds", *_ERRORS, "score")

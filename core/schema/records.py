@@ -94,6 +94,7 @@ class ResultRecord(Record):
     rigid_body_modes: Whole | None = None
     rigid_body_modes_expected: Whole | None = None
     negative_eigenvalues: Whole | None = None
+    surplus_partners: Whole | None = None
     parameter_count: Whole | None = None
     evaluations: Whole | None = None
     score: Score | None = None

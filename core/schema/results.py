@@ -78,12 +78,15 @@ class JobResult(_Stored):
     Arguments:
         case, strategy, seed: the job.
         status: how it ended; anything but ``ok`` has a reason.
-        reason: one line, with the measured figure where a self-check failed.
+        reason: one line, with the measured figure where a self-check failed; of a model that is
+            ``ok`` how many partners it has, where these are too many.
         seconds: wall time of the strategy alone.
         blocks: errors by block name; empty unless the status is ``ok``.
         rigid_body_modes: modes of zero frequency that are rigid-body motions.
         rigid_body_modes_expected: those of the nominal model.
         negative_eigenvalues: of the updated model.
+        surplus_partners: modes of it that could be partners of measured ones beyond those of the
+            nominal model, where they are too many for a prediction; else 0.
         parameter_count: unknowns that were free.
         evaluations: eigenvalue solutions that the strategy made.
         score: how much of the textbook model's error on unseen data is left: geometric mean over
@@ -109,6 +112,7 @@ class JobResult(_Stored):
     rigid_body_modes: Whole | None = None
     rigid_body_modes_expected: Whole | None = None
     negative_eigenvalues: Whole | None = None
+    surplus_partners: Whole | None = None
     parameter_count: Whole | None = None
     evaluations: Whole | None = None
     score: Score | None = None
@@ -147,8 +151,9 @@ class JobResult(_Stored):
 
     @property
     def unphysical(self) -> bool:
-        """Tell whether rigid-body modes were lost or eigenvalues are negative."""
-        return self.status == "ok" and bool(self.rigid_modes_lost or self.negative_eigenvalues)
+        """Tell whether rigid-body modes were lost, eigenvalues are negative or partners surplus."""
+        damage = self.rigid_modes_lost or self.negative_eigenvalues or self.surplus_partners
+        return self.status == "ok" and bool(damage)
 
 
 _NOTHING = b"", None, None

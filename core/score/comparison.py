@@ -354,8 +354,12 @@ def _changes(pairs: Iterable[_Pair]) -> tuple[Change, ...]:
 
 
 def _damage(result: JobResult) -> str:
-    negative = result.negative_eigenvalues or 0
-    return f"{result.rigid_modes_lost} rigid-body modes lost, {negative} eigenvalues < 0"
+    counts = {
+        "rigid-body modes lost": result.rigid_modes_lost,
+        "eigenvalues < 0": result.negative_eigenvalues or 0,
+        "surplus partners": result.surplus_partners or 0,
+    }
+    return ", ".join(f"{number} {what}" for what, number in counts.items() if number)
 
 
 def _ratios(

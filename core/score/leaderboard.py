@@ -289,7 +289,7 @@ def _row(strategy: str, results: Sequence[JobResult], table: _Table) -> dict[str
         "ok": len(fine),
         "not_applicable": sum(result.status == "not-applicable" for result in results),
         "total": len(grid.cases) * len(grid.seeds),
-        "unphysical": lost + negative > 0,
+        "unphysical": any(result.unphysical for result in fine),
     }
 
 

@@ -13,7 +13,7 @@ _VOLATILE = frozenset({"seconds", "rank", "score", "key", "provenance", "traceba
 # Figures of a result that depend on nothing but its provenance.
 _COUNTS = (
     *("rigid_body_modes", "rigid_body_modes_expected", "negative_eigenvalues"),
-    *("parameter_count", "evaluations"),
+    *("surplus_partners", "parameter_count", "evaluations"),
 )
 _MODEL = ("rigid_body_modes", "negative_eigenvalues", "parameter_count")
 

@@ -28,9 +28,10 @@ from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block
 from femubench.core.score.leaderboard import leaderboard
+from femubench.core.score.partners import Choices, surplus_partners
 from femubench.core.score.predicted_spread import MORE, Spread
 from femubench.core.score.ranking import rank_results, score_of
-from femubench.core.typing import FloatArray
+from femubench.core.typing import FloatArray, IntArray
 
 __all__ = [
     "Judgement",
@@ -56,11 +57,14 @@ class Reference:
         blocks: the errors of the nominal model by block name.
         zero: eigenvalue up to which a mode counts as one of zero frequency, rad^2/s^2.
         rigid: the rigid-body motions that the nominal model leaves free, (n, r).
+        choices: how many of its modes could be the partner of each measured one, by modification;
+            None for the structure as tested.
     """
 
     blocks: Mapping[str, Block]
     zero: float
     rigid: FloatArray
+    choices: Choices
 
     @property
     def rms_percent(self) -> dict[str, float]:
@@ -76,11 +80,16 @@ class Judgement:
         blocks: errors by block name.
         rigid_body_modes: zero-frequency modes that are rigid-body motions of the nominal model.
         negative_eigenvalues: of the model as tested, without modifications.
+        surplus_partners: modes that could be partners of measured ones beyond those that the
+            nominal model has, where they are too many for a prediction; else 0.
+        reason: tells both numbers then.
     """
 
     blocks: dict[str, Block]
     rigid_body_modes: int
     negative_eigenvalues: int
+    surplus_partners: int = 0
+    reason: str = ""
 
 
 def frequency_error(mode: PairedMode) -> float:
@@ -93,6 +102,14 @@ def frequency_error(mode: PairedMode) -> float:
     if mode.predicted_hz is None or mode.predicted_hz <= 0.0:
         return 1.0
     return abs(mode.predicted_hz / mode.measured_hz - 1.0)
+
+
+@dataclass(frozen=True)
+class _Predicted:
+    """Measured modes with their partners, and how many modes could have been those, (m,)."""
+
+    pairs: tuple[PairedMode, ...]
+    choices: IntArray
 
 
 def predict_block(
@@ -112,7 +129,7 @@ def predict_block(
         >>> [round(mode.predicted_hz) for mode in results.predict_block(model, measurement, None)]
         [256, 278, 581]
     """
-    return _predict(model, _modes_for(model, (measurement,)), measurement, modification)
+    return _predict(model, _modes_for(model, (measurement,)), measurement, modification).pairs
 
 
 def modified_modes(
@@ -130,8 +147,13 @@ def modified_modes(
     Raises:
         ModelError: when the modified model has no modes or a sensor lies off the structure.
     """
+    return _modified(model, change, spread, many).pairs
 
-    def make() -> tuple[Modification, Spread | None, tuple[PairedMode, ...]]:
+
+def _modified(
+    model: Model, change: Modification, spread: Spread | None, many: ManyChanges | None
+) -> _Predicted:
+    def make() -> tuple[Modification, Spread | None, _Predicted]:
         changed, modes = model.attach(change.masses, change.springs), None
         if many is not None:
             count, top = len(change.measurement) + MORE, _highest((change.measurement,))
@@ -177,7 +199,7 @@ def score_model(case: Case, model: Model) -> dict[str, Block]:
         >>> {name: round(block.rms_percent, 1) for name, block in scored.items()}
         {'used': 8.8, 'higher': 6.8}
     """
-    return _blocks(case, model, _modes_for(model, (case.measurement,)))
+    return _blocks(case, model, _modes_for(model, (case.measurement,)))[0]
 
 
 def reference_of(case: Case) -> Reference:
@@ -187,14 +209,14 @@ def reference_of(case: Case) -> Reference:
         ModelError: when the nominal model has no modes.
     """
     modes = _modes_for(case.model, (case.measurement,))
-    blocks = _blocks(case, case.model, modes)
-    return Reference(blocks, zero_tolerance(modes), rigid_modes_of(case.model))
+    blocks, choices = _blocks(case, case.model, modes)
+    return Reference(blocks, zero_tolerance(modes), rigid_modes_of(case.model), choices)
 
 
 def judge(
     case: Case, model: Model, reference: Reference, spread: Spread | None = None
 ) -> Judgement:
-    """Return errors, rigid-body modes kept and negative eigenvalues of a model.
+    """Return errors, rigid-body modes kept, negative eigenvalues and surplus partners of a model.
 
     A rigid-body mode is kept where |lambda| <= 1e-6 times the first elastic eigenvalue of the
     nominal model, an eigenvalue is negative below minus that.
@@ -207,11 +229,10 @@ def judge(
     """
     modes = _modes_for(model, (case.measurement,))
     negative = int(np.count_nonzero(modes.eigenvalues < -reference.zero))
-    return Judgement(
-        _blocks(case, model, modes, spread),
-        _kept_rigid_modes(case, model, modes, reference),
-        negative,
-    )
+    blocks, choices = _blocks(case, model, modes, spread)
+    surplus = surplus_partners(choices, reference.choices)
+    kept = _kept_rigid_modes(case, model, modes, reference)
+    return Judgement(blocks, kept, negative, surplus.count, surplus.reason)
 
 
 def _modes_for(model: Model, measurements: Sequence[Measurement]) -> Modes:
@@ -238,7 +259,7 @@ def _predict(
     measurement: Measurement,
     modification: str | None,
     spread: Spread | None = None,
-) -> tuple[PairedMode, ...]:
+) -> _Predicted:
     elastic = modes.elastic
     readings = np.asarray(model.observe(measurement.sensors) @ elastic.shapes)
     readings = np.where(seen_modes(readings), readings, 0.0)
@@ -251,7 +272,7 @@ def _predict(
     if spread is not None:
         whole = np.append(np.flatnonzero(~modes.rigid), -1)[pairing.index]
         std = spread.std_of(modes, whole, measurement.frequency_std)
-    return tuple(
+    pairs = tuple(
         PairedMode(
             number=number,
             measured_hz=float(measured),
@@ -269,27 +290,30 @@ def _predict(
             strict=True,
         )
     )
+    return _Predicted(pairs, pairing.choices)
 
 
 def _blocks(
     case: Case, model: Model, modes: Modes, spread: Spread | None = None
-) -> dict[str, Block]:
+) -> tuple[dict[str, Block], Choices]:
     tested = case.measurement.select(chain(case.used, case.held_out))
-    pairs = _predict(model, modes, tested, None, spread)
+    own = _predict(model, modes, tested, None, spread)
     shaped = _with_shape(tested)
     first, changes = len(case.used), case.modifications
     many = many_modifications(model, changes, modes)
+    modified = [_modified(model, change, spread, many) for change in changes]
     parts = {
-        "used": (pairs[:first], shaped[:first]),
-        "higher": (pairs[first:], shaped[first:]),
+        "used": (own.pairs[:first], shaped[:first]),
+        "higher": (own.pairs[first:], shaped[first:]),
         "modified": (  # every mode of every change counts alike
-            tuple(
-                pair for change in changes for pair in modified_modes(model, change, spread, many)
-            ),
+            tuple(pair for change in modified for pair in change.pairs),
             [flag for change in changes for flag in _with_shape(change.measurement)],
         ),
     }
-    return {name: _block(*part) for name, part in parts.items() if part[0]}
+    blocks = {name: _block(*part) for name, part in parts.items() if part[0]}
+    names = (None, *(change.name for change in changes))
+    choices = [each.choices for each in (own, *modified)]
+    return blocks, dict(zip(names, choices, strict=True))
 
 
 def _with_shape(measurement: Measurement) -> list[bool]:
