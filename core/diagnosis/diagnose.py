@@ -198,6 +198,8 @@ def _written(
     options = [placed_causes(examination, explanation, decision.held) for explanation in shown]
     causes = _group_causes(options)
     top = posterior.names[decision.group[0]] if decision.group else decision.nothing
+    told = decision, causes, options, top, proof.gain_rms
+    said = sentence_of(*told, reference=case.reference is not None)
     named = bool(decision.group)
     nothing = examination.nominal
     # Both in units of one noise: that of an explanation holds what it takes for model error.
@@ -209,14 +211,7 @@ def _written(
     return Diagnosis(
         case=case.name,
         verdict="named" if any(faults) and decision.verdict == "none" else decision.verdict,
-        sentence=with_faults(
-            sentence_of(
-                *(decision, causes, options, top, proof.gain_rms),
-                reference=case.reference is not None,
-            ),
-            mended,
-            loose,
-        ),
+        sentence=with_faults(said, mended, loose),
         causes=(*mended, *causes, *loose),
         rivals=rivals_of(examination, best if named else None, group),
         reason=_reason(decision),

@@ -134,7 +134,7 @@ class Chart:
 
     Examples:
         >>> ratio = plot.Axis("ratio of the errors", log=True)
-        >>> found = plot.Series("B over A", [0.5, 1.2], ["local", "kabe"], [0.4, 0.9], [0.7, 1.5])
+        >>> found = plot.Series("B over A", [0.5, 1.2], ["one", "other"], [0.4, 0.9], [0.7, 1.5])
         >>> chart = plot.Chart("interval", "B over A", ratio, plot.Axis("strategy"), (found,))
         >>> chart.draw().get_xlabel()
         'ratio of the errors'
