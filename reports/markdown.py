@@ -116,7 +116,7 @@ def _leaderboard(run: Run) -> Iterator[str]:
     board = leaderboard(run)
     tested = tell_apart(run, list(board["strategy"]))
     tiers, letters = tested.tier_of(), tested.letters()
-    yield " ".join(map(escape, finding(run, board.to_dict("records"), tested)))
+    yield " ".join(map(escape, finding(run, board.to_dict("records"), tested.tiers)))
     headers = [
         *("rank", "strategy", "skill", "from drawn", "tests", "higher %", "modified %", "given %"),
         *("in 90 %", "CRPS %", "rigid lost", "negative", "parameters", "evaluations", "seconds"),

@@ -347,7 +347,7 @@ class TestFinding:
 
     def told(self, run: Run) -> list[str]:
         board = leaderboard(run).to_dict("records")
-        return finding(run, board, tell_apart(run, [row["strategy"] for row in board]))
+        return finding(run, board, tell_apart(run, [row["strategy"] for row in board]).tiers)
 
     def test_who_leads_and_how_sure_that_is(self) -> None:
         run = synthetic_run(60, 12, failing=0.0)

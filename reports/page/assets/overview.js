@@ -21,7 +21,7 @@
     const name = (row) => `${row.strategy}${tiers.length > 1 && tierOf.has(row.index) ? `, tier ${tierOf.get(row.index)}` : ""}${row.unphysical ? " ▲" : ""}`;
     const kind = ranking.intervalKind(rows);
     const drawn = shown.filter((row) => row.skill_drawn !== null);
-    const given = data.yardstick === "textbook" ? "textbook models" : "nominal models";
+    const given = `${ranking.yardstick}s`;
     return bench.draw({
       kind: "interval", title: `Skill on ${data.scored_on} of every strategy`,
       note: `${kind ? `The line is the 95 % interval over ${kind}. ` : ""}0: the ${given}, which no data have changed; 1: no error left.${shown.some((row) => row.unphysical) ? " ▲: unphysical." : ""}${left(rows, shown)}`,
@@ -81,9 +81,9 @@
     });
     return bench.charts.scatter({
       title: "Accuracy against cost",
-      note: "What is left of the error (1 − skill; 1 = the textbook model) against wall time, median over the cases. Low and left is good.",
+      note: `What is left of the error (1 − skill; 1 = the ${ranking.yardstick}) against wall time, median over the cases. Low and left is good.`,
       xLabel: "wall time, s, median over the cases", yLabel: "error left (1)", logX: true, logY: true, height: 360,
-      lines: [{ y: 1, label: "textbook model" }], series: series.filter((s) => s.x.length),
+      lines: [{ y: 1, label: ranking.yardstick }], series: series.filter((s) => s.x.length),
     });
   }
 
