@@ -92,7 +92,8 @@ def main(store: Path) -> None:
             file = Path(folder, "page.html")
             file.write_text(text, encoding="utf-8")
             print(
-                f"{name}: {file.stat().st_size / 1e6:.2f} MB, opens in {opening(browser, file):.2f} s"
+                f"{name}: {file.stat().st_size / 1e6:.2f} MB, "
+                f"opens in {opening(browser, file):.2f} s"
             )
             page, _ = opened(browser, file)
             page.wait_for_timeout(1500)
