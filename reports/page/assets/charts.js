@@ -154,7 +154,7 @@
     const [fx, fy] = [node.scale("x").apply, node.scale("y").apply];
     const shown = points.map((row) => row.filter((p) => p.good).map((p) => ({ ...p, px: fx(p.atX), py: fy(p.atY) })));
     const box = { left, right: width - 8, top: 22, bottom: fy(y.domain[0]) };
-    for (const m of lines) node.append(svg("text", m.axis === "x" ? { class: "tick label", x: fx(m.value) + 4, y: 36 } : { class: "tick label end", x: width - 20, y: fy(m.value) - 5 }, m.label));
+    for (const m of lines) node.append(svg("text", m.axis === "x" ? { class: "tick label", x: fx(m.value) + 4, y: 24 } : { class: "tick label end", x: width - 20, y: fy(m.value) - 5 }, m.label));
     for (const p of outside) {
       const start = fx(p.atX) < width / 2;
       node.append(svg("text", { class: start ? "label" : "label end", x: fx(p.atX) + (start ? 7 : -7), y: fy(p.atY) + (p.beyond === "▼" ? -4 : 10) }, `${p.beyond} ${tickText(p.value)}`));

@@ -25,7 +25,7 @@
     return bench.draw({
       kind: "interval", title: `Skill on ${data.scored_on} of every strategy`,
       note: `${kind ? `The line is the 95 % interval over ${kind}. ` : ""}0: the ${given}, which no data have changed; 1: no error left.${shown.some((row) => row.unphysical) ? " ▲: unphysical." : ""}${left(rows, shown)}`,
-      x: { label: "skill, part of the error taken away (1)", unit: "", low: Math.max(-2, d3.min(shown.flatMap((row) => [-0.2, row.skill, row.skill_drawn])) - 0.1), high: 1 },
+      x: { label: "skill, part of the error taken away (1)", unit: "", high: 1 },
       y: { label: "", unit: "", names: shown.map(name) },
       series: [
         { name: `from the ${given}`, x: shown.map((row) => row.skill), y: shown.map(name), low: shown.map((row) => row.skill_low), high: shown.map((row) => row.skill_high), names: shown.map(name) },
