@@ -159,9 +159,11 @@ def finding(
         count = len(seeds_of(run) if kind == "seeds" else cases)
         ends = interval(best["skill_low"], best["skill_high"])
         sure = f", 95 % interval {ends} over {count} {kind}"
+    first = [plain(row["strategy"]) for row in board if row["rank"] == best["rank"]]
+    leads = "leads: it takes" if len(first) == 1 else "share the first rank: each takes"
     told = [
-        f"{name} leads: it takes away {100.0 * skill:.0f} % of the {models}' error on {data} "
-        f"(skill {skill:.3f}{sure})."
+        f"{' and '.join(first)} {leads} away {100.0 * skill:.0f} % of the {models}' error on "
+        f"{data} (skill {skill:.3f}{sure})."
         if skill > 0.0
         else f"No strategy improves on the {models} on {data}; the best, {name}, has a skill of "
         f"{skill:.3f}{sure}.",

@@ -369,6 +369,10 @@ class TestFinding:
         assert headline.startswith("No strategy improves on the nominal models on unseen data")
         assert "\u2212" in headline
 
+    def test_equal_skills_share_the_lead(self) -> None:
+        twins = [result(name, 0.1) for name in ("a", "b")]
+        assert self.told(run_of(*twins))[0].startswith("a and b share the first rank: each takes")
+
     def test_few_structures_or_no_model(self) -> None:
         alone = self.told(run_of(GOOD))
         assert len(alone) == 1

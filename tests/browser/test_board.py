@@ -163,7 +163,7 @@ def test_who_leads_is_seen_without_scrolling(page: Page) -> None:
         assert box is not None
         assert box["y"] + box["height"] <= 900
     chart = page.locator("figure.chart").first.text_content() or ""
-    for words in ("Skill on unseen data", "unchanged", "without data"):
+    for words in ("Skill of every strategy on unseen data", "unchanged", "without data"):
         assert words in chart
 
 

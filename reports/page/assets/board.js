@@ -182,7 +182,7 @@
       for (const name of ["top", "figures"]) parts[name] = el("div", { class: "columns" });
       parts.matrix = el("div", {});
       const table = el("table", { id: "board-table", class: "board" }, el("caption", { class: "hidden" }, "Leaderboard; the buttons in the head sort it"), head(), parts.body);
-      const page = el("section", { id: "board" }, finding(), parts.top, el("h2", {}, "Leaderboard"), el("p", { class: "lead" }, data.lead),
+      const page = el("section", { id: "board" }, finding(), parts.top, el("h2", {}, "Leaderboard"), el("p", { class: "lead" }, data.lead, " Every rms is over the modes of a block, and the median over the cases."),
         bench.filters(), parts.status, bench.scroll("Leaderboard", table), parts.matrix, el("h2", {}, "How the strategies compare"), parts.figures);
       update();
       return page;

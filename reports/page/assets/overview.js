@@ -23,7 +23,7 @@
     const drawn = shown.filter((row) => row.skill_drawn !== null);
     const given = `${ranking.yardstick}s`;
     return bench.draw({
-      kind: "interval", title: `Skill on ${data.scored_on} of every strategy`,
+      kind: "interval", title: `Skill of every strategy on ${data.scored_on}`,
       note: `${kind ? `The line is the 95 % interval over ${kind}. ` : ""}0: the ${given}, which no data have changed; 1: no error left.${shown.some((row) => row.unphysical) ? " ▲: unphysical." : ""}${left(rows, shown)}`,
       x: { label: "skill, part of the error taken away (1)", unit: "", high: 1 },
       y: { label: "", unit: "", names: shown.map(name) },
