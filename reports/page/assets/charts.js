@@ -314,13 +314,4 @@
   };
   scheme.addEventListener("change", () => document.querySelectorAll(".plot").forEach((plot) => plot.dispatchEvent(new Event("recolour"))));
   bench.shade = shadeOf;
-
-  // The older way to ask for a chart: names of the axes with their units inside, series by label.
-  const old = (kind, more = {}) => (given) => {
-    const spec = { ...more, ...given };
-    const axis = (key, label) => ({ label, unit: "", log: Boolean(spec[`log${key}`]), low: spec[`${key.toLowerCase()}Range`]?.[0], high: spec[`${key.toLowerCase()}Range`]?.[1] });
-    return bench.draw({ ...spec, kind, x: axis("X", spec.xLabel), y: axis("Y", spec.yLabel), series: spec.series.map((s) => ({ ...s, name: s.label })),
-      marks: (spec.lines ?? []).map((line) => ({ axis: "y", value: line.y, label: line.label })) });
-  };
-  bench.charts = { line: old("line"), bars: old("bars"), scatter: old("scatter"), profile: old("steps", { logX: true, yRange: [0, 1.02] }) };
 }
