@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import chain
 
 from femubench.reports.cells import NOTHING, fixed, hertz, interval, plain, whole
@@ -37,6 +38,22 @@ from femubench.results import (
 
 _SPECIAL = re.compile(r"([\\`*_\[\]|~])")
 _ENTITIES = {"&": "&amp;", "<": "&lt;", ">": "&gt;"}
+# Heads of the leaderboard's figures, their keys, and how they are written.
+_COLUMNS: dict[str, tuple[str, Callable[[float], str]]] = {
+    "skill": ("skill", partial(fixed, digits=3, width=6)),
+    "from drawn": ("skill_drawn", partial(fixed, digits=3, width=6)),
+    "tests": ("skill_tests", partial(fixed, digits=3, width=6)),
+    "higher %": ("higher_percent", partial(fixed, width=7)),
+    "modified %": ("modified_percent", partial(fixed, width=7)),
+    "given %": ("used_percent", partial(fixed, width=7)),
+    "in 90 %": ("coverage90", fixed),
+    "CRPS %": ("crps_percent", partial(fixed, width=7)),
+    "rigid lost": ("rigid_modes_lost", whole),
+    "negative": ("negative_eigenvalues", whole),
+    "parameters": ("parameters", whole),
+    "evaluations": ("evaluations", whole),
+    "seconds": ("seconds", partial(fixed, digits=3, width=7)),
+}
 _FOOTNOTES = (
     "**skill**: 1 - r, where r is the geometric mean over structures, each the mean of its blocks "
     "of unseen data, of (rms + 0.05 %) / (rms of the textbook model + 0.05 %). A job that failed, "
@@ -112,41 +129,28 @@ def table(headers: Sequence[str], rows: Iterable[Iterable[str]], align: str) -> 
 
 
 def _leaderboard(run: Run) -> Iterator[str]:
-    """Return the ranking with tiers and groups without a difference, and what they rest on."""
+    """Return what the run shows, the ranking, and what its tiers and groups rest on."""
     board = leaderboard(run)
-    tested = tell_apart(run, list(board["strategy"]))
-    tiers, letters = tested.tier_of(), tested.letters()
-    yield " ".join(map(escape, finding(run, board.to_dict("records"), tested)))
-    headers = [
-        *("rank", "strategy", "skill", "from drawn", "tests", "higher %", "modified %", "given %"),
-        *("in 90 %", "CRPS %", "rigid lost", "negative", "parameters", "evaluations", "seconds"),
-        *("ok", "tier", "group"),
-    ]
-    kind = interval_kind(run)
-    if kind:
-        headers.insert(3, f"95 % interval over {kind}")
-    rows = []
-    for row in board.to_dict("records"):
-        cells = [
+    tested, listed = tell_apart(run, list(board["strategy"])), board.to_dict("records")
+    tiers, letters, kind = tested.tier_of(), tested.letters(), interval_kind(run)
+    heads = ["rank", "strategy", *_COLUMNS, "ok", "tier", "group"]
+    rows = [
+        [
             whole(row["rank"]),
             escape(row["strategy"]) + (" (unphysical)" if row["unphysical"] else ""),
-            fixed(row["skill"], 3, 6),
-            fixed(row["skill_drawn"], 3, 6),
-            fixed(row["skill_tests"], 3, 6),
-            *(fixed(row[f"{block}_percent"], 2, 7) for block in ("higher", "modified", "used")),
-            fixed(row["coverage90"], 2),
-            fixed(row["crps_percent"], 2, 7),
-            *(whole(row[key]) for key in ("rigid_modes_lost", "negative_eigenvalues")),
-            *(whole(row[key]) for key in ("parameters", "evaluations")),
-            fixed(row["seconds"], 3, 7),
+            *(say(row[key]) for key, say in _COLUMNS.values()),
             f"{whole(row['ok'])} of {whole(row['total'] - row['not_applicable'])}",
             str(tiers.get(row["strategy"], NOTHING)),
             letters.get(row["strategy"], NOTHING),
         ]
-        if kind:
+        for row in listed
+    ]
+    if kind:
+        heads.insert(3, f"95 % interval over {kind}")
+        for cells, row in zip(rows, listed, strict=True):
             cells.insert(3, interval(row["skill_low"], row["skill_high"]))
-        rows.append(cells)
-    yield table(headers, rows, "rl" + "r" * (len(headers) - 3) + "l")
+    yield " ".join(map(escape, finding(run, listed, tested.tiers)))
+    yield table(heads, rows, "rl" + "r" * (len(heads) - 3) + "l")
     yield f"**tier, group**: {escape(tested.note)}"
 
 
@@ -247,26 +251,16 @@ def _case(
                 fixed(result.score, 3, 6),
             ]
         )
-        rows += [
-            _beside(result.strategy, said, named[result.strategy], columns)
-            for said, named in printed.items()
-            if result.strategy in named
-        ]
+        for said, named in printed.items():
+            if others := named.get(result.strategy):
+                cells = (
+                    _predicted(replace(mode, predicted_hz=others[number]))
+                    if number in others
+                    else NOTHING
+                    for (_, number), mode in columns.items()
+                )
+                rows.append([f"*{escape(result.strategy)}, {said}*", *cells, NOTHING, NOTHING])
     yield table([*headers, "mean MAC", "error left"], rows, "l" + "r" * (len(columns) + 2))
-
-
-def _beside(
-    strategy: str,
-    said: str,
-    hertz_of: Mapping[int, float | None],
-    columns: Mapping[tuple[str, int], PairedMode],
-) -> list[str]:
-    """Return a row of other frequencies of a strategy, to stand under its own."""
-    cells = (
-        _predicted(replace(mode, predicted_hz=hertz_of[number])) if number in hertz_of else NOTHING
-        for (_, number), mode in columns.items()
-    )
-    return [f"*{escape(strategy)}, {said}*", *cells, NOTHING, NOTHING]
 
 
 def _tested(result: JobResult) -> dict[tuple[str, int], PairedMode]:

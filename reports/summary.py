@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from femubench.reports.cells import interval, plain
 from femubench.results import (
@@ -17,9 +17,6 @@ from femubench.results import (
     scored_on,
     structures_of,
 )
-
-if TYPE_CHECKING:
-    from femubench.core.score.statistics import Groups
 
 FINE = ("ok", "not-applicable")
 _HEADER = (
@@ -143,12 +140,14 @@ def lead(run: Run) -> str:
     return " ".join(told)
 
 
-def finding(run: Run, board: Sequence[Mapping[Any, Any]], tested: Groups) -> list[str]:
+def finding(
+    run: Run, board: Sequence[Mapping[Any, Any]], tiers: Sequence[Sequence[str]]
+) -> list[str]:
     """Return what a run shows, in sentences made from its figures; the first is the headline.
 
     Arguments:
         board: rows of its leaderboard.
-        tested: which strategies differ.
+        tiers: strategies, the first those not shown to differ from the best; empty without a test.
     """
     best = next((row for row in board if row["ok"] and not row["unphysical"]), None)
     if best is None:
@@ -160,13 +159,15 @@ def finding(run: Run, board: Sequence[Mapping[Any, Any]], tested: Groups) -> lis
         count = len(seeds_of(run) if kind == "seeds" else cases)
         ends = interval(best["skill_low"], best["skill_high"])
         sure = f", 95 % interval {ends} over {count} {kind}"
+    first = [plain(row["strategy"]) for row in board if row["rank"] == best["rank"]]
+    leads = "leads: it takes" if len(first) == 1 else "share the first rank: each takes"
     told = [
-        f"{name} leads: it takes away {100.0 * skill:.0f} % of the {models}' error on {data} "
-        f"(skill {skill:.3f}{sure})."
+        f"{' and '.join(first)} {leads} away {100.0 * skill:.0f} % of the {models}' error on "
+        f"{data} (skill {skill:.3f}{sure})."
         if skill > 0.0
         else f"No strategy improves on the {models} on {data}; the best, {name}, has a skill of "
         f"{skill:.3f}{sure}.",
-        *_how_sure(name, tested, len(board)),
+        *_how_sure(name, tiers, len(board)),
     ]
     if skill > 0.0 >= best["skill_low"]:
         told.append(f"Its interval holds 0: an improvement on the {models} is not shown.")
@@ -181,10 +182,10 @@ def finding(run: Run, board: Sequence[Mapping[Any, Any]], tested: Groups) -> lis
     return [sentence.replace(" -", " \u2212") for sentence in told]
 
 
-def _how_sure(name: str, tested: Groups, count: int) -> Iterator[str]:
+def _how_sure(name: str, tiers: Sequence[Sequence[str]], count: int) -> Iterator[str]:
     """Return how many of the strategies are not shown to differ from the best."""
-    beside = [plain(other) for other in (tested.tiers or ((),))[0] if plain(other) != name]
-    if count > 1 and not tested.tiers:
+    beside = [plain(other) for other in (tiers or ((),))[0] if plain(other) != name]
+    if count > 1 and not tiers:
         yield "Whether the others differ from it is not tested."
     elif count > 1 and not beside:
         yield "It is alone in tier 1: all others are shown to be worse."

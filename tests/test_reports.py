@@ -347,7 +347,7 @@ class TestFinding:
 
     def told(self, run: Run) -> list[str]:
         board = leaderboard(run).to_dict("records")
-        return finding(run, board, tell_apart(run, [row["strategy"] for row in board]))
+        return finding(run, board, tell_apart(run, [row["strategy"] for row in board]).tiers)
 
     def test_who_leads_and_how_sure_that_is(self) -> None:
         run = synthetic_run(60, 12, failing=0.0)
@@ -368,6 +368,10 @@ class TestFinding:
         headline, *_ = self.told(run_of(WORSE))
         assert headline.startswith("No strategy improves on the nominal models on unseen data")
         assert "\u2212" in headline
+
+    def test_equal_skills_share_the_lead(self) -> None:
+        twins = [result(name, 0.1) for name in ("a", "b")]
+        assert self.told(run_of(*twins))[0].startswith("a and b share the first rank: each takes")
 
     def test_few_structures_or_no_model(self) -> None:
         alone = self.told(run_of(GOOD))

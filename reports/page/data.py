@@ -79,7 +79,7 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
     board = leaderboard(run).to_dict("records")
     tested = tell_apart(run, [row["strategy"] for row in board])
     shared = {
-        "finding": finding(run, board, tested),
+        "finding": finding(run, board, tested.tiers),
         "lead": lead(run),
         "scored_on": "unseen data" if scored_on(run) == "unseen" else "the modes that were given",
         "yardstick": run.meta.get("yardstick"),

@@ -22,11 +22,14 @@ def plain_data(data: Any, depth: int = 8) -> Any:  # noqa: ANN401 - JSON data of
 
     Numbers that JSON does not know, and what lies deeper, are None.
     """
-    if isinstance(data, Mapping):
-        return {str(k): plain_data(v, depth - 1) for k, v in data.items()} if depth else None
+    # First, since drawings have a million of them.
+    if type(data) is float and math.isfinite(data):
+        return int(data) if data.is_integer() else float(f"{data:.7g}")
     if isinstance(data, (list, tuple)):
         return [plain_data(value, depth - 1) for value in data] if depth else None
-    return rounded(data, 7) if isinstance(data, (float, np.floating)) else clean(data)
+    if isinstance(data, Mapping):
+        return {str(k): plain_data(v, depth - 1) for k, v in data.items()} if depth else None
+    return clean(data)
 
 
 def compact_json(data: Any) -> str:  # noqa: ANN401 - JSON data of any form

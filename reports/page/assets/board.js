@@ -12,9 +12,9 @@
   const COLUMNS = [
     column("rank", "Rank", null, bench.count),
     { key: "strategy", title: "Strategy", text: true, cell: nameCell },
-    column("skill", "Skill", "part of the textbook model's error on unseen data that is taken away: 1 is all of it, 0 none, less than 0 is worse; more is better", share, { down: true }),
+    column("skill", "Skill", `part of the ${ranking.yardstick}'s error on ${data.scored_on} that is taken away: 1 is all of it, 0 none, less than 0 is worse; more is better`, share, { down: true }),
     { title: "95 % interval", cell: ({ skill_low: low, skill_high: high }) => el("td", { class: "right range", "data-low": low ?? "", "data-high": high ?? "" }, low === null ? "–" : `${share(low)} to ${share(high)}`) },
-    shown("skill_drawn") && column("skill_drawn", "From drawn", "skill of the start from the models as drawn, against the textbook models too", share, { down: true }),
+    shown("skill_drawn") && column("skill_drawn", "From drawn", `skill of the start from the models as drawn, against the ${ranking.yardstick}s too`, share, { down: true }),
     shown("skill_tests") && column("skill_tests", "On tests", "skill on tests alone, without computed truths", share, { down: true }),
     data.strategies.some((s) => s.twins) && { key: "twins", title: "On twins", down: true, hint: "skill on similar structures under other names, drawn when the run began; beside it, in brackets, on the cases that have such twins", by: (row) => twinsOf(row)?.skill,
       cell: (row) => value(twinsOf(row)?.skill, (v) => (twinsOf(row) ? `${share(v)} (${share(twinsOf(row).original_skill)})` : number(v))) },
@@ -182,7 +182,7 @@
       for (const name of ["top", "figures"]) parts[name] = el("div", { class: "columns" });
       parts.matrix = el("div", {});
       const table = el("table", { id: "board-table", class: "board" }, el("caption", { class: "hidden" }, "Leaderboard; the buttons in the head sort it"), head(), parts.body);
-      const page = el("section", { id: "board" }, finding(), parts.top, el("h2", {}, "Leaderboard"), el("p", { class: "lead" }, data.lead),
+      const page = el("section", { id: "board" }, finding(), parts.top, el("h2", {}, "Leaderboard"), el("p", { class: "lead" }, data.lead, " Every rms is over the modes of a block, and the median over the cases."),
         bench.filters(), parts.status, bench.scroll("Leaderboard", table), parts.matrix, el("h2", {}, "How the strategies compare"), parts.figures);
       update();
       return page;

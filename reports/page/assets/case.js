@@ -95,11 +95,11 @@
     const shown = [...new Set([...twoOf(state), nominalOf(stage, entries)])].filter(Boolean);
     const keys = Object.keys(given.measured);
     const all = keys.flatMap((key) => [given.measured[key], ...shown.map((entry) => entry.exhibit?.receptance?.[key] ?? [])]).flat().filter(Number.isFinite);
-    const yRange = [Math.floor(d3.min(all) / 10) * 10, Math.ceil(d3.max(all) / 10) * 10];
+    const [low, high] = [Math.floor(d3.min(all) / 10) * 10, Math.ceil(d3.max(all) / 10) * 10];
     const charts = keys.map((key) => {
-      const curves = shown.filter((entry) => entry.exhibit?.receptance?.[key]).map((entry) => ({ label: entry.name, x: given.hz, y: entry.exhibit.receptance[key], ...lookOf(entry, state) }));
-      return bench.charts.line({ title: key ? `After the design change \u201c${key}\u201d` : keys.length > 1 ? "Before the design change" : "Structure as tested",
-        xLabel: "Frequency, Hz", yLabel: "Receptance, dB re 1 m/N", series: [{ label: "measured", x: given.hz, y: given.measured[key], role: "measured" }, ...curves], height: 320, yRange });
+      const curves = shown.filter((entry) => entry.exhibit?.receptance?.[key]).map((entry) => ({ name: entry.name, x: given.hz, y: entry.exhibit.receptance[key], ...lookOf(entry, state) }));
+      return bench.draw({ kind: "line", title: key ? `After the design change \u201c${key}\u201d` : keys.length > 1 ? "Before the design change" : "Structure as tested",
+        x: { label: "Frequency", unit: "Hz" }, y: { label: "Receptance", unit: "dB re 1 m/N", low, high }, series: [{ name: "measured", x: given.hz, y: given.measured[key], role: "measured" }, ...curves], height: 320 });
     });
     const text = given.note || "The measured curve is synthesised from the measured modes, scaled to mass by the paired modes of the nominal model.";
     return [note(`At the drive sensor ${stage.drive}, with a damping ratio of ${bench.number(given.damping, 2)} in every mode. ${text}`), charts, twoOf(state).map((entry) => lack(entry, entry.exhibit))];
@@ -123,20 +123,20 @@
   const histories = (state) => {
     const told = twoOf(state).filter((entry) => entry.ok && entry.detail.history.length > 1);
     if (!told.length) return note("No iterations were recorded.");
-    const chart = (more) => bench.charts.line({ xLabel: "Iteration (1)", height: 240, ...more });
+    const chart = (title, y, series) => bench.draw({ kind: "line", title, x: { label: "Iteration", unit: "1" }, y: { unit: "", ...y }, series, height: 240 });
     const first = (entry) => entry.detail.history[0];
     const named = (entry) => new Set(entry.detail.parameters.map((item) => item.name));
     const steps = (entry) => entry.detail.history.map((row, i) => row.iteration ?? i);
     const keys = d3.union(...told.map((entry) => Object.keys(first(entry)).filter((key) => key !== "iteration" && !named(entry).has(key))));
     const plain = [...keys].slice(0, HISTORY_CHARTS).map((key) => {
-      const series = told.filter((entry) => key in first(entry)).map((entry) => ({ label: entry.name, x: steps(entry), y: entry.detail.history.map((row) => row[key] ?? null), ...lookOf(entry, state) }));
+      const series = told.filter((entry) => key in first(entry)).map((entry) => ({ name: entry.name, x: steps(entry), y: entry.detail.history.map((row) => row[key] ?? null), ...lookOf(entry, state) }));
       const [low, high] = d3.extent(series.flatMap((one) => one.y).filter((value) => value > 0));
       const title = key.replace(/_/g, " ");
-      return chart({ title: `${title}: ${series.map((one) => one.label).join(", ")}`, yLabel: title, series, logY: high / low > 50 });
+      return chart(`${title}: ${series.map((one) => one.name).join(", ")}`, { label: title, log: high / low > 50 }, series);
     });
     const moving = told.map((entry) => {
       const own = Object.keys(first(entry)).filter((key) => named(entry).has(key) && first(entry)[key]).slice(0, 8);
-      return own.length ? chart({ title: `Parameters of ${entry.name}`, yLabel: "Value over start (1)", series: own.map((key) => ({ label: key, x: steps(entry), y: entry.detail.history.map((row) => row[key] / first(entry)[key]) })) }) : null;
+      return own.length ? chart(`Parameters of ${entry.name}`, { label: "Value over start", unit: "1" }, own.map((key) => ({ name: key, x: steps(entry), y: entry.detail.history.map((row) => row[key] / first(entry)[key]) }))) : null;
     });
     return columns(plain, moving);
   };

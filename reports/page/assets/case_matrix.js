@@ -23,7 +23,7 @@
     const columns = baseline ? [baseline, ...rows.filter((row) => row !== baseline)] : rows;
     const { cases } = rows[0];
     const measures = [
-      { key: "left", title: "Error left (1 = textbook model)", of: bench.errorLeft, say: number, offset: 0 },
+      { key: "left", title: `Error left (1 = ${bench.ranking.yardstick})`, of: bench.errorLeft, say: number, offset: 0 },
       ...filter.blocks.map((k) => ({ key: data.blocks[k], title: `${data.blocks[k] === "used" ? "given" : data.blocks[k]}: rms frequency error, %`, of: (row, c) => bench.ranking.errorOf(row.index, cases[c], k), say: small, offset: data.offset_percent })),
     ];
     const holder = el("div", {});
@@ -51,6 +51,6 @@
     } }, measures.map(({ key, title }) => el("option", { value: key, selected: key === chosen }, title)));
     fill();
     return [el("h2", {}, "Case by case"),
-      el("p", { class: "controls" }, select, el("span", { class: "soft" }, `Medians over the seeds. Blue: less than ${chosen === "left" ? "the textbook model leaves" : "the baseline"}, vermilion: more. A name sorts the cases.`)), holder];
+      el("p", { class: "controls" }, select, el("span", { class: "soft" }, `Medians over the seeds. Blue: less than ${chosen === "left" ? `the ${bench.ranking.yardstick} leaves` : "the baseline"}, vermilion: more. A name sorts the cases.`)), holder];
   };
 }

@@ -154,7 +154,7 @@
     const [fx, fy] = [node.scale("x").apply, node.scale("y").apply];
     const shown = points.map((row) => row.filter((p) => p.good).map((p) => ({ ...p, px: fx(p.atX), py: fy(p.atY) })));
     const box = { left, right: width - 8, top: 22, bottom: fy(y.domain[0]) };
-    for (const m of lines) node.append(svg("text", m.axis === "x" ? { class: "tick label", x: fx(m.value) + 4, y: 36 } : { class: "tick label end", x: width - 20, y: fy(m.value) - 5 }, m.label));
+    for (const m of lines) node.append(svg("text", m.axis === "x" ? { class: "tick label", x: fx(m.value) + 4, y: 24 } : { class: "tick label end", x: width - 20, y: fy(m.value) - 5 }, m.label));
     for (const p of outside) {
       const start = fx(p.atX) < width / 2;
       node.append(svg("text", { class: start ? "label" : "label end", x: fx(p.atX) + (start ? 7 : -7), y: fy(p.atY) + (p.beyond === "▼" ? -4 : 10) }, `${p.beyond} ${tickText(p.value)}`));
@@ -314,13 +314,4 @@
   };
   scheme.addEventListener("change", () => document.querySelectorAll(".plot").forEach((plot) => plot.dispatchEvent(new Event("recolour"))));
   bench.shade = shadeOf;
-
-  // The older way to ask for a chart: names of the axes with their units inside, series by label.
-  const old = (kind, more = {}) => (given) => {
-    const spec = { ...more, ...given };
-    const axis = (key, label) => ({ label, unit: "", log: Boolean(spec[`log${key}`]), low: spec[`${key.toLowerCase()}Range`]?.[0], high: spec[`${key.toLowerCase()}Range`]?.[1] });
-    return bench.draw({ ...spec, kind, x: axis("X", spec.xLabel), y: axis("Y", spec.yLabel), series: spec.series.map((s) => ({ ...s, name: s.label })),
-      marks: (spec.lines ?? []).map((line) => ({ axis: "y", value: line.y, label: line.label })) });
-  };
-  bench.charts = { line: old("line"), bars: old("bars"), scatter: old("scatter"), profile: old("steps", { logX: true, yRange: [0, 1.02] }) };
 }

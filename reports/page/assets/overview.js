@@ -21,11 +21,11 @@
     const name = (row) => `${row.strategy}${tiers.length > 1 && tierOf.has(row.index) ? `, tier ${tierOf.get(row.index)}` : ""}${row.unphysical ? " ▲" : ""}`;
     const kind = ranking.intervalKind(rows);
     const drawn = shown.filter((row) => row.skill_drawn !== null);
-    const given = data.yardstick === "textbook" ? "textbook models" : "nominal models";
+    const given = `${ranking.yardstick}s`;
     return bench.draw({
-      kind: "interval", title: `Skill on ${data.scored_on} of every strategy`,
+      kind: "interval", title: `Skill of every strategy on ${data.scored_on}`,
       note: `${kind ? `The line is the 95 % interval over ${kind}. ` : ""}0: the ${given}, which no data have changed; 1: no error left.${shown.some((row) => row.unphysical) ? " ▲: unphysical." : ""}${left(rows, shown)}`,
-      x: { label: "skill, part of the error taken away (1)", unit: "", low: Math.max(-2, d3.min(shown.flatMap((row) => [-0.2, row.skill, row.skill_drawn])) - 0.1), high: 1 },
+      x: { label: "skill, part of the error taken away", unit: "1", high: 1 },
       y: { label: "", unit: "", names: shown.map(name) },
       series: [
         { name: `from the ${given}`, x: shown.map((row) => row.skill), y: shown.map(name), low: shown.map((row) => row.skill_low), high: shown.map((row) => row.skill_high), names: shown.map(name) },
@@ -63,27 +63,27 @@
     const series = shown.map((row) => {
       const own = ratios[rows.indexOf(row)];
       const x = [1, ...new Set(own.filter((tau) => tau > 1 && tau < end)), end];
-      return { label: row.strategy, x, y: x.map((tau) => d3.bisectRight(own, tau * (1 + 1e-9)) / own.length), role: row.strategy === data.baseline ? "nominal" : "other" };
+      return { name: row.strategy, x, y: x.map((tau) => d3.bisectRight(own, tau * (1 + 1e-9)) / own.length), role: row.strategy === data.baseline ? "nominal" : "other" };
     });
-    return bench.charts.profile({
-      title: "Performance profiles",
+    return bench.draw({
+      kind: "steps", title: "Performance profiles",
       note: `How often is a strategy within a factor τ of the best one? ${bench.plural(problems.length, "problem")}, one a case and block; rms errors with ${offset} % added as in the score. Left edge: how often it is the best; high and left is good.${left(rows, shown)}`,
-      xLabel: "factor τ of the best rms error (1)", yLabel: "share of problems (1)", xRange: [1, end], series, height: 360,
+      x: { label: "factor τ of the best rms error", unit: "1", log: true, low: 1, high: end }, y: { label: "share of problems", unit: "1", low: 0, high: 1.02 }, series, height: 360,
     });
   }
 
   function cost(rows) {
     const found = rows.filter((row) => row.ok && row.seconds > 0);
     if (!found.length) return null;
-    const series = [["physical", false, 2], ["unphysical", true, 1]].map(([label, unphysical, style]) => {
+    const series = [["physical", false, 2], ["unphysical", true, 1]].map(([name, unphysical, style]) => {
       const own = found.filter((row) => row.unphysical === unphysical);
-      return { label, style, x: own.map((r) => r.seconds), y: own.map((r) => 1 - r.skill), names: own.map((r) => r.strategy) };
+      return { name, style, x: own.map((r) => r.seconds), y: own.map((r) => 1 - r.skill), names: own.map((r) => r.strategy) };
     });
-    return bench.charts.scatter({
-      title: "Accuracy against cost",
-      note: "What is left of the error (1 − skill; 1 = the textbook model) against wall time, median over the cases. Low and left is good.",
-      xLabel: "wall time, s, median over the cases", yLabel: "error left (1)", logX: true, logY: true, height: 360,
-      lines: [{ y: 1, label: "textbook model" }], series: series.filter((s) => s.x.length),
+    return bench.draw({
+      kind: "scatter", title: "Accuracy against cost",
+      note: `What is left of the error (1 − skill; 1 = the ${ranking.yardstick}) against wall time, median over the cases. Low and left is good.`,
+      x: { label: "wall time, median over the cases", unit: "s", log: true }, y: { label: "error left", unit: "1", log: true }, height: 360,
+      marks: [{ axis: "y", value: 1, label: ranking.yardstick }], series: series.filter((s) => s.x.length),
     });
   }
 

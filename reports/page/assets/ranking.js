@@ -179,6 +179,7 @@
   }
 
   bench.ranking = {
+    yardstick: `${data.yardstick === "textbook" ? "textbook" : "nominal"} model`,
     intervals, intervalKind, isWhole, problems, errorOf, covered,
     rows(filter) {
       const grid = gridOf(filter);
