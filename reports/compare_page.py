@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
+from femubench.plot import Axis, Chart, Mark, Series
 from femubench.reports.cells import NOTHING, fixed, plain, shortened
 from femubench.reports.markdown import escape, table
+from femubench.reports.svg import drawing
 from femubench.reports.templating import site_page
 from femubench.reports.terminal import WIDTH, aligned_table
 from femubench.results import METHOD
@@ -17,7 +18,6 @@ _RATIOS = ("unseen", "used", "higher", "modified", "seconds")
 _NAME = 26
 _BLANK = "\u2800"  # stands for an indent until the table is made, which strips all white space
 _MOST_LINES = 20
-_FOREST = (0.0, 560.0)  # where the axis of the drawing begins and ends
 _LEGEND = (
     "Ratios B / A, less than 1 is better in B: unseen (errors that make the skill); used, higher, "
     "modified (rms frequency error + 0.05 %); seconds (sums). Means are geometric, over cases and "
@@ -88,7 +88,9 @@ def comparison_html(data: Mapping[str, Any]) -> str:
         heads=_HEADS,
         rows=[(row["scenario"] is None, _cells(row), _tones(row)) for row in data["rows"]],
         proofs=map(_proof, data["evidence"]),
-        forest=forest(data["evidence"]),
+        forest=drawing(
+            forest(data["evidence"]), "Their 95 % intervals; the table has the figures."
+        ),
         lists=[(title, lines) for title, lines in _lists(data) if lines],
         legend=_LEGEND,
         evidence=_EVIDENCE,
@@ -116,38 +118,16 @@ def headline(data: Mapping[str, Any]) -> str:
     return f"B is worse than A: {', '.join(names[:3])}{more} ({asked}; {jobs})"
 
 
-def forest(evidence: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return where ratio and interval of every strategy stand on a logarithmic axis."""
+def forest(evidence: Sequence[Mapping[str, Any]]) -> Chart:
+    """Return ratio and interval of every strategy, by what is shown of it."""
     listed = [item for item in evidence if item["ratio"] is not None]
-    ends = [item[name] for item in listed for name in ("ratio", "low", "high") if item[name]]
-    reach = min(max(abs(math.log(end)) for end in [*ends, 1.1]) * 1.05, math.log(1e6))
-    left, right = _FOREST
-
-    def place(ratio: float) -> float:
-        share = max(-1.0, min(1.0, math.log(ratio) / reach))
-        return round(left + (right - left) * (0.5 + 0.5 * share), 1)
-
-    bars = [
-        {
-            "name": plain(item["strategy"]),
-            "verdict": item["verdict"],
-            "at": place(item["ratio"]),
-            "low": None if item["low"] is None else place(item["low"]),
-            "high": None if item["high"] is None else place(item["high"]),
-        }
-        for item in listed
-    ]
-    ticks = [(place(value), f"{value:.3g}") for value in _ticks(reach)]
-    return {"bars": bars, "ticks": ticks}
-
-
-def _ticks(reach: float) -> Iterator[float]:
-    yield 1.0
-    for value in (1.05, 1.2, 2.0, 5.0, 20.0, 100.0, 1e4, 1e6):
-        if 0.3 * reach < math.log(value) <= reach:
-            yield value
-            yield 1.0 / value
-            return
+    series = []
+    for verdict in dict.fromkeys(item["verdict"] for item in listed):
+        own = [item for item in listed if item["verdict"] == verdict]
+        ratio, low, high = ([item[key] for item in own] for key in ("ratio", "low", "high"))
+        series.append(Series(verdict, ratio, [plain(o["strategy"]) for o in own], low, high))
+    axes = Axis("mean ratio of the errors, B / A", log=True), Axis("strategy")
+    return Chart("interval", "B over A", *axes, tuple(series), (Mark("x", 1.0, "no change"),))
 
 
 def _telling(rows: Iterable[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:

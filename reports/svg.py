@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import partial
 from xml.etree import ElementTree
 
 from markupsafe import Markup
+
+from femubench.plot import Chart, svg
 
 _SVG, _XLINK = "http://www.w3.org/2000/svg", "http://www.w3.org/1999/xlink"
 _PICTURE = "data:image/png;base64,"  # how a matrix image lies in a drawing
@@ -14,6 +17,19 @@ _PICTURE = "data:image/png;base64,"  # how a matrix image lies in a drawing
 _REFUSED = frozenset({"script", "foreignObject", "metadata"})
 _ID_LISTS = ("aria-labelledby", "aria-describedby")
 _REFERENCE = re.compile(r"url\(\s*['\"]?([^'\")]*)['\"]?\s*\)")
+
+
+def drawing(chart: Chart, caption: str) -> Markup | None:
+    """Return a chart for the middle of a page, in the colours of its style sheet.
+
+    Arguments:
+        caption: what one sees in it, for who cannot see it.
+    """
+    if not any(series.x for series in chart.series):
+        return None
+    name = re.sub(r"\W+", "-", chart.title)
+    named = partial(svg, name=name, title=chart.title, caption=caption)
+    return Markup(named(chart.draw, size=chart.size, themed=True))
 
 
 def embedded(svg: str, prefix: str, label: str) -> Markup:

@@ -36,7 +36,7 @@ def site_page(name: str) -> Template:
     """Return a template of `bench compare` or `bench publish`, with its style, script, policy."""
     from markupsafe import Markup
 
-    style, script = asset("site.css"), asset("site.js")
+    style, script = asset("page.css") + asset("site.css"), asset("site.js")
     # Nothing but this very style and this very script may take effect, whatever a name smuggles in.
     policy = f"default-src 'none'; base-uri 'none'; form-action 'none'; style-src {_hash(style)}"
     shared = {"style": style, "script": script, "policy": policy}

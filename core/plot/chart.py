@@ -14,6 +14,7 @@ import numpy as np
 
 from femubench.core.errors import InputError
 from femubench.core.plot.style import (
+    COLOURS,
     INK,
     SOFT,
     curve_style,
@@ -26,6 +27,7 @@ from femubench.core.typing import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis as MatplotlibAxis
 
 Kind = Literal["line", "steps", "calibration", "scatter", "bars", "interval", "cells"]
 KINDS: tuple[Kind, ...] = ("line", "steps", "calibration", "scatter", "bars", "interval", "cells")
@@ -36,6 +38,7 @@ _FAR = 4.0  # an axis leaves out what lies farther away than so many times the s
 _FEWEST = 5  # values from which one can be called far off
 _MOST_NAMED = 60
 _NUMBERED = 200  # cells of a matrix with their number; more have no room
+_MOST_TICKS = 7  # of a logarithmic axis
 _MARKERS = ("o", "s", "^", "D", "X", "P", "v", "*")
 _HATCHES = ("", "///", "\\\\\\", "...", "xxx", "|||")
 
@@ -165,6 +168,12 @@ class Chart:
             names = dict.fromkeys(str(v) for s in self.series for v in getattr(s, named))
             object.__setattr__(self, named, replace(getattr(self, named), names=tuple(names)))
 
+    @property
+    def size(self) -> tuple[float, float]:
+        """Return width and height of a drawing of its own in inch."""
+        rows = len(self.y.names or ()) if self.kind in ("interval", "cells") else 0
+        return 7.3, 1.4 + 0.26 * rows if rows else 4.0
+
     def to_json(self) -> dict[str, Any]:
         """Return it as JSON data, as pages draw it."""
         return {key: v for key, v in _plain(asdict(self)).items() if v not in (None, "", [])}
@@ -175,8 +184,7 @@ class Chart:
         Arguments:
             ax: to draw on; None for axes of a new figure.
         """
-        tall = {"interval": 1.2 + 0.26 * len(self.y.names or ())}.get(self.kind, 4.0)
-        ax = own_axes(ax, (7.0, max(tall, 1.6)))
+        ax = own_axes(ax, self.size)
         if self.kind == "cells":
             return _cells(self, ax)
         for key in ("x", "y"):
@@ -188,7 +196,7 @@ class Chart:
         for mark in self.marks:
             _mark(mark, ax)
         if len(self.series) > 1:
-            figure_of(ax).legend(loc="outside lower center", ncols=3, fontsize=8.5)
+            figure_of(ax).legend(loc="outside lower center", ncols=3, fontsize=8.5, frameon=False)
         return ax
 
 
@@ -253,7 +261,7 @@ def _lay_out(chart: Chart, key: Literal["x", "y"], ax: Axes) -> None:
         pad, zero = 0.12 if chart.kind == "scatter" else wide, chart.kind == "bars" and key == "y"
         reach = ends_of(values, axis, pad=pad, few=few, zero=zero)
         settings |= {f"{key}scale": "log" if axis.log else "linear", f"{key}lim": reach}
-        ax.grid(axis=key, color="0.88", linewidth=0.6)
+        ax.grid(axis=key, color=COLOURS["grid"], linewidth=0.6)
     else:
         reach = (-0.5, len(axis.names) - 0.5)
         settings |= {f"{key}lim": reach if key == "x" else reach[::-1]}
@@ -261,6 +269,26 @@ def _lay_out(chart: Chart, key: Literal["x", "y"], ax: Axes) -> None:
         settings |= {f"{key}ticklabels": [name_of(name, 30) for name in axis.names]}
     ax.set(**settings)
     ax.set_axisbelow(True)
+    if axis.log:
+        _round_ticks(ax.xaxis if key == "x" else ax.yaxis, *reach)
+
+
+def _round_ticks(axis: MatplotlibAxis, low: float, high: float) -> None:
+    """Set the ticks of a logarithmic axis to few round numbers, written out."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
+
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    lists = [
+        [digit * 10.0**power for power in decades for digit in digits]
+        for digits in (range(1, 10), (1, 2, 5), (1,))
+    ]
+    inside = [[v for v in ticks if low <= v <= high] for ticks in lists]
+    found = next((ticks for ticks in inside if len(ticks) <= _MOST_TICKS), inside[-1])
+    if len(found) < 3 and high < 20.0 * low:
+        found = [v for v in MaxNLocator(_MOST_TICKS).tick_values(low, high) if low <= v <= high]
+    axis.set_major_locator(FixedLocator(found))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.4g}"))
+    axis.set_minor_locator(NullLocator())
 
 
 def _points(chart: Chart, series: Series, ax: Axes) -> Iterator[tuple[int, float, float]]:
@@ -352,8 +380,8 @@ def _mark(mark: Mark, ax: Axes) -> None:
     name: dict[str, Any] = {"color": SOFT, "fontsize": 8.0, "ha": "right"}
     if mark.axis == "x":
         ax.axvline(mark.value, linewidth=1.0, linestyle=(0, (4, 2)), **look)
-        place, name = ax.get_xaxis_transform(), {**name, "rotation": 90, "va": "top"}
-        ax.text(mark.value, 0.99, name_of(mark.label), transform=place, **name)
+        place, name = ax.get_xaxis_transform(), {**name, "ha": "center", "va": "bottom"}
+        ax.text(mark.value, 1.01, name_of(mark.label), transform=place, **name)
     else:
         ax.axhline(mark.value, linewidth=1.0, linestyle=(0, (4, 2)), **look)
         place, name = ax.get_yaxis_transform(), {**name, "va": "bottom"}

@@ -12,6 +12,7 @@ from femubench.core.errors import harmless
 from femubench.core.plot.style import COLOURS, figure_of, own_axes, report_style
 
 # DejaVu is wide: what is laid out for it has room for the others.
+_PAGE = ("max-width", "height")  # the style sheet of the page has them
 _FONTS = "'DejaVu Sans', Verdana, Arial, sans-serif"
 
 
@@ -100,4 +101,11 @@ def _themed(text: str) -> str:
     text = re.sub(r' (?:xmlns(?::\w+)?|clip-path)="[^"]*"', "", text)
     for role, colour in COLOURS.items():
         text = text.replace(colour, f"var(--{role})")
-    return text
+    return re.sub(r' style="([^"]*)"', _as_attributes, text)
+
+
+def _as_attributes(style: re.Match[str]) -> str:
+    """Return a style as attributes, which no content security policy refuses."""
+    rules = (rule.partition(":") for rule in style[1].split(";") if ":" in rule)
+    known = {key.strip(): value.strip() for key, _, value in rules}
+    return "".join(f' {key}="{value}"' for key, value in known.items() if key not in _PAGE)

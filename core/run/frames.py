@@ -21,8 +21,9 @@ def results_frame(run: Run) -> pd.DataFrame:
     Columns: case strategy seed nominal status reason seconds; ``used_percent``, ``used_mac`` and
     the same for ``higher`` and ``modified`` (nan where the case has no such block);
     rigid_body_modes rigid_body_modes_expected negative_eigenvalues surplus_partners unphysical
-    parameter_count evaluations score rank. Of a study also the values of its axes: ``plain_case`` and
-    ``plain_strategy``, noise, sensors_left_out, and every option as ``STRATEGY.OPTION``.
+    parameter_count evaluations score rank. Of a study also the values of its axes:
+    ``plain_case`` and ``plain_strategy``, noise, sensors_left_out, and every option as
+    ``STRATEGY.OPTION``.
 
     Examples:
         >>> results.results_frame(run)["status"].tolist()
