@@ -28,6 +28,7 @@ Data = Mapping[str, Any]
 
 _MOST_RIVALS, _MOST_PLACES, _MOST_CHANGES, _MOST_ADVICE = 8, 5, 8, 5
 _LEAST = 0.005  # what two decimals show
+_WHEN = ("before", "after")
 _GAINS = {**GAINS, "cross_validated_percent": "each used mode left out in turn"}
 
 
@@ -61,6 +62,10 @@ def diagnosis_sections(data: Data) -> list[Section]:
             "Plausibility checks of the model, before any fit",
             _items((look["where"], _look(look)) for look in data["looks"]),
         ),
+        (
+            "The stated scatter does not fit what is left",
+            _items(("", row["warning"]) for row in (data.get("scatter") or ()) if row["warning"]),
+        ),
         ("Residuals in standard deviations, measured minus predicted", _residuals(data)),
         (
             FAULTS,
@@ -80,7 +85,7 @@ def diagnosis_sections(data: Data) -> list[Section]:
             _items((("", _advice(item)) for item in data["advice"]), _MOST_ADVICE),
         ),
         ("The smallest that these data would have shown", _visible(data)),
-        ("Gain: median frequency error before and after", _gain(data)),
+        ("Gain: frequency error before and after", _gain(data)),
         ("Where the error sits, 1 at the largest", _items((k, _top(v)) for k, v in found.items())),
         ("Notes", _items(("", note) for note in data["notes"])),
         ("", [f"The extended case is in {written}"] if written else []),
@@ -220,11 +225,19 @@ def _visible(data: Data) -> list[Block]:
 
 
 def _gain(data: Data) -> list[Block]:
-    found = [(title, data["gain"][key]) for key, title in _GAINS.items()]
-    columns = [Column("", 32, left=True), Column("before %", 9), Column("after %", 9)]
-    return [
-        Table(columns, [[title, *(fixed(v, 3, 7) for v in pair)] for title, pair in found if pair])
+    """Return the errors as rms, as in a run, and as medians, which alone files of old have."""
+    columns = [Column("", 32, left=True)]
+    columns += [Column(f"{kind} %\n{when}", 9) for kind in ("rms", "median") for when in _WHEN]
+    pairs = [
+        (title, (data.get("gain_rms") or {}).get(key), data["gain"][key])
+        for key, title in _GAINS.items()
     ]
+    rows = [
+        [title, *(fixed(v, 3, 7) for v in (*(rms or (None, None)), *median))]
+        for title, rms, median in pairs
+        if median
+    ]
+    return [Table(columns, rows)]
 
 
 def _top(rows: Sequence[Data]) -> str:

@@ -37,17 +37,21 @@ def diagnosis_html(data: Data) -> str:
     room = templates().overlay(finalize=_shown)
     room.filters.update(chance=chance, figure=figure, signed=signed)
     indicators = dict.fromkeys(row["indicator"] for row in data["locations"])
-    pairs = {key: data["gain"][key] for key in words.GAINS if data["gain"][key] is not None}
+    gains = _gains(data)
     titles = {"frequency": "Frequencies", "shape": "Mode shapes, rms over the sensors"}
     panels = [_panel(data, kind, title) for kind, title in titles.items()]
     return room.get_template("diagnosis.html").render(
         data=data,
         words=words,
-        style=Markup(asset("diagnosis.css")),
+        style=Markup(asset("page.css") + asset("diagnosis.css")),
         script=Markup(asset("diagnosis.js")),
-        tiles=_tiles(data),
-        gains=pairs,
-        largest=max([v for pair in pairs.values() for v in pair if v is not None], default=0.0),
+        tiles=_tiles(data, gains),
+        left=words.adequacy(data),
+        warnings=[row["warning"] for row in (data.get("scatter") or ()) if row["warning"]],
+        gains=gains,
+        largest=max(
+            [v for pair in gains.values() for v in pair["shown"] if v is not None], default=0.0
+        ),
         panels=[panel for panel in panels if panel],
         **_where(data),
         indicators=[
@@ -58,6 +62,19 @@ def diagnosis_html(data: Data) -> str:
     )
 
 
+def _gains(data: Data) -> dict[str, dict[str, Any]]:
+    """Return the errors before and after, rms with the median beside it.
+
+    Files of earlier versions have medians alone.
+    """
+    found = {}
+    for key in words.GAINS:
+        median, rms = data["gain"][key], (data.get("gain_rms") or {}).get(key)
+        if median is not None:
+            found[key] = {"shown": rms or median, "median": median if rms else None}
+    return found
+
+
 def _shown(value: object) -> object:
     """Return text on one line, a number and its percent sign together."""
     if isinstance(value, Markup):
@@ -66,20 +83,23 @@ def _shown(value: object) -> object:
     return text.replace("> ", ">\N{NO-BREAK SPACE}").replace("< ", "<\N{NO-BREAK SPACE}")
 
 
-def _tiles(data: Data) -> list[tuple[str, str, str]]:
+def _tiles(data: Data, gains: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, str]]:
     """Return the figures that matter most, each with a title and what it is."""
     nothing, none = data["nothing"], data["verdict"] == "none"
     sure = nothing if none or nothing is None else 1.0 - nothing
     found = "Nothing is missing" if none else "Something is missing"
     tiles = [(found, chance(sure), "probability, before any name is given")]
-    for key in ("held_out_percent", "modified_percent", "cross_validated_percent", "used_percent"):
-        pair = data["gain"][key]
-        if pair is not None and not none:
-            text = f"{words.percent(pair[0])} → {words.percent(pair[1])}"
-            title = f"Error on {words.GAINS[key]}"
-            tiles.append((title, text, "median frequency error, before → after"))
+    order = ("held_out_percent", "modified_percent", "cross_validated_percent", "used_percent")
+    for key in order if not none else ():
+        if key in gains:
+            before, after = map(words.percent, gains[key]["shown"])
+            kind = "rms" if gains[key]["median"] else "median"
+            said = f"{kind} frequency error, before → after"
+            tiles.append((f"Error on {words.GAINS[key]}", f"{before} → {after}", said))
             break
-    return [*tiles, ("What is left", *words.adequacy(data))]
+    tiles.append(("What is left", *words.adequacy(data)))
+    tiles += [("Model error", words.scale(row), row["class"]) for row in data["model_error"]]
+    return tiles
 
 
 def _panel(data: Data, kind: Any, title: str) -> dict[str, Any] | None:  # noqa: ANN401

@@ -108,13 +108,25 @@ def sits(cause: Data) -> str:
     if cause["place"] == "all" or cause["place_probability"] is None:
         return ""
     text = f"at this place {chance(cause['place_probability'])}"
+    more = elsewhere(cause)
+    return f"{text}; {more}" if more else text
+
+
+def elsewhere(cause: Data) -> str:
+    """Return how many places mirror that of a cause, and where else it may sit."""
     mirrors = len(cause["mirrors"])
-    if mirrors:
-        text = f"{text}, one of {mirrors + 1} mirror places"
+    parts = [f"one of {mirrors + 1} mirror places"] if mirrors else []
     others = [f"{name} {chance(p)}" for name, p in cause["places"] if name != cause["place"]]
     more = len(others) - _MOST_PLACES
-    listed = ", ".join(others[:_MOST_PLACES]) + (f" and {more} more" if more > 0 else "")
-    return f"{text}; else at {listed}" if others else text
+    if others and cause["place"] != "all":
+        listed = ", ".join(others[:_MOST_PLACES]) + (f" and {more} more" if more > 0 else "")
+        parts.append(f"else at {listed}")
+    return "; ".join(parts)
+
+
+def scale(row: Data) -> str:
+    """Return the size of a model error with its unit."""
+    return f"{figure(row['scale'], 2)} {row['unit']}".strip()
 
 
 def pairs_of(rival: Data) -> list[tuple[str, str]]:

@@ -86,7 +86,7 @@ def identification_html(found: Identification, source: str = "") -> str:
             worst=worst,
             channels=0 if found.measured is None else _seen(found).sum(),
             version=__version__,
-            style=Markup(asset("diagnosis.css")),
+            style=Markup(asset("page.css") + asset("diagnosis.css")),
         )
     )
 

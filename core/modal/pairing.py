@@ -26,6 +26,8 @@ WINDOW_WITHOUT_SHAPE = 1.4
 # One MAC point is worth four points of ln(f_p / f_m): shapes decide, and frequencies decide
 # between shapes that the sensors can hardly tell apart.
 FREQUENCY_WEIGHT = 0.25
+# Shapes that differ by less are told apart by frequencies a fifth apart, that is by what was measured.
+ALIKE = 0.05
 # Any gain by shape outweighs all gains by frequency alone.
 _WITHOUT_SHAPE = 1e-4
 _IN_ORDER = 1e-3
@@ -39,7 +41,8 @@ class Pairing:
     Arguments:
         index: column of the predicted mode, -1 where there is none, (m,).
         mac: of the pair; nan where there is none or the shapes could not be compared, (m,).
-        choices: number of predicted modes that could be the partner, (m,).
+        choices: number of predicted modes that could be the partner, and whose shape is as near to
+            the measured one within a MAC of 0.05, (m,).
     """
 
     index: IntArray
@@ -108,7 +111,8 @@ def pair_modes(
     index[rows[taken]] = columns[taken]
     score = likeness[np.arange(m), index]
     known = (index >= 0) & by_shape[np.arange(m), index]
-    return Pairing(index, np.where(known, score, np.nan), np.count_nonzero(gain > 0.0, axis=1))
+    alike = (gain > 0.0) & (~by_shape | (likeness > score[:, None] - ALIKE)) & (index >= 0)[:, None]
+    return Pairing(index, np.where(known, score, np.nan), np.count_nonzero(alike, axis=1))
 
 
 def pair_measured(measurement: Measurement, modes: Modes, readings: FloatArray) -> Pairing:
