@@ -26,7 +26,7 @@ WINDOW_WITHOUT_SHAPE = 1.4
 # One MAC point is worth four points of ln(f_p / f_m): shapes decide, and frequencies decide
 # between shapes that the sensors can hardly tell apart.
 FREQUENCY_WEIGHT = 0.25
-# Shapes that differ by less are told apart by frequencies a fifth apart, that is by what was measured.
+# Of shapes that differ by less, frequencies a fifth apart choose: that is what was measured.
 ALIKE = 0.05
 # Any gain by shape outweighs all gains by frequency alone.
 _WITHOUT_SHAPE = 1e-4
