@@ -21,6 +21,7 @@ from femubench.core.fem.model import Model
 
 Symbol = Literal["change", "spring", "mass", "fault"]
 Data = Mapping[str, Any]
+_Where = tuple[str, PlaceKind, tuple[Span, ...], tuple[Point, ...]]
 
 _BETWEEN = "; "  # the places of one parameter, as results have them
 _MOST_WORDS = 2000  # of an update; more places are no picture
@@ -83,7 +84,7 @@ def changes_found(source: Case | Model, parameters: Sequence[Data]) -> list[Find
         words = set()
     structure = placed_wireframe(source, sorted(words))
     places = {place.place: place for place in structure.places}
-    groups: dict[Any, list[Data]] = {}
+    groups: dict[_Where, list[Data]] = {}
     for item in changed:
         own = [places[word] for word in _words(item) if word in places]
         spans = tuple(span for place in own for span in place.spans)
@@ -91,7 +92,7 @@ def changes_found(source: Case | Model, parameters: Sequence[Data]) -> list[Find
         kind = own[0].kind if own else "elsewhere"
         where = _BETWEEN.join(dict.fromkeys(split_direction(place.place)[0] for place in own))
         groups.setdefault((where, kind, spans, points), []).append(item)
-    return [_changed(*place, items) for place, items in groups.items()]
+    return [_changed(*place, items=items) for place, items in groups.items()]
 
 
 def _changed(
@@ -173,7 +174,8 @@ def _cause_label(cause: Data) -> str:
 def _size(value: float, unit: str) -> str:
     text = f"{value:.3g}"
     text = f"{float(text):.0f}" if "e" in text and 1.0 <= abs(value) < 1e7 else text
-    return f"{text} {unit}".strip().replace("e+0", "e").replace("-", "\N{MINUS SIGN}", 1)
+    text = text.replace("e+", "e").replace("e0", "e")
+    return f"{text} {unit}".strip().replace("-", "\N{MINUS SIGN}", 1)
 
 
 def percent(change: float) -> str:
