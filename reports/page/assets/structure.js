@@ -360,7 +360,8 @@
     const told = el("p", { class: "case-told", role: "status" });
     const show = { joints: stage.plane !== "matrices", sensors: false, attached: true, measured: true, found: true };
     let [entry, modes, at, now, amplitude, found] = [shown[0] ?? null, [], 0, { shape: null, arrows: null }, 1, []];
-    const eyeNow = () => camera(view, frame, drawing.clientWidth, drawing.clientHeight);
+    let size = [0, 0]; // read once: asked for at every frame it would lay out the page
+    const eyeNow = () => camera(view, frame, ...size);
     const paint = (eye = eyeNow()) => {
       const reach = REACH * amplitude * frame.radius * play.phase;
       layers.shape.setAttribute("d", now.shape ? outline(chains, stage.nodes.map((node, i) => eye.project(add(node, now.shape[i], reach)))) : "");
@@ -371,14 +372,14 @@
       }).join("") : "");
     };
     const draw = () => {
-      if (!drawing.clientWidth) return;
+      if (!size[0]) return;
       const eye = eyeNow();
       for (const layer of [layers.found, layers.fixed, layers.names]) layer.replaceChildren();
       const write = namer(layers.names);
       layers.still.setAttribute("d", outline(chains, stage.nodes.map(eye.project)));
       layers.still.classList.toggle("alone", !now.shape);
       if (show.found) drawFound(layers.found, write, found, scaleEnd(found), eye.project);
-      drawFixed(layers.fixed, write, stage, show, eye, frame.radius, drawing.clientHeight);
+      drawFixed(layers.fixed, write, stage, show, eye, frame.radius, size[1]);
       paint(eye);
     };
     const play = player(drawing, paint);
@@ -468,7 +469,8 @@
     pickStrategy(shown[0] ? shown[0].name : "");
     new ResizeObserver(() => {
       if (!drawing.clientWidth) return;
-      view.fit = fitted(start, frame, stage, REACH * frame.radius, drawing.clientWidth, drawing.clientHeight);
+      size = [drawing.clientWidth, drawing.clientHeight];
+      view.fit = fitted(start, frame, stage, REACH * frame.radius, ...size);
       draw();
     }).observe(drawing);
     if (shown.length && !matchMedia("(prefers-reduced-motion: reduce)").matches) toggle();
