@@ -102,15 +102,15 @@
   };
 
   /** Return what writes names at free places around points, where there are any. */
-  const namer = (layer, taken = []) => (text, [x, y], kind = "", must = false) => {
+  const namer = (layer, width, taken = []) => (text, [x, y], kind = "", must = false) => {
     const wide = (kind === "strong" ? 1.15 : 1) * LETTER * text.length;
     const spots = [[8, -7], [8, 15], [-8 - wide, -7], [-8 - wide, 15], [-wide / 2, -12], [-wide / 2, 21]];
     const boxAt = ([dx, dy]) => ({ l: x + dx - 1, r: x + dx + wide + 1, t: y + dy - 11, b: y + dy + 3 });
-    const free = (o) => !taken.some((box) => o.l < box.r && o.r > box.l && o.t < box.b && o.b > box.t);
+    const free = (o) => o.l >= 0 && o.r <= width && !taken.some((box) => o.l < box.r && o.r > box.l && o.t < box.b && o.b > box.t);
     const spot = spots.find((one) => free(boxAt(one))) ?? (must ? spots[0] : null);
     if (!spot) return;
     taken.push(boxAt(spot));
-    layer.append(svg("text", { x: x + spot[0], y: y + spot[1], class: kind }, text));
+    layer.append(svg("text", { x: Math.max(Math.min(x + spot[0], width - wide - 3), 2), y: y + spot[1], class: kind }, text));
   };
 
   const zigzag = (from, to) => {
@@ -328,7 +328,7 @@
       const [height, turn, frame] = [360, FLAT[stage.plane] ?? FLAT["3d"], extent(stage.nodes)];
       const eye = camera({ turn, zoom: 1, fit: fitted(turn, frame, stage, 0, width, height, 90) }, frame, width, height);
       const [marks, names] = [svg("g", {}), svg("g", { class: "names" })];
-      const write = namer(names);
+      const write = namer(names, width);
       const large = d3.sort(found, ({ value }) => -Math.abs(value ?? Infinity));
       const told = `Largest: ${large.slice(0, 3).map(({ label }) => label).join("; ")}.`;
       drawFound(marks, write, found, end, eye.project);
@@ -375,7 +375,7 @@
       if (!size[0]) return;
       const eye = eyeNow();
       for (const layer of [layers.found, layers.fixed, layers.names]) layer.replaceChildren();
-      const write = namer(layers.names);
+      const write = namer(layers.names, size[0]);
       layers.still.setAttribute("d", outline(chains, stage.nodes.map(eye.project)));
       layers.still.classList.toggle("alone", !now.shape);
       if (show.found) drawFound(layers.found, write, found, scaleEnd(found), eye.project);
