@@ -17,6 +17,7 @@ from femubench.core.plot.diagnosis import (
     residuals,
     strongest_places,
 )
+from femubench.core.plot.findings import changes
 from femubench.core.plot.heat_map import heat_map
 from femubench.core.plot.identification import stabilisation, synthesis
 from femubench.core.plot.mac import mac
@@ -36,6 +37,7 @@ __all__ = [
     "Spot",
     "Wireframe",
     "calibration",
+    "changes",
     "convergence",
     "error_against_cost",
     "evidence",

@@ -6,7 +6,7 @@ import base64
 import json
 import os
 import sys
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from femubench.core.drawing.prediction import (
 )
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
+from femubench.core.run.jobs import _parameter
 from femubench.core.score.scoring import score_model
 from femubench.core.update.strategy import UpdateResult
 from femubench.scenarios import HERE
@@ -51,7 +52,8 @@ def updated(case: Case, strategy: str) -> UpdateResult:
 
 def shown(case: Case, strategy: str) -> dict[str, Any]:
     result = updated(case, strategy)
-    found = exhibit_of(case, result.model, [asdict(item) for item in result.parameters])
+    told = [_parameter(item, result.model) for item in result.parameters]
+    found = exhibit_of(case, result.model, told)
     assert found is not None
     return found
 
@@ -80,28 +82,43 @@ def test_a_factor_on_elements_is_the_change_of_these_elements(cases: dict[str, C
     case = cases["hframe"]
     result = updated(case, "global")
     (factor,) = (item.after for item in result.parameters)
-    found = relative_changes(case.model, result.model, ())
+    found = relative_changes(case.model, result.model)
     assert found is not None
     # EI changes, EA does not: the change is less than that of the factor.
     assert 0.0 < max(x for x in found if x is not None) <= abs(factor - 1.0) + 1e-12
-    still = relative_changes(case.model, updated(case, "unchanged").model, ())
+    still = relative_changes(case.model, updated(case, "unchanged").model)
     assert still == [0.0] * 64
 
 
-def test_elements_of_families_are_recovered_from_the_parameters(cases: dict[str, Case]) -> None:
-    from femubench.core.fem.beam import stiffness_matrices
-
+def test_what_a_strategy_reports_is_found_at_its_place(cases: dict[str, Case]) -> None:
     case = cases["frame"]
     result = updated(case, "physical")
-    found = relative_changes(case.model, result.model, [asdict(item) for item in result.parameters])
-    assert found is not None
+    found = {finding["place"]: finding for finding in shown(case, "physical")["findings"]}
     ratios = {item.name: item.after / item.before for item in result.parameters}
-    structure = case.model.frame_structure
-    for label, value in zip(structure.labels, found, strict=True):
-        changes = sorted(abs(ratios[f"{key} {label}"] - 1.0) for key in ("EI", "GJ"))
-        assert value is not None
-        assert changes[0] - 1e-4 <= value <= changes[1] + 1e-4
-    assert len(stiffness_matrices(structure.properties)) == len(found)
+    assert set(found) == set(case.model.frame_structure.labels)
+    for label, finding in found.items():
+        changes = [ratios[f"{key} {label}"] - 1.0 for key in ("EI", "GJ")]
+        assert finding["value"] == pytest.approx(max(changes, key=abs))
+        assert (finding["kind"], len(finding["spans"])) == ("element", 1)
+
+
+def test_a_global_factor_is_everywhere_and_springs_are_at_their_ends(
+    cases: dict[str, Case],
+) -> None:
+    case = cases["hframe"]
+    (factor,) = updated(case, "global").parameters
+    (finding,) = shown(case, "global")["findings"]
+    assert (finding["kind"], finding["symbol"]) == ("all", "change")
+    assert finding["value"] == pytest.approx(factor.after - 1.0)
+    assert finding["label"].startswith("EI all members ")
+    (springs,) = (f for f in shown(case, "spring")["findings"] if f["symbol"] == "spring")
+    assert {(span["member"], span["end"] - span["start"]) for span in springs["spans"]} == {
+        (0, 0.125)
+    }
+    assert "N m/rad" in springs["label"]
+    lost = shown(case, "offset")["findings"]
+    turned = next(f for f in lost if f["label"].startswith("a T branch"))
+    assert turned["value"] is None  # a length that changes its sign
 
 
 def test_matrix_methods_have_a_difference_instead(cases: dict[str, Case]) -> None:

@@ -17,11 +17,12 @@ ALLOWED = {
     "frame": r"kind\b|'frame' or 'matrices'|`parameters` and `frame`|axes",
     "density": r"rhoA|\"E\"",  # a quantity of elements, beside the others
     # likewise, and a symbol in drawings
-    "spring": r"quantity|properties|lookup|weights|name|property|rigid|: \(\)|counted|marker|stiff",
+    "spring": r"quantity|properties|lookup|weights|name|property|rigid|: \(\)|counted|marker|stiff"
+    r"|symbol|\"mass\"|\"N/m\"",
     "offset": r"`offset` \(global",  # where a point mass sits
     "hframe": r"\"hframe\": _hframe",  # a structure of the challenge; in its seeds
     # the model with handbook values, and where a value of a cause comes from
-    "textbook": r"[nN]ominal|handbook|record|: \[|_CAUSE_COLUMNS|source =|start|yardstick|both",
+    "textbook": r"[nN]ominal|handbook|record|: \[|_CAUSE_COLUMNS|source =|start|yardstick|both|item\.get",
     "physical": r"\"unphysical\"",  # a label beside its contrary
 }
 

@@ -28,6 +28,7 @@ from femubench import (
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.drawing.places import placed_wireframe
 from femubench.core.errors import InputError
+from femubench.core.plot.findings import scale_end
 from femubench.core.plot.style import COLOURS, place_names
 from femubench.core.schema.diagnosis import LocationRow, ResidualRow
 from femubench.core.schema.results import JobResult
@@ -317,12 +318,47 @@ class TestEvidence:
         ax = plot.evidence(diagnosis_toys.made(causes=(cause,), locations=()))
         assert "1" in [t.get_text() for t in ax.texts if t.get_weight() == "bold"]
 
+    def test_causes_stand_where_they_sit_and_are_listed(self) -> None:
+        ax = plot.evidence(diagnosis_toys.made(locations=()))
+        listed = labels(ax)
+        causes = data_of()["causes"]
+        assert len(listed) == len(causes)
+        assert all(any(text.startswith(f"{k} ") for text in listed) for k in range(1, len(causes)))
+        marks = [a for a in ax.get_lines() if str(a.get_gid()).startswith("finding-")]
+        assert all(mark.get_marker() in "DosX" for mark in marks)
+
+    def test_a_fault_marks_its_sensor(self, hframe: Case) -> None:
+        label = hframe.measurement.sensors.labels[3]
+        cause = replace(
+            diagnosis_toys.SOFT, effect="sensor-sign", place=f"sensor:{label}", side="data"
+        )
+        ax = plot.evidence(diagnosis_toys.made(causes=(cause,), locations=()), case=hframe)
+        (mark,) = (a for a in ax.get_lines() if a.get_gid() == "finding-0")
+        xyz = hframe.measurement.sensors.xyz[3]
+        assert mark.get_xydata()[0] == pytest.approx((xyz[0], xyz[2]))
+        assert mark.get_marker() == "X"
+
     @pytest.mark.parametrize("xyz", [[0.0, 0.0, 0.0], [1e308, -1e308, 1e308]])
     def test_no_extent_no_drawing(self, xyz: list[float]) -> None:
         joints = [{"name": "a", "xyz": xyz}, {"name": "b", "xyz": [-v for v in xyz]}]
         bare = {**STRUCTURE, "joints": joints, "sensors": [], "places": []}
         with pytest.raises(InputError, match="no extent"):
             plot.evidence({**data_of(), "structure": bare})
+
+
+class TestChanges:
+    def test_what_is_drawn_is_what_was_reported(self, hframe: Case) -> None:
+        estimate = ParameterEstimate("E all", 1.0, 1.056, places=("all",))
+        soft = ParameterEstimate("k", 1e6, 2e5, "N m/rad", places=("horizontal@T1:ry",))
+        result = UpdateResult(hframe.model, 2, (estimate, soft))
+        ax = plot.changes(hframe, result)
+        assert labels(ax) == ["E all +5.6 %", "k 200000 N m/rad"]
+        (ring,) = (a for a in ax.get_lines() if a.get_gid() == "finding-1")
+        assert ring.get_marker() == "o"
+
+    def test_one_outlier_does_not_make_the_rest_pale(self) -> None:
+        assert scale_end([0.02, -0.03, 0.9]) == pytest.approx(0.09)
+        assert scale_end([0.02, -0.03]) == pytest.approx(0.03)
 
 
 WRONG: list[Callable[[Case], object]] = [
@@ -346,6 +382,7 @@ WRONG: list[Callable[[Case], object]] = [
     lambda case: plot.error_against_cost(run(results=())),
     lambda case: plot.residuals(case),  # type: ignore[arg-type]
     lambda case: plot.residuals(diagnosis_toys.made(residuals=())),
+    lambda case: plot.changes(case, update()),
     lambda case: plot.evidence({"residuals": [], "locations": [], "causes": []}),
 ]
 

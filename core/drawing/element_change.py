@@ -3,28 +3,15 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
-from itertools import product
 from typing import Any
 
 import numpy as np
 
-from femubench.core.errors import FemubenchError
 from femubench.core.fem.beam import stiffness_matrices
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.typing import FloatArray
-from femubench.core.update.element_families import (
-    ElementFamily,
-    Symmetry,
-    generic_family,
-    nobari_family,
-    physical_family,
-)
 
-_PLAIN: tuple[Symmetry, ...] = ("half-turn", "full", "mirror", "none")
-_JOINT: tuple[Symmetry, ...] = ("none", "full")
 _TURNS = np.tile([False, False, False, True, True, True], 2)
 _MOST_DOFS = 3000  # a dense difference of more is no picture
 _CELLS = 64
@@ -33,17 +20,13 @@ _DECADES = 4.0
 _NOTHING = 1e-12  # of the stiffness itself: rounding of the assembly
 
 
-def relative_changes(
-    nominal: Model, updated: Model, parameters: Sequence[Mapping[str, Any]]
-) -> list[float | None] | None:
+def relative_changes(nominal: Model, updated: Model) -> list[float | None] | None:
     """Return |dK_e| / |K0_e| of every element of the nominal frame, (n_elements,).
 
     Frobenius norms, rotations times the element's length, so that all entries have one unit.
 
     Arguments:
         nominal, updated: models of the same frame; the second may be meshed anew.
-        parameters: of the update, which tell the elements of a strategy that changes the assembled
-            matrix from a family of element matrices.
 
     Returns None where the change is none of elements.
     """
@@ -58,16 +41,11 @@ def relative_changes(
     found = np.array(
         [np.nan if k is None else np.linalg.norm(after[k] - before[e]) for e, k in enumerate(rows)]
     )
-    if np.nanmax(found, initial=0.0) > _NOTHING * size.max() or _as_assembled(updated):
-        return _ratios(found, size, rows)
-    change = _from_family(structure, parameters)
-    return None if change is None else _ratios(element_norms(structure, change), size, rows)
-
-
-def _ratios(change: FloatArray, size: FloatArray, rows: Sequence[int | None]) -> list[float | None]:
+    if not (np.nanmax(found, initial=0.0) > _NOTHING * size.max() or _as_assembled(updated)):
+        return None
     return [
         None if row is None or not norm > 0.0 else float(f"{part / norm:.4g}")
-        for part, norm, row in zip(change, size, rows, strict=True)
+        for part, norm, row in zip(found, size, rows, strict=True)
     ]
 
 
@@ -100,26 +78,6 @@ def _as_assembled(updated: Model) -> bool:
     if own.shape != updated.stiffness.shape:
         return False
     return bool(abs(updated.stiffness - own).max() <= 1e-9 * abs(own).max())
-
-
-def _from_family(
-    structure: Structure, parameters: Sequence[Mapping[str, Any]]
-) -> FloatArray | None:
-    names = tuple(item["name"] for item in parameters)
-    after = np.array([item["after"] for item in parameters], dtype=float)
-    for family in _families(structure) if names else ():
-        if family.names == names:
-            return family.change(family.relative(after))
-    return None
-
-
-def _families(structure: Structure) -> Iterator[ElementFamily]:
-    for make in (physical_family, nobari_family):
-        with suppress(FemubenchError):
-            yield make(structure)
-    for plain, joint, tied in product(_PLAIN, _JOINT, (False, True)):
-        with suppress(FemubenchError):
-            yield generic_family(structure, plain=plain, joint=joint, tied=tied)
 
 
 def difference_picture(nominal: Model, updated: Model) -> dict[str, Any] | None:

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from femubench.core.drawing.findings import Finding
 from femubench.core.drawing.wireframe import Wireframe, adapter, check_same
 from femubench.core.errors import InputError, OutputError
 from femubench.core.files import read_bytes, write_atomically
@@ -93,6 +94,7 @@ class _Exhibit(_Part):
     modes: list[_Mode] = Field(max_length=2000)
     mac: _Mac
     receptance: dict[str, list[Number]] = {}
+    findings: list[Finding] = Field(default=[], max_length=_MOST)
     elements: Row | None = Field(default=None, max_length=_MOST)
     difference: _Difference | None = None
 

@@ -30,6 +30,7 @@ from femubench.core.fem.model import Model
 PlaceKind = Literal["all", "joint", "member", "element", "end", "point", "pair", "elsewhere"]
 _Station = Annotated[float, Field(ge=0.0, le=1.0)]
 
+_SENSOR = "sensor:"  # or several with + between
 _END = 0.125  # how much of its member an end takes in a drawing
 
 
@@ -70,7 +71,9 @@ class PlacedWireframe(Wireframe):
     def place(self, word: str) -> DrawnPlace:
         """Return what the word of a place covers."""
         listed = next((place for place in self.places if place.place == word), None)
-        return listed or _plain_place(self, word, split_direction(bare_place(word))[0])
+        if listed is not None and listed.kind != "elsewhere":
+            return listed
+        return _plain_place(self, word, split_direction(bare_place(word))[0])
 
 
 def placed_wireframe(source: Case | Model, words: Iterable[str]) -> PlacedWireframe:
@@ -102,8 +105,9 @@ def _plain_place(wireframe: Wireframe, word: str, head: str) -> DrawnPlace:
         if member.name == name and number.isdecimal() and 0 < int(number[:7]) <= count:
             span = Span(k, (int(number) - 1) / count, int(number) / count)
             return DrawnPlace(word, "element", (span,))
-    points = tuple(sensor.xyz for sensor in wireframe.sensors if sensor.label == word)
-    return DrawnPlace(word, "point" if points else "elsewhere", points=points[:1])
+    named = word.removeprefix(_SENSOR).split("+") if word.startswith(_SENSOR) else [word]
+    at = {s.label: s.xyz for s in reversed(wireframe.sensors) if s.label in named}
+    return DrawnPlace(word, "point" if at else "elsewhere", points=tuple(at.values()))
 
 
 def _place(wireframe: Wireframe, frame: Frame | None, word: str) -> DrawnPlace:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from femubench.core.case.case import Case, Modification
 from femubench.core.drawing.element_change import difference_picture, relative_changes
 from femubench.core.drawing.files import Exhibits
+from femubench.core.drawing.findings import changes_found
 from femubench.core.drawing.thinning import thinned
 from femubench.core.drawing.wireframe import MOST_NODES, node_positions, to_plain, wireframe_of
 from femubench.core.fem.model import Model
@@ -72,11 +74,17 @@ def exhibit_of(
     few = thinned(case)
     if few is None and len(node_positions(case.model)) > MOST_NODES:
         return None
-    elements = None if few is not None else relative_changes(case.model, model, parameters)
-    by_entries = elements is None or model.stiffness_change is not None
+    found = changes_found(case, parameters)
+    elements = None
+    if few is not None:
+        found = [replace(finding, spans=()) for finding in found]  # its members are not drawn
+    elif all(finding.kind == "elsewhere" for finding in found):
+        elements = relative_changes(case.model, model)
+    by_entries = (elements is None and not found) or model.stiffness_change is not None
     return {
         **_modes(case, model, None if few is None else few.nodes),
         "receptance": receptances(case, model),
+        "findings": [to_plain(finding) for finding in found],
         "elements": elements,
         "difference": difference_picture(case.model, model) if by_entries else None,
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -150,6 +150,27 @@ def all_elements(structure: Structure) -> tuple[str, ...]:
         ('rung-right/1', 'rung-right/2', 'rung-right/3')
     """
     return tuple(dict.fromkeys(label for label in structure.labels if label))
+
+
+def place_words(structure: Structure | None, places: Sequence[str]) -> str:
+    """Return places as one text, ``; `` between them: whole members and the whole frame as such.
+
+    Arguments:
+        structure: the frame; None for a model that came as matrices.
+        places: elements as ``member/k``, or any other places.
+    """
+    wanted = dict.fromkeys(places)
+    if structure is not None and len(wanted) > 1:
+        every = all_elements(structure)
+        if wanted.keys() >= set(every):
+            return "all"
+        members: dict[str, list[str]] = {}
+        for label in every:
+            members.setdefault(label.rpartition("/")[0], []).append(label)
+        for name, labels in members.items():
+            if len(labels) > 1 and wanted.keys() >= set(labels):
+                wanted = dict.fromkeys(name if word in labels else word for word in wanted)
+    return "; ".join(wanted)
 
 
 def elements_at(structure: Structure, group: JointGroup) -> tuple[str, ...]:

@@ -13,9 +13,11 @@ from pydantic import ValidationError
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.serial import diagnosis_to_json
+from femubench.core.drawing.findings import Finding, causes_found
 from femubench.core.drawing.places import DrawnPlace, PlacedWireframe
 from femubench.core.drawing.wireframe import adapter
 from femubench.core.errors import InputError
+from femubench.core.plot.findings import draw_findings, lines_of
 from femubench.core.plot.structure import (
     View,
     draw_lines,
@@ -29,14 +31,11 @@ from femubench.core.plot.style import (
     AFTER,
     BEFORE,
     COLOURS,
-    INK,
     PAGE,
     SOFT,
     name_of,
     own_axes,
-    place_names,
 )
-from femubench.core.typing import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,7 +49,6 @@ _PLAIN = 8.0  # up to here the axis is the same everywhere
 _FARTHEST = 1e12
 _LEVELS = 5
 _MOST_SPOTS, _LEAST = 14, 0.005  # what two decimals show
-_MOST_BADGES = 4  # of one place
 
 
 @dataclass(frozen=True)
@@ -274,14 +272,16 @@ def evidence(
     """Draw the structure with the places where something is missing: the thicker, the more likely.
 
     A planar structure is drawn in its plane, any other one in a parallel projection from above a
-    corner. Places of causes carry the causes' numbers, a halo stands for evidence everywhere.
+    corner. Causes stand where they sit, by what they are (a ring is a spring, a square a mass, a
+    cross a fault of a sensor, a coloured member is another one) and with their numbers, and are
+    listed below; shades are places where they may sit, a halo evidence everywhere.
 
     Arguments:
         diagnosis: or its JSON as plain data, which holds the structure.
         case: what was diagnosed, for its sensors; else the extended model is drawn.
         indicator: ``evidence`` (probability of a cause at each place, 1 at the largest), or one of
             the classical indicators.
-        names: whether joints, members, sensors and numbers of causes are drawn.
+        names: whether joints, members, sensors and causes are drawn.
         ax: to draw on; None for axes of a new figure.
 
     Raises:
@@ -293,7 +293,8 @@ def evidence(
     data = _data(diagnosis, case)
     structure = _structure(data.get("structure"))
     spots = strongest_places(data, indicator)
-    return draw_spots(own_axes(ax, (6.0, 4.6)), structure, spots, names=names)
+    found = causes_found(data, structure) if indicator == "evidence" else ()
+    return draw_spots(own_axes(ax, (6.0, 4.6)), structure, spots, found, names=names)
 
 
 def _structure(data: Data | None) -> PlacedWireframe:
@@ -307,13 +308,19 @@ def _structure(data: Data | None) -> PlacedWireframe:
 
 
 def draw_spots(
-    ax: Axes, structure: PlacedWireframe, spots: Sequence[Spot], *, names: bool = True
+    ax: Axes,
+    structure: PlacedWireframe,
+    spots: Sequence[Spot],
+    findings: Sequence[Finding] = (),
+    *,
+    names: bool = True,
 ) -> Axes:
     """Draw a structure with places of different strength.
 
     Arguments:
         spots: strongest first.
-        names: whether joints, members, sensors and numbers of causes are drawn.
+        findings: drawn above them, and listed below the structure.
+        names: whether joints, members, sensors and findings are drawn.
 
     Raises:
         InputError: when the structure has no extent.
@@ -332,25 +339,8 @@ def draw_spots(
     frame_axes(ax, view, view.flat(structure.points), pad=room, scales=False, directions=names)
     if names:
         draw_sensors(ax, structure, view)
-        taken = draw_names(ax, structure, view)
-        at, numbers = _badges(structure, view, spots, places)
-        badge = {"boxstyle": "round,pad=0.25,rounding_size=0.7", "facecolor": INK}
-        place_names(ax, at, numbers, avoid=taken, size=8.5, color=PAGE, weight="bold",
-                    bbox={**badge, "edgecolor": PAGE}, zorder=5)  # fmt: skip
+        draw_findings(ax, structure, view, findings, draw_names(ax, structure, view))
     return ax
-
-
-def _lines_of(structure: PlacedWireframe, view: View, place: DrawnPlace) -> FloatArray:
-    """Return the lines of a place on the page, (n, 2, 2)."""
-    if place.kind == "pair" and len(place.points) == 2:
-        return view.flat([place.points])
-    members = view.flat(structure.lines)
-    found = [
-        [(1.0 - s) * members[span.member, 0] + s * members[span.member, 1] for s in ends]
-        for span in place.spans
-        for ends in ((span.start, span.end),)
-    ]
-    return np.array(found).reshape(-1, 2, 2)
 
 
 def _draw_spot(
@@ -361,8 +351,8 @@ def _draw_spot(
         "gid": f"at-{number}",
         "label": f"_{name_of(spot.place)}: {spot.value:.2f}",
     }
-    lines = _lines_of(structure, view, place)
-    if len(lines):
+    lines = lines_of(structure, view, place)
+    if len(lines) and place.kind != "all":
         dashed = {"linestyles": (0, (1.2, 0.8)), "capstyle": "butt"}
         more: dict[str, Any] = dashed if place.kind == "pair" else {}
         draw_lines(ax, lines, colors=colour, linewidths=width, zorder=2.5, **said, **more)
@@ -372,18 +362,3 @@ def _draw_spot(
             markersize=4.0 + 2.4 * spot.level, markerfacecolor=colour,
             markeredgecolor=PAGE, markeredgewidth=0.8, zorder=2.6, **said,
         )  # fmt: skip
-
-
-def _badges(
-    structure: PlacedWireframe, view: View, spots: Sequence[Spot], places: Sequence[DrawnPlace]
-) -> tuple[list[FloatArray], list[str]]:
-    """Return where the numbers of causes belong, at most four times each."""
-    at: list[FloatArray] = []
-    numbers: list[str] = []
-    for spot, place in zip(spots, places, strict=True):
-        anchors = list(_lines_of(structure, view, place).mean(axis=1))
-        anchors += [] if place.kind == "pair" else list(view.flat(place.points or np.empty((0, 3))))
-        if spot.causes:
-            at += anchors[:_MOST_BADGES]
-            numbers += [spot.causes] * len(anchors[:_MOST_BADGES])
-    return at, numbers

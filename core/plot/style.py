@@ -20,9 +20,12 @@ if TYPE_CHECKING:
 COLOURS = {
     "ink": "#1b1b1b", "soft": "#565656", "page": "#ffffff", "grid": "#dcdfe3", "band": "#e4ecd9",
     "member": "#8a9099", "halo": "#cfe3f5", "before": "#b34700", "after": "#0072b2",
+    "cause": "#8f2468",
     "e1": "#a9cbe8", "e2": "#79aeda", "e3": "#4a8fc6", "e4": "#1d6fae", "e5": "#08407a",
 }  # fmt: skip
-INK, SOFT, PAGE, MEMBER = (COLOURS[role] for role in ("ink", "soft", "page", "member"))
+INK, SOFT, PAGE, MEMBER, CAUSE = (
+    COLOURS[role] for role in ("ink", "soft", "page", "member", "cause")
+)
 BEFORE, AFTER = COLOURS["before"], COLOURS["after"]
 # Okabe & Ito (2008): told apart with any kind of colour vision.
 BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY = (

@@ -30,6 +30,7 @@ _APART = ("status", "model", "samples")  # what is no JSON
 _LONGEST_TEXT = 100_000
 _LONGEST_NAME = 500
 _LONGEST_REASON = 2_000
+_LONGEST_PLACES = 10_000
 _MOST_FIGURES = 200_000
 _LONGEST_FIGURES = 4 * 2**20  # characters: a file of a run has room for many results
 
@@ -187,13 +188,14 @@ def _std(value: object) -> float | None:
 
 
 def _parameter(item: Mapping[str, Any]) -> dict[str, Any]:
-    std = item["std"]
+    std, places = item["std"], _text(item.get("places", ""), _LONGEST_PLACES)
     return {
         "name": _text(item["name"]),
         "before": _number(item["before"]),
         "after": _number(item["after"]),
         "unit": _text(item["unit"]),
         "std": None if std is None else _number(std),
+        **({"places": places} if places else {}),
     }
 
 

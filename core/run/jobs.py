@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from femubench.core.errors import Diverged, NotApplicable, StrategyFailure
+from femubench.core.fem.joints import place_words
 from femubench.core.fem.model import Model, differ
 from femubench.core.modal.eigen import counted_evaluations
 from femubench.core.modal.measurement import Measurement
@@ -231,7 +232,7 @@ def _plain(result: Result) -> JobOutcome:
         samples=samples,
         discrepancy_std=discrepancy,
         parameter_count=count,
-        parameters=tuple(_parameter(item) for item in result.parameters),
+        parameters=tuple(_parameter(item, result.model) for item in result.parameters),
         history=tuple(_figures(item) for item in result.history),
         diagnostics=_figures(result.diagnostics),
     )
@@ -257,13 +258,15 @@ def _uncertainty(result: Result, model: Model) -> tuple[tuple[Model, ...], float
     return tuple(replace(sample, **own, groups={}) for sample in samples), discrepancy
 
 
-def _parameter(item: Any) -> dict[str, Any]:  # noqa: ANN401 - a `ParameterEstimate`
+def _parameter(item: Any, model: Model) -> dict[str, Any]:  # noqa: ANN401 - a `ParameterEstimate`
+    places = place_words(model.structure, getattr(item, "places", ()))
     return {
         "name": str(item.name),
         "before": float(item.before),
         "after": float(item.after),
         "unit": str(item.unit),
         "std": None if item.std is None else float(item.std),
+        **({"places": places} if places else {}),
     }
 
 

@@ -179,6 +179,11 @@ class Family(ABC):
 
     @property
     @abstractmethod
+    def places(self) -> tuple[tuple[str, ...], ...]:
+        """Return the parts that every unknown acts on, in the grammar of places."""
+
+    @property
+    @abstractmethod
     def length(self) -> float:
         """Return the length in m by which moments are made forces."""
 
@@ -204,6 +209,15 @@ class ElementFamily(Family):
     structure: Structure
     elements: IntArray
     patterns: FloatArray
+
+    @property
+    def places(self) -> tuple[tuple[str, ...], ...]:
+        """Return the labels of the elements that every unknown acts on."""
+        found: list[list[str]] = [[] for _ in self.names]
+        for element, columns in zip(self.elements, self.columns, strict=True):
+            for column in set(columns[columns >= 0].tolist()):
+                found[column].append(self.structure.labels[element])
+        return tuple(map(tuple, found))
 
     @property
     def length(self) -> float:
@@ -247,6 +261,11 @@ class GroupFamily(Family):
     """
 
     parts: StiffnessParts
+
+    @property
+    def places(self) -> tuple[tuple[str, ...], ...]:
+        """Return the groups."""
+        return tuple(parameter.places for parameter in self.parts.parameters)
 
     @property
     def length(self) -> float:

@@ -316,8 +316,13 @@ def _iterate(
 
 
 def _estimates(family: Family, x: FloatArray) -> tuple[ParameterEstimate, ...]:
-    listed = zip(family.names, family.before, family.values(x), family.units, strict=True)
-    return tuple(ParameterEstimate(n, float(b), float(a), u) for n, b, a, u in listed)
+    listed = zip(
+        *(family.names, family.before, family.values(x), family.units, family.places), strict=True
+    )
+    return tuple(
+        ParameterEstimate(name, float(before), float(after), unit, places=places)
+        for name, before, after, unit, places in listed
+    )
 
 
 def _self_check(

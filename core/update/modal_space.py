@@ -370,7 +370,7 @@ def factor_result(
     """
     factors = np.exp(log)
     estimates = tuple(
-        ParameterEstimate(name, 1.0, float(value))
-        for name, value in zip(parts.names, factors, strict=True)
+        ParameterEstimate(parameter.name, 1.0, float(value), places=parameter.places)
+        for parameter, value in zip(parts.parameters, factors, strict=True)
     )
     return UpdateResult(parts.at(factors), len(parts), estimates, tuple(history), figures)

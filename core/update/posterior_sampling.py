@@ -387,7 +387,8 @@ def _result(
     own = target.discrepancy.std(chain[:, -1])
     parameters = tuple(
         ParameterEstimate(
-            u.parameter.name, u.start, float(value), u.parameter.unit, float(value * s)
+            *(u.parameter.name, u.start, float(value), u.parameter.unit, float(value * s)),
+            places=u.parameter.places,
         )
         for u, value, s in zip(iteration.unknowns, iteration.scaling.values(q), std, strict=True)
     )

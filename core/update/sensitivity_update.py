@@ -214,6 +214,7 @@ class Iteration:
                 after=float(value),
                 unit=unknown.parameter.unit,
                 std=None if std is None else float(std[i] * grow[i]),
+                places=unknown.parameter.places,
             )
             for i, (unknown, value) in enumerate(zip(self.unknowns, values, strict=True))
         )

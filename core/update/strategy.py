@@ -28,6 +28,8 @@ class ParameterEstimate:
         after: value in the updated model.
         unit: of both; empty for a ratio.
         std: standard deviation of ``after``; None where the method gives none.
+        places: where on the structure it acts, in the grammar of places, so that drawings show it
+            there; nothing where it has no place.
     """
 
     name: str
@@ -35,6 +37,7 @@ class ParameterEstimate:
     after: float
     unit: str = ""
     std: float | None = None
+    places: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, repr=False)

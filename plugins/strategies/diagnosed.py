@@ -169,6 +169,7 @@ def _estimates(explanation: Explanation) -> tuple[ParameterEstimate, ...]:
             after=item.value,
             unit=item.unit,
             std=item.std,
+            places=(cause.place,),
         )
         for cause in causes
         for item in cause.parameters

@@ -37,7 +37,9 @@ class Textbook(Strategy):
         known = registered_effects()
         repaired = textbook_model(model, known)
         values = [
-            ParameterEstimate(f"{item.name} of {effect.name}", item.neutral, value, item.unit)
+            ParameterEstimate(
+                f"{item.name} of {effect.name}", item.neutral, value, item.unit, places=(place,)
+            )
             for effect in known
             for place, found in textbook_values(effect, model).items()
             for item, value in zip(effect.parameters(model, place), found, strict=True)

@@ -107,16 +107,17 @@
 
   const changes = (stage, state) => {
     if (!stage) return note(NO_PICTURES);
-    const top = d3.max(twoOf(state).flatMap((entry) => entry.exhibit?.elements ?? [])) ?? 0;
+    const drawn = ({ exhibit }) => (exhibit?.findings ?? []).some(({ kind }) => kind !== "elsewhere") || exhibit?.elements?.some((value) => value);
+    const figures = new Map(bench.findings(stage, twoOf(state).filter(drawn)).map((figure, k) => [twoOf(state).filter(drawn)[k], figure]));
     return columns(twoOf(state).map((entry) => {
       const missing = lack(entry, entry.exhibit);
       if (missing) return missing;
-      const { elements, difference } = entry.exhibit;
+      const { elements, difference, findings } = entry.exhibit;
+      if (figures.has(entry)) return figures.get(entry);
       if (difference) return bench.heat.image({ ...difference, axis: "node", title: `${entry.name}: |K \u2212 K\u2080| between nodes, logarithmic` });
-      if (stage.thinned) return note(`${entry.name}: the model has too many elements to show the change of each.`);
-      if (!elements || elements.every((value) => value === null)) return note(`${entry.name}: the change of stiffness cannot be told element by element.`);
-      if (elements.every((value) => !value)) return note(`${entry.name}: no element was changed.`);
-      return bench.elementMap(stage, elements, top, `${entry.name}: relative change of every element's stiffness, in %`);
+      if (findings?.length) return note(`${entry.name}: ${findings.map(({ label }) => label).join("; ")}; these have no place on the drawing.`);
+      if (elements?.every((value) => value === 0)) return note(`${entry.name}: no element was changed.`);
+      return note(stage.thinned ? `${entry.name}: the model has too many elements to show the change of each.` : `${entry.name}: the change cannot be told element by element.`);
     }));
   };
 
