@@ -16,6 +16,7 @@ from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_js
 from femubench.core.drawing.places import placed_wireframe
 from femubench.core.errors import InputError
 from femubench.core.schema.diagnosis import LocationRow, Rival
+from femubench.reports.diagnosis import diagnosis_text
 from femubench.reports.diagnosis_page import diagnosis_html
 from femubench.reports.diagnosis_words import odds, times
 
@@ -68,19 +69,18 @@ class TestPage:
         text = page_of(data_of()).text
         parts = [
             "named: one explanation stands alone",
+            "What is missing",
+            "joint rotation at type:T what: this effect 94.2 %",
+            "bending 31000 ± 1200 N m/rad",
+            "weigh the structure 140 σ² odds over a million to 1",
             "What it gains",
-            "used modes before 4.25 % after 0.125 % 34 times smaller",
+            "used modes before 4.25 % after 0.125 % median; 34 times smaller",
             "held-out modes before 3.4 % after 0.75 %",
             "How well it fits",
             "+12.3 → -0.2",
             "9201 before, 55.25 after, 61 data. What is left is noise: noise alone leaves as much "
             "with probability 61.4 %",
-            "Where it is",
-            "J1 1.00",
-            "What is missing",
-            "joint rotation at type:T 94.2 %",
-            "bending 31000 ± 1200 N m/rad",
-            "weigh the structure 140 σ² odds over a million to 1",
+            "Where it is J1 1.00",
             "joint offset at type:T 3.1 % 812.5 10.4",
             "torsion constant everywhere + added mass at J3",
             "added mass J3 0.0123 kg",
@@ -91,6 +91,29 @@ class TestPage:
         found = [text.find(part) for part in parts]
         assert -1 not in found, parts[found.index(-1)]
         assert found == sorted(found)
+
+    def test_errors_are_rms_with_the_median_beside_them(self) -> None:
+        data = data_of()
+        data["gain_rms"] = {**data["gain"], "used_percent": [5.0, 0.5]}
+        page = page_of(data).text
+        assert (
+            "before 5 % after 0.5 % 10 times smaller; median 4.25 % before, 0.125 % after" in page
+        )
+        assert "rms frequency error, before → after" in page
+        text = diagnosis_text(data)
+        assert re.search(r"used modes +5\.000 +0\.500 +4\.250 +0\.125", text)
+
+    def test_scatter_that_cannot_be_is_told_first(self) -> None:
+        warning = "What is left of the shapes is far too little."
+        data = data_of() | {"scatter": [{"kind": "shapes", "warning": warning}]}
+        assert page_of(data).text.index(warning) < page_of(data).text.index("What it gains")
+        assert warning in diagnosis_text(data)
+
+    def test_what_and_where_have_probabilities_of_their_own(self) -> None:
+        data = data_of()
+        data["causes"][0] |= {"place": "J1", "probability": 0.625, "place_probability": 0.25}
+        text = page_of(data).text
+        assert "what: this effect 62.5 % where: this place 25.0 %" in text
 
     @pytest.mark.parametrize("verdict", VERDICTS)
     def test_every_verdict(self, verdict: str) -> None:

@@ -22,7 +22,8 @@ ALLOWED = {
     "offset": r"`offset` \(global",  # where a point mass sits
     "hframe": r"\"hframe\": _hframe",  # a structure of the challenge; in its seeds
     # the model with handbook values, and where a value of a cause comes from
-    "textbook": r"[nN]ominal|handbook|record|: \[|_CAUSE_COLUMNS|source =|start|yardstick|both|item\.get",
+    "textbook": r"[nN]ominal|handbook|record|: \[|_CAUSE_COLUMNS|source =|start|yardstick|both"
+    r"|item\.get",
     "physical": r"\"unphysical\"",  # a label beside its contrary
 }
 
