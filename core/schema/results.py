@@ -151,9 +151,8 @@ class JobResult(_Stored):
 
     @property
     def unphysical(self) -> bool:
-        """Tell whether rigid-body modes were lost, eigenvalues are negative or partners helped."""
-        helped = self.surplus_partners and (self.score is None or self.score < 1.0)
-        damage = self.rigid_modes_lost or self.negative_eigenvalues or helped
+        """Tell whether rigid-body modes were lost, eigenvalues are negative or partners surplus."""
+        damage = self.rigid_modes_lost or self.negative_eigenvalues or self.surplus_partners
         return self.status == "ok" and bool(damage)
 
 
