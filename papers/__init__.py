@@ -13,6 +13,8 @@ PAPERS = {
     "frame": ("frame", "frame-beam", "frame-solid"),
     "hframe": ("hframe", "hframe-solid"),
 }
+# How many different updates a re-run computes, for who waits for it.
+UPDATES = {"frame": 55, "hframe": 16}
 
 
 def study(paper: str, bench: Workbench) -> Study:

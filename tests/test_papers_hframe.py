@@ -16,7 +16,7 @@ from femubench.core.library.report import rendering
 from femubench.core.library.reproduce import studies_of
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.variants import strategy_of
-from femubench.papers import study
+from femubench.papers import UPDATES, study
 from femubench.papers.hframe.beyond import compare
 from femubench.papers.hframe.meshes import frequencies, mesh_cells
 from femubench.papers.hframe.physical import physical_model, shape_paired_errors
@@ -59,7 +59,11 @@ def bench() -> Workbench:
 
 @pytest.fixture(scope="module")
 def done(bench: Workbench) -> Study:
-    return study("hframe", bench)
+    steps: list[int] = []
+    counted = Workbench(bench.strategies, bench.cases, lambda: steps.append(1), bench._done)
+    found = study("hframe", counted)
+    assert len(steps) == UPDATES["hframe"]
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -312,7 +316,10 @@ def test_the_transcription_contradicts_itself_at_the_misprints_only() -> None:
 
 def test_docs_count_the_cells_of_both_papers(done: Study) -> None:
     """One sentence on the screen, in README and in docs; JSON counts the same."""
-    studies = (*studies_of(("frame",), load_plugins()), done)
+    steps: list[tuple[int, int]] = []
+    frame = studies_of(("frame",), load_plugins(), lambda *step: steps.append(step))
+    assert steps == [(k, UPDATES["frame"]) for k in range(1, UPDATES["frame"] + 1)]
+    studies = (*frame, done)
     headline = rendering(studies, "terminal").partition("\n\n")[0]
     verdicts = [cell["verdict"] for cell in json.loads(rendering(studies, "json"))]
     assert headline.startswith(f"{verdicts.count('independent')} of {len(verdicts)} printed cells")

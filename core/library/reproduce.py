@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from itertools import count
 from os import PathLike
 from pathlib import Path
 
@@ -54,16 +55,29 @@ def known_papers(papers: str | Sequence[str] | None = None) -> tuple[str, ...]:
     return chosen("paper", PAPERS if papers is None else listed(papers), PAPERS)
 
 
-def studies_of(papers: Sequence[str], plugins: Plugins) -> tuple[Study, ...]:
-    """Return the studies of papers; see `reproduce`."""
-    from femubench.papers import PAPERS, study
+def studies_of(
+    papers: Sequence[str], plugins: Plugins, told: Callable[[int, int], None] | None = None
+) -> tuple[Study, ...]:
+    """Return the studies of papers; see `reproduce`.
+
+    Arguments:
+        told: called with how many updates are computed, of how many.
+    """
+    from femubench.papers import PAPERS, UPDATES, study
 
     found = []
+    steps, total = count(1), sum(UPDATES[paper] for paper in papers)
+
+    def step() -> None:
+        done = next(steps)
+        if told is not None:
+            told(done, max(total, done))
+
     for paper in papers:
         cases = {case.name: case for case in read_cases(PAPERS[paper], plugins)}
         # Many small matrices: threads would only wait for each other.
         with threadpool_limits(1):
-            found.append(study(paper, Workbench(plugins.strategies, cases)))
+            found.append(study(paper, Workbench(plugins.strategies, cases, step)))
     return tuple(found)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,10 +20,12 @@ class Workbench:
     Arguments:
         strategies: by name.
         cases: by name.
+        told: called after each update that had to be computed.
     """
 
     strategies: Mapping[str, Strategy]
     cases: Mapping[str, Case]
+    told: Callable[[], None] = lambda: None
     _done: dict[tuple[str, str], UpdateResult] = field(default_factory=dict, repr=False)
 
     def update(self, case: str, words: str) -> UpdateResult:
@@ -45,4 +47,5 @@ class Workbench:
             result = strategy.update(found.model, found.used_measurement(0), rng)
             assert isinstance(result, UpdateResult), type(result)
             self._done[key] = result
+            self.told()
         return self._done[key]
