@@ -90,7 +90,7 @@ $(BIN)/python:
 
 # Installed by link: a change of a source file needs no other install, one of the dependencies does.
 $(VENV)/.installed: pyproject.toml | $(BIN)/python
-	$(PIP) install --quiet -e '.[plot]'
+	$(PIP) install --quiet -e .
 	touch $@
 
 $(VENV)/.installed-test: pyproject.toml | $(BIN)/python

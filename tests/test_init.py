@@ -16,7 +16,6 @@ import femubench
 import femubench.plot
 from femubench.core.cli.main import bench
 
-pytest.importorskip("matplotlib")
 SPANS, MASS, STIFFNESS = 8, 2.0, 4.0e6
 
 

@@ -168,19 +168,6 @@ class TestOutput:
             "new/out: reproduce.md, reproduce.html, reproduce.json, 4 figures in figures"
         )
 
-    @pytest.mark.parametrize("words", [["--output", "out"], ["--format", "html"]])
-    def test_without_matplotlib_it_says_what_to_install(
-        self, invoke: Invoke, papers: Papers, monkeypatch: pytest.MonkeyPatch, words: list[str]
-    ) -> None:
-        monkeypatch.setitem(sys.modules, "matplotlib", None)
-        result = invoke(*words)
-        assert result.exit_code == 2
-        assert result.stderr == (
-            "bench: drawing the figures needs matplotlib (expected pip install 'femubench[plot]')\n"
-        )
-        assert papers.asked == []
-        assert invoke().exit_code == 0
-
     def test_markdown_links_to_every_figure_by_its_title(self, invoke: Invoke) -> None:
         invoke("--output", "out")
         text = Path("out/reproduce.md").read_text(encoding="utf-8")

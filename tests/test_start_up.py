@@ -14,9 +14,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from femubench import InputError
 from femubench.core.cli.main import bench
-from femubench.core.plot.style import own_axes, report_style
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.validation import CHECKS
 
@@ -139,26 +137,3 @@ def test_help_names_every_report_format() -> None:
     text = " ".join(CliRunner().invoke(bench, ["report", "--help"]).output.split())
     (listed,) = re.findall(r"FORMAT (.*?); several separated by commas", text)
     assert [word.split()[0] for word in listed.split(", ")] == list(load_plugins().reporters)
-
-
-def test_without_matplotlib_a_page_with_drawings_is_refused_before_the_search(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    monkeypatch.setattr("femubench.core.library.diagnose.diagnosis_of", None)
-    page = tmp_path / "page.html"
-    result = CliRunner().invoke(bench, ["diagnose", "frame", "--report", str(page)])
-    assert (result.exit_code, page.exists()) == (2, False)
-    assert result.stderr == (
-        "bench: a page with drawings needs matplotlib (expected pip install 'femubench[plot]')\n"
-    )
-
-
-def test_without_matplotlib_a_drawing_says_what_to_install(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(InputError, match=re.escape("pip install 'femubench[plot]'")):
-        own_axes(None)
-    with pytest.raises(InputError, match="a drawing needs matplotlib"), report_style("mac"):
-        pass

@@ -11,7 +11,7 @@ import click
 from femubench.core.cli import options
 from femubench.core.cli.progress import time_left
 from femubench.core.cli.registry import plugins_for
-from femubench.core.errors import FemubenchError, InputError, require
+from femubench.core.errors import FemubenchError, InputError
 from femubench.core.files import check_new, write_atomically
 from femubench.core.library.cases import one_case
 from femubench.core.plugin.validation import chosen
@@ -135,8 +135,6 @@ def _check_report(file: Path) -> None:
     if file.suffix.lower() not in _STYLES:
         known = " or ".join(_STYLES)
         raise InputError("does not say its format", file=file, expected=f"a name with {known}")
-    if _STYLES[file.suffix.lower()] == "html":
-        require("matplotlib", "plot", "a page with drawings")
 
 
 def _fault(found: Diagnosis, folder: Path) -> Exception | None:

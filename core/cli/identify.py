@@ -9,7 +9,6 @@ import click
 from femubench.core.cli import options
 from femubench.core.cli.progress import waiting
 from femubench.core.cli.registry import plugins_for
-from femubench.core.errors import require
 from femubench.core.files import check_new
 
 
@@ -66,7 +65,6 @@ def identify(
     """
     if output is not None:
         check_new(output)
-        require("matplotlib", "plot", "a page with drawings")
     from femubench.core.library.identify import identification_of, write_identification
     from femubench.reports.identification import identification_text
 

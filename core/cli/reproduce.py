@@ -10,7 +10,6 @@ from femubench.core.cli import options
 from femubench.core.cli.progress import time_left
 from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
-from femubench.core.errors import require
 from femubench.core.files import check_can_make, write_atomically
 from femubench.core.plugin.validation import chosen
 
@@ -41,8 +40,6 @@ def reproduce(
     from femubench.papers import PAPERS
 
     papers = chosen("paper", PAPERS if paper is None else [paper], PAPERS)
-    if output is not None or style == "html":
-        require("matplotlib", "plot", "drawing the figures")
     if output is not None:
         check_can_make(output)
     from femubench.core.library.report import rendering

@@ -94,7 +94,7 @@ def identification_of(
 
 
 def write_identification(found: Identification, folder: Path, *, source: str = "") -> None:
-    """Write the tables of a case, and a page where matplotlib is there.
+    """Write the tables of a case, and a page.
 
     Arguments:
         found: what was identified.

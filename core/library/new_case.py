@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 
 from femubench.core.case.case import Case
@@ -13,7 +12,7 @@ from femubench.core.score.scoring import predict_block
 
 
 def begin_case(folder: Path, given: Beginning, plugins: Plugins) -> Case:
-    """Write a case folder from files, with a picture of the match where matplotlib is there.
+    """Write a case folder from files, with a picture of the match.
 
     Arguments:
         folder: new or empty.
@@ -24,7 +23,7 @@ def begin_case(folder: Path, given: Beginning, plugins: Plugins) -> Case:
         InputError: when the folder holds anything, or for what is wrong in the files.
     """
     readers = tuple(plugins.readers.values())
-    return start_case(folder, given, readers, _draw if find_spec("matplotlib") else None)
+    return start_case(folder, given, readers, _draw)
 
 
 def _draw(case: Case, file: Path) -> None:

@@ -24,7 +24,7 @@ def matching(case: Case, *, ax: Axes | None = None) -> Axes:
         ax: to draw on; None for axes of a new figure.
 
     Raises:
-        InputError: when no sensor was matched, or matplotlib is not installed.
+        InputError: when no sensor was matched.
 
     Examples:
         >>> plot.matching(case).get_figure().savefig("matches.png")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femubench.core.errors import InputError, harmless, require
+from femubench.core.errors import InputError, harmless
 from femubench.core.typing import FloatArray
 
 if TYPE_CHECKING:
@@ -62,13 +62,9 @@ def own_axes(ax: Axes | None, size: tuple[float, float] = (6.4, 4.4)) -> Axes:
 
     Arguments:
         size: of a new figure in inch.
-
-    Raises:
-        InputError: when matplotlib is not installed.
     """
     if ax is not None:
         return ax
-    require("matplotlib", "plot", "a drawing")
     from matplotlib.figure import Figure
 
     return Figure(figsize=size, layout="constrained").subplots()
@@ -101,11 +97,7 @@ def report_style(name: str) -> Iterator[None]:
 
     Arguments:
         name: of the drawing, from which the ids in it follow.
-
-    Raises:
-        InputError: when matplotlib is not installed.
     """
-    require("matplotlib", "plot", "a drawing")
     from matplotlib import rc_context, rcdefaults, rcParams
 
     wanted: Any = {**_SETTINGS, "svg.hashsalt": name}
