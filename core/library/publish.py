@@ -10,11 +10,11 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from femubench.core.case.case import Case
+from femubench.core.errors import InputError
 from femubench.core.files import check_can_make, resolved
 from femubench.core.library.cases import listed, read_cases, scenarios_of, usable_plugins
 from femubench.core.library.rank import classes_of, drawn_twins, textbook_of
 from femubench.core.plugin.loader import Plugins
-from femubench.core.errors import InputError
 from femubench.core.publish.publishing import Published, publish as merge
 from femubench.core.publish.submissions import Verify, read_submission
 from femubench.core.publish.verification import verify

@@ -22,7 +22,8 @@ KIND = "femubench leaderboard"
 DATA = "data"
 MOST_RUNS, MOST_RESULTS = 1_000, 200_000
 # What publish makes; everything else in the folder, such as .git or CNAME, is somebody's and stays.
-OWN = (MARKER, DATA, "index.html", "index.json", "strategies", "cases")
+_FILES = ("index.html", "index.json", "leaderboard.csv", "feed.xml", "site.css", "site.js")
+OWN = (MARKER, DATA, *_FILES, "strategies", "cases", "classes")
 # A folder with nothing but these counts as empty.
 _SPARE = frozenset({".git", ".nojekyll", "CNAME", ".gitignore", ".gitattributes"})
 Render = Callable[[Mapping[str, Any]], Mapping[str, str]]
