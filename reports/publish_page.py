@@ -13,9 +13,11 @@ from femubench.reports.svg import drawing
 from femubench.reports.templating import asset, templates
 from femubench.results import ranked
 
+_ALL = ("everything as JSON", "index.json")
 _MOST_DRAWN = 20
 _MOST_NEWS = 8
 _LEAST = -1.0  # skill that is drawn; an arrow tells of less
+_OTHERS = ("others", "not shown to be worse", "shown to be worse")
 _BLOCKS = ("used", "higher", "modified")
 _ERRORS = "rms frequency errors in percent: used modes, higher modes, after a design change"
 _SKILL = (
@@ -80,7 +82,7 @@ def pages_of(index: Data) -> dict[str, str]:
 def _page(here: str, title: str, **parts: Any) -> str:  # noqa: ANN401 - as the template has it
     root = "../" * here.count("/")
     empty = dict.fromkeys(("answer", "chart", "facts", "links", "news"), ())
-    everything = {**empty, "downloads": [("index.json", "index.json")], **parts}
+    everything = {**empty, "downloads": [_ALL], **parts}
     return templates().get_template("site.html").render(
         here=here, root=root, title=title, **everything
     )  # fmt: skip
@@ -100,7 +102,7 @@ def _board_page(index: Data, board: Data, links: Sequence[tuple[str, str]]) -> s
         links=links,
         chart=_drawn(skills_of(board), "The line is the 95 % interval over the structures."),
         news=news if whole else (),
-        downloads=[("leaderboard.csv", "leaderboard.csv"), ("index.json", "index.json")],
+        downloads=[("all boards as CSV", "leaderboard.csv"), _ALL],
         tables=tables,
     )
 
@@ -108,21 +110,24 @@ def _board_page(index: Data, board: Data, links: Sequence[tuple[str, str]]) -> s
 def _answer(board: Data) -> Iterator[str]:
     """Yield who is best, how sure that is, and on what."""
     first = [row for row in board["rows"] if row["rank"] == 1]
-    others = [row for row in board["rows"] if row["rank"] and row not in first]
+    others = [row for row in board["rows"] if _stand(row) in _OTHERS]
     if first:
         who = " and ".join(plain(row["strategy"]) for row in first)
         skill = f"skill {fixed(first[0]['skill'], 3, 7)}"
         yield f"{who} {'lead' if first[1:] else 'leads'} with {skill}{_sure(first[0])}."
     else:
         yield "Nobody leads: no strategy has all cases of the ranking."
-    near = [plain(row["strategy"]) for row in others if row["below_best"] is False]
+    near = [plain(row["strategy"]) for row in others if not row["below_best"]]
     if others and not board["tested"]:
         yield "Too few structures to say whether the others are worse by more than chance."
     elif others:
-        below = sum(row["below_best"] is True for row in others)
+        below = len(others) - len(near)
         more = f" and {len(near) - 3} more" if len(near) > 3 else ""
         rest = f"; not shown of {', '.join(near[:3])}{more}" if near else ""
         yield f"Shown to be worse by more than chance: {below} of {len(others)} others{rest}."
+    unphysical = sum(_stand(row) == "unphysical" for row in board["rows"])
+    if unphysical:
+        yield f"Below them for unphysical models: {unphysical}."
     cases, structures = len(board["cases"]), board["structures"]
     told = f"{cases} case{'s' * (cases != 1)} of {structures} structure{'s' * (structures != 1)}"
     yield f"On {told} that more than half of the strategies were run on."
@@ -147,7 +152,7 @@ def _board_table(index: Data, board: Data) -> Table:
             *_errors(row),
             _number(row["seconds"]),
             Cell("number", covered, row["covered"]),
-            Cell("text", shortened(plain(latest["version"]), 24)),
+            Cell("text", shortened(plain(latest["version"]), 14)),
             Cell("text", latest["femubench"]),
             Cell("text", latest["last"][:10]),
             _count(len(item["versions"])),
@@ -227,7 +232,7 @@ def _strategy_page(item: Data, index: Data) -> str:
         answer=[answer],
         chart=_drawn(history_of(item["versions"]), "The line is the 95 % interval."),
         facts=list(_facts(item)),
-        downloads=[(f"{stem}{suffix}", f"{stem}{suffix}") for suffix in (".json", ".csv")],
+        downloads=[(suffix.upper(), f"{stem}.{suffix}") for suffix in ("json", "csv")],
         tables=[_version_table(item), _class_table(item, index), _result_table(item, index)],
     )
 
@@ -418,8 +423,7 @@ def _stand(row: Data) -> str:
         return "unphysical"
     if row["rank"] == 1:
         return "best"
-    said = {None: "others", True: "shown to be worse", False: "not shown to be worse"}
-    return said[row["below_best"]]
+    return _OTHERS[(None, False, True).index(row["below_best"])]
 
 
 def history_of(versions: Sequence[Data]) -> Chart | None:
@@ -440,7 +444,7 @@ def history_of(versions: Sequence[Data]) -> Chart | None:
 def _chart(title: str, rows: Sequence[tuple[str, str, Data]]) -> Chart:
     """Return skills with intervals, given by group and label."""
     ends = [row[key] for _, _, row in rows for key in ("skill", "low") if row[key] is not None]
-    least = _LEAST if min(ends, default=0.0) < _LEAST else None
+    least = max(min([*ends, 0.0]) - 0.05, _LEAST)
     series = []
     for group in dict.fromkeys(group for group, _, _ in rows):
         own = [(label, row) for other, label, row in rows if other == group]
@@ -450,7 +454,8 @@ def _chart(title: str, rows: Sequence[tuple[str, str, Data]]) -> Chart:
         )
         skills = [row["skill"] for _, row in own]
         series.append(Series(group, skills, [label for label, _ in own], low, high))
-    x, y = Axis("skill", "1", low=least, high=1.0), Axis("", names=tuple(r[1] for r in rows))
+    x = Axis("skill, part of the error taken away", low=least, high=1.0)
+    y = Axis("", names=tuple(label for _, label, _ in rows))
     return Chart("interval", title, x, y, tuple(series), (Mark("x", 0.0, "textbook model"),))
 
 
