@@ -10,7 +10,7 @@ from femubench.plot import Axis, Chart, Mark, Series
 from femubench.reports.cells import NOTHING, fixed, plain, shortened
 from femubench.reports.markdown import escape, table
 from femubench.reports.svg import drawing
-from femubench.reports.templating import site_page
+from femubench.reports.templating import styled_page
 from femubench.reports.terminal import WIDTH, aligned_table
 from femubench.results import METHOD
 
@@ -78,7 +78,7 @@ def comparison_markdown(data: Mapping[str, Any]) -> str:
 def comparison_html(data: Mapping[str, Any]) -> str:
     """Return a comparison as one document that needs no script and no network."""
     before, after = _sides(data)
-    return site_page("compare.html").render(
+    return styled_page("compare.html").render(
         headline=headline(data),
         before=before,
         after=after,

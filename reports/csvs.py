@@ -21,7 +21,7 @@ class CsvReporter:
 
     def render(self, run: Run) -> str:
         """Return the results as CSV."""
-        return _csv(results_frame(run))
+        return harmless_csv(results_frame(run))
 
 
 class ModesCsvReporter:
@@ -32,10 +32,11 @@ class ModesCsvReporter:
 
     def render(self, run: Run) -> str:
         """Return the paired modes as CSV."""
-        return _csv(modes_frame(run))
+        return harmless_csv(modes_frame(run))
 
 
-def _csv(frame: pd.DataFrame) -> str:
+def harmless_csv(frame: pd.DataFrame) -> str:
+    """Return a table as CSV that no spreadsheet runs anything of."""
     text: str = frame.map(_harmless).to_csv(index=False, lineterminator="\n")
     return text.rstrip("\n")
 

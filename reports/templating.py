@@ -32,16 +32,16 @@ def templates(folder: str = "page/assets") -> Environment:
 
 
 @cache
-def site_page(name: str) -> Template:
-    """Return a template of `bench compare` or `bench publish`, with its style, script, policy."""
+def styled_page(name: str) -> Template:
+    """Return a template of a page without scripts, with its style and policy."""
     from markupsafe import Markup
 
-    style, script = asset("page.css") + asset("site.css"), asset("site.js")
-    # Nothing but this very style and this very script may take effect, whatever a name smuggles in.
-    policy = f"default-src 'none'; base-uri 'none'; form-action 'none'; style-src {_hash(style)}"
-    shared = {"style": style, "script": script, "policy": policy}
-    shared["script_policy"] = f"{policy}; script-src {_hash(script)}"
-    return templates().get_template(name, globals={k: Markup(v) for k, v in shared.items()})
+    style = asset("page.css") + asset("site.css")
+    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
+    # Nothing but this very style may take effect, whatever a name smuggles in.
+    policy = f"default-src 'none'; base-uri 'none'; form-action 'none'; style-src 'sha256-{digest}'"
+    shared = {"style": Markup(style), "policy": Markup(policy)}
+    return templates().get_template(name, globals=shared)
 
 
 def asset(name: str) -> str:
@@ -52,8 +52,3 @@ def asset(name: str) -> str:
 
 def _one_line(value: object) -> object:
     return value if hasattr(value, "__html__") else plain(value)
-
-
-def _hash(text: str) -> str:
-    digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-    return f"'sha256-{digest}'"

@@ -9,6 +9,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
+from xml.etree import ElementTree
 
 import pytest
 from click.testing import CliRunner, Result
@@ -147,7 +148,12 @@ def test_history_has_every_version_and_the_board_the_latest(data: Data, site: Si
     assert softer["versions"][0]["skill"] > softer["versions"][1]["skill"]
     assert softer["versions"][1]["machines"][0]["cpu"] == "Old <cpu>"
     page = (site.folder / softer["page"]).read_text()
-    assert "<polyline" in page
+    drawn = Links(page).text.partition("Versions")[0]
+    assert "Skill of every version" in drawn
+    assert all(
+        f"{number}" in drawn and row["last"][:10] in drawn
+        for number, row in zip((2, 1), softer["versions"], strict=True)
+    )
     assert "Old &lt;cpu&gt;" in page
     # The strategy that did not change has one version, which two machines agree on.
     same = site.strategy("unchanged")
@@ -345,13 +351,17 @@ class Links(HTMLParser):
         self.tags: list[str] = []
         self.links: list[str] = []
         self.events: list[str] = []
+        self.text = ""
         self.feed(text)
         self.close()
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append(tag)
         self.links += [value or "" for name, value in attrs if name in ("href", "src")]
-        self.events += [name for name, _ in attrs if name.startswith("on")]
+        self.events += [name for name, _ in attrs if name.startswith("on") or name == "style"]
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
 
 
 def test_hostile_names_are_text_and_no_paths(data: Data, site: Site) -> None:
@@ -360,6 +370,8 @@ def test_hostile_names_are_text_and_no_paths(data: Data, site: Site) -> None:
     made["meta"] |= {"run": HOSTILE, "citations": {HOSTILE: "javascript:<b>"}}
     made["meta"]["cases"]["corner"]["title"] = '"><img src=http://x>'
     made["meta"]["machine"]["cpu"] = "\x1b<i>"
+    made["meta"]["classes"] = {"corner": ["<img src=x onerror=alert(1)>", "../../etc"]}
+    made["meta"]["about"] = {HOSTILE: {"summary": "<script>", "author": '"><iframe>'}}
     again = called(versioned(scaled(made, HOSTILE, 0.5), HOSTILE, "<b>2</b>"), HOSTILE, 9)
     answer = site.add(made, again)
     assert answer.exit_code == 0, answer.output
@@ -371,7 +383,8 @@ def test_hostile_names_are_text_and_no_paths(data: Data, site: Site) -> None:
             continue
         page = Links(content.decode())
         assert page.tags.count("script") == 1
-        assert not {"img", "i", "b", "iframe", "link"} & set(page.tags)
+        assert page.tags.count("link") == 2
+        assert not {"img", "i", "b", "iframe", "style"} & set(page.tags)
         assert page.events == []
         assert b"\x1b" not in content
         for link in page.links:
@@ -413,7 +426,8 @@ def test_pages_need_nothing_from_elsewhere(data: Data, site: Site) -> None:
             text = content.decode()
             assert "default-src 'none'" in text
             assert "unsafe" not in text
-            assert not re.search(r"(?:https?:)?//\w", text.partition("<script>")[0])
+            assert "script-src 'self'" in text
+            assert not re.search(r"(?:https?:)?//\w", text)
 
 
 def test_one_yardstick_and_one_start_for_all(data: Data, site: Site) -> None:
@@ -430,3 +444,121 @@ def test_one_yardstick_and_one_start_for_all(data: Data, site: Site) -> None:
     mixed = site.add(called(data, "older", 2))
     assert mixed.exit_code == 2
     assert "others against the drawn ones" in mixed.stderr
+
+
+def test_a_class_has_a_board_of_its_own(data: Data, site: Site) -> None:
+    made = json.loads(json.dumps(data))
+    parts = [
+        json.loads(json.dumps(data).replace("other/corner", f"b{k}").replace('"corner"', f'"a{k}"'))
+        for k in range(2)
+    ]
+    made["results"] = [
+        {**result, "key": f"{k}{result['key'][1:]}"}
+        for k, part in enumerate(parts)
+        for result in part["results"]
+    ]
+    for key in ("cases", "reference"):
+        made["meta"][key] = {n: v for part in parts for n, v in part["meta"][key].items()}
+    made["meta"]["structures"] = {name: name for name in made["meta"]["cases"]}
+    made["meta"]["classes"] = {"a0": ["frame", "all"], "a1": ["frame", "all"], "b0": ["all", "one"]}
+    made["meta"]["classes"]["b1"] = ["all"]
+    worse = scaled(made, "softer", 20.0)
+    for result, other in zip(made["results"], worse["results"], strict=True):
+        if result["case"] in ("a0", "a1"):
+            result |= {name: other[name] for name in ("used", "higher", "modified")}
+    assert site.add(made).exit_code == 0
+    boards = {board["class"]: board for board in site.index()["boards"]}
+    assert list(boards) == ["", "frame"]  # all of them is the whole, one is a case
+    assert boards["frame"]["cases"] == ["a0", "a1"]
+    first = boards["frame"]["rows"][0]
+    assert first["strategy"] == "unchanged"
+    page = (site.folder / boards["frame"]["page"]).read_text()
+    assert f'data-value="{first["skill"]}"' in page
+    assert "unchanged leads" in page
+    assert f'href="{boards["frame"]["page"]}"' in (site.folder / "index.html").read_text()
+    lines = (site.folder / "leaderboard.csv").read_text().splitlines()
+    assert [line.split(",")[:3] for line in lines if line.startswith("frame")] == [
+        ["frame", row["strategy"], str(row["rank"])] for row in boards["frame"]["rows"]
+    ]
+
+
+ATOM = "{http://www.w3.org/2005/Atom}"
+
+
+def test_the_feed_tells_of_new_versions_and_new_leaders(data: Data, site: Site) -> None:
+    first = called(scaled(data, "softer", 20.0), "first", 1)
+    site.add(first)
+    before = site.index()["news"]
+    assert [(item["kind"], item["strategy"]) for item in before] == [
+        ("leader", "unchanged"), ("strategy", "unchanged"), ("strategy", "softer"),
+        ("strategy", "failing"),
+    ]  # fmt: skip
+    site.add(called(versioned(data, "softer", "2 & <more>"), "second", 2))
+    news = site.index()["news"]
+    assert [(item["kind"], item["strategy"], item["version"]) for item in news[:2]] == [
+        ("leader", "softer", "2 & <more>"), ("version", "softer", "2 & <more>"),
+    ]  # fmt: skip
+    assert news[2:] == before
+    feed = ElementTree.fromstring((site.folder / "feed.xml").read_text())
+    assert feed.tag == f"{ATOM}feed"
+    assert feed.findtext(f"{ATOM}updated") == "2027-01-02T00:00:00+00:00"
+    entries = feed.findall(f"{ATOM}entry")
+    assert [entry.findtext(f"{ATOM}title") for entry in entries[:2]] == [
+        "softer leads", "New version of softer",
+    ]  # fmt: skip
+    assert "2 & <more>" in str(entries[0].findtext(f"{ATOM}content"))
+    for one in (feed, *entries):
+        for tag in ("id", "title", "updated"):
+            assert one.findtext(f"{ATOM}{tag}")
+        for link in one.findall(f"{ATOM}link"):
+            assert (site.folder / link.attrib["href"]).is_file()
+    ids = [one.findtext(f"{ATOM}id") for one in (feed, *entries)]
+    assert len(set(ids)) == len(ids)
+
+
+def test_equal_leaders_are_no_news_of_each_other(data: Data, site: Site) -> None:
+    twin = renamed(data, "softer", "zofter")
+    site.add(called(data, "first", 1), called(twin, "second", 2))
+    assert [n["strategy"] for n in site.index()["news"] if n["kind"] == "leader"] == ["softer"]
+
+
+def test_pages_of_strategies_say_where_they_come_from(data: Data, site: Site) -> None:
+    told = {
+        "homepage": "https://example.org/?a=1&b=<2>".replace("<2>", "2"),
+        "summary": "One & all", "author": "Ada <ada@example.org>", "doi": "10.1000/xyz",
+    }  # fmt: skip
+    made = json.loads(json.dumps(data))
+    made["meta"]["about"] = {"softer": told}
+    made["meta"]["citations"] = {"softer": "Ada (1843), note G"}
+    assert site.add(made).exit_code == 0
+    item = site.strategy("softer")
+    assert item["about"] == told
+    page = Links((site.folder / item["page"]).read_text())
+    assert told["homepage"] in page.links
+    assert "https://doi.org/10.1000/xyz" in page.links
+    for text in ("One & all", "Ada <ada@example.org>", "Ada (1843), note G"):
+        assert text in page.text
+    own = json.loads((site.folder / item["page"].replace(".html", ".json")).read_text())
+    assert own == item
+    lines = (site.folder / item["page"].replace(".html", ".csv")).read_text().splitlines()
+    assert len(lines) == 1 + len(item["versions"][0]["cases"])
+    for bad_link in ("javascript:alert(1)", "https://x y", 'https://x"', "ftp://x"):
+        made["meta"]["about"]["softer"]["homepage"] = bad_link
+        answer = site.add(made)
+        assert answer.exit_code == 2
+        assert "meta.about.softer.homepage" in answer.stderr
+
+
+def test_cells_of_downloads_are_no_formulas(data: Data, site: Site) -> None:
+    made = renamed(data, "softer", "=cmd|' /C calc'!A0")
+    assert site.add(made).exit_code == 0
+    assert ",'=cmd|" in (site.folder / "leaderboard.csv").read_text()
+
+
+def test_the_board_says_who_is_best_and_how_sure(data: Data, site: Site) -> None:
+    site.add(data)
+    text = Links((site.folder / "index.html").read_text()).text
+    best = site.index()["boards"][0]["rows"][0]
+    assert f"softer leads with skill {best['skill']:.3f}." in text
+    assert "Too few structures to say" in text
+    assert "On 2 cases of 2 structures" in text

@@ -37,6 +37,10 @@ VERBS = {
         "Compare run B with run A; exit with 1 if B is worse.",
     ),
     "store": ("femubench.core.cli.store", "Check, repair or export stored runs."),
+    "submit": (
+        "femubench.core.cli.submit",
+        "Check, run and compare a strategy for a leaderboard.",
+    ),
     "publish": ("femubench.core.cli.publish", "Merge result files into a static site in DIR."),
     "update": (
         "femubench.core.cli.update",

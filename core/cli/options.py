@@ -88,7 +88,7 @@ cluster = click.option(
     help="Start a Dask cluster for the run: local:N workers here, or slurm:QUEUE.",
 )  # fmt: skip
 
-_timeouts = click.option(
+timeouts = click.option(
     "--timeout", "timeouts", multiple=True, callback=timeouts_of, metavar="DURATION",
     help="Give up on a job after this time, e.g. 90s, 10m, 1h. STRATEGY=DURATION is for one "
     "strategy; may be repeated. Default: 10m.",
@@ -116,7 +116,7 @@ def of_jobs(json: str) -> Option:
     Arguments:
         json: what is in the file of JSON.
     """
-    where, limits = (jobs, scheduler, cluster), (sandbox, _timeouts, _memory)
+    where, limits = (jobs, scheduler, cluster), (sandbox, timeouts, _memory)
     files = (json_file(json), _csv_file, store("Keep results there."), _report_file, quiet)
 
     def with_all(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -10,11 +10,13 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from femubench.core.case.case import Case
+from femubench.core.errors import InputError
 from femubench.core.files import check_can_make, resolved
 from femubench.core.library.cases import listed, read_cases, scenarios_of, usable_plugins
 from femubench.core.library.rank import classes_of, drawn_twins, textbook_of
 from femubench.core.plugin.loader import Plugins
 from femubench.core.publish.publishing import Published, publish as merge
+from femubench.core.publish.submissions import Verify, read_submission
 from femubench.core.publish.verification import verify
 from femubench.core.schema.records import run_to_json
 from femubench.core.schema.results import Run
@@ -53,12 +55,26 @@ def publish(
             if isinstance(run, Run):
                 file.write_text(json.dumps(run_to_json(run), allow_nan=False), encoding="utf-8")
             files.append(file)
-        installed = InstalledCases(usable_plugins())
+        return merge(Path(folder), files, pages_of, _check(), unverified=unverified)
 
-        def check(run: Run, data: Mapping[str, Any], file: Path) -> None:
-            verify(run, data, installed, file)
 
-        return merge(Path(folder), files, pages_of, check, unverified=unverified)
+def refusal_of(file: Path) -> str:
+    """Return why a site would not take a result file as verified; nothing where it would."""
+    try:
+        read_submission(file, _check())
+    except InputError as fault:
+        return str(fault)
+    return ""
+
+
+def _check() -> Verify:
+    """Return what checks a run against the cases that are installed here."""
+    installed = InstalledCases(usable_plugins())
+
+    def check(run: Run, data: Mapping[str, Any], file: Path) -> None:
+        verify(run, data, installed, file)
+
+    return check
 
 
 class InstalledCases:
@@ -71,6 +87,7 @@ class InstalledCases:
     def __init__(self, plugins: Plugins) -> None:
         self._plugins = plugins
         self._owners = scenarios_of(plugins.scenarios)
+        self._classes = classes_of(plugins)
         self._found: dict[str, Case] = {}
 
     def case(self, name: str) -> Case | None:
@@ -79,9 +96,13 @@ class InstalledCases:
             (self._found[name],) = read_cases([name], self._plugins)
         return self._found.get(name)
 
+    def classes(self, name: str) -> Sequence[str]:
+        """Return the kinds of structure and of truth of a case."""
+        return self._classes.get(name, ())
+
     def twins(self, cases: Sequence[Case], number: int, seed: int) -> Sequence[Case]:
         """Return the twins that a run of these cases draws from a seed."""
-        return drawn_twins(cases, classes_of(self._plugins), number, seed)
+        return drawn_twins(cases, self._classes, number, seed)
 
     def yardstick(self, case: Case) -> Case:
         """Return a case with the model that all errors are measured against."""

@@ -14,6 +14,7 @@ from typing import Any
 
 from femubench.core.errors import InputError
 from femubench.core.plugin.apart import Origin
+from femubench.core.plugin.distribution import about
 from femubench.core.plugin.foreign import doc_of
 from femubench.core.plugin.importing import (
     BrokenPlugin,
@@ -64,13 +65,21 @@ def described(origin: Origin, _: Mapping[str, Any]) -> dict[str, Any]:
         told[kind] = []
         for name in offered:
             try:
-                told[kind].append(_DESCRIBE[kind](offered[name]))
+                told[kind].append(_told(origin, kind, offered[name]))
             except BaseException as fault:
                 broken.append(broken_plugin(source, fault, kind))
     faults = [asdict(fault) for fault in broken]
     for item in faults:
         item["traceback"] = item["traceback"][-_LONGEST_TRACE:]
     return {"loaded": found is not None, "offers": told, "broken": faults}
+
+
+def _told(origin: Origin, kind: str, offered: Any) -> dict[str, Any]:  # noqa: ANN401 - of any role
+    found = _DESCRIBE[kind](offered)
+    if kind == "strategies":
+        name = origin.distribution.rpartition(" ")[0]
+        found["about"] = about(name, getattr(offered, "doi", ""))
+    return found
 
 
 def _strategy(strategy: Any) -> dict[str, Any]:  # noqa: ANN401 - with what it likes besides
@@ -132,7 +141,7 @@ def _common(offered: Any) -> dict[str, Any]:  # noqa: ANN401 - of any role
 def varied(origin: Origin, question: Mapping[str, Any]) -> dict[str, Any]:
     """Say what a strategy is with other options."""
     base = offered_by(origin, "strategies", question["name"])
-    return _strategy(with_options(base, question["options"]))
+    return _told(origin, "strategies", with_options(base, question["options"]))
 
 
 def folder(origin: Origin, question: Mapping[str, Any]) -> dict[str, Any]:

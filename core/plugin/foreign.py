@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from femubench.core.errors import PluginError, harmless
 from femubench.core.plugin import apart
 from femubench.core.plugin.apart import Origin
+from femubench.core.plugin.distribution import known_about
 from femubench.core.plugin.importing import Later, offered_by
 from femubench.core.plugin.options import SIMPLE, ToldOptions, with_options
 from femubench.core.plugin.validation import (
@@ -139,6 +140,11 @@ class ForeignStrategy(ToldOptions):
     def doc(self) -> str:
         """Return what it says of itself."""
         return str(self._told["doc"])
+
+    @property
+    def about(self) -> dict[str, str]:
+        """Return what its package says of it: home page, summary, authors, DOI."""
+        return dict(self._told["about"])
 
     @property
     def options(self) -> dict[str, Any]:
@@ -366,6 +372,7 @@ def strategy_of(handle: Handle, told: Mapping[str, Any]) -> ForeignStrategy:
         "yardstick": told.get("yardstick") is True,
         "module": harmless(of_type(told.get("module"), str, "module")),
         "doc": _doc(told),
+        "about": known_about(of_type(told.get("about"), dict, "what its package says")),
     }  # fmt: skip
     return ForeignStrategy(handle, json.dumps(plain))
 

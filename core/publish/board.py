@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from femubench.core.errors import InputError
-from femubench.core.publish.agreement import Finding, References, findings_of, machine_of
+from femubench.core.publish.agreement import Finding, findings_of, machine_of
+from femubench.core.publish.news import news_of
+from femubench.core.publish.places import Ground, board_on, errors_of, on_case, skill_on
 from femubench.core.publish.submissions import Submission, slug
-from femubench.core.schema.results import BLOCKS, DONE, JobResult
-from femubench.core.score.counting import block_shares
-from femubench.core.score.ranking import geometric_mean, ranked as in_order, score_of
+from femubench.core.schema.results import BLOCKS
 from femubench.core.score.repeatability import unsteady
 from femubench.core.score.statistics import structures_of
 from femubench.core.score.twin_skill import twin_skills
@@ -45,21 +45,25 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
     versions = _versions(findings)
     latest = {version.strategy: version for version in versions}  # the last one stays
     ranked = _ranked(latest.values(), versions, current)
-    structures: dict[str, str] = {}
-    for item in submissions:
-        own = structures_of(item.run)
-        for name in _cases(item):
-            structures.setdefault(name, own.get(name, name))
-    described = {
-        version: _described(version, listed, current, ranked, references, structures)
-        for version, listed in versions.items()
-    }
+    told = _told(submissions, "structures"), _told(submissions, "classes")
+    ground = Ground(ranked, current, references, *told)
+    runs = [_run_entry(item) for item in submissions]
+    described = {v: _described(v, listed, ground) for v, listed in versions.items()}
+    entrants = {name: versions[version] for name, version in latest.items()}
+    boards = [
+        {"class": name, "page": f"classes/{slug(name)}.html" if name else "index.html", **board}
+        for name, part in ground.classes()
+        for board in (board_on(part, entrants),)
+    ]
+    strategies = _strategy_entries(submissions, described, boards[0])
     return {
         "schema": INDEX_SCHEMA,
-        "cases": _case_entries(submissions, current, ranked, references),
-        "strategies": _strategy_entries(submissions, latest, described, ranked),
+        "boards": boards,
+        "cases": _case_entries(submissions, ground),
+        "strategies": strategies,
         "conflicts": [_conflict(item) for item in findings if item.conflict],
-        "runs": [_run_entry(item) for item in submissions],
+        "runs": runs,
+        "news": news_of(strategies, runs),
     }
 
 
@@ -118,32 +122,22 @@ def _is_current(item: Finding, current: Mapping[str, str]) -> bool:
     return bool(item.result.provenance["case"] == current[item.result.case])
 
 
-def _described(
-    version: _Version,
-    findings: Sequence[Finding],
-    current: Mapping[str, str],
-    ranked: Sequence[str],
-    references: References,
-    structures: Mapping[str, str],
-) -> dict[str, Any]:
+def _described(version: _Version, findings: Sequence[Finding], ground: Ground) -> dict[str, Any]:
     """Return a version with its results on every case and what they come to."""
     groups: dict[tuple[str, str], list[Finding]] = {}
     for item in findings:
         job = item.result.case, str(item.result.provenance["case"])
         groups.setdefault(job, []).append(item)
-    known = {name: references[name, digest] for name, digest in groups if digest == current[name]}
-    known = {name: errors for name, errors in known.items() if name in ranked}
-    shares = block_shares(known, structures)
+    shares = ground.shares
     cases = [
         {
-            **_on_case(listed, references[case], shares.get(case[0])),
-            "current": case[1] == current[case[0]],
-            "ranked": case[1] == current[case[0]] and case[0] in ranked,
+            **on_case(listed, ground.references[case], shares.get(case[0])),
+            "current": ground.has(case),
+            "ranked": ground.counts(case),
         }
         for case, listed in sorted(groups.items())
     ]
-    counted = [case for case in cases if case["ranked"]]
-    weights = [sum(shares.get(case["case"], {"": 1.0}).values()) for case in counted]
+    figures = skill_on(ground, [case for case in cases if case["ranked"]])
     runs = sorted({run.order: run for item in findings for run in item.runs}.items())
     machines = {machine_of(run): run.run.meta["machine"] for _, run in runs}
     return {
@@ -154,15 +148,9 @@ def _described(
         "last": runs[-1][1].started,
         "machines": [machines[key] for key in sorted(machines)],
         "runs": [run.name for _, run in runs],
-        "skill": 1.0 - geometric_mean([c["score"] for c in counted], weights) if counted else None,
-        **{f"{name}_percent": _median(counted, f"{name}_percent") for name in BLOCKS},
-        "seconds": _median([c for c in counted if c["status"] == "ok"], "seconds"),
-        "covered": len(counted),
-        "complete": len(counted) == len(ranked) and bool(ranked),
-        "unphysical": any(case["unphysical"] for case in counted),
-        "failures": sum(case["status"] not in DONE for case in counted),
+        **figures,
         "conflicts": sum(item.conflict for item in findings),
-        "comparable": bool(counted),
+        "comparable": figures["covered"] > 0,
         "cases": cases,
     }
 
@@ -182,83 +170,44 @@ def _marks(strategy: str, findings: Iterable[Finding]) -> list[str]:
     return marks
 
 
-def _on_case(
-    findings: Sequence[Finding], reference: Mapping[str, float], shares: Mapping[str, float] | None
-) -> dict[str, Any]:
-    """Return the result on one case: of the data as recorded, or the median over noise draws."""
-    recorded = [item for item in findings if item.result.seed == 0]
-    listed = recorded[-1:] or list(findings)
-    results = [item.result for item in listed]
-    scores = [score_of(result, reference, shares) for result in results]
-    failed = [result.status for result in results if result.status not in DONE]
-    return {
-        "case": results[0].case,
-        "digest": str(results[0].provenance["case"]),
-        "recorded": bool(recorded),
-        "seeds": sorted({item.result.seed for item in findings}),
-        "status": failed[0] if failed else results[0].status,
-        "score": statistics.median(scores),
-        **_errors(results),
-        "seconds": statistics.median(result.seconds for result in results),
-        "unphysical": any(result.unphysical for result in results),
-        "conflict": any(item.conflict for item in findings),
-        "machines": min(item.machines for item in listed),
-    }
-
-
-def _errors(results: Sequence[JobResult]) -> dict[str, float | None]:
-    """Return the median error of every block."""
-    return {
-        f"{name}_percent": _middle(
-            [r.blocks[name].rms_percent for r in results if name in r.blocks]
-        )
-        for name in BLOCKS
-    }
-
-
-def _middle(values: Sequence[float]) -> float | None:
-    return statistics.median(values) if values else None
-
-
-def _median(cases: Iterable[Mapping[str, Any]], name: str) -> float | None:
-    return _middle([case[name] for case in cases if case[name] is not None])
+def _told(submissions: Iterable[Submission], what: str) -> dict[str, Any]:
+    """Return what the runs say of their cases; the first that says something counts."""
+    found: dict[str, Any] = {}
+    for item in submissions:
+        said = structures_of(item.run) if what == "structures" else item.run.meta.get(what) or {}
+        for name in _cases(item):
+            if said.get(name):
+                found.setdefault(name, said[name])
+    return found
 
 
 def _strategy_entries(
     submissions: Iterable[Submission],
-    latest: Mapping[str, _Version],
     described: Mapping[_Version, dict[str, Any]],
-    ranked: Sequence[str],
+    board: Mapping[str, Any],
 ) -> list[dict[str, Any]]:
-    """Return the strategies, best first; those that lack a case have no rank."""
+    """Return the strategies, best first, as on the board of all cases."""
     citations: dict[str, str] = {}
+    about: dict[str, dict[str, str]] = {}
     for item in submissions:
         citations.update(item.run.meta["citations"])
-
-    def order(name: str) -> tuple[tuple[float, ...], float, str]:
-        row = described[latest[name]]
-        tier = not row["complete"], row["unphysical"], -row["covered"]
-        return tier, 0.0 if row["skill"] is None else 1.0 - row["skill"], name
-
+        about.update(item.run.meta.get("about") or {})
     return [
         {
             "name": name,
             "citation": citations.get(name, ""),
+            "about": about.get(name, {}),
             "page": f"strategies/{slug(name)}.html",
-            "rank": rank if described[latest[name]]["complete"] else None,
-            "cases": len(ranked),
-            "versions": [row for own, row in described.items() if own.strategy == name][::-1],
+            "rank": row["rank"],
+            "cases": len(board["cases"]),
+            "versions": [own for key, own in described.items() if key.strategy == name][::-1],
         }
-        for rank, name in in_order(latest, order)
+        for row in board["rows"]
+        for name in (row["strategy"],)
     ]
 
 
-def _case_entries(
-    submissions: Iterable[Submission],
-    current: Mapping[str, str],
-    ranked: Sequence[str],
-    references: References,
-) -> list[dict[str, Any]]:
+def _case_entries(submissions: Iterable[Submission], ground: Ground) -> list[dict[str, Any]]:
     titles: dict[str, str] = {}
     digests: dict[str, dict[str, None]] = {}
     for item in submissions:
@@ -272,10 +221,11 @@ def _case_entries(
             "page": f"cases/{slug(name)}.html",
             "digest": digest,
             "older": [old for old in digests[name] if old != digest],
-            "ranked": name in ranked,
-            "nominal_percent": dict(references[name, digest]),
+            "classes": list(ground.kinds.get(name, ())),
+            "ranked": name in ground.cases,
+            "nominal_percent": dict(ground.references[name, digest]),
         }
-        for name, digest in sorted(current.items())
+        for name, digest in sorted(ground.current.items())
     ]
 
 
@@ -290,7 +240,7 @@ def _conflict(item: Finding) -> dict[str, Any]:
             {
                 "counted": number == 0,
                 "status": other.result.status,
-                **_errors([other.result]),
+                **errors_of([other.result]),
                 "runs": [run.name for run in other.runs],
                 "machines": [dict(run.run.meta["machine"]) for run in other.runs],
             }

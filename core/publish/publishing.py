@@ -22,7 +22,8 @@ KIND = "femubench leaderboard"
 DATA = "data"
 MOST_RUNS, MOST_RESULTS = 1_000, 200_000
 # What publish makes; everything else in the folder, such as .git or CNAME, is somebody's and stays.
-OWN = (MARKER, DATA, "index.html", "index.json", "strategies", "cases")
+_FILES = ("index.html", "index.json", "leaderboard.csv", "feed.xml", "site.css", "site.js")
+OWN = (MARKER, DATA, *_FILES, "strategies", "cases", "classes")
 # A folder with nothing but these counts as empty.
 _SPARE = frozenset({".git", ".nojekyll", "CNAME", ".gitignore", ".gitattributes"})
 Render = Callable[[Mapping[str, Any]], Mapping[str, str]]
@@ -128,22 +129,20 @@ def _merged(submissions: Iterable[Submission]) -> list[Submission]:
     """Return every run once, whatever order they came in.
 
     A run that another file of the same run holds whole, as one made before it was resumed or was
-    verified, is left out.
+    verified, or by a version that kept less of it, is left out.
     """
     unique = {item.name: item for item in submissions}
     listed = sorted(unique.values(), key=lambda item: item.order)
     parts = {item.name: _results(item) for item in listed}
-    kept = [
-        item
-        for item in listed
-        if not any(
-            item.run.meta["run"] == other.run.meta["run"]
-            and (parts[item.name], item.verified) != (parts[other.name], other.verified)
-            and parts[item.name] <= parts[other.name]
-            and item.verified <= other.verified
-            for other in listed
-        )
-    ]
+
+    def within(item: Submission, other: Submission) -> bool:
+        if item.run.meta["run"] != other.run.meta["run"]:
+            return False
+        if (parts[item.name], item.verified) == (parts[other.name], other.verified):
+            return (len(item.text), item.name) < (len(other.text), other.name)
+        return parts[item.name] <= parts[other.name] and item.verified <= other.verified
+
+    kept = [item for item in listed if not any(within(item, other) for other in listed)]
     results = sum(len(item.run.results) for item in kept)
     if len(kept) > MOST_RUNS or results > MOST_RESULTS:
         what = f"{len(kept)} runs with {results} results"

@@ -14,6 +14,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from femubench.core.errors import InputError
 from femubench.core.files import read_text
+from femubench.core.plugin.distribution import DOI, HOMEPAGE, LONGEST_LINE
 from femubench.core.schema.bounds import Name
 from femubench.core.schema.records import (
     LARGEST_RUN,
@@ -63,6 +64,15 @@ class _Twins(_Record):
     reference: dict[Name, dict[Literal["used", "higher", "modified"], float]]
 
 
+class _About(_Record):
+    """What the package of a strategy says of it."""
+
+    homepage: Annotated[str, Field(max_length=LONGEST_LINE, pattern=HOMEPAGE)] = ""
+    summary: Annotated[str, Field(max_length=LONGEST_LINE)] = ""
+    author: Annotated[str, Field(max_length=LONGEST_LINE)] = ""
+    doi: Annotated[str, Field(max_length=LONGEST_LINE, pattern=DOI)] = ""
+
+
 class _Meta(_Record):
     """The meta data that are published; nothing else of them is."""
 
@@ -78,7 +88,9 @@ class _Meta(_Record):
     starts: dict[Name, list[Nominal]] = {}
     alike: list[Name] = []
     cases: dict[Name, _Case]
+    classes: dict[Name, Annotated[list[_Word], Field(max_length=50)]] = {}
     citations: dict[Name, Annotated[str, Field(max_length=5_000)]] = {}
+    about: dict[Name, _About] = {}
     reference: dict[Name, dict[Literal["used", "higher", "modified"], float]]
     versions: Annotated[dict[_Word, _Word], Field(max_length=50)] = {}
     machine: _Machine = _Machine()
@@ -186,7 +198,7 @@ def _meta(run: Run, file: Path) -> dict[str, Any]:
         key = ".".join(["meta", *map(str, first["loc"])])
         raise InputError(first["msg"], file=file, key=key) from error
     data: dict[str, Any] = record.model_dump()
-    for name in ("baseline", "structures"):
+    for name in ("baseline", "structures", "classes", "about"):
         if not data[name]:  # as in what was published before there was one
             del data[name]
     for name, blocks in data["reference"].items():

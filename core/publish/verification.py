@@ -36,6 +36,10 @@ class Installed(Protocol):
         """Return a case by its name; None where there is none."""
         ...
 
+    def classes(self, name: str) -> Sequence[str]:
+        """Return the kinds of structure and of truth of a case."""
+        ...
+
     def twins(self, cases: Sequence[Case], number: int, seed: int) -> Sequence[Case]:
         """Return the twins that a run of these cases draws from a seed."""
         ...
@@ -119,6 +123,11 @@ def _own_cases(run: Run, installed: Installed, file: Path) -> dict[str, Case]:
         if structure != (case.structure or name):
             what = f"{structure!r} is not its structure"
             _refuse(file, what, f"meta.structures.{name}", repr(case.structure or name))
+        classes = (run.meta.get("classes") or {}).get(name)  # files of old do not tell them
+        if classes and list(classes) != list(installed.classes(name)):
+            what = f"{', '.join(map(str, classes))[:80]!r} are not its classes"
+            expected = repr(", ".join(installed.classes(name)))
+            _refuse(file, what, f"meta.classes.{name}", expected)
         found[name] = case
     return found
 

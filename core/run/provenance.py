@@ -18,6 +18,7 @@ from typing import Any
 
 from femubench.core.case.case import Case
 from femubench.core.modal.factorisation import solver_name, solver_note
+from femubench.core.plugin.distribution import about
 from femubench.core.plugin.foreign import ForeignStrategy
 from femubench.core.plugin.source_files import Stamp, python_files, stamp, stamps
 from femubench.core.plugin.variants import Variant
@@ -63,6 +64,14 @@ def strategy_version(strategy: Strategy) -> str:
         return f"{number}+{_digest(files)}"
     top, module = home_of(strategy)
     return f"{_number(top)}+{source_digest(top, module)}"
+
+
+def about_of(strategy: Strategy) -> dict[str, str]:
+    """Return what the package of a strategy says of it; of one given by hand, its DOI alone."""
+    inner = strategy.base if isinstance(strategy, Variant) else strategy
+    if isinstance(inner, ForeignStrategy):
+        return inner.about
+    return about(_OWN if comes_along(strategy) else "", getattr(inner, "doi", ""))
 
 
 def comes_along(strategy: Strategy) -> bool:
@@ -190,7 +199,7 @@ def run_meta(
     references: Mapping[str, Reference],
     seeds: Sequence[int],
     settings: Mapping[str, Any],
-    about: Mapping[str, Any],
+    told: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return the meta data of a run: id, seeds, versions, machine, commit, cases, references.
 
@@ -198,7 +207,7 @@ def run_meta(
         settings: ``seed`` of the run's statistics, ``jobs``, ``timeout`` in s, ``memory`` in bytes,
             ``plan`` (digest of the keys of all jobs), ``request`` (what was asked for, so that the
             run can be continued and repeated).
-        about: what else is said of the cases, by case: ``starts``, ``classes``.
+        told: what else is said of the cases, by case: ``starts``, ``classes``.
     """
     return {
         "run": new_run_id(),
@@ -220,9 +229,10 @@ def run_meta(
             *solver_note(),
         ],
         "cases": {case.name: {"title": case.title, "digest": case.digest} for case in cases},
-        **about,
+        **told,
         "strategies": [strategy.name for strategy in strategies],
         "citations": {strategy.name: strategy.citation for strategy in strategies},
+        "about": {s.name: known for s in strategies if (known := about_of(s))},
         "baseline": next((s.name for s in strategies if getattr(s, "baseline", False)), None),
         "reference": {name: item.rms_percent for name, item in references.items()},
     }

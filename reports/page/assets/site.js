@@ -1,57 +1,40 @@
 "use strict";
 // Sorts tables by their heads and filters their rows; without it, the pages are read as they are.
-(() => {
-  const value = (row, column) => {
-    const cell = row.cells[column];
-    const number = Number(cell.dataset.value || "nothing");
-    return Number.isNaN(number) ? null : number;
-  };
-
-  const compare = (a, b, column, numeric) => {
-    if (!numeric) return a.cells[column].textContent.localeCompare(b.cells[column].textContent);
-    const [first, second] = [value(a, column), value(b, column)];
-    if (first === null || second === null) return (first === null) - (second === null);
-    return first - second;
-  };
-
-  const sort = (table, head) => {
-    const column = head.cellIndex;
-    const numeric = head.dataset.kind === "number";
-    const falling = head.getAttribute("aria-sort") === "ascending";
-    const rows = [...table.tBodies[0].rows];
-    rows.sort((a, b) => {
+for (const table of document.querySelectorAll("table.sortable")) {
+  const { tHead: { rows: [{ cells: heads }] }, tBodies: [body] } = table;
+  for (const head of heads) {
+    const { cellIndex: column, dataset: { kind } } = head;
+    const valueOf = kind === "number"
+      ? ({ dataset: { value } }) => (value === "" ? null : Number(value))
+      : (cell) => cell.textContent || null;
+    const compare = kind === "number" ? (a, b) => a - b : new Intl.Collator("en").compare;
+    const button = document.createElement("button");
+    button.type = "button";
+    button.append(...head.childNodes);
+    button.addEventListener("click", () => {
+      const falling = head.getAttribute("aria-sort") === "ascending";
+      const rows = [...body.rows].map((row) => [valueOf(row.cells[column]), row]);
       // What has no value stays last in either direction.
-      const missing = numeric && (value(a, column) === null || value(b, column) === null);
-      return compare(a, b, column, numeric) * (falling && !missing ? -1 : 1);
+      rows.sort(([a], [b]) => (a === null || b === null ? (a === null) - (b === null) : compare(a, b) * (falling ? -1 : 1)));
+      body.append(...rows.map(([, row]) => row));
+      for (const other of heads) other.removeAttribute("aria-sort");
+      head.setAttribute("aria-sort", falling ? "descending" : "ascending");
     });
-    table.tBodies[0].append(...rows);
-    for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
-    head.setAttribute("aria-sort", falling ? "descending" : "ascending");
-  };
+    head.append(button);
+  }
+}
 
-  for (const table of document.querySelectorAll("table.sortable")) {
-    for (const head of table.tHead.rows[0].cells) {
-      const button = document.createElement("button");
-      button.type = "button";
-      button.append(...head.childNodes);
-      button.addEventListener("click", () => sort(table, head));
-      head.append(button);
+const field = document.getElementById("filter");
+if (field) {
+  field.parentElement.hidden = false;
+  field.addEventListener("input", () => {
+    const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
+    const rows = [...document.querySelectorAll("table.filtered tbody tr")];
+    for (const row of rows) {
+      const name = row.querySelector("th").textContent.toLowerCase();
+      row.hidden = !words.every((word) => name.includes(word));
     }
-  }
-
-  const field = document.getElementById("filter");
-  if (field) {
-    field.parentElement.hidden = false;
-    const count = document.getElementById("count");
-    field.addEventListener("input", () => {
-      const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
-      let shown = 0;
-      for (const row of document.querySelectorAll("table.filtered tbody tr")) {
-        const name = row.querySelector("th").textContent.toLowerCase();
-        row.hidden = !words.every((word) => name.includes(word));
-        shown += row.hidden ? 0 : 1;
-      }
-      count.textContent = words.length ? `${shown} shown` : "";
-    });
-  }
-})();
+    const shown = rows.filter((row) => !row.hidden).length;
+    document.getElementById("count").textContent = words.length ? `${shown} shown` : "";
+  });
+}

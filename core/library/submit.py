@@ -1,0 +1,148 @@
+"""A strategy checked, run and compared, ready for a public leaderboard: ``bench submit``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from femubench.core.display import counted
+from femubench.core.files import check_writable
+from femubench.core.library.cases import listed, usable_plugins
+from femubench.core.library.compare import compare
+from femubench.core.library.plugins import check
+from femubench.core.library.publish import refusal_of
+from femubench.core.library.rank import Run, Twins, rank, read_run
+from femubench.core.library.report import rendered, rendering, report, reporter
+from femubench.core.run.recording import Progress
+from femubench.core.run.sandbox import Sandbox
+
+if TYPE_CHECKING:
+    from femubench.core.score.comparison import Comparison
+
+_NO_ANSWER = ("crashed", "timeout")
+_MOST_NAMED = 3
+
+
+@dataclass(frozen=True)
+class Submission:
+    """A run that may go to a leaderboard, and what stands against it.
+
+    Arguments:
+        run: of the strategies.
+        faults: why it should not go there, a line each; none where all is well.
+        unverified: why a leaderboard would take it as unverified alone; empty where not.
+        comparison: with the baseline, where there is one.
+    """
+
+    run: Run
+    faults: tuple[str, ...]
+    unverified: str
+    comparison: Comparison | None
+
+
+def submit(
+    strategies: str | Iterable[str],
+    cases: Iterable[str | PathLike[str]] = (),
+    *,
+    output: str | PathLike[str],
+    baseline: str | PathLike[str] | None = None,
+    fail: Iterable[str] = (),
+    twins: Twins = 2,
+    sandbox: Sandbox = "auto",
+    jobs: int | None = None,
+    timeouts: Mapping[str, float] | None = None,
+    tell: Callable[[str], None] = lambda line: None,
+    progress: Progress | None = None,
+) -> Submission:
+    """Check strategies, run them, compare them with an earlier run, and write the result file.
+
+    Arguments:
+        strategies: names.
+        cases: names or folders; the default set where there is none.
+        output: the file that `publish` takes.
+        baseline: the result file of an earlier run; without one nothing is compared.
+        fail: what counts as worse, as in `compare`.
+        twins, sandbox, jobs, progress: as in `rank`.
+        timeouts: seconds that a job may take, by strategy; without a name for all others.
+        tell: is given a line at the start of every step.
+
+    Raises:
+        InputError: for an unknown name, a faulty case or baseline, or no job in common with it.
+    """
+    names = [str(name) for name in listed(strategies)]
+    file = Path(output)
+    check_writable(file)
+    before = None if baseline is None else read_run(Path(baseline))
+    faults = list(_broken_rules(names, tell))
+    tell(f"run {', '.join(names)}")
+    limits = dict(timeouts or {})
+    run = rank(
+        list(cases), names, twins=twins, sandbox=sandbox, jobs=jobs, timeout=limits.pop("", None),
+        timeouts=limits, progress=progress,
+    )  # fmt: skip
+    report(run, file, style="json")
+    faults += _unanswered(run, names)
+    found = None
+    if before is not None:
+        tell(f"compare with {baseline}")
+        found = compare(before, run, strategies=names, fail=fail)
+        faults += _losses(found)
+    tell(f"check {file} as a leaderboard does")
+    return Submission(run, tuple(faults), refusal_of(file), found)
+
+
+def _broken_rules(names: Sequence[str], tell: Callable[[str], None]) -> Iterator[str]:
+    """Yield the rules for plugins that a strategy breaks."""
+    for name in names:
+        tell(f"check {name}")
+        failed = [found for found in check(name) if found.verdict.status == "fail"]
+        for found in failed:
+            yield f"{name} breaks the rule {found.check.name}: {found.verdict.message}"
+
+
+def _unanswered(run: Run, names: Iterable[str]) -> Iterator[str]:
+    """Yield strategies with jobs that ended their process or had to be ended."""
+    for name in names:
+        own = [item for item in run.results if item.strategy == name]
+        for status in _NO_ANSWER:
+            cases = list(dict.fromkeys(item.case for item in own if item.status == status))
+            if cases:
+                what = "crashed" if status == "crashed" else "ran out of time"
+                yield f"{name} {what} on {_named(cases)}"
+
+
+def _losses(found: Comparison) -> Iterator[str]:
+    """Yield what is worse than in the baseline, over all cases where that says it."""
+    whole = [item for item in found.excesses if item.scenario is None]
+    for item in whole or found.excesses:
+        where = "" if item.scenario is None else f" on {item.scenario}"
+        was = "lost results" if item.metric == "failures" else f"{item.metric}, as a ratio"
+        told = f"{was}: {item.value:.3g}, allowed {item.most:g}"
+        yield f"{item.strategy} is worse than the baseline{where}: {told}"
+
+
+def _named(cases: Sequence[str]) -> str:
+    first = ", ".join(cases[:_MOST_NAMED])
+    left = len(cases) - _MOST_NAMED
+    return f"{first} and {counted(left, 'more case')}" if left > 0 else first
+
+
+def summary_of(found: Submission) -> str:
+    """Return what came out in Markdown: the verdict, the ranking, the comparison."""
+    from femubench.reports.markdown import escape
+
+    markdown = reporter(usable_plugins(), "markdown")
+    verdict = "not accepted" if found.faults else "accepted"
+    lines = [f"# Submission: {verdict}", *(f"- {escape(line)}" for line in found.faults)]
+    if found.unverified:
+        lines.append(f"- a leaderboard takes it as unverified alone: {escape(found.unverified)}")
+    if found.comparison is None:
+        lines.append("- no baseline: commit the result file to have the next run compared with it")
+    parts = ["\n".join(lines)]
+    if found.comparison is not None:
+        parts.append(str(rendering(found.comparison, "markdown")))
+    parts.append(str(rendered(markdown, found.run)))
+    return "\n\n".join(parts) + "\n"

@@ -1,0 +1,56 @@
+"""What the package of a strategy says of itself: home page, summary, authors, DOI."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from functools import lru_cache
+from importlib import metadata
+
+from femubench.core.errors import harmless
+
+LONGEST_LINE = 500  # characters
+HOMEPAGE = r"^(https?://[^\s\"'<>\\]+)?$"
+DOI = r"^(10\.\d{4,9}/[^\s\"'<>\\]+)?$"
+# Labels of addresses, the best first, as packaging.python.org lists them.
+_LABELS = ("homepage", "repository", "source", "sourcecode", "github", "documentation", "docs")
+
+
+def about(name: str, doi: object = "") -> dict[str, str]:
+    """Return what an installed distribution says of itself; nothing where there is none.
+
+    Arguments:
+        name: of the distribution.
+        doi: that the strategy states, if any.
+    """
+    return known_about({**_packaged(name), "doi": str(doi)})
+
+
+@lru_cache(maxsize=100)
+def _packaged(name: str) -> dict[str, str]:
+    try:
+        told = metadata.metadata(name)
+    except (metadata.PackageNotFoundError, ValueError):
+        return {}
+    links: dict[str, str] = {}
+    for line in told.get_all("Project-URL") or ():
+        label, _, address = str(line).partition(",")
+        links[re.sub(r"[\W_]", "", label).lower()] = address.strip()
+    addresses = [*map(links.get, _LABELS), told.get("Home-page"), *links.values()]
+    authors = (told.get("Author"), told.get("Author-email"))
+    return {
+        "homepage": next((str(url) for url in addresses if _fits(HOMEPAGE, url)), ""),
+        "summary": str(told.get("Summary") or ""),
+        "author": next((str(text) for text in authors if text), ""),
+    }
+
+
+def known_about(told: Mapping[str, object]) -> dict[str, str]:
+    """Return the part of a description that can be shown; an address is one of the web or none."""
+    forms = {"homepage": HOMEPAGE, "doi": DOI, "summary": "", "author": ""}
+    lines = {name: harmless(str(told.get(name) or ""))[:LONGEST_LINE] for name in forms}
+    return {name: text for name, text in lines.items() if text and _fits(forms[name], text)}
+
+
+def _fits(form: str, text: object) -> bool:
+    return bool(text) and re.search(form, str(text)) is not None

@@ -1,0 +1,72 @@
+"""What happened on a public leaderboard, run by run: new versions, new leaders."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from femubench.core.score.ranking import ranked
+
+_MOST = 100  # entries that are kept, the latest
+
+
+def news_of(
+    strategies: Sequence[Mapping[str, Any]], runs: Sequence[Mapping[str, Any]]
+) -> list[dict[str, Any]]:
+    """Return every new version and every change of the leader, latest first.
+
+    Skills are those on the cases of today, on which alone versions of different times compare; so
+    a leader of old is whom one would have seen with these cases.
+
+    Arguments:
+        strategies: those of ``index.json``, with their versions.
+        runs: those of ``index.json``, oldest first.
+    """
+    owners: dict[str, list[tuple[Mapping[str, Any], Mapping[str, Any]]]] = {}
+    for strategy in strategies:
+        for version in strategy["versions"]:
+            for name in version["runs"]:
+                owners.setdefault(name, []).append((strategy, version))
+    present: dict[str, Mapping[str, Any]] = {}
+    told: list[dict[str, Any]] = []
+    leader = ""
+    for run in runs:
+        found = owners.get(run["file"].rpartition("/")[2], [])
+        told += _arrivals(found, present, run)
+        present |= {strategy["name"]: version for strategy, version in found}
+        first = _leaders(present)
+        if first and leader not in first:
+            leader = first[0]
+            told.append(_entry("leader", leader, present[leader], run))
+    pages = {strategy["name"]: strategy["page"] for strategy in strategies}
+    return [{**item, "page": pages[item["strategy"]]} for item in told[::-1][:_MOST]]
+
+
+def _arrivals(
+    found: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]],
+    present: Mapping[str, object],
+    run: Mapping[str, Any],
+) -> Iterator[dict[str, Any]]:
+    """Yield the versions whose first run this is."""
+    for strategy, version in sorted(found, key=lambda item: str(item[0]["name"])):
+        if version["runs"][0] == run["file"].rpartition("/")[2]:
+            kind = "version" if strategy["name"] in present else "strategy"
+            yield _entry(kind, strategy["name"], version, run)
+
+
+def _leaders(present: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Return who shares the first rank; nobody where nobody has all cases."""
+    sound = {
+        name: version
+        for name, version in present.items()
+        if version["complete"] and version["skill"] is not None and not version["unphysical"]
+    }
+    listed = ranked(sound, lambda name: ((), 1.0 - sound[name]["skill"], name))
+    return [name for rank, name in listed if rank == 1]
+
+
+def _entry(
+    kind: str, strategy: str, version: Mapping[str, Any], run: Mapping[str, Any]
+) -> dict[str, Any]:
+    told = {name: version[name] for name in ("version", "femubench", "skill", "low", "high")}
+    return {"kind": kind, "when": run["started"], "strategy": strategy, **told}
