@@ -2,15 +2,8 @@
 {
   const { el } = bench;
 
-  /** Return the style of an element of class case-shade or case-stroke. */
+  /** Return the style of an element of class case-shade. */
   const shade = (share) => ({ "--shade-light": bench.shade(share, false), "--shade-dark": bench.shade(share, true) });
-
-  // Canvases know nothing of style sheets: those still in use are drawn again.
-  const redraws = new Map();
-  const whenColoursChange = (canvas, redraw) => redraws.set(new WeakRef(canvas), redraw);
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-    for (const [held, redraw] of redraws) if (held.deref()) redraw(); else redraws.delete(held);
-  });
 
   /** Return a number as m x 10^k. */
   const scientific = (value) => {
@@ -62,5 +55,5 @@
     return figure;
   };
 
-  bench.heat = { table, image, shade, scientific, whenColoursChange };
+  bench.heat = { table, image, shade, scientific };
 }
