@@ -20,7 +20,7 @@ from femubench.core.run.recording import Progress
 from femubench.core.run.sandbox import Sandbox
 
 if TYPE_CHECKING:
-    from femubench.core.score.comparison import Comparison
+    from femubench.core.score.comparison import Comparison, Threshold
 
 _NO_ANSWER = ("crashed", "timeout")
 _MOST_NAMED = 3
@@ -49,7 +49,7 @@ def submit(
     *,
     output: str | PathLike[str],
     baseline: str | PathLike[str] | None = None,
-    fail: Iterable[str] = (),
+    fail: Iterable[str | Threshold] = (),
     twins: Twins = 2,
     sandbox: Sandbox = "auto",
     jobs: int | None = None,

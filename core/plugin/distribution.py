@@ -6,8 +6,12 @@ import re
 from collections.abc import Mapping
 from functools import lru_cache
 from importlib import metadata
+from typing import TYPE_CHECKING, cast
 
 from femubench.core.errors import harmless
+
+if TYPE_CHECKING:
+    from email.message import Message
 
 LONGEST_LINE = 500  # characters
 HOMEPAGE = r"^(https?://[^\s\"'<>\\]+)?$"
@@ -29,7 +33,8 @@ def about(name: str, doi: object = "") -> dict[str, str]:
 @lru_cache(maxsize=100)
 def _packaged(name: str) -> dict[str, str]:
     try:
-        told = metadata.metadata(name)
+        # A mapping to type checkers; in all versions of Python a message with `get`.
+        told = cast("Message", metadata.metadata(name))
     except (metadata.PackageNotFoundError, ValueError):
         return {}
     links: dict[str, str] = {}

@@ -94,3 +94,36 @@ def test_fits_a_small_screen(
     assert page.evaluate(width) <= 390
     unfolded(page)
     assert page.evaluate(width) <= 390
+
+
+def test_a_board_is_sorted_and_filtered_with_the_keyboard(
+    view: Callable[..., Any], addresses: dict[str, tuple[Path, str]]
+) -> None:
+    opened = view(addresses["site"][0])
+    page, index = opened.page, json.loads((addresses["site"][0].parent / "index.json").read_text())
+    table = page.locator("table.filtered")
+    names = [row["strategy"] for row in index["boards"][0]["rows"]]
+    assert table.locator("tbody th a").all_inner_texts() == names
+    shown = [cell.get_attribute("data-value") for cell in table.locator("td:nth-child(3)").all()]
+    assert [float(text) for text in shown] == [row["skill"] for row in index["boards"][0]["rows"]]
+    head = table.locator("thead th").nth(1)
+    head.locator("button").focus()
+    page.keyboard.press("Enter")
+    assert head.get_attribute("aria-sort") == "ascending"
+    assert table.locator("tbody th a").all_inner_texts() == sorted(names)
+    page.keyboard.press("Enter")
+    assert table.locator("tbody th a").all_inner_texts() == sorted(names, reverse=True)
+    page.get_by_label("Filter by name").fill(names[0])
+    assert table.locator("tbody tr:visible").count() == 1
+    assert page.locator("#count").inner_text() == "1 shown"
+    assert opened.messages == []
+
+
+def test_the_best_is_seen_without_scrolling(
+    view: Callable[..., Any], addresses: dict[str, tuple[Path, str]]
+) -> None:
+    page = view(addresses["site"][0]).page
+    for place in (".answer", "figure svg", "figcaption"):
+        box = page.locator(place).first.bounding_box()
+        assert box["y"] + box["height"] <= 900
+    assert " leads with skill " in page.locator(".answer").inner_text()
