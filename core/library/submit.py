@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from femubench.core.display import counted
+from femubench.core.errors import InputError
 from femubench.core.files import check_writable
 from femubench.core.library.cases import listed, usable_plugins
 from femubench.core.library.compare import compare
@@ -75,7 +76,7 @@ def submit(
     names = [str(name) for name in listed(strategies)]
     file = Path(output)
     check_writable(file)
-    before = None if baseline is None else read_run(Path(baseline))
+    before = None if baseline is None else _baseline(Path(baseline))
     faults = list(_broken_rules(names, tell))
     tell(f"run {', '.join(names)}")
     limits = dict(timeouts or {})
@@ -92,6 +93,12 @@ def submit(
         faults += _losses(found)
     tell(f"check {file} as a leaderboard does")
     return Submission(run, tuple(faults), refusal_of(file), found)
+
+
+def _baseline(file: Path) -> Run:
+    if not file.is_file():
+        raise InputError("there is no such file", file=file, expected="a result file")
+    return read_run(file)
 
 
 def _broken_rules(names: Sequence[str], tell: Callable[[str], None]) -> Iterator[str]:
