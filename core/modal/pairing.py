@@ -63,7 +63,7 @@ def pair_modes(
     window: float = WINDOW,
     window_without_shape: float = WINDOW_WITHOUT_SHAPE,
 ) -> Pairing:
-    """Return the partner of every measured mode, by one linear assignment over all of them.
+    """Return the partner of every measured mode, by one linear assignment.
 
     A mode with a shape at three sensors or more pairs by (1 - MAC) + 0.25 |ln(f_p / f_m)|, where
     MAC >= 0.5 and the frequencies lie within a factor of two. A mode with fewer sensors, or with
@@ -77,8 +77,8 @@ def pair_modes(
         predicted_frequencies: Hz, negative for imaginary ones, (p,).
         predicted_shapes: at the same sensors, (n_sensors, p).
         least_mac: smallest MAC of a pair.
-        window: largest ratio of the two frequencies.
-        window_without_shape: the same where shapes cannot be compared.
+        window, window_without_shape: largest ratio of the two frequencies; where shapes cannot be
+            compared.
 
     Examples:
         >>> pairs = modal.pair_modes(
@@ -111,8 +111,8 @@ def pair_modes(
     index[rows[taken]] = columns[taken]
     score = likeness[np.arange(m), index]
     known = (index >= 0) & by_shape[np.arange(m), index]
-    alike = (gain > 0.0) & (~by_shape | (likeness > score[:, None] - ALIKE)) & (index >= 0)[:, None]
-    return Pairing(index, np.where(known, score, np.nan), np.count_nonzero(alike, axis=1))
+    alike = (gain > 0.0) & (~by_shape | (likeness > score[:, None] - ALIKE))
+    return Pairing(index, np.where(known, score, np.nan), alike.sum(axis=1) * (index >= 0))
 
 
 def pair_measured(measurement: Measurement, modes: Modes, readings: FloatArray) -> Pairing:
