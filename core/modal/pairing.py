@@ -109,10 +109,7 @@ def pair_modes(
     index = np.full(m, -1, dtype=np.int64)
     taken = columns < p
     index[rows[taken]] = columns[taken]
-    score = likeness[np.arange(m), index]
-    known = (index >= 0) & by_shape[np.arange(m), index]
-    alike = (gain > 0.0) & (~by_shape | (likeness > score[:, None] - ALIKE))
-    return Pairing(index, np.where(known, score, np.nan), alike.sum(axis=1) * (index >= 0))
+    return _told(index, likeness, by_shape, gain)
 
 
 def pair_measured(measurement: Measurement, modes: Modes, readings: FloatArray) -> Pairing:
@@ -136,6 +133,15 @@ def pair_measured(measurement: Measurement, modes: Modes, readings: FloatArray) 
         np.asarray(readings)[:, elastic],
     )
     return replace(found, index=np.append(elastic, -1)[found.index])
+
+
+def _told(index: IntArray, likeness: FloatArray, by_shape: BoolArray, gain: FloatArray) -> Pairing:
+    """Return partners with their MAC, and how many modes could have been them."""
+    rows = np.arange(len(index))
+    score = likeness[rows, index]
+    known = (index >= 0) & by_shape[rows, index]
+    alike = (gain > 0.0) & (~by_shape | (likeness > score[:, None] - ALIKE))
+    return Pairing(index, np.where(known, score, np.nan), alike.sum(axis=1) * (index >= 0))
 
 
 def _distance(measured: FloatArray, predicted: FloatArray) -> FloatArray:
