@@ -167,7 +167,7 @@ class TestTerminal:
         assert not any(line != line.rstrip() for line in lines)
 
     def test_order_and_content(self) -> None:
-        text = words(toys.made())
+        text = words(toys.made(gain_rms=Gain((5.5, 0.25), (3.6, 0.8))))
         parts = [
             "toy: named; that nothing is missing has probability < 0.1 %; "
             "taken at the textbook value: shear-deformation, rotary-inertia.",
@@ -184,7 +184,8 @@ class TestTerminal:
             "torsion-constant, everywhere + added-mass at J3: probability 0.2 %",
             "weigh the structure (separates by 140 sigma squared)",
             "added-mass J3 0.0123 kg",
-            "used modes 4.250 0.125 held-out modes 3.400 0.750",
+            "rms % rms % median % median % before after before after",
+            "used modes 5.500 0.250 4.250 0.125 held-out modes 3.600 0.800 3.400 0.750",
             "evidence: J1 1.00, J3 0.50 ecomac: p2 1.00",
             "Mode 9 found no partner.",
         ]
@@ -198,7 +199,7 @@ class TestTerminal:
             toys.SOFT, place_probability=0.25, places=places, mirrors=("type:L", "J1", "J9")
         )
         told = (
-            "probability 94.2 %; at this place 25.0 %, one of 4 mirror places; "
+            "probability 94.2 %; at this place 25.0 %; one of 4 mirror places; "
             "else at type:L 25.0 %, J1 25.0 %, J9 25.0 %; the joints rotate"
         )
         assert told in words(toys.made(causes=(cause,)))
@@ -232,7 +233,8 @@ class TestTerminal:
         told = "each used mode left out in turn"
         cross = Gain((4.0, 0.5), cross_validated_percent=(5.0, 1.5))
         assert told not in words(toys.made())
-        assert f"{told} 5.000 1.500" in words(toys.made(gain=cross))
+        rms = replace(cross, cross_validated_percent=(6.0, 2.5))
+        assert f"{told} 6.000 2.500 5.000 1.500" in words(toys.made(gain=cross, gain_rms=rms))
         assert "held-out" not in words(toys.made(gain=cross))
 
     def test_where_it_was_written(self) -> None:
