@@ -2,7 +2,16 @@
 
 from femubench.core.plot.figure import Bars, Curve, Curves, Figure, MatrixImage, StructureMap
 from femubench.core.reproduction.cell import Cell, Page
+from femubench.core.reproduction.convention import Choice, Convention, under
+from femubench.core.reproduction.equation import Equation
 from femubench.core.reproduction.ground import VERDICTS, Ground, Verdict
+from femubench.core.reproduction.printed_table import (
+    Entry,
+    Grid,
+    PrintedTable,
+    as_printed,
+    places_of,
+)
 from femubench.core.reproduction.study import Extra, Study, verdict_counts
 from femubench.core.reproduction.workbench import Workbench
 
@@ -10,16 +19,25 @@ __all__ = [
     "VERDICTS",
     "Bars",
     "Cell",
+    "Choice",
+    "Convention",
     "Curve",
     "Curves",
+    "Entry",
+    "Equation",
     "Extra",
     "Figure",
+    "Grid",
     "Ground",
     "MatrixImage",
     "Page",
+    "PrintedTable",
     "StructureMap",
     "Study",
     "Verdict",
     "Workbench",
+    "as_printed",
+    "places_of",
+    "under",
     "verdict_counts",
 ]

@@ -17,5 +17,5 @@ def to_html(sections: Iterable[Section], *, title: str, heading: str) -> str:
         title: in the title bar.
         heading: at the top, the line that matters most.
     """
-    page = templates("templates").get_template("report.html")
+    page = templates().get_template("report.html")
     return page.render(title=title, heading=heading, sections=list(sections), embedded=embedded)

@@ -17,7 +17,6 @@ from femubench.reports.blocks import (
 )
 from femubench.reports.cells import plain
 from femubench.reports.digits import Digits, off
-from femubench.reports.html import to_html
 from femubench.reports.markdown import escape
 from femubench.reports.terminal import WIDTH
 from femubench.reproduction import (
@@ -30,7 +29,6 @@ from femubench.reproduction import (
     verdict_counts,
 )
 
-Drawings = Mapping[str, str]  # name of a figure -> SVG
 Words = Mapping[Verdict, str]
 
 FIGURES = "figures"
@@ -45,7 +43,7 @@ _SHORT: dict[Verdict, str] = {
     "misprint": "! misprint",
     "does-not-follow": "✗ no",
 }
-_WORDS: dict[Verdict, str] = {
+WORDS: dict[Verdict, str] = {
     "independent": "✓ independent",
     "under-convention": "≈ under a convention",
     "searched": "? searched",
@@ -55,7 +53,7 @@ _WORDS: dict[Verdict, str] = {
     "misprint": "! misprint",
     "does-not-follow": "✗ does not follow",
 }
-_MEANING: dict[Verdict, str] = {
+MEANING: dict[Verdict, str] = {
     "independent": "the figures agree, and nothing was chosen for it",
     "under-convention": "they agree under a convention that the text does not state, or states "
     "otherwise",
@@ -80,11 +78,11 @@ _COUNTED: dict[Verdict, str] = {
     "misprint": "misprinted",
     "does-not-follow": "do not follow",
 }
-_AGREE = (
+AGREE = (
     "Two figures agree when ours rounds to the printed one or lies within the tolerance of the "
     "row's kind. Of several grounds the weakest makes the verdict; the note names them all."
 )
-_DEVIATION = (
+DEVIATION = (
     "Deviation: (ours - printed) / |printed| in percent; of figures that are percentages "
     "themselves, ours - printed in points (pt). A frequency with an i is imaginary and counts as "
     "negative. – : there is no value of ours."
@@ -98,30 +96,24 @@ _NUMERIC = frozenset("0123456789+-–<>.")
 
 def counts_line(studies: Iterable[Study]) -> str:
     """Return how many cells agree with nothing chosen for it, then all other verdicts."""
-    return _counts([cell for study in studies for cell in study.cells])
+    return sentence_of_counts([cell for study in studies for cell in study.cells])
 
 
 def reproduction_text(studies: Sequence[Study]) -> str:
     """Return studies as plain text of 80 columns, but for the first line: all the counts."""
-    sections = [*_legend(_SHORT), *_chapters(studies, _SHORT, None, "")]
+    sections = [*_legend(_SHORT), *_chapters(studies, _SHORT, "")]
     return f"{counts_line(studies)}\n\n{to_terminal(sections)}"
 
 
 def reproduction_markdown(studies: Sequence[Study], *, figures: bool = False) -> str:
     """Return studies in GitHub's Markdown; `figures`: link to `FIGURES`/NAME.svg."""
     folder = f"{FIGURES}/" if figures else ""
-    sections = [*_legend(_WORDS), *_chapters(studies, _WORDS, None, folder)]
+    sections = [*_legend(WORDS), *_chapters(studies, WORDS, folder)]
     return f"# {escape(counts_line(studies))}\n\n{to_markdown(sections)}"
 
 
-def reproduction_html(studies: Sequence[Study], drawings: Drawings) -> str:
-    """Return studies as one HTML document that needs nothing besides itself."""
-    sections = [*_legend(_WORDS), *_chapters(studies, _WORDS, drawings, "")]
-    names = ", ".join(study.paper for study in studies)
-    return to_html(sections, title=f"Reproduced: {names}", heading=counts_line(studies))
-
-
-def _counts(cells: Sequence[Cell]) -> str:
+def sentence_of_counts(cells: Sequence[Cell]) -> str:
+    """Return how many cells there are of every verdict, as a sentence without its stop."""
     count = verdict_counts(cells)
     return (
         f"{count['independent']} of {len(cells)} printed {_noun(cells)} agree independently, "
@@ -132,7 +124,7 @@ def _counts(cells: Sequence[Cell]) -> str:
     )
 
 
-def _summary(cells: Sequence[Cell]) -> str:
+def summary(cells: Sequence[Cell]) -> str:
     """Return the counts of a table without those that are zero."""
     counts = verdict_counts(cells)
     parts = ", ".join(f"{counts[v]} {_COUNTED[v]}" for v in VERDICTS if counts[v])
@@ -144,24 +136,22 @@ def _noun(cells: Sequence[Cell]) -> str:
 
 
 def _legend(words: Words) -> Iterator[Section]:
-    entries = [(words[verdict], meaning) for verdict, meaning in _MEANING.items()]
-    yield Section("How to read it", [_AGREE, Items(entries), _DEVIATION])
+    entries = [(words[verdict], meaning) for verdict, meaning in MEANING.items()]
+    yield Section("How to read it", [AGREE, Items(entries), DEVIATION])
 
 
-def _chapters(
-    studies: Iterable[Study], words: Words, drawings: Drawings | None, folder: str
-) -> Iterator[Section]:
+def _chapters(studies: Iterable[Study], words: Words, folder: str) -> Iterator[Section]:
     for study in studies:
-        yield Section(study.title, [study.citation, f"{_counts(study.cells)}."])
+        yield Section(study.title, [study.citation, f"{sentence_of_counts(study.cells)}."])
         yield from _remarks("What was taken from where", study.premises)
         for table, cells in _grouped(study.cells).items():
-            title = _heading(table)
-            yield Section(title, list(_page(cells, words)), level=3)
+            title = heading(table)
+            yield Section(title, list(cells_in_words(cells, words)), level=3)
         yield from _remarks("What the re-run shows", study.findings)
         for extra in study.extras:
-            yield Section(extra.title, list(_extra(extra)), level=3)
+            yield Section(extra.title, list(extra_blocks(extra)), level=3)
         if study.figures:
-            found = [_drawing(figure, drawings, folder) for figure in study.figures]
+            found = [_drawing(figure, folder) for figure in study.figures]
             yield Section("Figures", found, level=3)
 
 
@@ -178,7 +168,7 @@ def _remarks(title: str, sentences: Sequence[str]) -> Iterator[Section]:
         yield Section(title, [Items([("", sentence) for sentence in sentences])], level=3)
 
 
-def _page(cells: Sequence[Cell], words: Words) -> Iterator[Block]:
+def cells_in_words(cells: Sequence[Cell], words: Words) -> Iterator[Block]:
     """Return the cells of one table, then every note once."""
     notes = list(dict.fromkeys(cell.note for cell in cells if cell.note))
     marks = {note: f"[{number}]" for number, note in enumerate(notes, 1)}
@@ -201,13 +191,13 @@ def _page(cells: Sequence[Cell], words: Words) -> Iterator[Block]:
     ]
     titles = ["row", "column", *(["unit"] * several), "printed", "ours", "dev. %", "verdict"]
     sides = "ll" + "l" * several + "rrrl"
-    caption = f"{_summary(cells)}{f'; in {units[0]}' if units[0] and not several else ''}."
+    caption = f"{summary(cells)}{f'; in {units[0]}' if units[0] and not several else ''}."
     yield Table(_columns(titles, rows, sides), rows, caption, [cell.verdict for cell in cells])
     if notes:
         yield Items([(marks[note], note) for note in notes], whole=True)
 
 
-def _extra(extra: Extra) -> Iterator[Block]:
+def extra_blocks(extra: Extra) -> Iterator[Block]:
     """Return a table; a column of sentences that the screen has no room for stands below it."""
     columns = list(zip(*extra.rows, strict=True)) or [()] * len(extra.columns)
     figures = (all(not cell or cell[0] in _NUMERIC for cell in cells) for cells in columns[1:])
@@ -254,13 +244,12 @@ def _narrowed(widths: Sequence[int], least: Sequence[int], room: int) -> list[in
     return narrow
 
 
-def _drawing(figure: Figure, drawings: Drawings | None, folder: str) -> Drawing:
-    svg = drawings[figure.name] if drawings is not None else ""
+def _drawing(figure: Figure, folder: str) -> Drawing:
     file = f"{folder}{figure.name}.svg" if folder else ""
-    return Drawing(figure.title, figure.caption, svg, file)
+    return Drawing(figure.title, figure.caption, "", file)
 
 
-def _heading(table: str) -> str:
+def heading(table: str) -> str:
     """Return a heading for a table by the paper's number, or by what the cells are from."""
     if table[:1].isdigit():
         return f"Table {table}"

@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 
 @cache
-def templates(folder: str = "page/assets") -> Environment:
-    """Return the templates of a folder below `femubench.reports`."""
+def templates() -> Environment:
+    """Return the templates of pages."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     room = Environment(
-        loader=PackageLoader("femubench.reports", folder),
+        loader=PackageLoader("femubench.reports", "page/assets"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

@@ -163,9 +163,10 @@ def _comparison_writers() -> Writers:
 
 def _study_writers() -> Writers:
     from femubench.reports import reproduction as page
+    from femubench.reports.reproduction_page import reproduction_html
 
     def html(studies: Sequence[Study]) -> str:
-        return page.reproduction_html(studies, dict(drawings(studies)))
+        return reproduction_html(studies, dict(drawings(studies)))
 
     def data(studies: Sequence[Study]) -> str:
         return json.dumps(cells_to_json(studies), indent=1, ensure_ascii=False, allow_nan=False)

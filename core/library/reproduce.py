@@ -83,11 +83,8 @@ def studies_of(
 
 def write_studies(studies: Sequence[Study], folder: Path) -> tuple[list[str], int]:
     """Write the reports and the figures; return the names of the reports, and how many figures."""
-    from femubench.reports.reproduction import (
-        FIGURES,
-        reproduction_html,
-        reproduction_markdown,
-    )
+    from femubench.reports.reproduction import FIGURES, reproduction_markdown
+    from femubench.reports.reproduction_page import reproduction_html
 
     make_folder(folder / FIGURES)
     drawn = dict(drawings(studies))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from femubench.core.errors import InputError
 from femubench.core.reproduction.ground import FAULTS, Ground, Verdict, weakest
@@ -25,6 +25,7 @@ class Cell:
         note: what an agreement rests on, or why there is none.
         unit: of both; ``%`` for a figure that is a percentage itself.
         tried: number of readings that were tried, of a cell that was found by searching.
+        page: what it was judged by.
     """
 
     paper: str
@@ -37,6 +38,7 @@ class Cell:
     note: str
     unit: str = ""
     tried: int | None = None
+    page: Page | None = field(default=None, repr=False, compare=False)
 
     @property
     def deviation_percent(self) -> float | None:
@@ -108,7 +110,7 @@ class Page:
             deciding, note = self.fault, self.fault.words
         return Cell(
             self.paper, self.table, row, column, printed, ours,
-            deciding.verdict, note, self.unit, deciding.tried,
+            deciding.verdict, note, self.unit, deciding.tried, self,
         )  # fmt: skip
 
     def _meets(self, printed: float, ours: float | None) -> bool:

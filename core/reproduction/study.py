@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from femubench.core.plot.figure import Figure
 from femubench.core.reproduction.cell import Cell
+from femubench.core.reproduction.convention import Convention
+from femubench.core.reproduction.equation import Equation
 from femubench.core.reproduction.ground import VERDICTS, Verdict
+from femubench.core.reproduction.printed_table import PrintedTable
 
 _TOLD = (
     *("paper", "table", "row", "column"),
@@ -46,6 +49,9 @@ class Study:
         findings: what the re-run shows, one sentence each.
         extras: what the paper did not print.
         figures: its figures, and ours.
+        tables: how it prints its tables; cells of others stand by their rows.
+        equations: its equations, and what works by them.
+        conventions: computes what can be read in several ways; no two change the same cell.
     """
 
     paper: str
@@ -56,6 +62,9 @@ class Study:
     findings: tuple[str, ...] = ()
     extras: tuple[Extra, ...] = ()
     figures: tuple[Figure, ...] = ()
+    tables: tuple[PrintedTable, ...] = ()
+    equations: tuple[Equation, ...] = ()
+    conventions: Callable[[], tuple[Convention, ...]] = tuple
 
 
 def verdict_counts(cells: Sequence[Cell]) -> dict[Verdict, int]:

@@ -390,7 +390,7 @@ def physical_family(structure: Structure) -> ElementFamily:
     The matrices that integration gave are kept: with a Timoshenko beam the shear rigidity goes
     with EI, so that the ratio of shear to bending flexibility stays.
 
-    Source: Ahmadian, Gladwell & Ismail (1997), section 4.2.
+    Source: Ahmadian, Gladwell & Ismail (1997), section 4.2 and equation (21).
 
     Examples:
         >>> update.physical_family(structure).names[:2]

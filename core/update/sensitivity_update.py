@@ -268,7 +268,7 @@ def sensitivity_update(
         StrategyFailure: when no measured mode has a partner at the start.
         Diverged: when a parameter leaves the range in which it makes sense.
 
-    Source: Horton, Gurgenci, Veidt & Friswell (1999), equations (1)-(4).
+    Source: Horton, Gurgenci, Veidt & Friswell (1999), equations (1), (2), (3) and (4).
 
     Examples:
         >>> factor = update.global_stiffness(structure)

@@ -6,6 +6,7 @@ import numpy as np
 
 from femubench.papers.frame.changes import change_figures
 from femubench.papers.frame.common import CASE, PAPER, TRUTH, strain_modes
+from femubench.papers.frame.conventions import conventions
 from femubench.papers.frame.counts import count_cells, largest_difference
 from femubench.papers.frame.finding import finding
 from femubench.papers.frame.mass_matrix import mass_cells
@@ -19,8 +20,8 @@ from femubench.papers.frame.predictions import (
 from femubench.papers.frame.readings import convergence, cutoffs, other_readings
 from femubench.papers.frame.receptances import receptance_figures
 from femubench.papers.frame.spaces import spaces_extra
-from femubench.papers.frame.tables import printed_errors, table_cells
-from femubench.papers.printed import printed
+from femubench.papers.frame.tables import layout, printed_errors, table_cells
+from femubench.papers.printed import equations, printed
 from femubench.reproduction import Study, Workbench
 
 
@@ -61,6 +62,9 @@ def study(bench: Workbench) -> Study:
             misprint_table(bench, spaces),
         ),
         figures=(*torsion_figures, *change_figures(bench), *receptance_figures(bench)),
+        tables=layout(),
+        equations=equations(PAPER),
+        conventions=lambda: conventions(bench),
     )
 
 

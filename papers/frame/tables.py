@@ -21,7 +21,7 @@ from femubench.papers.frame.common import (
     strain_modes,
 )
 from femubench.papers.printed import printed
-from femubench.reproduction import Cell, Ground, Page, Workbench
+from femubench.reproduction import Cell, Grid, Ground, Page, PrintedTable, Workbench
 
 _EXACT = 0.1  # percent: of what a method promises to meet, or what follows from the model alone
 _SHAPED = 0.5  # percent: of what depends on shapes that are not the test's
@@ -54,6 +54,26 @@ def table_cells(bench: Workbench) -> tuple[Cell, ...]:
     )
 
 
+def layout() -> tuple[PrintedTable, ...]:
+    """Return table 1 with the measured frequencies; the others print their cells alone."""
+    measured = [f"{value:.1f}" for value in printed(PAPER)["table1"]["measured"]]
+    modes = [f"mode {i}" for i in range(1, 6)]
+    rows = tuple(
+        (m, ((m, "FE model"), f, (m, "error"))) for m, f in zip(modes, measured, strict=True)
+    )
+    return (
+        PrintedTable(
+            "1",
+            "Frequencies of the FE model",
+            (Grid(("", "FE model", "measured", "error, %"), rows),),
+        ),
+        PrintedTable("2", "Updated without an eye on connectivity, or on non-zeros alone", ()),
+        PrintedTable("3", "Updated by factors on elements", ()),
+        PrintedTable("4", "Updated by generic elements", ()),
+        PrintedTable("generalised mass", "Of the five expanded shapes, off the diagonal", ()),
+    )
+
+
 def page(table: str, tolerance: float, ground: Ground, reason: str = "") -> Page:
     """Return a page of frequencies in Hz with one printed digit behind the point."""
     made = Page(PAPER, table, (ground,), "Hz", tolerance, 1)
@@ -71,13 +91,19 @@ def column(
 
 
 def _rigid(where: Page, name: str, values: Sequence[float], ours: FloatArray) -> Cell:
-    """Return the cell of the row of rigid-body modes, which prints one figure a column.
+    """Return the cell of the row of rigid-body modes, which prints one figure a column."""
+    size = rigid_figure(values, ours)
+    return where.cell("rigid-body modes", name, float(values[0]), size)
+
+
+def rigid_figure(values: Sequence[float], ours: FloatArray) -> float | None:
+    """Return our figure of the row of rigid-body modes in Hz; None where there are not three.
 
     Three zero frequencies are as good as the worst of them, of others the paper prints the lowest.
     """
-    free = not any(values)
-    size = float(ours[np.argmax(np.abs(ours))] if free else ours.min())
-    return where.cell("rigid-body modes", name, float(values[0]), size if len(ours) == 3 else None)
+    if len(ours) != 3:
+        return None
+    return float(ours.min() if any(values) else ours[np.argmax(np.abs(ours))])
 
 
 def printed_errors() -> FloatArray:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from femubench.papers.hframe.beyond import compare, extras, held_out_bars
+from femubench.papers.hframe.conventions import conventions
 from femubench.papers.hframe.findings import findings, premises
+from femubench.papers.hframe.layout import layout
 from femubench.papers.hframe.meshes import mesh_cells
 from femubench.papers.hframe.shapes import mac_extra, shape_cells
 from femubench.papers.hframe.updates import update_cells
+from femubench.papers.printed import equations
 from femubench.reproduction import Study, Workbench
 
 
@@ -28,4 +31,7 @@ def study(bench: Workbench) -> Study:
         findings=findings(bench, comparison),
         extras=(*extras(bench, comparison), mac_extra(case)),
         figures=(held_out_bars(bench, comparison),),
+        tables=layout(bench),
+        equations=equations("hframe"),
+        conventions=lambda: conventions(bench),
     )

@@ -4,7 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from femubench.reproduction import Bars, Curve, Curves, Extra, Figure, Ground, Page, Study
+from femubench.plot import Axis, Chart, Series
+from femubench.reproduction import (
+    Bars,
+    Choice,
+    Convention,
+    Curve,
+    Curves,
+    Equation,
+    Extra,
+    Figure,
+    Grid,
+    Ground,
+    Page,
+    PrintedTable,
+    Study,
+)
 
 GIVEN = Ground("input", "a count")
 FREE = Ground("independent", "nothing is chosen for it")
@@ -53,7 +68,24 @@ def study(paper: str = "frame") -> Study:
         findings=("Torsion it is.",),
         extras=(extra,),
         figures=figures(paper),
+        tables=(table(paper),),
+        equations=(Equation("(1)", EVIL, "femubench.modal.mac", "<math><mi>x</mi></math>"),),
+        conventions=lambda: (convention(),),
     )
+
+
+def table(paper: str = "frame") -> PrintedTable:
+    """Return table 1 without its last row, with a column that is no cell, and a chart."""
+    rows = tuple((f"mode {k}", (EVIL, (f"mode {k}", "FE"))) for k in range(1, 6))
+    x, y = Axis("iteration"), Axis("parameter")
+    chart = Chart("line", f"{paper} {EVIL}", x, y, (Series("k", (0, 1, 2), (1.0, 0.5, 0.4)),))
+    return PrintedTable("1", EVIL, (Grid(("", "measured", "FE"), rows),), chart)
+
+
+def convention() -> Convention:
+    """Return another way to read the text, by which mode 4 agrees and mode 3 does not."""
+    other = {("1", "mode 3", "FE"): 560.0, ("1", "mode 4", "FE"): 911.35}
+    return Convention("Shear <b>", "without", (Choice("with | it", other),))
 
 
 def figures(paper: str) -> tuple[Figure, ...]:

@@ -1,0 +1,96 @@
+"""Printed tables, conventions and equations of papers: what they refuse, and what they show."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from femubench import InputError
+from femubench.papers.printed import equations
+from femubench.reproduction import (
+    Choice,
+    Convention,
+    Equation,
+    PrintedTable,
+    as_printed,
+    places_of,
+    under,
+)
+
+sys.path.insert(0, str(Path(__file__).parent / "toys"))
+import reproduction_toys as toys
+
+CELLS = toys.study().cells
+MATH = "<math><mi>x</mi></math>"
+
+
+class TestPrintedTable:
+    def test_what_no_layout_has_follows(self) -> None:
+        first, second = as_printed((toys.table(),), CELLS)
+        assert [table.table for table, _ in (first, second)] == ["1", "4d"]
+        table, own = first
+        placed = [place for grid in table.grids for place in grid.places]
+        assert sorted(placed) == sorted(own)
+        assert table.grids[1].heads == ("", "Kabe")
+
+    def test_no_cells(self) -> None:
+        ((table, own),) = as_printed((PrintedTable("9", "", ()),), ())
+        assert (table.grids, own) == ((), {})
+
+    def test_entries(self) -> None:
+        assert places_of("12.5") == ()
+        assert places_of(("a", "b")) == (("a", "b"),)
+        assert places_of((("a", "b"), ("a", "c"))) == (("a", "b"), ("a", "c"))
+
+
+class TestConvention:
+    def test_cells_are_judged_by_their_own_bars(self) -> None:
+        (choice,) = toys.convention().choices
+        found = under(choice, CELLS)
+        verdicts = {key[1]: cell.verdict for key, cell in found.items()}
+        assert verdicts == {"mode 3": "does-not-follow", "mode 4": "under-convention"}
+        assert found["1", "mode 4", "FE"].note.endswith("; with | it")
+        assert found["1", "mode 3", "FE"].note == "the figures do not agree: with | it"
+
+    def test_what_cannot_be_checked_stays_so(self) -> None:
+        found = under(Choice("x", {("4d", "MAC", "1"): 75.0}, "independent"), CELLS)
+        assert [cell.verdict for cell in found.values()] == ["cannot-be-checked"]
+
+    def test_unknown_cell(self) -> None:
+        with pytest.raises(InputError, match="no judged cell"):
+            under(Choice("x", {("1", "mode 99", "FE"): 1.0}), CELLS)
+
+    def test_nothing_to_see(self) -> None:
+        with pytest.raises(InputError, match="changes nothing"):
+            Convention("x", "y", (Choice("z", {}),))
+
+
+class TestEquation:
+    @pytest.mark.parametrize("paper", ["frame", "hframe"])
+    def test_the_function_cites_its_equation(self, paper: str) -> None:
+        found = equations(paper)
+        assert len(found) >= 5
+        for equation in found:
+            assert equation.number in equation.documentation, equation.function
+            assert equation.summary.endswith(".")
+
+    @pytest.mark.parametrize(
+        "mathml",
+        [
+            "<math><mi>x</math>",
+            "<math><script>alert(1)</script></math>",
+            "<math href='x'><mi>x</mi></math>",
+            "<mi>x</mi>",
+            "<math onclick='x'/>",
+        ],
+    )
+    def test_only_formulas_get_through(self, mathml: str) -> None:
+        with pytest.raises(InputError, match=r"equation \(1\)"):
+            Equation("(1)", "what", "femubench.modal.mac", mathml)
+
+    @pytest.mark.parametrize("function", ["femubench.modal.nothing", "os.getcwd", ""])
+    def test_function_of_ours(self, function: str) -> None:
+        with pytest.raises(InputError, match="no "):
+            Equation("(1)", "what", function, MATH).documentation  # noqa: B018
