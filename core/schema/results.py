@@ -85,8 +85,6 @@ class JobResult(_Stored):
         rigid_body_modes: modes of zero frequency that are rigid-body motions.
         rigid_body_modes_expected: those of the nominal model.
         negative_eigenvalues: of the updated model.
-        surplus_partners: modes of it that could be partners of measured ones beyond those of the
-            nominal model, where they are too many for a prediction; else 0.
         parameter_count: unknowns that were free.
         evaluations: eigenvalue solutions that the strategy made.
         score: how much of the textbook model's error on unseen data is left: geometric mean over
@@ -98,6 +96,8 @@ class JobResult(_Stored):
         provenance: versions, libraries, processor, commit and digests, in plain data.
         nominal: the model that the strategy started from; ``textbook`` too where the model as drawn
             has all that handbooks give.
+        surplus_partners: modes of it that could be partners of measured ones beyond those of the
+            nominal model, where they are too many for a prediction; else 0.
     """
 
     __pydantic_config__: ClassVar = READING
@@ -112,7 +112,6 @@ class JobResult(_Stored):
     rigid_body_modes: Whole | None = None
     rigid_body_modes_expected: Whole | None = None
     negative_eigenvalues: Whole | None = None
-    surplus_partners: Whole | None = None
     parameter_count: Whole | None = None
     evaluations: Whole | None = None
     score: Score | None = None
@@ -124,6 +123,7 @@ class JobResult(_Stored):
     key: Name = ""
     provenance: Mapping[str, Any] = field(default_factory=dict)
     nominal: Nominal = "drawn"
+    surplus_partners: Whole | None = None
 
     if not TYPE_CHECKING:
 
