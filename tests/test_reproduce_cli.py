@@ -107,7 +107,8 @@ class TestPrint:
     def test_html(self, invoke: Invoke, papers: Papers) -> None:
         text = invoke("frame", "-f", "html").stdout
         assert text.startswith("<!DOCTYPE html>")
-        assert f"<h1>{ONE}</h1>" in text
+        assert "<h1>3 of 11 printed figures do not come out again</h1>" in text
+        assert f'<p class="counts">{ONE}.</p>' in text
         assert papers.drawings == ["frame-curve", "frame-bars"]
 
     def test_quiet(self, invoke: Invoke) -> None:
