@@ -285,7 +285,15 @@ class TestDocument:
         assert html.count("<script") == 2
 
     def test_every_asset_of_the_run_page_is_in_it(self) -> None:
-        others = ("compare", "diagnosis", "identification", "site", "publish", "history")
+        others = (
+            "compare",
+            "diagnosis",
+            "identification",
+            "site",
+            "report",
+            "reproduction",
+            "blocks",
+        )
         own = [p.name for p in ASSETS.iterdir() if not p.name.startswith((*others, "vendor"))]
         own += [f"vendor/{p.name}" for p in (ASSETS / "vendor").glob("*.js")]
         assert sorted(own) == sorted([*SCRIPTS, *STYLES, "run.html"])

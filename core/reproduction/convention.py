@@ -60,8 +60,21 @@ def under(choice: Choice, cells: Sequence[Cell]) -> dict[Key, Cell]:
 
     What agrees is worth no more than the choice; what cannot be checked stays so.
 
+    Arguments:
+        choice: with values of ours.
+        cells: of the study.
+
     Raises:
         InputError: for a cell that is not there, or that does not know how it was judged.
+
+    Examples:
+        >>> fit = reproduction.Ground("fitted", "the length is fitted to this frequency")
+        >>> page = reproduction.Page("paper", "1", (fit,), unit="Hz", tolerance=0.1)
+        >>> key = "1", "mode 1", "FE"
+        >>> choice = reproduction.Choice("lumped mass", {key: 300.0})
+        >>> found = reproduction.under(choice, [page.cell("mode 1", "FE", 255.8, 255.83)])
+        >>> found[key].verdict
+        'does-not-follow'
     """
     known = {(cell.table, cell.row, cell.column): cell for cell in cells}
     found = {}

@@ -34,7 +34,15 @@ class Grid:
 
 
 def places_of(entry: Entry) -> tuple[Place, ...]:
-    """Return where the cells of an entry belong: none, one or two."""
+    """Return where the cells of an entry belong: none, one or two.
+
+    Arguments:
+        entry: of a grid.
+
+    Examples:
+        >>> reproduction.places_of((("mode 1", "FE"), ("mode 1", "error")))
+        (('mode 1', 'FE'), ('mode 1', 'error'))
+    """
     if isinstance(entry, str):
         return ()
     return (entry,) if isinstance(entry[0], str) else entry
@@ -73,7 +81,20 @@ def by_rows(cells: Iterable[Cell]) -> Grid:
 def as_printed(
     tables: Sequence[PrintedTable], cells: Sequence[Cell]
 ) -> Iterator[tuple[PrintedTable, dict[Place, Cell]]]:
-    """Yield every table with its cells; those that no layout has follow by their own rows."""
+    """Yield every table with its cells; those that no layout has follow by their own rows.
+
+    Arguments:
+        tables: layouts.
+        cells: of all tables.
+
+    Examples:
+        >>> fit = reproduction.Ground("fitted", "the length is fitted to this frequency")
+        >>> page = reproduction.Page("paper", "1", (fit,), unit="Hz", tolerance=0.1)
+        >>> cell = page.cell("mode 1", "FE", 255.8, 255.83)
+        >>> [(table, own)] = reproduction.as_printed([], [cell])
+        >>> table.grids[0].heads, own["mode 1", "FE"].ours
+        (('', 'FE'), 255.83)
+    """
     left: dict[str, dict[Place, Cell]] = {}
     for cell in cells:
         left.setdefault(cell.table, {})[cell.row, cell.column] = cell
