@@ -124,7 +124,7 @@
   const histories = (state) => {
     const told = twoOf(state).filter((entry) => entry.ok && entry.detail.history.length > 1);
     if (!told.length) return note("No iterations were recorded.");
-    const chart = (title, y, series) => bench.draw({ kind: "line", title, x: { label: "Iteration", unit: "" }, y: { unit: "", ...y }, series, height: 240 });
+    const chart = (title, y, series) => bench.draw({ kind: "line", title, x: { label: "Iteration", unit: "1" }, y: { unit: "", ...y }, series, height: 240 });
     const first = (entry) => entry.detail.history[0];
     const named = (entry) => new Set(entry.detail.parameters.map((item) => item.name));
     const steps = (entry) => entry.detail.history.map((row, i) => row.iteration ?? i);
@@ -137,7 +137,7 @@
     });
     const moving = told.map((entry) => {
       const own = Object.keys(first(entry)).filter((key) => named(entry).has(key) && first(entry)[key]).slice(0, 8);
-      return own.length ? chart(`Parameters of ${entry.name}`, { label: "Value over start", unit: "" }, own.map((key) => ({ name: key, x: steps(entry), y: entry.detail.history.map((row) => row[key] / first(entry)[key]) }))) : null;
+      return own.length ? chart(`Parameters of ${entry.name}`, { label: "Value over start", unit: "1" }, own.map((key) => ({ name: key, x: steps(entry), y: entry.detail.history.map((row) => row[key] / first(entry)[key]) }))) : null;
     });
     return columns(plain, moving);
   };

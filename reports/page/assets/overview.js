@@ -25,7 +25,7 @@
     return bench.draw({
       kind: "interval", title: `Skill of every strategy on ${data.scored_on}`,
       note: `${kind ? `The line is the 95 % interval over ${kind}. ` : ""}0: the ${given}, which no data have changed; 1: no error left.${shown.some((row) => row.unphysical) ? " ▲: unphysical." : ""}${left(rows, shown)}`,
-      x: { label: "skill, part of the error taken away", unit: "", high: 1 },
+      x: { label: "skill, part of the error taken away", unit: "1", high: 1 },
       y: { label: "", unit: "", names: shown.map(name) },
       series: [
         { name: `from the ${given}`, x: shown.map((row) => row.skill), y: shown.map(name), low: shown.map((row) => row.skill_low), high: shown.map((row) => row.skill_high), names: shown.map(name) },
@@ -42,7 +42,7 @@
     return bench.draw({
       kind: "calibration", title: "Are stated uncertainties true?",
       note: `Share of unseen modes inside the interval of each level that a strategy states; over ${d3.extent(shown, (row) => d3.sum(row.stated, (f) => f.modes)).filter((n, k, both) => !k || n > both[0]).join(" to ")} modes, every structure counts alike. On the diagonal: true; below it: too sure; above: too cautious.`,
-      x: { label: "stated level", unit: "", low: 0, high: 1 }, y: { label: "share of unseen modes inside", unit: "", low: 0, high: 1 },
+      x: { label: "stated level", unit: "1", low: 0, high: 1 }, y: { label: "share of unseen modes inside", unit: "1", low: 0, high: 1 },
       series: shown.map((row) => ({ name: row.strategy, x: LEVELS, y: LEVELS.map((level) => ranking.covered(row, level)) })),
       height: 330,
     });
@@ -68,7 +68,7 @@
     return bench.draw({
       kind: "steps", title: "Performance profiles",
       note: `How often is a strategy within a factor τ of the best one? ${bench.plural(problems.length, "problem")}, one a case and block; rms errors with ${offset} % added as in the score. Left edge: how often it is the best; high and left is good.${left(rows, shown)}`,
-      x: { label: "factor τ of the best rms error", unit: "", log: true, low: 1, high: end }, y: { label: "share of problems", unit: "", low: 0, high: 1.02 }, series, height: 360,
+      x: { label: "factor τ of the best rms error", unit: "1", log: true, low: 1, high: end }, y: { label: "share of problems", unit: "1", low: 0, high: 1.02 }, series, height: 360,
     });
   }
 
@@ -82,7 +82,7 @@
     return bench.draw({
       kind: "scatter", title: "Accuracy against cost",
       note: `What is left of the error (1 − skill; 1 = the ${ranking.yardstick}) against wall time, median over the cases. Low and left is good.`,
-      x: { label: "wall time, median over the cases", unit: "s", log: true }, y: { label: "error left", unit: "", log: true }, height: 360,
+      x: { label: "wall time, median over the cases", unit: "s", log: true }, y: { label: "error left", unit: "1", log: true }, height: 360,
       marks: [{ axis: "y", value: 1, label: ranking.yardstick }], series: series.filter((s) => s.x.length),
     });
   }
