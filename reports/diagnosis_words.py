@@ -78,6 +78,8 @@ def adequacy(data: Data) -> tuple[str, str]:
     if p is None:
         return NOTHING, "whether it is noise was not tested"
     said = f"noise alone leaves as much with probability {chance(p)}"
+    if any(row["less_p"] < _LIMIT for row in data.get("scatter") or () if row["warning"]):
+        return "less than noise", f"of the stated size; {said}"
     if p >= _NOISE:
         return "noise", said
     return ("a little more than noise" if p >= _LIMIT else "more than noise"), said

@@ -105,7 +105,9 @@ class TestPage:
 
     def test_scatter_that_cannot_be_is_told_first(self) -> None:
         warning = "What is left of the shapes is far too little."
-        data = data_of() | {"scatter": [{"kind": "shapes", "warning": warning}]}
+        row = {"kind": "shapes", "warning": warning, "less_p": 1e-9}
+        data = data_of() | {"scatter": [row]}
+        assert "What is left less than noise of the stated size" in page_of(data).text
         assert page_of(data).text.index(warning) < page_of(data).text.index("What it gains")
         assert warning in diagnosis_text(data)
 
