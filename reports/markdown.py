@@ -57,8 +57,9 @@ _COLUMNS: dict[str, tuple[str, Callable[[float], str]]] = {
 _FOOTNOTES = (
     "**skill**: 1 - r, where r is the geometric mean over structures, each the mean of its blocks "
     "of unseen data, of (rms + 0.05 %) / (rms of the textbook model + 0.05 %). A job that failed, "
-    "crashed or timed out counts 10 in r, one that is not applicable 1. **from drawn**: the same "
-    "with the start from the models as drawn. **tests**: on tests alone, no computed truths.",
+    "crashed or timed out counts 10 in r, one that is not applicable as the model that it was "
+    "given, which is 1 from the textbook model. **from drawn**: the same with the start from the "
+    "models as drawn. **tests**: on tests alone, no computed truths.",
     "**higher, modified, given**: rms relative frequency error in percent over the higher modes "
     "and those of the structure with a known design change, which no strategy is given, and over "
     "the modes that it was given; median over the cases. A measured mode without partner counts "

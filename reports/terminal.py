@@ -198,7 +198,7 @@ def _notes(run: Run) -> Iterator[str]:
         yield f"Still moving at their last iteration (jobs): {named}."
     for reason, names in spared(run.results).items():
         listed = ", ".join(map(plain, names))
-        yield f"Not applicable, counted with a skill of 0: {listed}: {reason}."
+        yield f"Not applicable, counted as the model that was given: {listed}: {reason}."
 
 
 def _legend(run: Run, board: pd.DataFrame) -> Iterator[str]:
