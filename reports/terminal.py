@@ -205,6 +205,7 @@ def _legend(run: Run, board: pd.DataFrame) -> Iterator[str]:
     yield textwrap.fill(lead(run), WIDTH)
     yield "high, mod., given: rms frequency error of the modes, median over the cases"
     if board["unphysical"].any():
-        yield "!: unphysical (rigid modes lost or negative eigenvalues), below all others"
+        why = "rigid modes lost, negative eigenvalues or surplus partners"
+        yield textwrap.fill(f"!: unphysical ({why}), below all others", WIDTH)
     if (board["ok"] + board["not_applicable"] < board["total"]).any():
         yield "*: some jobs gave no model: ten times the error, left out of the errors shown"

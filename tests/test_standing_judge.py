@@ -169,12 +169,17 @@ def test_a_judge_stands_apart() -> None:
     """No strategy reads its memory, and it holds nothing open but what it is asked through."""
     code = """if True:
     import ctypes, os
-    from femubench.core.run.standing_judge import _stand_apart
-    requests, answer = os.pipe()
-    _stand_apart(requests, answer, os.dup(1))
-    there = sorted(int(name) for name in os.listdir("/proc/self/fd"))
-    print(ctypes.CDLL(None).prctl(3, 0, 0, 0, 0), there[:5] == [0, 1, 2, requests, answer])
-    print(len(there), os.getsid(0) == os.getpid())
+    from multiprocessing.connection import Connection
+    from femubench.core.run import standing_judge
+    ends = [Connection(end) for end in (*os.pipe(), os.dup(1))]
+    kept = sorted(end.fileno() for end in ends[:2])
+    def peak():
+        there = sorted(int(name) for name in os.listdir("/proc/self/fd"))
+        print(ctypes.CDLL(None).prctl(3, 0, 0, 0, 0), there[:5] == [0, 1, 2, *kept])
+        print(len(there), os.getsid(0) == os.getpid(), flush=True)
+        os._exit(0)
+    standing_judge._peak = peak
+    standing_judge.serve(*ends)
     """
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout.split() == ["0", "True", "6", "True"]  # one lists the folder

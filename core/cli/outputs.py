@@ -49,12 +49,16 @@ def finish(
     outputs: dict[Path, Reporter],
     plugins: Plugins,
     store: Store,
+    screen: Reporter | None,
     exhibits: object = None,
 ) -> int:
     """Write the files, then show the ranking and where the files are.
 
     A file that cannot be written keeps nobody from the ranking and the other files.
     Returns the exit code: 1 where some job has no result.
+
+    Arguments:
+        screen: shows the ranking; None shows none.
 
     Raises:
         OutputError: for the last such file, when all else is done.
@@ -76,8 +80,7 @@ def finish(
             if broken is not None:
                 click.echo(f"bench: {broken}", err=True)
             broken = fault
-    if not ctx.params["quiet"]:
-        screen = reporter(plugins, "terminal")
+    if screen is not None:
         click.echo("\n".join(["", text_of(screen, rendered(screen, run)), *written]))
     if broken is not None:
         raise broken

@@ -115,7 +115,7 @@ def run(
         with progress(quiet=quiet) as told:
             how: dict[str, Any] = {"overwrite": overwrite, "resume": resume, "told": told}
             outcome = plan.run(None, kept, executor, **how)
-    code = finish(ctx, outcome, outputs, plugins, kept, kept.exhibits)
+    code = finish(ctx, outcome, outputs, plugins, kept, screen, kept.exhibits)
     return code if old is None else _compare(old, outcome)
 
 

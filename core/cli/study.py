@@ -88,7 +88,7 @@ def study(
                 overwrite=overwrite,
                 told=told,
             )
-    return finish(ctx, found, outputs, plugins, kept)
+    return finish(ctx, found, outputs, plugins, kept, screen)
 
 
 def _title(plan: StudyPlan) -> str:

@@ -10,7 +10,6 @@ import ctypes
 import os
 import pickle
 import resource
-import signal
 import sys
 import threading
 import time
@@ -18,13 +17,12 @@ from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from multiprocessing import connection, get_context
 from typing import Any, Generic
 
 from femubench.core.run.judging import Verdict, run_judge
 from femubench.core.run.limits import MIB, Limits
-from femubench.core.run.worker import LENGTH_BYTES, address_space, end_with_parent, write_all
+from femubench.core.run.worker import LENGTH_BYTES, address_space, stand_alone, write_all
 from femubench.core.run.workers import Ending, Key, Task, end_group, forked, parts_of, progress_of
 
 _MOST_CASES = 20  # that a judge holds
@@ -57,7 +55,9 @@ def serve(
     requests: connection.Connection, answer: connection.Connection, output: connection.Connection
 ) -> None:
     """Judge until nobody asks; the body of a judge's process."""
-    _stand_apart(requests.fileno(), answer.fileno(), output.fileno())
+    stand_alone(output, requests.fileno(), answer.fileno())
+    if sys.platform == "linux":  # strategies run under the same account: its memory has the data
+        ctypes.CDLL(None).prctl(_PR_SET_DUMPABLE, 0)
     cases: dict[bytes, Any] = {}
     first, grown = _peak(), False
     while not grown:
@@ -76,24 +76,6 @@ def serve(
         data = (_IS_DONE if grown else _GOES_ON) + data
         write_all(answer.fileno(), len(data).to_bytes(LENGTH_BYTES, "big") + data)
         del request, verdict, data
-
-
-def _stand_apart(*descriptors: int) -> None:
-    """Share no terminal with anybody; the last of what is left open takes what is printed."""
-    # Ctrl-C goes to the whole foreground group; it is the parent that ends its judges.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.setsid()
-    end_with_parent()
-    if sys.platform == "linux":  # strategies run under the same account: its memory has the data
-        ctypes.CDLL(None).prctl(_PR_SET_DUMPABLE, 0)
-    for stream in (1, 2):
-        os.dup2(descriptors[-1], stream)
-    left = sorted((2, *descriptors[:-1], os.sysconf("SC_OPEN_MAX")))
-    for low, high in pairwise(left):
-        os.closerange(low + 1, high)
-    nothing = os.open(os.devnull, os.O_RDONLY)
-    os.dup2(nothing, 0)
-    os.close(nothing)
 
 
 @contextmanager

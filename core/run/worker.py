@@ -12,6 +12,7 @@ import tempfile
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -76,8 +77,8 @@ def serve(
         walls: of the sandbox; None for none.
     """
     descriptor = answer.fileno()
-    _leave_the_family(output, scratch)
-    _close_all_but(descriptor)
+    stand_alone(output, descriptor)
+    _settle(scratch)
     if walls is not None:
         room = limits.file if limits.memory is None else min(limits.file, limits.memory)
         enter(walls, scratch, room, limits.processes)
@@ -89,35 +90,40 @@ def serve(
     write_all(descriptor, data)
 
 
-def _leave_the_family(output: Connection, scratch: str) -> None:
-    """Become a session of its own that dies with its parent and shares no terminal or folder."""
+def stand_alone(output: Connection, *kept: int) -> None:
+    """Become a session of its own that dies with its parent and shares no terminal with anybody.
+
+    Arguments:
+        output: takes what is printed.
+        kept: descriptors that stay open; of the others whoever writes to one that multiprocessing
+            left open ends the server of all workers.
+    """
     # Ctrl-C goes to the whole foreground group; it is the parent that stops the workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     os.setsid()
     end_with_parent()
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
-    os.close(nothing)
     for stream in (1, 2):
         os.dup2(output.fileno(), stream)
     output.close()
+    # So that a strategy that starts processes of its own gets its own server and tracker.
+    for keeper in (forkserver._forkserver, resource_tracker._resource_tracker):
+        for name in _KEPT:
+            if hasattr(keeper, name):
+                setattr(keeper, name, None)
+    for low, high in pairwise(sorted((2, *kept, os.sysconf("SC_OPEN_MAX")))):
+        os.closerange(low + 1, high)
+
+
+def _settle(scratch: str) -> None:
+    """Work in a folder of its own, and forget how the parent was called."""
     os.chdir(scratch)
     os.environ["TMPDIR"] = tempfile.tempdir = scratch
     # The words of the command line are none of a strategy's business.
     sys.argv = [""]
     # PYTHONWARNINGS and -W of the parent are for the parent.
     sys.warnoptions = []
-
-
-def _close_all_but(descriptor: int) -> None:
-    """Close what multiprocessing left open: whoever writes there ends the server of all workers."""
-    # So that a strategy that starts processes of its own gets its own server and tracker.
-    for keeper in (forkserver._forkserver, resource_tracker._resource_tracker):
-        for name in _KEPT:
-            if hasattr(keeper, name):
-                setattr(keeper, name, None)
-    os.closerange(3, descriptor)
-    os.closerange(descriptor + 1, os.sysconf("SC_OPEN_MAX"))
 
 
 def end_with_parent() -> None:

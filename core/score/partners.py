@@ -6,17 +6,11 @@ wherever that is: which one it is, the measurement says and not the model.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
 from femubench.core.typing import IntArray
-
-# By modification, None for the structure as tested: of every measured mode, how many modes of the
-# model could be its partner, (m,).
-Choices: TypeAlias = Mapping[str | None, IntArray]
 
 # Of two modes of one shape that lie close, sensors do not always tell which is which: results on
 # built-in cases have up to half as many surplus partners as there are measured modes.
@@ -37,7 +31,7 @@ class Surplus:
     reason: str = ""
 
 
-def surplus_partners(found: Choices, expected: Choices) -> Surplus:
+def surplus_partners(found: IntArray, expected: IntArray) -> Surplus:
     """Return possible partners beyond those of the nominal model, where they are too many.
 
     More than two for every three measured modes are, of the structure as tested and of all its
@@ -45,12 +39,10 @@ def surplus_partners(found: Choices, expected: Choices) -> Surplus:
     another one's.
 
     Arguments:
-        found, expected: of the model and of the nominal one.
+        found, expected: how many modes of the model, and of the nominal one, could be the partner
+            of each measured mode, (m,).
     """
-    own, known = (
-        np.concatenate([np.maximum(choices[change], 1) for change in found])
-        for choices in (found, expected)
-    )
+    own, known = np.maximum(found, 1), np.maximum(expected, 1)
     count = int(own.sum() - known.sum())
     if count <= max(_ALWAYS, _MOST * len(own)):
         return Surplus()

@@ -28,7 +28,7 @@ from femubench.core.modal.rigid import rigid_modes_of
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block
 from femubench.core.score.leaderboard import leaderboard
-from femubench.core.score.partners import Choices, surplus_partners
+from femubench.core.score.partners import surplus_partners
 from femubench.core.score.predicted_spread import MORE, Spread
 from femubench.core.score.ranking import TIE, rank_results, score_of
 from femubench.core.typing import FloatArray, IntArray
@@ -58,14 +58,14 @@ class Reference:
         blocks: the errors of the nominal model by block name.
         zero: eigenvalue up to which a mode counts as one of zero frequency, rad^2/s^2.
         rigid: the rigid-body motions that the nominal model leaves free, (n, r).
-        choices: how many of its modes could be the partner of each measured one, by modification;
-            None for the structure as tested.
+        choices: how many of its modes could be the partner of each measured one, of the structure
+            as tested and then of its modifications, (m,).
     """
 
     blocks: Mapping[str, Block]
     zero: float
     rigid: FloatArray
-    choices: Choices
+    choices: IntArray
 
     @property
     def rms_percent(self) -> dict[str, float]:
@@ -310,7 +310,7 @@ def _predict(
 
 def _blocks(
     case: Case, model: Model, modes: Modes, spread: Spread | None = None
-) -> tuple[dict[str, Block], Choices]:
+) -> tuple[dict[str, Block], IntArray]:
     tested = case.measurement.select(chain(case.used, case.held_out))
     own = _predict(model, modes, tested, None, spread)
     shaped = _with_shape(tested)
@@ -326,9 +326,7 @@ def _blocks(
         ),
     }
     blocks = {name: _block(*part) for name, part in parts.items() if part[0]}
-    names = (None, *(change.name for change in changes))
-    choices = [each.choices for each in (own, *modified)]
-    return blocks, dict(zip(names, choices, strict=True))
+    return blocks, np.concatenate([each.choices for each in (own, *modified)])
 
 
 def _with_shape(measurement: Measurement) -> list[bool]:
