@@ -219,11 +219,10 @@ def _columns(titles: Sequence[str], rows: Sequence[Sequence[str]], sides: str) -
 def _narrowed(widths: Sequence[int], least: Sequence[int], room: int) -> list[int]:
     """Return widths of which the largest give way until all fit, or none has room to give."""
     narrow = list(widths)
-    while sum(narrow) > room:
-        free = [place for place, width in enumerate(narrow) if width > least[place]]
-        if not free:
-            break
-        narrow[max(free, key=lambda place: narrow[place])] -= 1
+    for most in range(max(widths), 0, -1):
+        for place, width in enumerate(narrow):
+            if sum(narrow) > room and width == most > least[place]:
+                narrow[place] -= 1
     return narrow
 
 
