@@ -52,9 +52,9 @@ _VERDICTS: dict[Verdict, tuple[str, str, str, str, str]] = {
     "does-not-follow": ("✗", "no", "does not follow", "do not follow",
         "it does not follow from the text under any reading that was tried"),
 }  # fmt: skip
-_SHORT = {verdict: f"{sign} {short}" for verdict, (sign, short, *_) in _VERDICTS.items()}
-WORDS = {verdict: f"{sign} {whole}" for verdict, (sign, _, whole, *_) in _VERDICTS.items()}
-MEANING = {verdict: meaning for verdict, (*_, meaning) in _VERDICTS.items()}
+_SHORT: Words = {verdict: f"{sign} {short}" for verdict, (sign, short, *_) in _VERDICTS.items()}
+WORDS: Words = {verdict: f"{sign} {whole}" for verdict, (sign, _, whole, *_) in _VERDICTS.items()}
+MEANING: Words = {verdict: meaning for verdict, (*_, meaning) in _VERDICTS.items()}
 AGREE = (
     "Two figures agree when ours rounds to the printed one or lies within the tolerance of the "
     "row's kind. Of several grounds the weakest makes the verdict; the note names them all."
