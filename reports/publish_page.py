@@ -29,7 +29,12 @@ def pages_of(index: Data) -> dict[str, str]:
     """
     pages = {board["page"]: _board_page(index, board) for board in index["boards"]}
     pages["leaderboard.csv"] = _csv(
-        {"class": board["class"], **row, **_release(item), "marks": "; ".join(_flags(row))}
+        {
+            "class": board["class"],
+            **row,
+            **_release(item["versions"][0]),
+            "marks": "; ".join(_flags(row)),
+        }
         for board, item, row in _places(index)
     )
     for item in index["strategies"]:
@@ -207,16 +212,15 @@ def _chart(title: str, rows: Sequence[tuple[str, str, Data]]) -> Chart:
     return Chart("interval", title, x, y, tuple(series), marks, note=note)
 
 
-def _release(item: Data) -> dict[str, Any]:
-    return {key: item["versions"][0][key] for key in ("version", "femubench", "last")}
+def _release(version: Data) -> dict[str, Any]:
+    return {key: version[key] for key in ("version", "femubench", "last")}
 
 
 def _lines(item: Data) -> Iterator[dict[str, Any]]:
     """Yield a line a version and case."""
     for version in item["versions"]:
-        told = {key: version[key] for key in ("version", "femubench", "last")}
         for row in version["cases"]:
-            yield {**told, **row, "seeds": " ".join(map(str, row["seeds"]))}
+            yield {**_release(version), **row, "seeds": " ".join(map(str, row["seeds"]))}
 
 
 def _csv(rows: Iterable[Data]) -> str:

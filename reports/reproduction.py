@@ -52,9 +52,9 @@ _VERDICTS: dict[Verdict, tuple[str, str, str, str, str]] = {
     "does-not-follow": ("✗", "no", "does not follow", "do not follow",
         "it does not follow from the text under any reading that was tried"),
 }  # fmt: skip
-_SHORT = {verdict: f"{sign} {short}" for verdict, (sign, short, *_) in _VERDICTS.items()}
-WORDS = {verdict: f"{sign} {whole}" for verdict, (sign, _, whole, *_) in _VERDICTS.items()}
-MEANING = {verdict: meaning for verdict, (*_, meaning) in _VERDICTS.items()}
+_SHORT: Words = {verdict: f"{sign} {short}" for verdict, (sign, short, *_) in _VERDICTS.items()}
+WORDS: Words = {verdict: f"{sign} {whole}" for verdict, (sign, _, whole, *_) in _VERDICTS.items()}
+MEANING: Words = {verdict: meaning for verdict, (*_, meaning) in _VERDICTS.items()}
 AGREE = (
     "Two figures agree when ours rounds to the printed one or lies within the tolerance of the "
     "row's kind. Of several grounds the weakest makes the verdict; the note names them all."
@@ -219,11 +219,10 @@ def _columns(titles: Sequence[str], rows: Sequence[Sequence[str]], sides: str) -
 def _narrowed(widths: Sequence[int], least: Sequence[int], room: int) -> list[int]:
     """Return widths of which the largest give way until all fit, or none has room to give."""
     narrow = list(widths)
-    while sum(narrow) > room:
-        free = [place for place, width in enumerate(narrow) if width > least[place]]
-        if not free:
-            break
-        narrow[max(free, key=lambda place: narrow[place])] -= 1
+    for most in range(max(widths), 0, -1):
+        for place, width in enumerate(narrow):
+            if sum(narrow) > room and width == most > least[place]:
+                narrow[place] -= 1
     return narrow
 
 
