@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from femubench.plot import Axis, Chart, Mark, Series
@@ -37,6 +37,12 @@ _FOREST = (
     "change; the table has the figures."
 )
 _SAYS = {"lost": "lost", "gained": "gained", "other": "changed"}
+_BOARD = (
+    Column("strategy", 22, left=True),
+    Column("jobs", 4),
+    *(Column(name, max(len(name), 6)) for name in _RATIOS),
+    Column("lost", 4),
+)
 _PROOF = (
     Column("strategy", 20, left=True),
     Column("differing", 9),
@@ -112,8 +118,8 @@ def _sections(data: Mapping[str, Any], *, screen: bool = False) -> Iterator[Sect
     yield from _listed("Beyond a threshold", map(_excess, data["excesses"]), screen)
     rows, told = _proofs(data["evidence"]), [] if screen else _drawn(data["evidence"])
     yield Section("Is it more than chance?", [*told, Table(_PROOF, rows), _EVIDENCE])
-    board = _board(data["rows"]) if screen else _ratios(data["rows"])
-    yield Section("Ratios", [board, f"{_LEGEND} {_TELLING}" if screen else _LEGEND])
+    legend = f"{_LEGEND} {_TELLING}" if screen else _LEGEND
+    yield Section("Ratios", [_ratios(data["rows"], screen), legend])
     yield from _listed("Only in A", _jobs(data["only_before"]), screen)
     yield from _listed("Only in B", _jobs(data["only_after"]), screen)
     yield from _listed("Not compared: other case files", _jobs(data["other_cases"]), screen)
@@ -135,38 +141,24 @@ def _drawn(evidence: Sequence[Mapping[str, Any]]) -> list[Block]:
     return [Drawing("B over A", _FOREST, shown)] if shown else []
 
 
-def _ratios(rows: Iterable[Mapping[str, Any]]) -> Table:
-    """Return all ratios, those that got worse or better with an arrow."""
-    names = [Column(name, 0, left=True) for name in ("strategy", "scenario")]
-    figures = [Column(name, 0) for name in ("jobs", *_RATIOS, "lost")]
-    cells = [[plain(row["strategy"]), _scenario(row), *_cells(row, _arrow)] for row in rows]
-    return Table([*names, *figures], cells)
+def _ratios(rows: Iterable[Mapping[str, Any]], screen: bool) -> Table:
+    """Return the ratios, those that got worse or better with an arrow where there is room for it.
 
-
-def _board(rows: Iterable[Mapping[str, Any]]) -> Table:
-    """Return the ratios for the screen, without the scenarios where only times differ."""
-    heads = (("jobs", 4), ("unseen", 6), ("used", 6), ("high.", 6), ("mod.", 6), ("s", 6))
-    columns = [Column("strategy", 26, left=True), *(Column(*head) for head in heads)]
+    The screen leaves out the scenarios where only times differ.
+    """
     cells = []
     for row in rows:
-        tones = [_arrow(name, row["values"][name]) for name in _RATIOS if name != "seconds"]
-        whole = row["scenario"] is None
-        if whole or any(tones) or row["values"]["failures"]:
-            name = plain(row["strategy"]) if whole else 2 * _BLANK + _scenario(row)
-            cells.append([name, *_cells(row, lambda *_: "")])
-    return Table([*columns, Column("lost", 4)], cells)
-
-
-def _cells(row: Mapping[str, Any], sign: Callable[[str, float | None], str]) -> list[str]:
-    values = row["values"]
-    return [
-        str(row["jobs"]),
-        *(
-            fixed(values[name], 2 if name == "seconds" else 3, 6) + sign(name, values[name])
-            for name in _RATIOS
-        ),
-        f"{values['failures']:.0f}",
-    ]
+        name, scenario, values = plain(row["strategy"]), row["scenario"], row["values"]
+        signs = [_arrow(key, values[key]) for key in _RATIOS]
+        if screen and scenario is not None and not (any(signs[:-1]) or values["failures"]):
+            continue
+        if scenario is not None:
+            name = 2 * _BLANK + plain(scenario) if screen else f"{name}, {plain(scenario)}"
+        figures = [fixed(values[key], 2 if key == "seconds" else 3, 6) for key in _RATIOS]
+        if not screen:
+            figures = [text + sign for text, sign in zip(figures, signs, strict=True)]
+        cells.append([name, str(row["jobs"]), *figures, f"{values['failures']:.0f}"])
+    return Table(_BOARD, cells)
 
 
 def _arrow(name: str, ratio: float | None) -> str:
@@ -191,10 +183,6 @@ def _proofs(evidence: Iterable[Mapping[str, Any]]) -> list[list[str]]:
     ]
 
 
-def _scenario(item: Mapping[str, Any], every: str = "all") -> str:
-    return every if item["scenario"] is None else plain(item["scenario"])
-
-
 def _change(item: Mapping[str, Any]) -> str:
     said = f" ({plain(item['reason'])})" if item["reason"] else ""
     job = f"{plain(item['strategy'])}, {plain(item['case'])}, seed {item['seed']}"
@@ -202,7 +190,7 @@ def _change(item: Mapping[str, Any]) -> str:
 
 
 def _excess(item: Mapping[str, Any]) -> str:
-    where = _scenario(item, "all scenarios")
+    where = "all scenarios" if item["scenario"] is None else plain(item["scenario"])
     value = f"{item['value']:.4g} > {item['most']:g}"
     return f"{plain(item['strategy'])}, {where}: {item['metric']} {value}"
 

@@ -27,12 +27,7 @@
     }))];
   };
 
-  /**
-   * Return the table of natural frequencies in Hz; the measured ones and the baseline stay in view.
-   *
-   * entries: [{name, detail, result, mark}]. beside: see rowsOf. options: errors, mac: whether they
-   * stand under every frequency.
-   */
+  /** Return the table of natural frequencies of entries [{name, detail, result, mark}]; measured ones and baseline stay in view. */
   bench.frequencies = (entries, beside, options) => {
     const modes = [...new Map(entries.flatMap(({ detail }) => detail.modes.map((mode) => [keyOf(mode), mode]))).values()];
     const groups = data.blocks.flatMap((block) => d3.groups(modes.filter((mode) => mode.block === block), (mode) => mode.modification ?? "")

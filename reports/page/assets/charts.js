@@ -112,8 +112,6 @@
     const { kind, series } = figure;
     const [joined, bars, interval] = [LINES.has(kind), kind === "bars", kind === "interval"];
     const all = (key) => series.flatMap((s) => s[key] ?? []);
-    const namesOf = (key, must) => ({ ...figure[key], names: figure[key].names ?? (must ? [...new Set(all(key))] : null) });
-    figure = { ...figure, x: namesOf("x", bars), y: namesOf("y", interval) };
     const spread = [...all("low"), ...all("high")];
     const few = joined ? 1 : Math.max(1, Math.floor(all("x").length / 10));
     const pad = kind === "scatter" ? 0.12 : 0.05;
@@ -128,8 +126,9 @@
     const node = framed(width, height, x, y, [
       !x.plain.tickRotate && !figure.x.names && Plot.gridX({ ticks: x.plain.ticks, className: "grid", strokeOpacity: 1 }),
       !figure.y.names && Plot.gridY({ ticks: y.plain.ticks, className: "grid", strokeOpacity: 1 }), Plot.ruleY([base], { className: "axis" }),
-      lines.map(({ axis, value, label }) => (axis === "x" ? [Plot.ruleX([value], { className: "mark" }), Plot.text([label], { x: [value], frameAnchor: "top", textAnchor: "start", dx: 4, dy: -4, className: "tick" })]
-        : [Plot.ruleY([value], { className: "mark" }), Plot.text([label], { y: [value], frameAnchor: "right", textAnchor: "end", dy: -7, className: "tick" })])),
+      lines.map(({ axis, value }) => (axis === "x" ? Plot.ruleX : Plot.ruleY)([value], { className: "mark" })),
+      lines.map(({ axis, value, label }) => Plot.text([label], axis === "y" ? { y: [value], frameAnchor: "right", textAnchor: "end", dy: -7, className: "tick" }
+        : { x: [value], frameAnchor: "top", lineAnchor: "bottom", textAnchor: value > d3.mean(ends.x) ? "end" : "start", dx: value > d3.mean(ends.x) ? -4 : 4, className: "tick" })),
       points.map((row, k) => KINDS[kind](row, styles[k], k, { ...figure, base })),
     ]);
     const [fx, fy] = [node.scale("x").apply, node.scale("y").apply];
@@ -184,7 +183,7 @@
       tall > 15 && room / nx > 34 && Plot.text(cells.filter(({ v }) => v !== null), { x: "i", y: "k", text: ({ v }) => number(v, 2),
         fill: { value: ({ v }) => (d3.lab(shade(v)).l > 60 ? "#000" : "#fff"), scale: null }, className: "in-cell" }),
     ], { color });
-    const bar = Plot.legend({ color, label: named(value), tickFormat: tickText, width: Math.min(280, width), className: "canvas" });
+    const bar = Plot.legend({ color, label: named(value), tickFormat: "~g", width: Math.min(280, width), className: "canvas" });
     bar.querySelector("style").remove();
     const [fx, fy] = [node.scale("x").apply, node.scale("y").apply];
     return { node, bar, points: d3.groups(cells, ({ k }) => k).map(([, row]) => row.map((c) => ({ ...c, px: fx(c.i), py: fy(c.k) }))) };

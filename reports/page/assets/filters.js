@@ -15,7 +15,8 @@
       tell();
     });
     const panel = el("fieldset", { class: "panel" }, el("legend", {}, title), el("div", { class: "row" }, button("All", true), button("None", false)), el("ul", { class: "boxes" }, rows));
-    const node = el("details", { class: "menu", "data-filter": title.toLowerCase(), onkeydown: ({ key }) => {
+    // Of one name: one menu at a time.
+    const node = el("details", { class: "menu", name: "filters", "data-filter": title.toLowerCase(), onkeydown: ({ key }) => {
       if (key !== "Escape" || !node.open) return;
       node.open = false;
       node.firstChild.focus();
@@ -49,10 +50,8 @@
       for (const item of menus) item.reset();
       set(everything);
     }, { id: "reset" });
-    // One menu at a time, and none once the reader has gone elsewhere.
-    const close = (kept) => menus.forEach(({ node }) => node !== kept && !node.contains(kept) && (node.open = false));
-    for (const { node } of menus) node.addEventListener("toggle", () => node.open && close(node));
-    document.addEventListener("pointerdown", ({ target }) => close(target));
+    // None is open once the reader has gone elsewhere.
+    document.addEventListener("pointerdown", ({ target }) => menus.forEach(({ node }) => node.contains(target) || (node.open = false)));
     return el("div", { class: "controls", role: "group", "aria-label": "Filters" }, menus.map(({ node }) => node), el("label", { for: "find" }, "Find a strategy ", search), reset);
   };
 }

@@ -23,24 +23,23 @@
 
   const straight = d3.line().digits(1);
   const smooth = d3.line().curve(d3.curveCardinal).digits(1);
-  const drawn = (...parts) => parts.join("");
   const ring = ([x, y], r) => `M${(x - r).toFixed(1)},${y.toFixed(1)}a${r},${r} 0 1 0 ${2 * r},0a${r},${r} 0 1 0 ${-2 * r},0`;
   const box = ([x, y], r) => `M${(x - r).toFixed(1)},${(y - r).toFixed(1)}h${2 * r}v${2 * r}h${-2 * r}Z`;
-  const cross = ([x, y], r) => drawn(straight([[x - r, y - r], [x + r, y + r]]), straight([[x - r, y + r], [x + r, y - r]]));
+  const cross = ([x, y], r) => straight([[x - r, y - r], [x + r, y + r]]) + straight([[x - r, y + r], [x + r, y - r]]);
   const SIGNS = { spring: ["ring", ring], mass: ["solid", box], fault: ["cross", cross], change: ["solid", ring] };
 
   const zigzag = (from, to) => {
     const [dx, dy] = add(to, from, -1);
     const length = Math.hypot(dx, dy) || 1;
     const side = (share, off) => [from[0] + share * dx - (off * dy) / length, from[1] + share * dy + (off * dx) / length];
-    return drawn(straight([from, ...d3.range(1, 9).map((k) => side(k / 9, k % 2 ? 4 : -4)), to]), straight([side(1, -7), side(1, 7)]));
+    return straight([from, ...d3.range(1, 9).map((k) => side(k / 9, k % 2 ? 4 : -4)), to]) + straight([side(1, -7), side(1, 7)]);
   };
   const arrow = (from, to) => {
     const [dx, dy] = add(to, from, -1);
     const length = Math.hypot(dx, dy);
     const head = Math.min(8, 0.6 * length) / (length || 1);
     const back = (side) => [to[0] - head * (dx - 0.5 * side * dy), to[1] - head * (dy + 0.5 * side * dx)];
-    return drawn(straight([from, to]), length < 2 ? "" : straight([back(1), to, back(-1)]));
+    return straight([from, to]) + (length < 2 ? "" : straight([back(1), to, back(-1)]));
   };
   /** Return the lines of a structure as one path; nodes without elements are dots. */
   const outline = (chains, points) => (chains.length ? chains.map((nodes) => smooth(nodes.map((node) => points[node]))) : points.map((p) => straight([p, p]))).join("");
@@ -202,7 +201,7 @@
     attached(stage.masses, ({ kg }, at) => ["attached", box(at, 5), kg < 1 ? `${Number((1000 * kg).toPrecision(3))} g` : `${Number(kg.toPrecision(3))} kg`, at]);
     for (const { xyz, axis, rotation, label } of stage.sensors) {
       const at = project(xyz);
-      mark("measured", drawn(box(at, 2.5), show.sensors && !rotation ? arrow(at, project(add(xyz, axis, 0.09 * radius))) : ""));
+      mark("measured", box(at, 2.5) + (show.sensors && !rotation ? arrow(at, project(add(xyz, axis, 0.09 * radius))) : ""));
       if (show.sensors) write(label, at, { name: "measured-name" });
     }
     ["x", "y", "z"].forEach((name, k) => {
@@ -233,11 +232,7 @@
     return state;
   };
 
-  /**
-   * Return two strategies' changes as drawings beside each other, on one scale where they are comparable.
-   *
-   * shown: [{name, exhibit}].
-   */
+  /** Return changes of strategies [{name, exhibit}] as drawings, on one scale where they are comparable. */
   bench.findings = (stage, shown) => {
     const all = shown.map(({ exhibit }) => foundIn(stage, exhibit));
     const words = all.map((found) => new Set(found.flatMap(({ label, norm }) => (norm ? ["norm"] : label.split(", ").map((text) => text.split(" ")[0])))));
@@ -269,11 +264,7 @@
     ["attached", "masses, springs, supports"], ["more", "found stiffer or more"], ["less", "found softer or less"], ["ring", "found: a spring"]]
     .map(([kind, text]) => el("li", {}, el("span", { class: `case-key ${kind}`, "aria-hidden": "true" }), text)));
 
-  /**
-   * Show a structure, its mode shapes and what was found on it; returns {pick(name)} to choose the strategy.
-   *
-   * stage: of the case. exhibits: [{name, exhibit, modes}], one a strategy; exhibit may be null.
-   */
+  /** Show a structure, its mode shapes and what strategies [{name, exhibit or null, modes}] found on it; returns {pick(name)}. */
   bench.structure = (root, stage, exhibits) => {
     const shown = exhibits.filter((entry) => entry.exhibit);
     const start = START[stage.plane] ?? START["3d"];
@@ -290,7 +281,7 @@
       if (!size[0]) return;
       const reach = REACH * amplitude * frame.radius * play.phase;
       layers.shape.setAttribute("d", now.shape ? outline(chains, flat.nodes.map((p, i) => add(p, flat.ways[i], reach))) : "");
-      layers.arrows.setAttribute("d", flat.arrows.map(([from, way]) => drawn(arrow(from, add(from, way, reach)), ring(add(from, way, reach), 3.5))).join(""));
+      layers.arrows.setAttribute("d", flat.arrows.map(([from, way]) => arrow(from, add(from, way, reach)) + ring(add(from, way, reach), 3.5)).join(""));
     };
     const draw = () => {
       if (!size[0]) return;
