@@ -42,3 +42,4 @@ function sortable(table) {
   }
   return sort;
 }
+document.querySelectorAll("table.sortable").forEach(sortable);

@@ -8,6 +8,7 @@
   const REACH = 0.22; // of the radius of the structure, a reading of 1 at an amplitude of 1
   const MOST_LABELS = 12; // of findings that are told in words on the drawing
   const MANY = 100; // findings; more are drawn by colours while the view moves
+  const MOST_BENT = 300; // nodes with smooth lines between them; those of more lie close enough
   const LONGEST = 40; // letters beside a place
   const ROBUST = 3; // medians at which colours of changes end
   const BLOCKS = { used: "used", higher: "held out", modified: "modified, held out" };
@@ -42,7 +43,7 @@
     return straight([from, to]) + (length < 2 ? "" : straight([back(1), to, back(-1)]));
   };
   /** Return the lines of a structure as one path; nodes without elements are dots. */
-  const outline = (chains, points) => (chains.length ? chains.map((nodes) => smooth(nodes.map((node) => points[node]))) : points.map((p) => straight([p, p]))).join("");
+  const outline = (chains, points, pen = points.length > MOST_BENT ? straight : smooth) => (chains.length ? chains.map((nodes) => pen(nodes.map((node) => points[node]))) : points.map((p) => straight([p, p]))).join("");
 
   /** Return the nodes of every member in order, as chains to draw smooth lines through. */
   const chainsOf = (stage) => stage.elements.reduce((found, [start, stop], i) => {
