@@ -47,7 +47,8 @@ def pages_of(index: Data) -> dict[str, str]:
         title = plain(item["title"]) or plain(item["name"])
         pages[item["page"]] = _page("case", index, item, title, rows=rows)
     style = asset("page.css") + asset("site.css")
-    return pages | feeds_of(index) | {"site.css": style, "site.js": asset("site.js")}
+    script = asset("sortable.js") + asset("site.js")
+    return pages | feeds_of(index) | {"site.css": style, "site.js": script}
 
 
 def _page(kind: str, index: Data, item: Data, title: str, **parts: Any) -> str:  # noqa: ANN401

@@ -286,8 +286,8 @@ class TestDocument:
 
     def test_every_asset_of_the_run_page_is_in_it(self) -> None:
         others = (
-            "compare",
             "diagnosis",
+            "feed",
             "identification",
             "site",
             "report",
