@@ -68,7 +68,7 @@ sweep: $(VENV)/.installed-test
 	$(BIN)/pytest -m sweep $(ARGS)
 
 fuzz: $(VENV)/.installed-test
-	$(BIN)/pytest tests/test_fuzz.py -m fuzz -s $(ARGS)
+	$(BIN)/pytest tests -m fuzz -s $(ARGS)
 
 # gmsh's wheel wants Debian's libglu1-mesa, libxcursor1, libxft2 and libxinerama1.
 truths: $(VENV)/.installed-truths

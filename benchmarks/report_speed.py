@@ -1,10 +1,11 @@
-"""How large the page of a run is, and how long it takes to open and to sort.
+"""How large the page of a run and a published site are, and how long they take to open and to sort.
 
     python benchmarks/report_speed.py [STORE]
 
 STORE is a store with a run of everything (`bench run`), by default that of `bench report`. Prints
 the size of its page and the time until its leaderboard stands, then for made-up runs of 40
-strategies on 60 cases and 200 on 55 the time to sort. Needs chromium, see CONTRIBUTING.md.
+strategies on 60 cases and 200 on 55 the time to sort; the same of a site of 40 strategies on 60
+cases, with the time to publish it and to filter. Needs chromium, see CONTRIBUTING.md.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import shutil
 import statistics
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 from playwright.sync_api import Browser, Page, sync_playwright
@@ -23,6 +25,7 @@ from femubench.reports.htmls import HtmlReporter
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "toys"))
 from synthetic_run import synthetic_run
+from synthetic_site import synthetic_site
 
 REPEATS = 5
 SIZE, OPENING, SORTING = 8.0, 2.0, 200.0  # MB, s, ms: what is asked for
@@ -53,6 +56,11 @@ def opening(browser: Browser, file: Path) -> float:
 
 def sorting(page: Page, key: str) -> tuple[float, float]:
     """Return milliseconds of processor and of wall time until a click has sorted and laid out."""
+    return timed(page, f"document.querySelector('th[data-key={key}] button').click()")
+
+
+def timed(page: Page, deed: str) -> tuple[float, float]:
+    """Return milliseconds of processor and of wall time until a page is laid out after a deed."""
     session = page.context.new_cdp_session(page)
     session.send("Performance.enable", {"timeDomain": "threadTicks"})
 
@@ -62,16 +70,43 @@ def sorting(page: Page, key: str) -> tuple[float, float]:
 
     before = busy()
     wall = page.evaluate(
-        """(key) => {
+        f"""() => {{
           const start = performance.now();
-          document.querySelector(`th[data-key=${key}] button`).click();
-          document.getElementById("board-table").getBoundingClientRect();
+          {deed};
+          document.querySelector("table").getBoundingClientRect();
           return performance.now() - start;
-        }""",
-        key,
+        }}"""
     )
     page.evaluate("new Promise((done) => requestAnimationFrame(() => setTimeout(done, 50)))")
     return busy() - before, float(wall)
+
+
+def measure_site(browser: Browser, folder: Path) -> None:
+    """Publish a site, then open, sort and filter its first page."""
+    began, wall = time.process_time(), time.perf_counter()
+    site = synthetic_site(folder)
+    began, wall = time.process_time() - began, time.perf_counter() - wall
+    size = sum(path.stat().st_size for path in site.rglob("*") if path.is_file()) / 1e6
+    print(f"site, 40 strategies x 60 cases: {size:.1f} MB, two runs published in {wall:.1f} s")
+    print(f"  of which {began:.1f} s of processor")
+    for kind in ("index.html", "classes/*.html", "strategies/*.html", "cases/*.html"):
+        file, found = min(site.glob(kind)), []
+        for _ in range(REPEATS):
+            page = browser.new_context(viewport={"width": 1440, "height": 900}).new_page()
+            page.goto(file.as_uri())
+            found.append(page.evaluate("performance.getEntriesByType('navigation')[0].duration"))
+            page.context.close()
+        print(f"  {kind}: {file.stat().st_size / 1e3:.0f} kB, opens in {min(found):.0f} ms")
+    page = browser.new_context(viewport={"width": 1440, "height": 900}).new_page()
+    page.goto((site / "index.html").as_uri())
+    page.wait_for_timeout(500)
+    for number in range(0, 14, 3):
+        deed = f"document.querySelectorAll('.filtered thead button')[{number}].click()"
+        print("  sort by column {}: {:.0f} ms of processor, {:.0f} ms in all".format(
+            number + 1, *timed(page, deed)
+        ))  # fmt: skip
+    typed = "filter.value = '01'; filter.dispatchEvent(new Event('input'))"
+    print("  filter: {:.0f} ms of processor, {:.0f} ms in all".format(*timed(page, typed)))
 
 
 def main(store: Path) -> None:
@@ -100,6 +135,7 @@ def main(store: Path) -> None:
             for key in KEYS:
                 processor, wall = sorting(page, key)
                 print(f"  sort by {key}: {processor:.0f} ms of processor, {wall:.0f} ms in all")
+        measure_site(browser, Path(folder, "site"))
         browser.close()
 
 

@@ -35,7 +35,8 @@ def unseen_logs(run: Run, zero: str = "textbook") -> dict[str, dict[str, float]]
     for result in run.results:
         base = unit[result.case]
         if result.status == "not-applicable":
-            own = {name: reference[result.case][name] for name in base}
+            known = {**reference[result.case], **result.start_percent}
+            own = {name: known[name] for name in base}
         elif result.status == "ok":
             own = _errors(result)
         else:

@@ -1,15 +1,17 @@
-"""News of a public leaderboard as a feed: Atom, RFC 4287."""
+"""News of a public leaderboard as feeds: Atom, RFC 4287, and JSON Feed 1.1."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import Any
 from uuid import NAMESPACE_URL, uuid5
-from xml.etree import ElementTree
 
 from femubench.reports.cells import fixed, interval, plain
+from femubench.reports.templating import templates
 
-_ATOM = "http://www.w3.org/2005/Atom"
+TITLE = "femubench leaderboard"
+_ABOUT = ("kind", "strategy", "version", "femubench", "when")
 _SAYS = {"strategy": "New: {}", "version": "New version of {}", "leader": "{} leads"}
 
 
@@ -18,33 +20,36 @@ def headline_of(item: Mapping[str, Any]) -> str:
     return _SAYS[item["kind"]].format(plain(item["strategy"]) or "a strategy without name")
 
 
-def feed_of(index: Mapping[str, Any]) -> str:
-    """Return the document; all time stamps in it are those of the runs.
+def feeds_of(index: Mapping[str, Any]) -> dict[str, str]:
+    """Return the feeds by file name; all time stamps in them are those of the runs.
 
-    Links are relative to it, as the address of the site is not known; the names of feed and entries
-    are made of what they are about.
+    Without the address of the site there is Atom alone, with links relative to itself: JSON Feed
+    has no such links. The names of feed and entries are made of what they are about.
 
     Arguments:
         index: the content of ``index.json``.
     """
-    feed = ElementTree.Element("feed", xmlns=_ATOM)
-    _add(feed, "id", _name("feed", index["runs"][0]["run"]))
-    _add(feed, "title", "femubench leaderboard")
-    _add(feed, "updated", index["runs"][-1]["started"])
-    _add(_add(feed, "author"), "name", "bench publish")
-    _add(feed, "link", rel="self", type="application/atom+xml", href="feed.xml")
-    _add(feed, "link", rel="alternate", type="text/html", href="index.html")
-    for item in index["news"]:
-        entry = _add(feed, "entry")
-        about = (item[key] for key in ("kind", "strategy", "version", "femubench", "when"))
-        _add(entry, "id", _name(*about))
-        _add(entry, "title", headline_of(item))
-        _add(entry, "updated", item["when"])
-        _add(entry, "link", rel="alternate", type="text/html", href=item["page"])
-        _add(entry, "content", _told(item), type="text")
-    ElementTree.indent(feed)
-    text = ElementTree.tostring(feed, encoding="unicode")
-    return f'<?xml version="1.0" encoding="utf-8"?>\n{text}\n'
+    home, name = index["address"], _name("feed", index["runs"][0]["run"])
+    items = [
+        {
+            "id": _name(*(item[key] for key in _ABOUT)),
+            "url": home + item["page"],
+            "title": headline_of(item),
+            "content_text": _told(item),
+            "date_published": item["when"],
+        }
+        for item in index["news"]
+    ]
+    atom = templates().get_template("feed.xml").render(
+        home=home, name=name, title=TITLE, updated=index["runs"][-1]["started"], items=items
+    )  # fmt: skip
+    if not home:
+        return {"feed.xml": atom}
+    feed = {
+        "version": "https://jsonfeed.org/version/1.1", "title": TITLE, "language": "en",
+        "home_page_url": f"{home}index.html", "feed_url": f"{home}feed.json", "items": items,
+    }  # fmt: skip
+    return {"feed.xml": atom, "feed.json": json.dumps(feed, indent=1) + "\n"}
 
 
 def _told(item: Mapping[str, Any]) -> str:
@@ -54,14 +59,6 @@ def _told(item: Mapping[str, Any]) -> str:
         return f"{told}no result on today's files of the cases."
     sure = "" if item["low"] is None else f" (95 %: {interval(item['low'], item['high'])})"
     return f"{told}skill {fixed(item['skill'], 3, 7)}{sure} on today's cases."
-
-
-def _add(
-    parent: ElementTree.Element, tag: str, text: str | None = None, **attributes: str
-) -> ElementTree.Element:
-    child = ElementTree.SubElement(parent, tag, attributes)
-    child.text = text
-    return child
 
 
 def _name(*parts: str) -> str:

@@ -30,52 +30,29 @@ from femubench.reproduction import (
 Words = Mapping[Verdict, str]
 
 FIGURES = "figures"
-# Short words for the screen, whole ones for documents; a mark tells them apart without colour.
-_SHORT: dict[Verdict, str] = {
-    "independent": "✓ yes",
-    "under-convention": "≈ if",
-    "searched": "? tried",
-    "fitted": "~ fitted",
-    "input": "= input",
-    "cannot-be-checked": "· unseen",
-    "misprint": "! misprint",
-    "does-not-follow": "✗ no",
-}
-WORDS: dict[Verdict, str] = {
-    "independent": "✓ independent",
-    "under-convention": "≈ under a convention",
-    "searched": "? searched",
-    "fitted": "~ fitted",
-    "input": "= input",
-    "cannot-be-checked": "· cannot be checked",
-    "misprint": "! misprint",
-    "does-not-follow": "✗ does not follow",
-}
-MEANING: dict[Verdict, str] = {
-    "independent": "the figures agree, and nothing was chosen for it",
-    "under-convention": "they agree under a convention that the text does not state, or states "
-    "otherwise",
-    "searched": "they agree under a reading that was found by trying; the note says how many were "
-    "tried",
-    "fitted": "they agree after something was fitted to this figure or to its like",
-    "input": "a count, a definition or a figure that the paper was given: its agreement shows "
-    "nothing but care in copying",
-    "cannot-be-checked": "needs mode shapes that are not in print: ours stands beside it for "
-    "comparison alone",
-    "misprint": "other printed figures of the same paper contradict it",
-    "does-not-follow": "it does not follow from the text under any reading that was tried",
-}
-# What a sentence says of a number of cells, and a caption of those of one table.
-_COUNTED: dict[Verdict, str] = {
-    "independent": "independent",
-    "under-convention": "under a convention",
-    "searched": "searched",
-    "fitted": "fitted",
-    "input": "input",
-    "cannot-be-checked": "cannot be checked",
-    "misprint": "misprinted",
-    "does-not-follow": "do not follow",
-}
+# A mark that tells it apart without colour; a short word for the screen and a whole one; what a
+# sentence says of a number of cells; what it means.
+_VERDICTS: dict[Verdict, tuple[str, str, str, str, str]] = {
+    "independent": ("✓", "yes", "independent", "independent",
+        "the figures agree, and nothing was chosen for it"),
+    "under-convention": ("≈", "if", "under a convention", "under a convention",
+        "they agree under a convention that the text does not state, or states otherwise"),
+    "searched": ("?", "tried", "searched", "searched", "they agree under a reading that was found "
+        "by trying; the note says how many were tried"),
+    "fitted": ("~", "fitted", "fitted", "fitted",
+        "they agree after something was fitted to this figure or to its like"),
+    "input": ("=", "input", "input", "input", "a count, a definition or a figure that the paper "
+        "was given: its agreement shows nothing but care in copying"),
+    "cannot-be-checked": ("·", "unseen", "cannot be checked", "cannot be checked",
+        "needs mode shapes that are not in print: ours stands beside it for comparison alone"),
+    "misprint": ("!", "misprint", "misprint", "misprinted",
+        "other printed figures of the same paper contradict it"),
+    "does-not-follow": ("✗", "no", "does not follow", "do not follow",
+        "it does not follow from the text under any reading that was tried"),
+}  # fmt: skip
+_SHORT = {verdict: f"{sign} {short}" for verdict, (sign, short, *_) in _VERDICTS.items()}
+WORDS = {verdict: f"{sign} {whole}" for verdict, (sign, _, whole, *_) in _VERDICTS.items()}
+MEANING = {verdict: meaning for verdict, (*_, meaning) in _VERDICTS.items()}
 AGREE = (
     "Two figures agree when ours rounds to the printed one or lies within the tolerance of the "
     "row's kind. Of several grounds the weakest makes the verdict; the note names them all."
@@ -125,7 +102,7 @@ def sentence_of_counts(cells: Sequence[Cell]) -> str:
 def summary(cells: Sequence[Cell]) -> str:
     """Return the counts of a table without those that are zero."""
     counts = verdict_counts(cells)
-    parts = ", ".join(f"{counts[v]} {_COUNTED[v]}" for v in VERDICTS if counts[v])
+    parts = ", ".join(f"{counts[v]} {_VERDICTS[v][3]}" for v in VERDICTS if counts[v])
     return f"{len(cells)} {_noun(cells)}: {parts}"
 
 
@@ -170,10 +147,8 @@ def cells_in_words(cells: Sequence[Cell], words: Words) -> Iterator[Block]:
     """Return the cells of one table, then every note once."""
     notes = list(dict.fromkeys(cell.note for cell in cells if cell.note))
     marks = {note: f"[{number}]" for number, note in enumerate(notes, 1)}
-    units = list(dict.fromkeys(cell.unit for cell in cells))
-    digits = {
-        unit: Digits.of(cell.printed for cell in cells if cell.unit == unit) for unit in units
-    }
+    digits = digits_of(cells)
+    units = list(digits)
     several = len(units) > 1  # then they have a column
     rows = [
         [
@@ -193,6 +168,14 @@ def cells_in_words(cells: Sequence[Cell], words: Words) -> Iterator[Block]:
     yield Table(_columns(titles, rows, sides), rows, caption, [cell.verdict for cell in cells])
     if notes:
         yield Items([(marks[note], note) for note in notes], whole=True)
+
+
+def digits_of(cells: Iterable[Cell]) -> dict[str, Digits]:
+    """Return how the figures of one table are written, by unit."""
+    printed: dict[str, list[float]] = {}
+    for cell in cells:
+        printed.setdefault(cell.unit, []).append(cell.printed)
+    return {unit: Digits.of(figures) for unit, figures in printed.items()}
 
 
 def extra_blocks(extra: Extra) -> Iterator[Block]:

@@ -6,9 +6,10 @@ Nothing runs in it: what is chosen among conventions is shown by the style sheet
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import count
+from typing import NamedTuple
 
 from markupsafe import Markup
 
@@ -20,7 +21,7 @@ from femubench.reports.reproduction import (
     MEANING,
     WORDS,
     cells_in_words,
-    counts_line,
+    digits_of,
     extra_blocks,
     heading,
     sentence_of_counts,
@@ -32,17 +33,17 @@ from femubench.reproduction import (
     VERDICTS,
     Cell,
     Convention,
-    Entry,
     Figure,
     PrintedTable,
     StructureMap,
     Study,
+    Verdict,
     as_printed,
     places_of,
     under,
 )
 
-_FAULTS = ("misprint", "does-not-follow")
+_FAULTS: tuple[Verdict, ...] = ("misprint", "does-not-follow")
 # Colours of drawings, and the names by which the style sheet has them by day and by night.
 _INKS = {
     "#000000": "ink", "#1b1b1b": "ink", "#565656": "soft", "#ffffff": "panel", "#cccccc": "line",
@@ -58,185 +59,155 @@ def reproduction_html(studies: Sequence[Study], drawings: Mapping[str, str]) -> 
         drawings: SVG of every figure by its name.
     """
     numbers = count(1)
-    page = templates().get_template("reproduction.html")
-    papers = [_Paper(study, numbers) for study in studies]
-    return page.render(
+    papers = [_Paper(study, *_worked_through(study, numbers)) for study in studies]
+    offers = [offer for paper in papers for offer in paper.offers]
+    return templates().get_template("reproduction.html").render(
         papers=papers,
-        counts=counts_line(studies),
-        choices=[key for paper in papers for key in paper.keys],
-        words=WORDS, meaning=MEANING, reading=(AGREE, DEVIATION), verdicts=VERDICTS,
+        cells=[cell for study in studies for cell in study.cells],
+        offers=offers,
+        options=[one for offer in offers for one in offer.options[1:]],
+        words=WORDS, meaning=MEANING, reading=(AGREE, DEVIATION), verdicts=VERDICTS, faults=_FAULTS,
         drawings={f.name: _shown(f, drawings[f.name]) for s in studies for f in s.figures},
-        embedded=embedded, drawing=drawing, extra_blocks=extra_blocks,
+        cells_in_words=cells_in_words, digits_of=digits_of, drawing=drawing, embedded=embedded,
+        extra_blocks=extra_blocks, heading=heading, off=off, places_of=places_of,
+        sentence=sentence_of_counts, summary=summary, tally=_tally,
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class _Reading:
-    """A cell as one convention has it; `key`: of the choice, empty for the verdict's own."""
-
-    cell: Cell
-    digits: Digits
-    key: str = ""
-    judged: str = ""
-
-    @property
-    def classes(self) -> str:
-        return f"other {self.key}" if self.key else self.judged
-
-    @property
-    def sign(self) -> str:
-        return WORDS[self.cell.verdict][0]
-
-    @property
-    def words(self) -> str:
-        return WORDS[self.cell.verdict][2:]
-
-    @property
-    def printed(self) -> str:
-        return self.digits.printed(self.cell.printed, self.cell.unit)
-
-    @property
-    def ours(self) -> str:
-        return self.digits.ours(self.cell.ours, self.cell.unit, beside=self.cell.printed)
-
-    @property
-    def off(self) -> str:
-        return off(self.cell.deviation_percent, self.cell.unit)
-
-    @property
-    def place(self) -> str:
-        return f"{self.cell.row}, {self.cell.column}"
-
-    @property
-    def label(self) -> str:
-        return f"{heading(self.cell.table)}, {self.place}: {self.words}"
+Key = tuple[str, str, str]  # table, row and column of a cell
 
 
-@dataclass(frozen=True)
-class _Spot:
-    """Where a cell stands on the page, and what it says there."""
+class _Change(NamedTuple):
+    """How many cells more a table has of a verdict, and the variable of the style for it."""
+
+    variable: str
+    table: str
+    verdict: Verdict
+    more: int
+
+
+class _Option(NamedTuple):
+    """A way to read a text, and the cells that it is about."""
+
+    key: str
+    label: str
+    agreeing: str
+    cells: Mapping[Key, Cell]
+    changes: Sequence[_Change]
+
+
+class _Offer(NamedTuple):
+    """A convention and what can be chosen, that which was judged first."""
+
+    name: str
+    convention: Convention
+    table: str
+    options: Sequence[_Option]
+
+
+class _Spot(NamedTuple):
+    """A cell on the page: as judged, and by the key of every other option."""
 
     id: str
-    readings: tuple[_Reading, ...]
+    cell: Cell
+    others: Sequence[tuple[str, Cell]]
 
 
-# Name, and what can be chosen: key, label, how many cells agree then.
-_Offer = tuple[str, Convention, tuple[tuple[str, str, str], ...]]
-
-
-@dataclass(frozen=True)
-class _Table:
+class _Table(NamedTuple):
     """A printed table with its spots by row and column, and conventions that begin in it."""
 
+    id: str
     printed: PrintedTable
+    cells: Sequence[Cell]
+    digits: Mapping[str, Digits]
     spots: Mapping[tuple[str, str], _Spot]
-    conventions: Sequence[_Offer]
-
-    @property
-    def cells(self) -> list[Cell]:
-        return [spot.readings[0].cell for spot in self.spots.values()]
-
-    @property
-    def heading(self) -> str:
-        return heading(self.printed.table)
-
-    @property
-    def id(self) -> str:
-        return next(iter(self.spots.values())).id.replace("c", "t")
-
-    @property
-    def summary(self) -> str:
-        return summary(self.cells)
-
-    @property
-    def wrong(self) -> int:
-        return _wrong(self.cells)
-
-    @property
-    def in_words(self) -> list[object]:
-        return list(cells_in_words(self.cells, WORDS))
-
-    def at(self, entry: Entry) -> list[_Spot]:
-        return [self.spots[place] for place in places_of(entry) if place in self.spots]
+    offers: Sequence[_Offer]
 
 
-@dataclass(frozen=True)
-class _Paper:
-    """A study as the page has it; `numbers`: of cells and conventions, unique in the page."""
-
+class _Paper(NamedTuple):
     study: Study
-    numbers: Iterator[int]
-    tables: list[_Table] = field(init=False)
-    keys: list[tuple[str, str]] = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Number cells and conventions, and judge the cells under each of these."""
-        object.__setattr__(self, "keys", [])
-        object.__setattr__(self, "tables", list(self._tables()))
-
-    @property
-    def sentence(self) -> str:
-        return sentence_of_counts(self.study.cells)
-
-    @property
-    def wrong(self) -> int:
-        return _wrong(self.study.cells)
-
-    @property
-    def size(self) -> int:
-        return len(self.study.cells)
-
-    def _tables(self) -> Iterator[_Table]:
-        others, begun = self._others()
-        for printed, cells in as_printed(self.study.tables, self.study.cells):
-            if cells:
-                yield _Table(printed, self._spots(cells, others), begun.get(printed.table, ()))
-
-    def _spots(
-        self, cells: Mapping[tuple[str, str], Cell], others: Mapping[object, list[tuple[str, Cell]]]
-    ) -> dict[tuple[str, str], _Spot]:
-        digits = {
-            unit: Digits.of(cell.printed for cell in cells.values() if cell.unit == unit)
-            for unit in {cell.unit for cell in cells.values()}
-        }
-        found = {}
-        for place, cell in cells.items():
-            more = others.get((cell.table, *place), [])
-            judged = f"judged {more[0][0].partition('-')[0]}" if more else ""
-            own = digits[cell.unit]
-            readings = _Reading(cell, own, "", judged), *(_Reading(c, own, k) for k, c in more)
-            found[place] = _Spot(f"c{next(self.numbers)}", readings)
-        return found
-
-    def _others(self) -> tuple[dict[object, list[tuple[str, Cell]]], dict[str, list[_Offer]]]:
-        """Return the cells under every choice, and the conventions by their first table."""
-        others: dict[object, list[tuple[str, Cell]]] = {}
-        begun: dict[str, list[_Offer]] = {}
-        for convention in self.study.conventions():
-            name = f"v{next(self.numbers)}"
-            own = [c for c in self.study.cells if (c.table, c.row, c.column) in convention.keys]
-            options = [(f"{name}-0", convention.judged, _agreeing(own, convention, own))]
-            for rank, choice in enumerate(convention.choices, 1):
-                key, found = f"{name}-{rank}", under(choice, self.study.cells)
-                self.keys.append((name, key))
-                for cell in own:
-                    place = cell.table, cell.row, cell.column
-                    others.setdefault(place, []).append((key, found.get(place, cell)))
-                read = [found.get((c.table, c.row, c.column), c) for c in own]
-                options.append((key, choice.label, _agreeing(read, convention, own)))
-            begun.setdefault(own[0].table, []).append((name, convention, tuple(options)))
-        return others, begun
+    tables: Sequence[_Table]
+    offers: Sequence[_Offer]
 
 
-def _wrong(cells: Sequence[Cell]) -> int:
-    return sum(cell.verdict in _FAULTS for cell in cells)
+def _worked_through(study: Study, numbers: Iterator[int]) -> tuple[list[_Table], list[_Offer]]:
+    """Return the tables of a study and what can be chosen in them.
+
+    Arguments:
+        numbers: of tables, cells and conventions, unique in the page.
+    """
+    cells = {(cell.table, cell.row, cell.column): cell for cell in study.cells}
+    offers = [_offer(one, cells, f"v{next(numbers)}") for one in study.conventions()]
+    others = [one for offer in offers for one in offer.options[1:]]
+    tables = []
+    for printed, found in as_printed(study.tables, study.cells):
+        spots = {}
+        for place, cell in found.items():
+            key = (cell.table, *place)
+            changed = [(one.key, one.cells[key]) for one in others if key in one.cells]
+            spots[place] = _Spot(f"c{next(numbers)}", cell, changed)
+        begun = [offer for offer in offers if offer.table == printed.table]
+        if own := list(found.values()):
+            name = f"t{next(numbers)}"
+            tables.append(_Table(name, printed, own, digits_of(own), spots, begun))
+    return tables, offers
 
 
-def _agreeing(cells: Sequence[Cell], convention: Convention, own: Sequence[Cell]) -> str:
-    unseen = sum(cell.verdict == "cannot-be-checked" for cell in cells)
-    if unseen == len(own):
-        return f"{len(own)} cells, none of which can be checked"
-    return f"{len(cells) - _wrong(cells) - unseen} of {len(convention.keys)} cells agree"
+def _offer(convention: Convention, cells: Mapping[Key, Cell], name: str) -> _Offer:
+    """Return a convention with the cells that any of its choices changes, under each of them."""
+    own = {key: cell for key, cell in cells.items() if key in convention.keys}
+    before = Counter((cell.table, cell.verdict) for cell in own.values())
+    read: list[tuple[str, Mapping[Key, Cell]]] = [(convention.judged, {})]
+    read += [(choice.label, under(choice, list(cells.values()))) for choice in convention.choices]
+    options = []
+    for rank, (label, changed) in enumerate(read):
+        found = {key: changed.get(key, cell) for key, cell in own.items()}
+        more = Counter((cell.table, cell.verdict) for cell in found.values())
+        more.subtract(before)
+        changes = [
+            _Change(re.sub(r"\W", "-", f"--{name}-{table}-{verdict}"), table, verdict, number)
+            for (table, verdict), number in more.items()
+            if number
+        ]
+        options.append(_Option(f"{name}-{rank}", label, _agreeing(found.values()), found, changes))
+    return _Offer(name, convention, next(iter(own.values())).table, options)
+
+
+def _agreeing(cells: Iterable[Cell]) -> str:
+    verdicts = [cell.verdict for cell in cells]
+    unseen = verdicts.count("cannot-be-checked")
+    if unseen == len(verdicts):
+        return f"{unseen} cells, none of which can be checked"
+    wrong = sum(map(verdicts.count, _FAULTS))
+    return f"{len(verdicts) - wrong - unseen} of {len(verdicts)} cells agree"
+
+
+def _tally(
+    cells: Sequence[Cell],
+    offers: Iterable[_Offer],
+    verdicts: Sequence[Verdict] = _FAULTS,
+    table: str | None = None,
+) -> Markup:
+    """Return how many cells have one of some verdicts, which follows what is chosen.
+
+    Arguments:
+        cells: as judged.
+        offers: that change some of them.
+        table: the only one that counts; None: all.
+    """
+    judged = sum(cell.verdict in verdicts for cell in cells)
+    variables = {
+        change.variable
+        for offer in offers
+        for option in offer.options
+        for change in option.changes
+        if change.verdict in verdicts and table in (None, change.table)
+    }
+    if not variables:
+        return Markup(judged)
+    total = " + ".join([str(judged), *(f"var({name}, 0)" for name in sorted(variables))])
+    shown = '<span class="tally" style="counter-reset: n calc({})"><span>{}</span></span>'
+    return Markup(shown).format(total, judged)
 
 
 def _shown(figure: Figure, svg: str) -> Markup:

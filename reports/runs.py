@@ -76,7 +76,7 @@ _LEGEND = {
 _SKILL = (
     "1 - r, where r is the geometric mean over structures, each the mean of its blocks of unseen "
     "data, of (rms + 0.05 %) / (rms of the textbook model + 0.05 %). A job that failed, crashed or "
-    "timed out counts 10 in r, one that is not applicable 1"
+    "timed out counts 10 in r, one that is not applicable as the model that it was given"
 )
 
 
@@ -199,7 +199,7 @@ def _notes(run: Run) -> Iterator[str]:
     yield from _moving(run)
     for reason, names in spared(run.results).items():
         named = ", ".join(map(plain, names))
-        yield f"Not applicable, counted with a skill of 0: {named}: {reason}."
+        yield f"Not applicable, counted as the model that was given: {named}: {reason}."
 
 
 def _moving(run: Run) -> Iterator[str]:

@@ -126,7 +126,7 @@ def _cells(cells: Sequence[dict[Any, Any]]) -> Iterator[Block]:
         ]
         for row in cells
     ]
-    yield Table(heads, rows, most=_MOST_ON_SCREEN, sortable=True)
+    yield Table(heads, rows, most=_MOST_ON_SCREEN)
     if not lost:
         yield "No job failed or is missing."
 

@@ -16,20 +16,27 @@ _PICTURE = "data:image/png;base64,"  # how a matrix image lies in a drawing
 # What can run, what can hold anything, and what no reader sees.
 _REFUSED = frozenset({"script", "foreignObject", "metadata"})
 _ID_LISTS = ("aria-labelledby", "aria-describedby")
+_NARROW = 3.7  # in, of a telephone
 _REFERENCE = re.compile(r"url\(\s*['\"]?([^'\")]*)['\"]?\s*\)")
 
 
 def drawing(chart: Chart, caption: str) -> Markup | None:
     """Return a chart for the middle of a page, in the colours of its style sheet.
 
+    It is drawn twice, ``broad`` and ``narrow``; the style sheet shows what the screen has room for.
+
     Arguments:
         caption: what one sees in it, for who cannot see it.
     """
     if not any(series.x for series in chart.series):
         return None
-    name = re.sub(r"\W+", "-", chart.title)
-    named = partial(svg, name=name, title=chart.title, caption=caption)
-    return Markup(named(chart.draw, size=chart.size, themed=True))
+    name, (broad, height) = re.sub(r"\W+", "-", chart.title), chart.size
+    named = partial(svg, chart.draw, title=chart.title, caption=caption, themed=True)
+    drawn = (
+        f'<div class="{look}">{named(name=f"{name}-{look}", size=(width, height))}</div>'
+        for look, width in (("broad", broad), ("narrow", _NARROW))
+    )
+    return Markup("".join(drawn))
 
 
 def embedded(svg: str, prefix: str, label: str) -> Markup:

@@ -26,6 +26,7 @@ ROOMS = (
         "gauss_newton",
         "files",
         "display",
+        "pace",
         "roles",
         "schema",
     ),

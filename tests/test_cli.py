@@ -23,6 +23,7 @@ from femubench.core.cli.main import VERBS, bench
 from femubench.core.cli.quantities import bytes_of, spoken, timeouts_of
 from femubench.core.errors import OutputError
 from femubench.core.files import write_atomically
+from femubench.core.pace import Advance
 from femubench.core.run.store import Store
 
 CASE = """\
@@ -672,24 +673,17 @@ def test_no_sizes(text: str) -> None:
 
 
 def test_progress_only_where_someone_watches(monkeypatch: pytest.MonkeyPatch) -> None:
-    from femubench.results import JobResult
-
-    with progress.progress_bar() as report:
-        assert report is None
+    with progress.progress() as told:
+        assert told is None
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    with progress.progress_bar(quiet=True) as report:
-        assert report is None
+    with progress.progress(quiet=True) as told:
+        assert told is None
     with progress.waiting("looking"), progress.waiting("not", quiet=True):
         pass
-    with progress.time_left("looking", quiet=True) as told:
-        assert told is None
-    with progress.time_left("looking") as told:
+    with progress.progress("[red]case") as told:
         assert told is not None
-        told(0, 0)
-        told(1, 2)
-    with progress.progress_bar() as report:
-        assert report is not None
-        report(JobResult("[red]case", "strategy", 0, "ok"), 1, 2)
+        told(Advance(0, 0))
+        told(Advance(1, 2, "[red]strategy", 3.0, 1.0))
 
 
 def test_files_are_replaced_in_one_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

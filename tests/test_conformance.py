@@ -145,6 +145,26 @@ def test_a_strategy_that_ends_or_blocks_its_process_leaves_the_checker_alone(
         assert found["symmetric"].status == "not-applicable"
 
 
+@pytest.mark.parametrize("toy", toys.FORGED, ids=lambda toy: toy.__name__)
+def test_a_strategy_that_changes_the_checks_in_its_process_changes_no_verdict(
+    toy: type[Strategy],
+) -> None:
+    (check,) = (check for check in checks_of("strategy") if check.name == toys.FORGED[toy])
+    found = kit.judged(check, Bench(toy()))
+    assert found.status == "fail", found
+    assert "\n" not in found.message
+
+
+@pytest.mark.parametrize("told", [b"", b"null", b"{}", b'["splendid", ""]', b"[" * 9999, b"\xff"])
+def test_a_verdict_that_is_none_is_a_failure(told: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run_here(tasks: Mapping[Any, object], limits: object, count: int) -> dict[Any, Ending]:
+        return {key: Ending("answer", told) for key in tasks}
+
+    monkeypatch.setattr(kit, "run_apart", run_here)
+    found = Bench(toys.Spring()).apart(print)
+    assert found == kit.Verdict("fail", "what its process told is no verdict")
+
+
 @pytest.mark.usefixtures("here")
 @pytest.mark.parametrize("name", [name for name in BUILT_IN.strategies if name not in SLOW])
 def test_built_in_strategies_pass(name: str) -> None:

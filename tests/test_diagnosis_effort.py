@@ -14,6 +14,7 @@ from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import InputError
 from femubench.core.inference.effort import Effort
+from femubench.core.pace import Advance
 from femubench.core.plugin.loader import load_plugins
 
 TASK = next(task for task in tasks() if task.key == ("pairs", 1))
@@ -45,16 +46,18 @@ def test_a_spent_budget_leaves_single_causes_and_says_so() -> None:
     assert "ended after its budget of 0 s" in short.notes[-1]
 
 
-def test_a_budget_that_is_not_spent_changes_nothing_and_fits_done_never_fall() -> None:
-    told: list[tuple[int, int]] = []
-    effort = Effort(budget=1e6, told=lambda *counts: told.append(counts))
-    whole, limited = diagnosed(None), diagnose(pair().case, effort=effort)
+def test_a_budget_that_is_not_spent_changes_nothing_and_pieces_done_never_fall() -> None:
+    told: list[Advance] = []
+    whole, limited = diagnosed(None), diagnose(pair().case, effort=Effort(1e6, told.append))
     assert (limited.sentence, limited.notes) == (whole.sentence, whole.notes)
-    done, known = zip(*told, strict=True)
-    assert list(done) == sorted(done)
-    assert all(a <= b for a, b in told)
-    assert done[-1] == known[-1] > 100
-    assert len(set(done)) > 10
+    done = [advance.done for advance in told]
+    assert done == sorted(done)
+    assert all(advance.done <= advance.total for advance in told)
+    assert done[-1] == told[-1].total > 10
+    assert told[-1].left == 0.0
+    assert told[0].left is None
+    known = [advance.left is not None for advance in told]
+    assert known == sorted(known)  # once there is a time, it stays
 
 
 def test_a_search_that_finds_the_truth_has_no_fault() -> None:
@@ -88,20 +91,6 @@ def test_the_truth_is_found_from_the_grid_too() -> None:
     assert without.chi2 == pytest.approx(recorded(None)["true_fit"]["chi2"], abs=0.1)
     nowhere = [[Finding(cause.effect, "nowhere")] for cause in truth.causes]
     assert true_fit(seen, nowhere, effects, str.__eq__) is None
-
-
-def test_a_stage_counts_what_it_can_do_without() -> None:
-    told: list[tuple[int, int]] = []
-    effort = Effort(told=lambda *counts: told.append(counts))
-    with effort.stage(30):
-        for fits in (10, 2):
-            with effort.stage(10):
-                for _ in range(fits + 5):
-                    effort.step()
-    assert max(told) == told[-1] == (30, 30)
-    assert (10, 30) in told
-    assert (17, 30) in told
-    assert not effort.cut
 
 
 def test_a_budget_is_a_number_of_seconds() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import socket
 import subprocess
 import sys
 import textwrap
@@ -101,7 +102,8 @@ HOSTILE: Mapping[str, tuple[str, str | None]] = {
         "for end in (lambda: os.kill(os.getppid(), 9), lambda: os.killpg(os.getppid(), 9)):\n"
         "    try: end()\n"
         "    except OSError: pass",
-        None,
+        # Its parent is outside and has no number: 0 is its own group.
+        "its process was ended by SIGKILL",
     ),
     "kill-itself": (
         "import os, signal\nos.kill(os.getpid(), signal.SIGKILL)",
@@ -516,6 +518,90 @@ def test_where_there_are_no_namespaces_nothing_is_left_either(
     assert answer["loaded"] is True
     time.sleep(0.2)
     assert daemons() == []
+
+
+# What it could do stands in its citation: text that it read, or the error.
+CURIOUS = """
+import os, pathlib, socket
+from femubench import Strategy, UpdateResult, hookimpl
+
+def tried(what):
+    try:
+        return str(what())
+    except Exception as error:
+        return type(error).__name__
+
+def daemon():
+    if os.fork() == 0:
+        os.setsid()
+        os.execve("/bin/sleep", ["femubench-hostile-daemon", "600"], {{}})
+
+def processes():
+    return sorted(name for name in os.listdir("/proc") if name.isdigit())
+
+DONE = [
+    tried(pathlib.Path({held_out!r}).read_text),
+    tried(lambda: pathlib.Path({home!r}, "left").write_text("left")),
+    tried(lambda: pathlib.Path(os.path.expanduser("~"), "own").write_text("own")),
+    tried(lambda: os.environ.get("SECRET", "no secret")),
+    tried(lambda: len(processes()) < 5),
+    tried(lambda: socket.create_connection(("127.0.0.1", {port}), 1.0) and "connected"),
+    tried(daemon),
+]
+
+class Curious(Strategy):
+    name = "curious"
+    citation = "|".join(DONE)
+
+    def update(self, model, measurement, rng):
+        return UpdateResult(model)
+
+@hookimpl
+def femubench_strategies():
+    return [Curious]
+"""
+BARRED = "FileNotFoundError|FileNotFoundError|3|no secret|True|ConnectionRefusedError|None"
+
+
+def test_a_description_is_made_in_a_sandbox(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home, site = tmp_path / "home", tmp_path / "site"
+    home.mkdir()
+    site.mkdir()
+    held_out = home / "modes.csv"
+    held_out.write_text("mode,frequency\n4,123.4\n")
+    monkeypatch.setenv("HOME", str(home))
+    monkeypatch.setenv("SECRET", "told")
+    monkeypatch.syspath_prepend(site)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        install(site, "curious", CURIOUS.format(held_out=str(held_out), home=str(home), port=port))
+        origin = ["curious", "curious_hostile", "curious 1.0"]
+        question = {"do": loader.DESCRIBE, "origin": origin}
+        (inside,) = apart.ask([{**question, "walled": True}], 20.0)
+        (told,) = inside["offers"]["strategies"]
+        assert told["citation"] == BARRED
+        assert sorted(path.name for path in home.iterdir()) == ["modes.csv"]
+        # The same plugin, asked for what may need files, could.
+        (outside,) = apart.ask([question], 20.0)
+        (told,) = outside["offers"]["strategies"]
+        assert "123.4" in told["citation"]
+        assert told["citation"].endswith("|connected|None")
+    assert daemons() == []
+    assert load_plugins().strategies["curious"].citation == BARRED
+
+
+def test_where_the_sandbox_cannot_be_entered_the_question_is_asked_without(
+    hostile: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    start = apart._START.replace(", way_in,", ", lambda *_: lambda at: 1 / 0,")
+    assert start != apart._START
+    monkeypatch.setattr(apart, "_START", start)
+    monkeypatch.syspath_prepend(hostile)
+    question = {"do": loader.DESCRIBE, "origin": ["chdir", "chdir_hostile", "chdir 1.0"]}
+    (answer,) = apart.ask([{**question, "walled": True}], 10.0)
+    assert answer["loaded"] is True
 
 
 def test_many_bytes_are_not_taken(hostile: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,9 +14,10 @@ import pytest
 from femubench import Model, read_case
 from femubench.core.library.report import rendering
 from femubench.core.library.reproduce import studies_of
+from femubench.core.pace import Advance
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.variants import strategy_of
-from femubench.papers import UPDATES, study
+from femubench.papers import DONE, study
 from femubench.papers.hframe.beyond import compare
 from femubench.papers.hframe.meshes import frequencies, mesh_cells
 from femubench.papers.hframe.physical import physical_model, shape_paired_errors
@@ -62,7 +63,7 @@ def done(bench: Workbench) -> Study:
     steps: list[int] = []
     counted = Workbench(bench.strategies, bench.cases, lambda: steps.append(1), bench._done)
     found = study("hframe", counted)
-    assert len(steps) == UPDATES["hframe"]
+    assert len(steps) == len(DONE["hframe"]) - 1
     return found
 
 
@@ -316,9 +317,10 @@ def test_the_transcription_contradicts_itself_at_the_misprints_only() -> None:
 
 def test_docs_count_the_cells_of_both_papers(done: Study) -> None:
     """One sentence on the screen, in README and in docs; JSON counts the same."""
-    steps: list[tuple[int, int]] = []
-    frame = studies_of(("frame",), load_plugins(), lambda *step: steps.append(step))
-    assert steps == [(k, UPDATES["frame"]) for k in range(1, UPDATES["frame"] + 1)]
+    steps: list[Advance] = []
+    frame = studies_of(("frame",), load_plugins(), steps.append)
+    count = len(DONE["frame"]) - 1
+    assert [(step.done, step.total) for step in steps] == [(k, count) for k in range(1, count + 1)]
     studies = (*frame, done)
     headline = rendering(studies, "terminal").partition("\n\n")[0]
     verdicts = [cell["verdict"] for cell in json.loads(rendering(studies, "json"))]

@@ -516,6 +516,47 @@ def test_the_feed_tells_of_new_versions_and_new_leaders(data: Data, site: Site) 
     assert len(set(ids)) == len(ids)
 
 
+def test_with_an_address_the_feeds_have_whole_links(data: Data, site: Site) -> None:
+    site.words += ["--address", "https://example.org/board"]
+    site.add(called(versioned(data, "softer", "2 & <more>"), "first", 1))
+    assert site.index()["address"] == "https://example.org/board/"
+    site.words = ["--unverified"]
+    site.add(called(data, "second", 2))  # the address stays
+    feed = json.loads((site.folder / "feed.json").read_text())
+    assert feed["version"] == "https://jsonfeed.org/version/1.1"
+    assert feed["feed_url"] == "https://example.org/board/feed.json"
+    atom = ElementTree.fromstring((site.folder / "feed.xml").read_text())
+    assert len(feed["items"]) == len(site.index()["news"]) > 0
+    for item, entry in zip(feed["items"], atom.findall(f"{ATOM}entry"), strict=True):
+        link = entry.find(f"{ATOM}link")
+        assert link is not None
+        assert link.attrib["href"] == item["url"]
+        assert (site.folder / item["url"].removeprefix(feed["home_page_url"][:-10])).is_file()
+        for key, tag in (
+            *(("id", "id"), ("title", "title"), ("content_text", "content")),
+            ("date_published", "updated"),
+        ):
+            assert item[key] == entry.findtext(f"{ATOM}{tag}")
+    assert any("2 & <more>" in item["content_text"] for item in feed["items"])
+    assert 'type="application/feed+json"' in (site.folder / "index.html").read_text()
+    site.words += ["--address", ""]
+    site.add(called(data, "third", 3))
+    assert not (site.folder / "feed.json").exists()
+    assert "feed.json" not in (site.folder / "index.html").read_text()
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["javascript:alert(1)", "example.org", "https://x y", 'https://x"', "https://x/?q", "//x"],
+)
+def test_what_is_no_address_is_refused(data: Data, site: Site, address: str) -> None:
+    site.words += ["--address", address]
+    answer = site.add(data)
+    assert answer.exit_code == 2
+    assert "is no address of a site" in answer.stderr
+    assert not site.folder.exists()
+
+
 def test_equal_leaders_are_no_news_of_each_other(data: Data, site: Site) -> None:
     twin = renamed(data, "softer", "zofter")
     site.add(called(data, "first", 1), called(twin, "second", 2))

@@ -128,6 +128,20 @@ def _one_mode_of_a_twin(data: Data) -> None:
     result["higher"]["modes"][0]["measured_hz"] *= 1.01
 
 
+def _spared(data: Data, **errors: float) -> None:
+    """Say that a strategy was not applicable to a drawn model that predicts better."""
+    result = next(
+        r for r in data["results"] if r["nominal"] == "drawn" and r["strategy"] == "global"
+    )
+    result |= {
+        "status": "not-applicable",
+        "start_percent": errors,
+        "score": None,
+        "unphysical": False,
+    }
+    result |= dict.fromkeys(("used", "higher", "modified"))
+
+
 def _new_plan(data: Data) -> None:
     """Leave a strategy out, and make the plan fit: what is left is a run of its own."""
     _without_strategy(data)
@@ -174,6 +188,11 @@ EDITS: dict[str, tuple[Edit, str]] = {
         lambda d: d["meta"]["structures"].update({"suite/bracket": "frame"}),
         "meta.structures.suite/bracket",
     ),
+    "not applicable": (_spared, "start_percent: not the errors of the drawn model"),
+    "applicable to a better one": (
+        lambda d: _spared(d, higher=0.1, used=0.1),
+        "start_percent: not the errors of the drawn model",
+    ),
     "yardstick": (lambda d: d["meta"].update(yardstick="drawn"), "meta.yardstick"),
     "a job twice": (lambda d: d["beside"].append(d["beside"][0]), "results: 0 jobs are missing"),
 }  # fmt: skip
@@ -188,6 +207,21 @@ def test_what_was_edited_is_refused_in_one_line(honest: Data, tmp_path: Path, na
     assert said in line
     assert "(expected " in line
     assert not (tmp_path / "site").exists()
+
+
+def test_who_was_not_applicable_is_taken_with_the_errors_of_the_drawn_model(
+    honest: Data, tmp_path: Path
+) -> None:
+    own = next(
+        r for r in honest["results"] if r["nominal"] == "drawn" and r["strategy"] == "unchanged"
+    )
+    errors = {
+        name: own[name]["rms_percent"] for name in ("used", "higher", "modified") if own[name]
+    }
+    made = edited(honest, lambda data: _spared(data, **errors))
+    del made["leaderboard"]
+    answer = publish(tmp_path, made)
+    assert answer.exit_code == 0, answer.output
 
 
 def test_a_smaller_run_is_a_run(honest: Data, tmp_path: Path) -> None:

@@ -374,6 +374,29 @@ def test_ranks_are_from_the_textbook_model_and_the_start_as_drawn_is_beside() ->
     assert [item.rank for item in run.results] == [1, 1, 1]
 
 
+def test_who_is_not_applicable_scores_as_the_model_that_was_given() -> None:
+    errors = {"used": 6.0, "higher": 8.0}
+    drawn = {name: Block(error, None, ()) for name, error in errors.items()}
+    idle = replace(result("idle", status="not-applicable"), start_percent=errors)
+    same = replace(result("same"), blocks=drawn)
+    assert score_of(idle, REFERENCE["a"]) == score_of(same, REFERENCE["a"])
+    assert score_of(idle, REFERENCE["a"]) == pytest.approx(8.05 / 2.05, rel=1e-14)
+    found = rank_results(
+        [idle, same, result("better", rms=1.9), result("worse", rms=9.0)], REFERENCE
+    )
+    assert [(item.strategy, item.rank) for item in found] == [
+        ("idle", 2), ("same", 2), ("better", 1), ("worse", 4),
+    ]  # fmt: skip
+    assert rank_results(found) == found
+    # From the textbook model it stays on the line that a measurement has to pass.
+    starts = {"starts": {"a": ["textbook", "drawn"]}, "reference": {"a": REFERENCE["a"]}}
+    line = replace(result("idle", status="not-applicable"), nominal="textbook")
+    row = leaderboard(Run({**META, **starts}, (line, idle))).iloc[0]
+    assert row["skill"] == 0.0
+    assert row["skill_drawn"] == pytest.approx(1.0 - 8.05 / 2.05, rel=1e-14)
+    assert np.isnan(row["higher_percent"])  # it is no model of the strategy's
+
+
 def test_the_unphysical_rank_below_the_physical_and_no_model_at_all_below_both() -> None:
     lost = result("lost", rms=0.1, rigid_body_modes=1, rigid_body_modes_expected=3)
     fine = result("lost", rms=0.1, case="b", rigid_body_modes=3, rigid_body_modes_expected=3)

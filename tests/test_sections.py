@@ -58,6 +58,13 @@ def test_torsion_of_a_solid_rectangle(ratio: float, beta: float) -> None:
         assert saint_venant_rectangle(a, b) == pytest.approx(beta * ratio, rel=5e-4)
 
 
+@pytest.mark.parametrize("thickness", [1e-4, 1e-100, np.finfo(float).tiny])
+def test_torsion_of_a_foil_is_a_third_of_width_times_thickness_cubed(thickness: float) -> None:
+    assert saint_venant_rectangle(100.0, thickness) == pytest.approx(
+        100.0 * thickness**3 / 3.0, rel=1e-5
+    )
+
+
 def test_bredt_is_four_area_squared_over_the_wall_integral() -> None:
     b, h, wall = 0.03, 0.05, 0.002
     assert bredt(b, h, wall) == pytest.approx(4 * (b * h) ** 2 / (2 * (b + h) / wall), rel=1e-14)

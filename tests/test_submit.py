@@ -168,6 +168,15 @@ def test_failing_tests_of_the_repository_fail_the_job(repository: Repository) ->
     assert told.splitlines()[-1] == "accepted: submission.json"
 
 
+@pytest.mark.parametrize("name", ["*", "sr?"])
+def test_names_are_no_patterns_of_files(repository: Repository, name: str) -> None:
+    assert sorted(repository.folder.glob(name))
+    code, told, _ = repository.act(strategy=f"{name}\nother", tests=f"--co -q {name}")
+    assert code != 0
+    assert f"no strategy {name!r}" in told, told
+    assert f"file or directory not found: {name}\n" in told, told
+
+
 def test_what_is_wrong_before_the_run_is_one_line(repository: Repository) -> None:
     code, told, summary = repository.act(strategy="fited")
     assert code == 2

@@ -15,12 +15,15 @@ from femubench import NotApplicable
 from femubench.core.cli.main import bench
 from femubench.core.library.rank import request_of
 from femubench.core.plugin.loader import load_plugins, registered_effects
+from femubench.core.run.store import Store
 from femubench.effect import textbook_model, textbook_values
 from femubench.fem import bredt
-from femubench.results import score_model
+from femubench.results import run_from_json, run_to_json, score_model
 from tests.test_cli import put_distribution
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parent / "toys"))
+import harness_toys as toys
 from effect_checks import as_matrices
 
 EFFECTS = registered_effects()
@@ -159,6 +162,31 @@ def test_the_screen_says_where_all_start_from(tmp_path: Path) -> None:
     locked = CliRunner().invoke(bench, ["run", "--locked", "x", "--nominal", "textbook"])
     assert locked.exit_code == 2
     assert "nominal cannot be given beside it" in locked.output
+
+
+def test_who_is_not_applicable_scores_as_who_leaves_the_model_as_it_is(tmp_path: Path) -> None:
+    still = femubench.strategies["unchanged"]
+    both = [still, toys.Declining()]
+    run = femubench.rank(["frame", "suite/bracket"], both, jobs=1, store=tmp_path)
+    own = {(r.case, r.strategy, r.nominal): r for r in run.results}
+    for case, _, nominal in own:
+        found, beside = own[case, "declining", nominal], own[case, "unchanged", nominal]
+        assert (found.status, found.blocks) == ("not-applicable", {})
+        assert found.score == pytest.approx(beside.score, rel=1e-9)
+        assert found.rank == beside.rank == 1
+        given = {name: block.rms_percent for name, block in beside.blocks.items()}
+        drawn = nominal == "drawn"
+        assert found.start_percent == (pytest.approx(given, rel=1e-9) if drawn else {})
+    assert own["frame", "declining", "textbook"].score == 1.0
+    assert own["frame", "declining", "drawn"].score > 1.5
+    assert ("suite/bracket", "declining", "drawn") not in own  # matrices have no textbook
+    board = run.leaderboard.set_index("strategy")
+    assert board.loc["declining", "skill_drawn"] == pytest.approx(
+        board.loc["unchanged", "skill_drawn"]
+    )
+    again = Store(tmp_path).load(run.meta["run"])
+    assert again.results == run.results
+    assert run_from_json(run_to_json(run)).results == run.results
 
 
 def test_a_result_that_is_reused_starts_from_where_it_is_asked_to(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from femubench.core.cli import options
-from femubench.core.cli.progress import time_left
+from femubench.core.cli.progress import progress
 from femubench.core.cli.registry import plugins_for
 from femubench.core.errors import FemubenchError, InputError
 from femubench.core.files import check_new, write_atomically
@@ -101,7 +101,7 @@ def diagnose(
     from femubench.core.library.diagnose import diagnosis_of, has_model
     from femubench.core.library.report import rendering
 
-    with time_left(f"looking for what {read.name} lacks", quiet=quiet) as told:
+    with progress(read.name, quiet=quiet) as told:
         found = diagnosis_of(
             *(read, names, plugins),
             pairs=not no_pairs,

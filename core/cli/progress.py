@@ -3,70 +3,97 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from femubench.core.schema.results import JobResult
+from femubench.core.pace import Advance, Told
 
 if TYPE_CHECKING:
-    from rich.progress import Progress as Bar
+    from rich.console import Console
 
-Progress = Callable[[JobResult, int, int], None]
-Counted = Callable[[int, int], None]
-
-
-@contextmanager
-def progress_bar(*, quiet: bool = False) -> Iterator[Progress | None]:
-    """Give the function that `run_jobs` calls after each job; None where stderr is no terminal."""
-    if quiet or not sys.stderr.isatty():
-        yield None
-        return
-    with _bar() as bar:
-        task = bar.add_task("jobs", total=None)
-
-        def advance(result: JobResult, done: int, total: int) -> None:
-            label = f"{result.case} {result.strategy}"[:36]
-            bar.update(task, completed=done, total=total, description=f"{label:36}")
-
-        yield advance
+_WIDE, _BAR = 32, 14  # characters
 
 
 @contextmanager
-def time_left(what: str, *, quiet: bool = False) -> Iterator[Counted | None]:
-    """Give the function that says how many steps are done, of how many; None as above.
+def progress(what: str = "", *, quiet: bool = False) -> Iterator[Told | None]:
+    """Give the function that is told how far something is; None where stderr is no terminal.
+
+    A line with a bar, pieces done of how many, the time gone by and the time left, which takes
+    itself away. No time is shown as left while none is known.
 
     Arguments:
-        what: a clause such as ``looking for causes``.
+        what: the piece is of, such as a case.
         quiet: show nothing.
     """
     if quiet or not sys.stderr.isatty():
         yield None
         return
-    with _bar() as bar:
-        task = bar.add_task(what, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
-
-
-def _bar() -> Bar:
-    """Return a bar with a count and the time left, which takes itself away."""
     from rich.console import Console
+
+    with shown(what, Console(stderr=True), time.monotonic) as told:
+        yield told
+
+
+@contextmanager
+def shown(what: str, console: Console, clock: Callable[[], float]) -> Iterator[Told]:
+    """Give the function that changes a line of a terminal; see `progress`.
+
+    Arguments:
+        clock: seconds from any time on.
+    """
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
-        Progress as Bar,
+        Progress,
+        ProgressColumn,
+        Task,
         TextColumn,
-        TimeRemainingColumn,
+        TimeElapsedColumn,
     )
+    from rich.text import Text
+
+    lead = f"{what}: " if what else ""
+    last = clock()
+    latest = Advance(0, 0)
+
+    class Left(ProgressColumn):
+        def render(self, task: Task) -> Text:
+            text = spoken_left(latest, clock() - last)
+            return Text(f"{text} left", style="progress.remaining")
 
     columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(bar_width=24),
+        TextColumn("{task.fields[what]}", markup=False),
+        BarColumn(bar_width=_BAR),
         MofNCompleteColumn(),
-        TimeRemainingColumn(),
-        TextColumn("left"),
+        TimeElapsedColumn(),
+        Left(),
     )
-    return Bar(*columns, console=Console(stderr=True), transient=True)
+    with Progress(*columns, console=console, transient=True, get_time=clock) as bar:
+        task = bar.add_task("", total=None, what=f"{what[:_WIDE]:{_WIDE}}")
+
+        def tell(advance: Advance) -> None:
+            nonlocal latest, last
+            latest, last = advance, clock()
+            line = f"{lead}{advance.what}"[:_WIDE]
+            bar.update(
+                task, completed=advance.done, total=advance.total or None, what=f"{line:{_WIDE}}"
+            )
+
+        yield tell
+
+
+def spoken_left(advance: Advance, since: float) -> str:
+    """Return the time that is left as h:mm:ss, dashes where it is not known.
+
+    Arguments:
+        since: seconds since the advance.
+    """
+    if advance.left is None:
+        return "-:--:--"
+    seconds = round(max(advance.left - min(since, advance.current), 0.0))
+    return f"{seconds // 3600}:{seconds // 60 % 60:02}:{seconds % 60:02}"
 
 
 @contextmanager

@@ -18,8 +18,15 @@ from femubench.core.display import counted
     help="Take also what cannot be verified, and say so on the site: runs without sandbox or "
     "twins, of cases that are not installed here, or whose figures do not agree.",
 )  # fmt: skip
+@click.option(
+    "--address", metavar="URL",
+    help="Where the site will be found: its feeds then have whole links, and there is one in JSON. "
+    "A later call need not tell it again.",
+)  # fmt: skip
 @options.quiet
-def publish(folder: Path, files: tuple[Path, ...], unverified: bool, quiet: bool) -> None:
+def publish(
+    folder: Path, files: tuple[Path, ...], unverified: bool, address: str | None, quiet: bool
+) -> None:
     """Merge result files into a static site in DIR.
 
     A FILE is written by run --json, here or on another machine. DIR is new, empty, or written by
@@ -28,7 +35,7 @@ def publish(folder: Path, files: tuple[Path, ...], unverified: bool, quiet: bool
     """
     from femubench.core.library.publish import publish as merge
 
-    done = merge(folder, files, unverified=unverified)
+    done = merge(folder, files, unverified=unverified, address=address)
     if quiet:
         return
     runs, index = len(done.index["runs"]), folder / "index.html"

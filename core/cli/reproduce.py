@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from femubench.core.cli import options
-from femubench.core.cli.progress import time_left
+from femubench.core.cli.progress import progress
 from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
 from femubench.core.files import check_can_make, write_atomically
@@ -45,7 +45,7 @@ def reproduce(
     from femubench.core.library.report import rendering
     from femubench.core.library.reproduce import studies_of, write_studies
 
-    with time_left(f"recomputing {' and '.join(papers)}", quiet=quiet) as told:
+    with progress(quiet=quiet) as told:
         studies = studies_of(papers, plugins_for(ctx), told)
     if json_file is not None and json_file != options.SCREEN:
         write_atomically(json_file, rendering(studies, "json"))

@@ -11,7 +11,7 @@ import click
 from femubench.core.cli import options
 from femubench.core.cli.ending import telling
 from femubench.core.cli.outputs import announce, finish, outputs_of
-from femubench.core.cli.progress import progress_bar
+from femubench.core.cli.progress import progress
 from femubench.core.cli.quantities import spoken, twins_of
 from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
@@ -112,8 +112,8 @@ def run(
     ):
         if not quiet:
             announce(_header(plan, executor.spoken), executor)
-        with progress_bar(quiet=quiet) as progress:
-            how: dict[str, Any] = {"overwrite": overwrite, "resume": resume, "progress": progress}
+        with progress(quiet=quiet) as told:
+            how: dict[str, Any] = {"overwrite": overwrite, "resume": resume, "told": told}
             outcome = plan.run(None, kept, executor, **how)
     code = finish(ctx, outcome, outputs, plugins, kept, kept.exhibits)
     return code if old is None else _compare(old, outcome)

@@ -11,7 +11,7 @@ import click
 from femubench.core.cli import options
 from femubench.core.cli.ending import telling
 from femubench.core.cli.outputs import announce, finish, outputs_of
-from femubench.core.cli.progress import progress_bar
+from femubench.core.cli.progress import progress
 from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
 
@@ -78,7 +78,7 @@ def study(
     ):
         if not quiet:
             announce(f"{_title(plan)}, {executor.spoken}", executor)
-        with progress_bar(quiet=quiet) as progress:
+        with progress(quiet=quiet) as told:
             found = plan.run(
                 executor,
                 kept,
@@ -86,7 +86,7 @@ def study(
                 timeouts=limits,
                 memory=memory,
                 overwrite=overwrite,
-                progress=progress,
+                told=told,
             )
     return finish(ctx, found, outputs, plugins, kept)
 

@@ -10,7 +10,7 @@ import click
 
 from femubench.core.cli import options
 from femubench.core.cli.compare import thresholds_of
-from femubench.core.cli.progress import progress_bar
+from femubench.core.cli.progress import progress
 from femubench.core.cli.quantities import twins_of
 from femubench.core.cli.registry import plugins_for
 from femubench.core.plugin.validation import chosen
@@ -75,10 +75,10 @@ def submit(
     chosen("strategy", (word.partition(":")[0] for word in strategies), plugins.strategies)
     from femubench.core.library.submit import submit as prepared, summary_of
 
-    with progress_bar(quiet=quiet) as progress:
+    with progress(quiet=quiet) as told:
         found = prepared(
             strategies, cases, output=output, baseline=baseline, fail=thresholds, twins=twins,
-            sandbox=sandbox, jobs=jobs, timeouts=timeouts, progress=progress,
+            sandbox=sandbox, jobs=jobs, timeouts=timeouts, told=told,
             tell=(lambda line: None) if quiet else click.echo,
         )  # fmt: skip
     if summary is not None:

@@ -8,22 +8,25 @@ import pickle
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, get_args
 
 from femubench.core.conformance import SECONDS
+from femubench.core.conformance.judging import Handed, confirmed, judge_handed
 from femubench.core.conformance.problems import PLAIN, Problem, problem
 from femubench.core.conformance.trial import (
     Observation,
     Trial,
     Want,
     brought,
-    observation_of,
+    promises_of,
     run_trial,
+    told_by,
 )
+from femubench.core.errors import harmless
 from femubench.core.plugin.foreign import is_foreign
 from femubench.core.plugin.variants import Variant
-from femubench.core.roles import Strategy
-from femubench.core.run.jobs import one_line, sent
+from femubench.core.roles import Strategy, declared
+from femubench.core.run.jobs import missing_capability, one_line, sent
 from femubench.core.run.limits import MIB, Limits
 from femubench.core.run.workers import Ending, Workers
 
@@ -32,6 +35,7 @@ Role = Literal["strategy", "effect", "reader", "scenario"]
 MEMORY = 1024 * MIB
 UNSENT = "not looked at: it cannot be sent to a worker"
 _ATTEMPTS = 3  # to start a process
+_LONGEST = 2_000  # characters of a message
 
 
 @dataclass(frozen=True)
@@ -167,10 +171,40 @@ class Bench:
     def observe(self, wants: Sequence[Want]) -> list[Observation]:
         """Return what is seen in some trials; those that have not run yet run now."""
         missing = [want for want in dict.fromkeys(wants) if want not in self._seen]
-        tasks = {want: (run_trial, self._trial(want)) for want in missing}
-        for want, ending in run_apart(tasks, self.limits, self._jobs).items():
-            self._seen[want] = observation_of(want.problem, ending)
+        self._seen |= {want: kept for want in missing if (kept := self._unrun(want)) is not None}
+        tasks = {want: (run_trial, self._trial(want)) for want in missing if want not in self._seen}
+        told = {
+            want: told_by(want.problem, ending)
+            for want, ending in run_apart(tasks, self.limits, self._jobs).items()
+        }
+        handed = {
+            want: (judge_handed, self._handed(want, answer))
+            for want, (seen, answer) in told.items()
+            if seen.kind == "result"
+        }
+        judged = run_apart(handed, self.limits, self._jobs)
+        for want, (seen, _) in told.items():
+            self._seen[want] = confirmed(seen, judged[want]) if want in judged else seen
         return [self._seen[want] for want in wants]
+
+    def _unrun(self, want: Want) -> Observation | None:
+        """Return what is known without a run: that the problem lacks what the strategy needs."""
+        given = self._problem(want)
+        try:
+            needs = frozenset(declared(self._strategy(want), "needs"))
+            reason = missing_capability(needs, given.model, given.measurement)
+        except Exception as error:  # whatever it says that it needs
+            return Observation(want.problem, "error", one_line(error))
+        return None if reason is None else Observation(want.problem, "lacking", reason)
+
+    def _handed(self, want: Want, answer: bytes) -> Handed:
+        return Handed(self._problem(want), answer, promises_of(self._strategy(want)))
+
+    def _strategy(self, want: Want) -> Any:  # noqa: ANN401 - a strategy of anybody's
+        return self.reference if want.reference else self.subject
+
+    def _problem(self, want: Want) -> Problem:
+        return self.cases.get(want.problem) or problem(want.problem)
 
     def apart(self, function: Callable[..., Verdict], *further: object) -> Verdict:
         """Return the verdict of a function that runs in a worker.
@@ -185,13 +219,12 @@ class Bench:
         ending = run_apart({0: task}, self.limits, 1)[0]
         if ending.how != "answer":
             return failed(f"{ending.reason}, expected an answer")
-        return Verdict(*json.loads(ending.answer))
+        return _told(ending.answer)
 
     def _trial(self, want: Want) -> Trial:
         code = sent(self.reference) if want.reference else self.code
         assert isinstance(code, bytes)
-        given = self.cases.get(want.problem) or problem(want.problem)
-        return Trial(code, given, want)
+        return Trial(code, self._problem(want), want)
 
 
 def run_apart(
@@ -233,6 +266,17 @@ def _judged(task: tuple[Callable[..., Verdict], bytes]) -> bytes:
     except BaseException as error:
         verdict = failed(f"{one_line(error)}, expected no exception")
     return json.dumps([verdict.status, verdict.message]).encode()
+
+
+def _told(answer: bytes) -> Verdict:
+    """Return the verdict that a process tells in which a stranger's code ran."""
+    try:
+        status, message = json.loads(answer)
+        if status in get_args(Status):
+            return Verdict(status, harmless(str(message)[:_LONGEST]))
+    except (ValueError, TypeError, RecursionError):
+        pass
+    return failed("what its process told is no verdict")
 
 
 def inspected(bench: Bench, function: Callable[..., Verdict]) -> Verdict:

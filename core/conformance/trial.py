@@ -1,32 +1,39 @@
-"""One run of a strategy on one problem in a worker, and all that can be seen of it."""
+"""One run of a strategy on one problem in a worker, and what that tells of it."""
 
 from __future__ import annotations
 
-import json
+import math
 import pickle
 import random
 import time
 import tracemalloc
 import warnings
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
+from pydantic import TypeAdapter, ValidationError
 
 from femubench.core.conformance.fingerprints import fingerprint, first_difference, global_state
 from femubench.core.conformance.problems import Problem
 from femubench.core.conformance.results import Given, faults_of
-from femubench.core.errors import NotApplicable, StrategyFailure
+from femubench.core.errors import NotApplicable, StrategyFailure, harmless
 from femubench.core.fem.model import Model
 from femubench.core.plugin.foreign import imported
 from femubench.core.plugin.variants import Variant
 from femubench.core.roles import Result, Strategy, declared
-from femubench.core.run.jobs import missing_capability, one_line
+from femubench.core.run.answers import packed
+from femubench.core.run.jobs import JobOutcome, one_line, plain_outcome
 from femubench.core.run.workers import Ending
 
 if TYPE_CHECKING:
     from femubench.core.update.strategy import UpdateResult
+
+_LENGTH = 8  # bytes that tell the length of an observation
+_LONGEST = 4 * 2**20  # bytes of it
+_LONGEST_TEXT = 2_000
 
 Kind = Literal["result", "lacking", "not-applicable", "failed", "error", "stopped"]
 
@@ -59,7 +66,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Observation:
-    """What was seen.
+    """What was seen, by the word of the worker in which the strategy ran.
 
     Arguments:
         problem: its name.
@@ -92,28 +99,46 @@ class Observation:
 
 
 def run_trial(trial: Trial) -> bytes:
-    """Return the observation of a trial as JSON; runs in a worker."""
+    """Return the observation of a trial as JSON, and what was handed back; runs in a worker."""
+    answer = b""
     try:
-        found = _observe(trial)
+        found, answer = _observe(trial)
     except Exception as error:
         found = Observation(trial.problem.name, "error", one_line(error))
-    return json.dumps(asdict(found)).encode()
+    head = _told().dump_json(found)
+    return len(head).to_bytes(_LENGTH, "big") + head + answer
 
 
-def observation_of(problem: str, ending: Ending) -> Observation:
-    """Return what a worker saw, or how it ended."""
+@cache
+def _told() -> TypeAdapter[Observation]:
+    return TypeAdapter(Observation)
+
+
+def told_by(problem: str, ending: Ending) -> tuple[Observation, bytes]:
+    """Return what a worker says that it saw, or how it ended, and what was handed back."""
     if ending.how != "answer":
-        return Observation(problem, "stopped", ending.reason, ending.seconds)
-    return Observation(**json.loads(ending.answer))
+        return Observation(problem, "stopped", ending.reason, ending.seconds), b""
+    size = int.from_bytes(ending.answer[:_LENGTH], "big")
+    try:
+        found = _told().validate_json(ending.answer[_LENGTH : _LENGTH + min(size, _LONGEST)])
+    except (ValidationError, RecursionError):
+        found = None
+    if found is None or found.kind == "lacking":  # what a problem lacks is not for it to say
+        return Observation(problem, "error", "what its process told is no observation"), b""
+    texts: dict[str, Any] = {
+        name: value and harmless(value[:_LONGEST_TEXT])
+        for name in ("text", "changed", "disturbed")
+        for value in (getattr(found, name),)
+    }
+    texts["faults"] = {name: harmless(text[:_LONGEST_TEXT]) for name, text in found.faults.items()}
+    seconds = found.seconds if math.isfinite(found.seconds) else ending.seconds
+    told = replace(found, problem=problem, seconds=seconds, **texts)
+    return told, ending.answer[_LENGTH + size :]
 
 
-def _observe(trial: Trial) -> Observation:
+def _observe(trial: Trial) -> tuple[Observation, bytes]:
     strategy: Strategy = brought(pickle.loads(trial.strategy))
     problem = trial.problem
-    needs = frozenset(declared(strategy, "needs"))
-    reason = missing_capability(needs, problem.model, problem.measurement)
-    if reason is not None:
-        return Observation(problem.name, "lacking", reason)
     # What is handed over may be spoilt; the problem itself is needed to judge the result.
     model, measurement = pickle.loads(pickle.dumps((problem.model, problem.measurement)))
     given = Problem(problem.name, model, measurement)
@@ -125,11 +150,16 @@ def _observe(trial: Trial) -> Observation:
     disturbed = first_difference(around, global_state())
     found = replace(found, changed=first_difference(before, _inputs(given)), disturbed=disturbed)
     if result is None:
-        return found
+        return found, b""
     with warnings.catch_warnings(), np.errstate(all="warn"):
         warnings.simplefilter("ignore")
         faults = faults_of(Given(problem, result, promises_of(strategy)))
-    return replace(found, faults=faults, prints=fingerprint(result, "result"))
+    found = replace(found, faults=faults, prints=fingerprint(result, "result"))
+    try:
+        outcome = plain_outcome(result)
+    except Exception as error:
+        outcome = JobOutcome("failed", one_line(error))
+    return found, packed(outcome, problem.model)
 
 
 def brought(subject: Any) -> Any:  # noqa: ANN401 - any role

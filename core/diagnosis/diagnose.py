@@ -35,10 +35,10 @@ from femubench.core.diagnosis.tables import (
 from femubench.core.diagnosis.verdict import Decision, decide, elsewhere
 from femubench.core.diagnosis.words import sentence_of
 from femubench.core.fem.model import Model
-from femubench.core.inference.effort import Effort
+from femubench.core.inference.effort import Effort, Kind, Number
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.extended_model import departure
-from femubench.core.inference.fault_search import Depth, inquire
+from femubench.core.inference.fault_search import Depth, Inquiry, inquire
 from femubench.core.inference.model_error import WIDTHS
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.search import adequacy
@@ -56,6 +56,8 @@ from femubench.core.ties import in_order
 
 _MOST_ADVISED = 8  # explanations that advice parts from each other
 _CLASSES = 3  # of model error that are told
+# Pieces of work that mostly follow: explanations that are judged, searches for a mode left out.
+_JUDGED, _SINGLE = (2.0, 5.0), 2.0
 
 
 @dataclass(frozen=True)
@@ -130,17 +132,23 @@ def diagnose(
         )
 
     before, width = case.used_reference, case.error_width or 1.0
-    inquiry = inquire(case.model, used, wrong, search, reference=before, width=width)
-    examination, given = inquiry.examination, case
-    case = mended_case(case, inquiry.mended)
-    proof = _proof(case, examination, known, given, effort)
-    leader = proof.leader
-    adequate = adequacy(leader.fit.state, leader.unknowns)
-    decision = decide(examination.posterior, adequate, leader, proof.log_bayes, proof.confirmed)
-    looks = _looks(given.model, case, (*registered, *known))
-    faults_told = fault_causes(inquiry.mended), fault_causes(inquiry.loose)
-    found = _written(case, examination, decision, adequate, proof, looks, faults_told, begin)
-    return replace(found, notes=(*given.notes, *found.notes, *_cut_short(effort)))
+    with effort.scope(_expected(case)):
+        inquiry = inquire(
+            case.model, used, wrong, search, reference=before, width=width, effort=effort
+        )
+        mended = mended_case(case, inquiry.mended)
+        proof = _proof(mended, inquiry.examination, known, case, effort)
+        with effort.piece("advice"):
+            looks = _looks(case.model, mended, (*registered, *known))
+            found = _concluded(mended, inquiry, proof, looks, begin)
+    return replace(found, notes=(*case.notes, *found.notes, *_cut_short(effort)))
+
+
+def _expected(case: Case) -> dict[Kind, Number]:
+    """Return what mostly follows the search: unseen data or, without any, used ones left out."""
+    if case.held_out or case.modifications:
+        return {"unseen": _JUDGED, "advice": 1.0}
+    return {"single": _SINGLE * len(case.used), "advice": 1.0}
 
 
 def _looks(drawn: Model, case: Case, effects: Iterable[Effect]) -> tuple[LookWarning, ...]:
@@ -161,12 +169,14 @@ def _proof(
     effort: Effort,
 ) -> _Proof:
     best = examination.best
-    model = extended_by(case.model, best)
-    after = score_model(case, model)  # asks for the most modes: all that follows is given those
-    unseen = unseen_of(case, examination, best, model)
+    with effort.piece("unseen"):
+        model = extended_by(case.model, best)
+        # This asks for the most modes: all that follows is given those.
+        after = score_model(case, model)
+        unseen = unseen_of(case, examination, best, model)
     crossed = None
     if any(len(part.before) for part in unseen):
-        found = borne_out(case, examination)
+        found = borne_out(case, examination, effort)
         confirmed = found is not None
         if found is not None and found is not best:
             best, model = found, extended_by(case.model, found)
@@ -178,20 +188,31 @@ def _proof(
         confirmed = crossed.confirms(len(best.parts))
     before = score_model(given, given.model)
     median, rms = (of(before, after, crossed) for of in (gain_of, rms_gain_of))
+    effort.expect("unseen", 0)
     return _Proof(best, model, unseen, median, rms, crossed is not None, confirmed)
+
+
+def _concluded(
+    case: Case, inquiry: Inquiry, proof: _Proof, looks: tuple[LookWarning, ...], begin: float
+) -> Diagnosis:
+    leader = proof.leader
+    adequate = adequacy(leader.fit.state, leader.unknowns)
+    posterior = inquiry.examination.posterior
+    decision = decide(posterior, adequate, leader, proof.log_bayes, proof.confirmed)
+    return _written(case, inquiry, decision, adequate, proof, looks, begin)
 
 
 def _written(
     case: Case,
-    examination: Examination,
+    inquiry: Inquiry,
     decision: Decision,
     adequate: float,
     proof: _Proof,
     looks: tuple[LookWarning, ...],
-    faults: tuple[Sequence[Cause], Sequence[Cause]],
     begin: float,
 ) -> Diagnosis:
-    mended, loose = faults
+    examination = inquiry.examination
+    mended, loose = fault_causes(inquiry.mended), fault_causes(inquiry.loose)
     best, posterior = proof.leader, examination.posterior
     group = [best, *(posterior.best(key) for key in decision.group[1:])] if decision.group else []
     shown = group if decision.verdict == "ambiguous" else group[:1]
@@ -210,7 +231,7 @@ def _written(
     used = case.measurement.select(case.used)
     return Diagnosis(
         case=case.name,
-        verdict="named" if any(faults) and decision.verdict == "none" else decision.verdict,
+        verdict="named" if (mended or loose) and decision.verdict == "none" else decision.verdict,
         sentence=with_faults(said, mended, loose),
         causes=(*mended, *causes, *loose),
         rivals=rivals_of(examination, best if named else None, group),

@@ -278,7 +278,11 @@ def left_out(
     noise = Noise.of(np.zeros((len(data), 0)), 0.0)
     several = len(examination.best.parts) > 1
     before, after, std = [], [], []
+    effort = effort or Effort()
     for j, number in enumerate(numbers):
+        left = len(numbers) - j - 1
+        effort.expect("single", _SINGLE * left)
+        effort.expect("together", _TOGETHER * left * several)
         kept = data.measurement.select([other for other in numbers if other != number])
         if len(kept) == 0:
             break
@@ -345,6 +349,8 @@ def gain_of(before: Blocks, after: Blocks, crossed: Unseen | None) -> Gain:
 
 
 _TIED, _PLACES = 0.1, 6
+# Pieces of work that an examination mostly takes.
+_SINGLE, _TOGETHER = 2.0, 4.0
 
 
 def extended_by(model: Model, explanation: Explanation, x: FloatArray | None = None) -> Model:
@@ -443,20 +449,32 @@ def stands(
     return all(part.confirms(count) for part in unseen)
 
 
-def borne_out(case: Case, examination: Examination) -> Explanation | None:
+def borne_out(
+    case: Case, examination: Examination, effort: Effort | None = None
+) -> Explanation | None:
     """Return what unseen data bear out of all that the used data cannot tell from the best guess.
 
     That is the best guess, unless all data together, used and unseen, speak for another name of
     the group: decisively, or at all where unseen data refute the best guess. Where no name is
     borne out, it is the same name at a place about as likely, or None.
+
+    Arguments:
+        case: what holds the unseen data.
+        examination: of the used ones.
+        effort: counts the explanations that are judged.
     """
+    effort = effort or Effort()
     posterior, best = examination.posterior, examination.best
-    first = _judged(case, examination, best)
     name = posterior.key(best)
     others = inseparable(posterior)[0][1:] if name else ()
+    with effort.piece("unseen"):
+        first = _judged(case, examination, best)
+    places = _other_places(posterior, name) if name and not first[0] else []
+    effort.expect("unseen", len(others) + len(places))
     rivals = []
     for key in others:
-        stands, log_bayes = _judged(case, examination, posterior.best(key))
+        with effort.piece("unseen"):
+            stands, log_bayes = _judged(case, examination, posterior.best(key))
         gain = log_bayes - first[1] + log(posterior.names[key] / posterior.names[name])
         if stands and gain > (_DECISIVE if first[0] else 0.0):
             rivals.append((gain, posterior.best(key)))
@@ -464,8 +482,10 @@ def borne_out(case: Case, examination: Examination) -> Explanation | None:
         return max(rivals, key=lambda pair: pair[0])[1]
     if first[0]:
         return best
-    for found in _other_places(posterior, name) if name else ():
-        if _judged(case, examination, found)[0]:
+    for found in places:
+        with effort.piece("unseen"):
+            stands, _ = _judged(case, examination, found)
+        if stands:
             return found
     return None
 

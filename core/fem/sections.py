@@ -108,7 +108,9 @@ def saint_venant_rectangle(a: float, b: float) -> float:
     """Return the torsion constant of a solid rectangle in m4 (Timoshenko & Goodier, art. 109)."""
     long, short = max(a, b), min(a, b)
     n = np.arange(1, 40, 2)
-    series = np.sum(np.tanh(n * np.pi * long / (2.0 * short)) / n**5.0)
+    # tanh is 1 to the last digit from a slenderness of 100 on, and no quotient may overflow.
+    slenderness = 1.0 / max(short / long, 0.01)
+    series = np.sum(np.tanh(n * np.pi * slenderness / 2.0) / n**5.0)
     return float(long * short**3 * (1.0 / 3.0 - 64.0 / np.pi**5 * short / long * series))
 
 

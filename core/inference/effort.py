@@ -1,48 +1,126 @@
-"""How far a search is with the fits it knows of, and whether its time is spent."""
+"""How far a search is with what it knows of, how long the rest takes, whether its time is spent."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from typing import Literal
 
-Told = Callable[[int, int], None]
+from femubench.core.pace import Advance, Pace, Told
+
+Kind = Literal["faults", "typed", "single", "together", "more", "values", "unseen", "advice"]
+# So many pieces; or so many where what was found leaves no more than noise, and where not.
+Number = float | tuple[float, float]
+
+# What a piece of each kind takes, medians of the cases that come along (benchmarks/time_left.py),
+# and what is shown of it.
+_KINDS: dict[Kind, tuple[float, str]] = {
+    "faults": (0.35, "faults of the data"),
+    "typed": (0.018, "faults of the input"),
+    "single": (1.0, "single causes"),
+    "together": (0.45, "causes together"),
+    "more": (1.0, "more causes together"),
+    "values": (0.4, "a value each direction"),
+    "unseen": (0.35, "unseen data"),
+    "advice": (0.3, "what to measure next"),
+}
 
 
 class Effort:
-    """Fits that are done, of how many, and the time they may take.
+    """Pieces of work that are done, those that are known to come, and the time they may take.
 
     Arguments:
         budget: seconds from now on for the search for several causes; None for no end.
-        told: called with the number of fits that are done and that of all known so far.
+        told: called when a piece begins or ends.
+        clock: seconds from any time on.
     """
 
-    def __init__(self, budget: float | None = None, told: Told | None = None) -> None:
-        self.budget, self.told = budget, told
-        self.begin = time.perf_counter()
-        self.done = self.known = self._end = 0
-        self.cut = False
+    def __init__(
+        self,
+        budget: float | None = None,
+        told: Told | None = None,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self.budget, self._told, self._clock = budget, told, clock
+        self._begin, self.cut = clock(), False
+        self._pace = Pace({kind: weight for kind, (weight, _) in _KINDS.items()})
+        self._done = 0
+        self._piece: tuple[Kind, float] | None = None
+        self._ahead: list[dict[Kind, Number]] = []
+        self._adequate: bool | None = None
 
     @contextmanager
-    def stage(self, fits: int) -> Iterator[None]:
-        """Count what is done inside as at most so many fits; those it can do without count too."""
-        outer, end = self._end, self.done + fits
-        self._end, self.known = end, max(self.known, end)
+    def scope(self, ahead: Mapping[Kind, Number] | None = None) -> Iterator[None]:
+        """Expect pieces inside; those it can do without are not expected after it."""
+        self._ahead.append(dict(ahead or {}))
+        try:
+            yield
+        finally:
+            self._ahead.pop()
+
+    def expect(self, kind: Kind, number: Number) -> None:
+        """Expect so many pieces of a kind from now on, in the innermost scope."""
+        if self._ahead:
+            self._ahead[-1][kind] = number
+
+    def expect_alike(self, searches: int, several: bool) -> None:
+        """Expect as many searches more, of several causes or of single ones."""
+        self.expect("single", (2.0 * searches, 3.0 * searches))
+        self.expect("together", (2.0 * searches * several, 8.0 * searches * several))
+        self.expect("more", (0.0, 2.0 * searches * several))
+
+    def explained(self, adequate: bool) -> None:
+        """Say whether what was found leaves no more than noise, which decides on what follows."""
+        self._adequate = adequate
+
+    @contextmanager
+    def piece(self, kind: Kind) -> Iterator[None]:
+        """Do one piece of a kind."""
+        for ahead in reversed(self._ahead):
+            if number := ahead.get(kind):
+                ahead[kind] = _less(number)
+                break
+        self._piece = kind, self._clock()
+        self._tell(1)
         yield
-        self._end = outer
-        self._reach(end)
+        self._pace.took(kind, self._clock() - self._piece[1])
+        self._done += 1
+        self._tell(0)
 
-    def step(self) -> None:
-        """Count one fit."""
-        self._reach(min(self.done + 1, self._end))
+    def step(self, done: int, total: int) -> None:
+        """Say how far the piece that is being done is, in steps of its own."""
+        self._tell(1, f" {done}/{total}")
 
-    def _reach(self, done: int) -> None:
-        self.done = max(self.done, done)
-        if self.told is not None:
-            self.told(self.done, self.known)
+    def _tell(self, current: int, step: str = "") -> None:
+        if self._told is None or self._piece is None:
+            return
+        kind, begin = self._piece
+        numbers = dict.fromkeys(_KINDS, 0.0)
+        for ahead in self._ahead:
+            for name, number in ahead.items():
+                numbers[name] += self._number(number)
+        here = current * max(self._pace.of(kind) - (self._clock() - begin), 0.0)
+        known = self._adequate is not None
+        left = here + sum(n * self._pace.of(name) for name, n in numbers.items())
+        total = self._done + current + round(sum(numbers.values()))
+        what = f"{_KINDS[kind][1]}{step}"
+        self._told(Advance(self._done, total, what, left if known else None, here))
+
+    def _number(self, number: Number) -> float:
+        if isinstance(number, tuple):
+            return number[0] if self._adequate else number[1]
+        return number
 
     def stops(self) -> bool:
         """Tell whether the time is spent; whoever asks leaves the rest, which is remembered."""
-        spent = self.budget is not None and time.perf_counter() - self.begin >= self.budget
+        spent = self.budget is not None and self._clock() - self._begin >= self.budget
         self.cut = self.cut or spent
         return spent
+
+
+def _less(number: Number) -> Number:
+    """Return a number of pieces once one of them has begun."""
+    if isinstance(number, tuple):
+        return max(number[0] - 1.0, 0.0), max(number[1] - 1.0, 0.0)
+    return max(number - 1.0, 0.0)

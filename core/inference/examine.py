@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import log
@@ -32,7 +31,7 @@ from femubench.core.inference.noise import Noise
 from femubench.core.inference.posterior import LIKELY_NOTHING, Explanation, Posterior, by_weight
 from femubench.core.inference.residuals import Data
 from femubench.core.inference.screening import with_shortlist
-from femubench.core.inference.search import Found, Search, adequacy, most_fits
+from femubench.core.inference.search import Found, Search, adequacy
 from femubench.core.inference.static_response import Basis, placed
 from femubench.core.modal.eigen import Modes, zero_tolerance
 from femubench.core.modal.measurement import Measurement
@@ -196,7 +195,7 @@ def examine(
         reference: modes of the structure as it was, without the causes that are sought.
         width: factor on the widths of the model error; 0 takes the structure for a beam model.
         beam: prior probability that it is one, but for the scatter of its elements.
-        effort: that is counted; the search for several causes ends with its time.
+        effort: counts the pieces; the search for several causes ends with its time.
 
     Raises:
         NotApplicable: when a used frequency has no standard deviation.
@@ -209,17 +208,17 @@ def examine(
     """
     effort = effort or Effort()
     # Thousands of small matrices: threads would wait for each other most of the time.
-    with threadpool_limits(1), ExitStack() as stages:
+    with threadpool_limits(1):
         hypotheses, known = _candidates(model, tuple(effects), reference)
         basis = Basis.of(model, measurement)
         problem, slopes = posed(model, measurement, hypotheses, tolerance, basis)
         before = None if reference is None else before_of(problem, reference)
-        stages.enter_context(effort.stage(most_fits(problem, pairs, 1 + _ROUNDS * (width > 0.0))))
         explanations: list[Explanation] = []
         error = None
         if width > 0.0:
             error = model_error_of(problem, basis, before, width, log(1.0 - beam))
-            explanations = searched(problem, error, known, pairs, effort)
+            with effort.scope():
+                explanations = searched(problem, error, known, pairs, effort)
         own = replace(problem, noise=beam_noise(basis, slopes, before, tolerance, log(beam)))
         slopes = slopes[: len(measurement)].copy()  # those of shapes fill the memory
         floor = max((e.log_weight for e in explanations), default=-np.inf) - _HOPELESS
@@ -278,12 +277,14 @@ def searched(
 
     scales = error.fitted(nothing)
     explanations: list[Explanation] = []
+    effort.expect_alike(_ROUNDS, pairs)
     if len(error.residual):
         # Scales that do without a cause see none: those of the structure as it was do.
         earlier = error.before()
         single = by_weight(e for e in sought(earlier, False) if e.parts)[:_SINGLES]
         explanations += [with_scales(error, e, scales, nothing) for e in single]
-    for _ in range(_ROUNDS):
+    for left in reversed(range(_ROUNDS)):
+        effort.expect_alike(left, pairs)
         explanations += sought(scales, pairs)
         best = by_weight(explanations)[0].fit.state
         before, scales = scales, error.fitted(best, scales)

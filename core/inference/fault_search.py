@@ -29,6 +29,7 @@ from threadpoolctl import threadpool_limits
 from femubench.core.errors import FemubenchError
 from femubench.core.fem.model import Model
 from femubench.core.inference.charge import Charge, Mended, charges_of
+from femubench.core.inference.effort import Effort
 from femubench.core.inference.examine import Examination, before_of, model_error_of, posed
 from femubench.core.inference.extended_model import raw_residual
 from femubench.core.inference.fit import State, log_evidence, state_at
@@ -50,6 +51,7 @@ _OF_A_KIND, _PROMISING = 3, -3.0
 _CLEARLY = 20.0  # nats by which a fault may lag behind causes, and still be tried with them
 _SOLVED = 20  # suspects of what was typed in that are solved of a large model
 _ROUNDS = 3
+_AGAIN = 2.0  # searches for single causes that deviations mostly take
 _TWICE = 2.0  # by which deviations must be stated too large to be told
 _LITTLE = 0.3  # share of the squared misfit that is left, where a fault is most of it
 _FIT, _GROSS = 0.05, 0.05
@@ -85,6 +87,7 @@ def inquire(
     *,
     reference: Measurement | None = None,
     width: float = 1.0,
+    effort: Effort | None = None,
 ) -> Inquiry:
     """Weigh explanations of data by physical causes, and by faults beside them.
 
@@ -95,11 +98,13 @@ def inquire(
         examine: from model, data and how many causes are sought to their examination.
         reference: modes of the structure as it was, where they are known.
         width: factor on the widths of the model error beside which faults are sought.
+        effort: counts the pieces.
 
     Raises:
         NotApplicable: when a used frequency has no standard deviation.
         ModelError: when the model has no modes.
     """
+    effort = effort or Effort()
     # What was typed in is wrong in both states, and so no part of what differs.
     known = tuple(f for f in faults if reference is None or f.side == "data")
     mended: list[Mended] = []
@@ -107,14 +112,16 @@ def inquire(
     if not known:
         return Inquiry(examine(model, measurement, "several"))
     now = _Drawn(model, measurement, reference, width)
-    ranked = _weighed(now, known)
+    ranked = _weighed(now, known, effort)
     while len(mended) < _MOST and (found := _definite(now, ranked, examine)) is not None:
         mended.append(found)
         now = now.mended(found.charge)
-        ranked = _weighed(now, known)
-    seen = examine(now.model, now.measurement, "several")
+        ranked = _weighed(now, known, effort)
+    reweighing = [charge for charge, _ in ranked if charge.reweighs]
+    with effort.scope({"single": (0.0, _AGAIN if reweighing else 0.0)}):
+        seen = examine(now.model, now.measurement, "several")
     # Other deviations would excuse whatever is wrong: they are the last resort.
-    other = _reweighed(now, [charge for charge, _ in ranked if charge.reweighs], seen, examine)
+    other = _reweighed(now, reweighing, seen, examine)
     if other is None:
         return Inquiry(seen, tuple(mended))
     if other.charge.loosens < 1.0:
@@ -373,22 +380,22 @@ class _Drawn:
         bend = cost(x + _CURVED) + cost(x - _CURVED) - 2.0 * float(found.fun)
         return replace(charge, x=x, std=max(bend / _CURVED**2, 1.0) ** -0.5)
 
-    def typed(self, charges: Sequence[Charge]) -> list[tuple[Charge, float]]:
-        """Return faults of what was typed in with what each gains at the present scales."""
-        problem, noise = self.state.problem, self.state.problem.noise
-        count = len(self.measurement)
+    def worth_solving(self, charges: Sequence[Charge]) -> Sequence[Charge]:
+        """Return the faults of what was typed in that are tried: none where no error is gross."""
+        problem, count = self.state.problem, len(self.measurement)
         error = problem.data.by_mode(self.state.raw)[:count] * self.measurement.frequency_std
         if not (np.abs(error / self.measurement.frequencies) > _GROSS).any():
             return []
-        found = []
-        for charge in charges[: _SOLVED if self.model.size > DENSE_LIMIT else len(charges)]:
-            try:
-                rest = noise.residual(raw_residual(problem, charge.mended[0]))
-            except (FemubenchError, la.LinAlgError):
-                continue
-            gain = 0.5 * (self.state.chi2 - float(rest @ rest))
-            found.append((charge, gain + charge.log_prior))
-        return found
+        return charges[: _SOLVED if self.model.size > DENSE_LIMIT else len(charges)]
+
+    def typed(self, charge: Charge) -> Weighed:
+        """Return a fault of what was typed in with what it gains at the present scales."""
+        problem, noise = self.state.problem, self.state.problem.noise
+        try:
+            rest = noise.residual(raw_residual(problem, charge.mended[0]))
+        except (FemubenchError, la.LinAlgError):
+            return []
+        return [(charge, 0.5 * (self.state.chi2 - float(rest @ rest)) + charge.log_prior)]
 
 
 def _between(parameter: EffectParameter) -> tuple[float, float]:
@@ -405,18 +412,28 @@ def _inside(charge: Charge) -> bool:
     return low + _EDGE < charge.x < high - _EDGE
 
 
-def _weighed(now: _Drawn, faults: Sequence[Fault]) -> Weighed:
+def _weighed(now: _Drawn, faults: Sequence[Fault], effort: Effort) -> Weighed:
     """Return the suspects that promise something, likeliest first, with nats above no fault."""
     charges = charges_of(now.model, now.measurement, faults)
-    with threadpool_limits(1):
-        data = [charge for charge in charges if charge.fault.side == "data"]
-        promises = now.all_screened(data)
-        promises += now.typed([charge for charge in charges if charge.fault.side == "input"])
-        kinds: dict[str, Weighed] = {}
-        for charge, gain in in_order(promises, lambda pair: -pair[1]):
-            kinds.setdefault(charge.fault.name, []).append((charge, gain))
-        few = [pair for kind in kinds.values() for pair in kind[:_OF_A_KIND]]
-        exact = [now.exactly(charge, gain) for charge, gain in few]
+    data = [charge for charge in charges if charge.fault.side == "data"]
+    with threadpool_limits(1), effort.scope({"faults": 1}):
+        typed = now.worth_solving([charge for charge in charges if charge.fault.side == "input"])
+        effort.expect("typed", len(typed))
+        promises: Weighed = []
+        for charge in typed:
+            with effort.piece("typed"):
+                promises += now.typed(charge)
+        with effort.piece("faults"):
+            return _likeliest(now, [*now.all_screened(data), *promises])
+
+
+def _likeliest(now: _Drawn, promises: Weighed) -> Weighed:
+    """Return those that promise something at scales of their own, likeliest first."""
+    kinds: dict[str, Weighed] = {}
+    for charge, gain in in_order(promises, lambda pair: -pair[1]):
+        kinds.setdefault(charge.fault.name, []).append((charge, gain))
+    few = [pair for kind in kinds.values() for pair in kind[:_OF_A_KIND]]
+    exact = [now.exactly(charge, gain) for charge, gain in few]
     kept = [(c, gain) for c, gain in exact if c.reweighs or np.isfinite(gain)]
     return in_order(kept, lambda pair: -pair[1])
 

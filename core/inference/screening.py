@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from femubench.core.inference.effort import Effort
 from femubench.core.inference.fit import Fit, Problem, State, fit, state_at
 from femubench.core.inference.grid_search import Screened, residuals_at, screen
 from femubench.core.inference.hypothesis import Hypothesis, magnitudes
@@ -57,15 +58,17 @@ def with_shortlist(problem: Problem) -> Problem:
     return replace(problem, space=space)
 
 
-def screened(problem: Problem, base: State, projections: Sequence[Projection]) -> list[Screened]:
+def screened(
+    problem: Problem, base: State, projections: Sequence[Projection], effort: Effort
+) -> list[Screened]:
     """Return the atlas; of a large model, each hypothesis in coordinates of its own."""
     if not isinstance(problem, LargeProblem) or not projections:
         return screen(problem, base, projections)
     spaces = problem.common.first_response(problem.space, projections)
-    tried = (
-        _tried(replace(problem, space=own), projection)
-        for own, projection in zip(spaces, projections, strict=True)
-    )
+    tried = []
+    for number, (own, projection) in enumerate(zip(spaces, projections, strict=True)):
+        effort.step(number, len(projections))
+        tried.append(_tried(replace(problem, space=own), projection))
     return [item for item in tried if item is not None]
 
 

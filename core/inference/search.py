@@ -66,16 +66,11 @@ _NEAR = 16.0  # of the cost, below which the interpolation may have ranked wrong
 _CURVED = 0.05  # share of the explained chi-square that the interpolation may miss
 _LOST = 20.0  # behind the best by so much, a fit is not brought to its end
 _SINGLES_FOR_PAIRS, _PARTNERS = 6, 8
+_SWAPPED, _MORE = 2, 2  # how often partners are mostly sought after those of the first causes
 _PROMISE = 0.3  # of the chi-square that a partner must explain, were effects to add up
 _MOST_CAUSES = 4
 _ADEQUATE = 0.05
 _SPLIT = 4  # single causes that are tried with more values at their places
-
-
-def most_fits(problem: Problem, pairs: bool, searches: int = 1) -> int:
-    """Return how many fits searches are known to do at most; greedy steps may add some."""
-    singles = _GROUNDS * min(_REFINED, len(problem.space.projections))
-    return searches * (singles + pairs * (_SINGLES_FOR_PAIRS + 2) * _PARTNERS)
 
 
 @dataclass(frozen=True)
@@ -108,7 +103,7 @@ class Search:
         effects: what may be missing.
         pairs: whether more than one cause is sought.
         floor: of ln weight; where no single cause comes near it, no pairs are sought.
-        effort: that is counted; the search for several causes ends with its time.
+        effort: counts the pieces; the search for several causes ends with its time.
     """
 
     def __init__(
@@ -129,20 +124,37 @@ class Search:
 
     def run(self) -> tuple[list[Explanation], list[Found]]:
         """Return all explanations and the atlas of every base that was searched."""
-        with self.effort.stage(most_fits(self.problem, self.pairs)):
-            return self._run()
-
-    def _run(self) -> tuple[list[Explanation], list[Found]]:
         bases = textbook_bases(self.problem.space.projections)
+        several = self.pairs and bool(self.names)
+        with self.effort.scope(
+            {
+                "single": (min(len(bases), _GROUNDS), min(len(bases), _GROUNDS + 1)),
+                "together": (several * 2, several * (_SINGLES_FOR_PAIRS + _SWAPPED)),
+                "more": (0, several * _MORE),
+                "values": several * 2,
+            }
+        ):
+            return self._run(bases)
+
+    def _run(self, bases: Sequence[Base]) -> tuple[list[Explanation], list[Found]]:
         found = [self.on(bases[0])]
         bare = [self.bare(base) for base in bases[1:]]
-        found += [self.on(base) for base in self.promising(bare, found[0])]
+        self.effort.explained(self.enough(found) or any(map(self.adequate, bare)))
+        promising = self.promising(bare, found[0])
+        self.effort.expect("single", len(promising))
+        for base in promising:
+            found.append(self.on(base))
+            self.effort.explained(self.enough(found) or any(map(self.adequate, bare)))
         explanations = [e for item in found for e in item.explanations]
         searched = {item.base.names for item in found}
         explanations += [e for e in bare if e.base.names not in searched]
         if self.pairs and self.names and _best(explanations).log_weight > self.floor:
             explanations += self.combined(found)
-            explanations += [e for best in by_weight(explanations)[:2] for e in self.split(best)]
+            self.effort.expect("together", 0)
+            self.effort.expect("more", 0)
+            for best in by_weight(explanations)[:2]:
+                with self.effort.piece("values"):
+                    explanations += self.split(best)
         if isinstance(self.problem, LargeProblem):
             explanations = self.borne_out(explanations)
         return explanations, found
@@ -192,10 +204,14 @@ class Search:
 
     def on(self, base: Base) -> Found:
         """Return nothing and every single cause on top of a textbook set."""
+        with self.effort.piece("single"):
+            return self._on(base)
+
+    def _on(self, base: Base) -> Found:
         problem = self.grounded(base) if base.parts else self.problem
         start = fit(problem, (), np.zeros(0))
         assert start is not None
-        atlas = screened(problem, start.state, problem.space.projections)
+        atlas = screened(problem, start.state, problem.space.projections, self.effort)
         fits = self.refined(problem, start, atlas)
         explanations = [Explanation(base, item, self.names) for item in (start, *fits)]
         ranked = by_weight(explanations[1:])
@@ -236,11 +252,11 @@ class Search:
             chances = []
         fits: list[Fit] = []
         best = start.state.cost
-        for item in (*near, *chances):
+        for number, item in enumerate((*near, *chances)):
+            self.effort.step(number, len(near) + len(chances))
             own, parts = enriched(problem, (item.projection,))
             give_up = best + _LOST if id(item) in known else np.inf
             result = fit(own, parts, item.x, give_up=give_up)
-            self.effort.step()
             if result is not None:
                 fits.append(result)
                 best = min(best, result.state.cost)
@@ -251,17 +267,23 @@ class Search:
         by_base = {item.base.names: item for item in found}
         singles = by_weight(e for item in found for e in item.explanations if e.parts)
         places = {self.at(e.parts[0].hypothesis): e for e in reversed(singles)}
-        seeds = by_weight(places.values())[: _SINGLES_FOR_PAIRS if not self.enough(found) else 1]
+        enough = self.enough(found)
+        seeds = by_weight(places.values())[: 1 if enough else _SINGLES_FOR_PAIRS]
+        self.effort.expect("together", len(seeds) + (not enough) * _SWAPPED)
         result: list[Explanation] = []
         tried: set[tuple[object, ...]] = set()
         for seed in seeds:
             result += self.grown(by_base[seed.base.names], seed, tried)
+            self.effort.explained(enough or (bool(result) and self.adequate(_best(result))))
         if not result:
             return result
+        self.effort.expect("together", _SWAPPED)
         best = _best(result)
         result += self.swapped(by_base[best.base.names], best, tried)
+        self.effort.expect("together", 0)
         while True:
             best = _best(result)
+            self.effort.explained(enough or self.adequate(best))
             if len(best.parts) >= _MOST_CAUSES or self.adequate(best):
                 return result
             result += self.grown(by_base[best.base.names], best, tried)
@@ -282,6 +304,12 @@ class Search:
         """Return an explanation with one cause more, for every partner that is worth it."""
         if self.effort.stops():
             return []
+        with self.effort.piece("together" if len(seed.parts) == 1 else "more"):
+            return self._grown(found, seed, tried)
+
+    def _grown(
+        self, found: Found, seed: Explanation, tried: set[tuple[object, ...]]
+    ) -> list[Explanation]:
         problem, state = found.problem, seed.fit.state
         floor = 0.5 * selection_cost(self.names, self.places)
         above = beside(worthwhile(found, seed, _PROMISE * floor), seed.fit)
@@ -298,7 +326,6 @@ class Search:
                 break
             partner = originals.get(id(item.projection.hypothesis), item.projection)
             joint = self.joint(problem, (*seed.parts, partner), state.x, item.x, tried)
-            self.effort.step()
             if joint is not None:
                 result.append(Explanation(found.base, joint, self.names))
         return result

@@ -16,8 +16,9 @@ from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.serial import diagnosis_to_json
 from femubench.core.errors import InputError, NotApplicable
 from femubench.core.files import check_new, make_folder
-from femubench.core.inference.effort import Effort, Told
+from femubench.core.inference.effort import Effort
 from femubench.core.library.cases import CaseLike, listed, one_case, usable_plugins
+from femubench.core.pace import Told
 from femubench.core.plugin.loader import Plugins, registered_faults
 from femubench.core.plugin.validation import check_effect, chosen
 from femubench.core.roles import Effect
@@ -91,8 +92,8 @@ def diagnosis_of(
 ) -> Diagnosis:
     """Return the diagnosis; see `diagnose`.
 
-    `told` is called after every fit with how many are done, and how many are known so far; `others`
-    are the plugins of strangers that are asked for.
+    `told` is called with how far it is, and how long the rest takes; `others` are the plugins of
+    strangers that are asked for.
     """
     if budget is not None and not budget >= 0.0:
         raise InputError(f"budget = {budget!r}", expected="seconds >= 0")

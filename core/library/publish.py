@@ -27,6 +27,7 @@ def publish(
     runs: Run | str | PathLike[str] | Iterable[Run | str | PathLike[str]],
     *,
     unverified: bool = False,
+    address: str | None = None,
 ) -> Published:
     """Merge runs into a static site, all of them or none.
 
@@ -35,10 +36,12 @@ def publish(
         runs: files that ``bench run --json`` wrote, here or on another machine, or runs.
         unverified: whether to take, marked as such, what cannot be verified: runs without sandbox
             or twins, of cases that are not installed here, or with figures that do not agree.
+        address: where the site will be found, ``https://...``, for the links of its feeds; None for
+            what it was told before.
 
     Raises:
-        InputError: for a file that is not sound, or cannot be verified, or a folder with something
-            else in it.
+        InputError: for a file that is not sound, or cannot be verified, a folder with something
+            else in it, or an address that is none.
 
     Examples:
         >>> run = femubench.rank(case, [nominal, scaled])
@@ -55,7 +58,9 @@ def publish(
             if isinstance(run, Run):
                 file.write_text(json.dumps(run_to_json(run), allow_nan=False), encoding="utf-8")
             files.append(file)
-        return merge(Path(folder), files, pages_of, _check(), unverified=unverified)
+        return merge(
+            Path(folder), files, pages_of, _check(), unverified=unverified, address=address
+        )
 
 
 def refusal_of(file: Path) -> str:

@@ -19,6 +19,7 @@ from femubench.core.errors import InputError, NotApplicable
 from femubench.core.fem.model import differ
 from femubench.core.files import make_folder
 from femubench.core.library.cases import CaseLike, case_words, listed, read_cases, usable_plugins
+from femubench.core.pace import Told
 from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import check_strategy, chosen
 from femubench.core.plugin.variants import Variant, labelled, strategy_of
@@ -187,6 +188,7 @@ class Plan:
         overwrite: Overwrite | None = None,
         resume: bool = False,
         progress: Progress | None = None,
+        told: Told | None = None,
     ) -> Run:
         """Run every strategy on every case with every seed; see `rank`.
 
@@ -209,6 +211,7 @@ class Plan:
                 overwrite=overwrite,
                 resume=resume,
                 progress=progress,
+                told=told,
                 run_seed=asked.seed,
                 request=asked.to_json() if self.repeatable else {"nominal": asked.nominal},
                 starts=self.starts,

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
-from itertools import count
+from itertools import accumulate
 from os import PathLike
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from femubench.core.files import check_can_make, make_folder, write_atomically
 from femubench.core.library.cases import listed, read_cases, usable_plugins
 from femubench.core.library.report import drawings, rendering
+from femubench.core.pace import Advance, Told
 from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import chosen
 from femubench.core.reproduction.study import Study
@@ -56,29 +58,58 @@ def known_papers(papers: str | Sequence[str] | None = None) -> tuple[str, ...]:
 
 
 def studies_of(
-    papers: Sequence[str], plugins: Plugins, told: Callable[[int, int], None] | None = None
+    papers: Sequence[str],
+    plugins: Plugins,
+    told: Told | None = None,
+    clock: Callable[[], float] = time.monotonic,
 ) -> tuple[Study, ...]:
     """Return the studies of papers; see `reproduce`.
 
     Arguments:
-        told: called with how many updates are computed, of how many.
+        told: called after each update with how many are computed, of how many.
+        clock: seconds from any time on.
     """
-    from femubench.papers import PAPERS, UPDATES, study
+    from femubench.papers import PAPERS, study
 
     found = []
-    steps, total = count(1), sum(UPDATES[paper] for paper in papers)
-
-    def step() -> None:
-        done = next(steps)
-        if told is not None:
-            told(done, max(total, done))
-
+    watched = _Updates(papers, told, clock)
     for paper in papers:
         cases = {case.name: case for case in read_cases(PAPERS[paper], plugins)}
         # Many small matrices: threads would only wait for each other.
         with threadpool_limits(1):
-            found.append(study(paper, Workbench(plugins.strategies, cases, step)))
+            found.append(study(paper, Workbench(plugins.strategies, cases, watched.step)))
     return tuple(found)
+
+
+class _Updates:
+    """Updates that are computed, and the time that the rest takes, as such re-runs have it."""
+
+    def __init__(
+        self, papers: Sequence[str], told: Told | None, clock: Callable[[], float]
+    ) -> None:
+        from femubench.papers import DONE
+
+        rows = [DONE[paper] for paper in papers]
+        before = accumulate((row[-1] for row in rows), initial=0)
+        self._after = [
+            first + x for first, row in zip(before, rows, strict=False) for x in row[:-1]
+        ]
+        self._whole = sum(row[-1] for row in rows)
+        self._told, self._clock, self._begin = told, clock, clock()
+        self._done = 0
+
+    def step(self) -> None:
+        """Count an update."""
+        self._done += 1
+        if self._told is None:
+            return
+        after = [*self._after, self._whole]
+        place = min(self._done, len(self._after))
+        here, following = after[place - 1], after[place]
+        rate = (self._clock() - self._begin) / here
+        left = rate * (self._whole - here), rate * (following - here)
+        total = max(len(self._after), self._done)
+        self._told(Advance(self._done, total, "updates", *left))
 
 
 def write_studies(studies: Sequence[Study], folder: Path) -> tuple[list[str], int]:

@@ -20,6 +20,7 @@ from femubench.core.library.rank import (
     store_in,
     textbook_of,
 )
+from femubench.core.pace import Told
 from femubench.core.plugin.loader import Plugins
 from femubench.core.plugin.validation import chosen, unknown
 from femubench.core.plugin.variants import Variant
@@ -108,6 +109,7 @@ class StudyPlan:
         memory: int | None = None,
         overwrite: Overwrite | None = None,
         progress: Progress | None = None,
+        told: Told | None = None,
     ) -> Run:
         """Run what the store does not have, seed after seed; see `study`.
 
@@ -132,6 +134,7 @@ class StudyPlan:
                 overwrite=overwrite,
                 resume=store is not None,
                 progress=progress,
+                told=told,
                 run_seed=self.seed,
                 request={"study": self.axes.to_json()},
                 starts=self.starts,

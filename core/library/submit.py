@@ -15,9 +15,10 @@ from femubench.core.library.cases import listed, usable_plugins
 from femubench.core.library.compare import compare
 from femubench.core.library.plugins import check
 from femubench.core.library.publish import refusal_of
-from femubench.core.library.rank import Run, Twins, rank, read_run
+from femubench.core.library.rank import Run, Twins, plan_of, read_run
 from femubench.core.library.report import rendered, rendering, report, reporter
-from femubench.core.run.recording import Progress
+from femubench.core.pace import Told
+from femubench.core.run.executor import executor_of
 from femubench.core.run.sandbox import Sandbox
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def submit(
     jobs: int | None = None,
     timeouts: Mapping[str, float] | None = None,
     tell: Callable[[str], None] = lambda line: None,
-    progress: Progress | None = None,
+    told: Told | None = None,
 ) -> Submission:
     """Check strategies, run them, compare them with an earlier run, and write the result file.
 
@@ -66,9 +67,10 @@ def submit(
         output: the file that `publish` takes.
         baseline: the result file of an earlier run; without one nothing is compared.
         fail: what counts as worse, as in `compare`.
-        twins, sandbox, jobs, progress: as in `rank`.
+        twins, sandbox, jobs: as in `rank`.
         timeouts: seconds that a job may take, by strategy; without a name for all others.
         tell: is given a line at the start of every step.
+        told: how far the run is, and how long the rest takes.
 
     Raises:
         InputError: for an unknown name, a faulty case or baseline, or no job in common with it.
@@ -80,10 +82,14 @@ def submit(
     faults = list(_broken_rules(names, tell))
     tell(f"run {', '.join(names)}")
     limits = dict(timeouts or {})
-    run = rank(
-        list(cases), names, twins=twins, sandbox=sandbox, jobs=jobs, timeout=limits.pop("", None),
-        timeouts=limits, progress=progress,
-    )  # fmt: skip
+    plan = plan_of(
+        *(list(cases), names, usable_plugins()),
+        timeout=limits.pop("", None),
+        timeouts=limits,
+        twins=twins,
+    )
+    with executor_of(jobs, sandbox=sandbox) as where:
+        run = plan.run(None, None, where, told=told)
     report(run, file, style="json")
     faults += _unanswered(run, names)
     found = None

@@ -37,6 +37,7 @@ _LINES = ("line", "steps", "calibration")
 _FAR = 4.0  # an axis leaves out what lies farther away than so many times the spread of the rest
 _FEWEST = 5  # values from which one can be called far off
 _MOST_NAMED = 60
+_NARROW = 5.0  # in, of a figure whose legend has room for one name in a line
 _NUMBERED = 200  # cells of a matrix with their number; more have no room
 _MOST_TICKS = 7  # of a logarithmic axis
 _MARKERS = ("o", "s", "^", "D", "X", "P", "v", "*")
@@ -196,7 +197,10 @@ class Chart:
         for mark in self.marks:
             _mark(mark, ax)
         if len(self.series) > 1:
-            figure_of(ax).legend(loc="outside lower center", ncols=3, fontsize=8.5, frameon=False)
+            columns = 3 if figure_of(ax).get_figwidth() > _NARROW else 1
+            figure_of(ax).legend(
+                loc="outside lower center", ncols=columns, fontsize=8.5, frameon=False
+            )
         return ax
 
 
@@ -266,11 +270,16 @@ def _lay_out(chart: Chart, key: Literal["x", "y"], ax: Axes) -> None:
         reach = (-0.5, len(axis.names) - 0.5)
         settings |= {f"{key}lim": reach if key == "x" else reach[::-1]}
         settings |= {f"{key}ticks": range(len(axis.names))}
-        settings |= {f"{key}ticklabels": [name_of(name, 30) for name in axis.names]}
+        settings |= {f"{key}ticklabels": [name_of(name, _letters(ax)) for name in axis.names]}
     ax.set(**settings)
     ax.set_axisbelow(True)
     if axis.log:
         _round_ticks(ax.xaxis if key == "x" else ax.yaxis, *reach)
+
+
+def _letters(ax: Axes) -> int:
+    """Return how long names at an axis may be, so that most of the figure is left for the data."""
+    return min(30, max(12, int(5.4 * figure_of(ax).get_figwidth())))
 
 
 def _round_ticks(axis: MatplotlibAxis, low: float, high: float) -> None:

@@ -22,7 +22,8 @@ _START = """
 import json, sys
 sys.path[:] = json.loads(sys.argv[1])
 from femubench.core.plugin import describing, keeper
-keeper.main(describing.answer)
+from femubench.core.run.sandbox import way_in
+keeper.main(describing.answer, way_in, sys.argv[2])
 """
 
 
@@ -80,7 +81,8 @@ def ask(
 
     Arguments:
         questions: plain data; ``do`` names the function of ours that answers, ``origin`` the
-            plugin; every one is answered in a process of its own.
+            plugin; every one is answered in a process of its own, with ``walled`` in a sandbox
+            where that is possible.
         seconds, most: what each may take, `SECONDS` by default, and the bytes of its answer.
     """
     if not questions:
@@ -100,18 +102,21 @@ def ask(
 def _kept(questions: Iterable[Mapping[str, Any]], seconds: float) -> list[Any] | None:
     """Return what the process that asks writes; None where it does not come to an end."""
     import subprocess
+    import tempfile
 
     paths = json.dumps([os.path.abspath(path) for path in sys.path])
-    command = [sys.executable, "-c", _START, paths]
     quiet = {"PYTHONDONTWRITEBYTECODE": "1"} if sys.dont_write_bytecode else {}
-    with subprocess.Popen(
-        command,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        env={**os.environ, **quiet},
-        start_new_session=True,
-    ) as process:
+    with (
+        tempfile.TemporaryDirectory(prefix="femubench-apart-") as at,
+        subprocess.Popen(
+            [sys.executable, "-c", _START, paths, at],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, **quiet},
+            start_new_session=True,
+        ) as process,
+    ):
         try:
             said, _ = process.communicate(json.dumps(list(questions)).encode(), seconds)
         except subprocess.TimeoutExpired:

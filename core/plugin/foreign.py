@@ -213,7 +213,7 @@ def _parsed(told: str) -> dict[str, Any]:
 def _varied(handle: Handle, chosen: str) -> str:
     """Return the description of a strategy with other options."""
     options = json.loads(chosen)
-    limits: Mapping[str, Any] = {"seconds": apart.SECONDS, "most": apart.MOST}
+    limits: Mapping[str, Any] = {"seconds": apart.SECONDS, "most": apart.MOST, "walled": True}
     found = handle.origin.ask(_VARY, name=handle.name, options=options, **limits)
     return strategy_of(handle, found).told
 

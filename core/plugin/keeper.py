@@ -2,7 +2,8 @@
 
 It runs in a process of its own and imports no plugin itself. Where Linux allows it, every question
 is answered in a namespace of processes, which can signal or look into none outside it and of which
-nothing is left afterwards; elsewhere in a session whose orphans come back to this process.
+nothing is left afterwards; elsewhere in a session whose orphans come back to this process. What
+needs no file of anybody is answered in the sandbox of strategies, where that is possible.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NoReturn
 
 HEAD = 8  # bytes that tell the length of what follows
@@ -28,12 +30,16 @@ _LEAST_MEMORY = 4 * 2**30  # bytes of address space that every question may take
 _LARGEST_FILE = 2**30
 _MOST_PROCESSES = 256  # in a namespace
 _SIGNALLED = 128  # added to the number of a signal by who passes the end of a process on
+_ROOM = 2**28  # bytes that the temporary folder in a sandbox may hold
+_INSIDE = b"\1"  # said by who is in the sandbox, before any plugin is imported
 _END = 5.0  # s that is spent on ending what was left behind
 _CHUNK = 2**16
+_PAUSE = 0.001  # s
 _TICK = 0.2  # s between two looks at who has ended
 
 exit_now = os._exit  # before anybody puts something else there
 Answer = Callable[[dict[str, Any]], dict[str, Any]]
+Enter = Callable[[str], None]
 
 
 @dataclass
@@ -41,36 +47,52 @@ class _Asked:
     """A question on its way.
 
     Arguments:
-        number: of the question.
+        number, question: what was asked.
+        walled: whether a sandbox was to be entered first.
         process, pipe: who answers, and where.
         deadline, seconds: when it has had its time, on the monotonic clock, and how much that is.
         most: bytes that the answer may have.
     """
 
     number: int
+    question: dict[str, Any]
     process: int
     pipe: int
     deadline: float
     seconds: float
     most: int
+    walled: bool
     received: bytearray = field(default_factory=bytearray)
+
+    @property
+    def barred(self) -> bool:
+        """Tell whether the sandbox was not entered, so that no plugin has been imported yet."""
+        return self.walled and not self.received
+
+    @property
+    def start(self) -> int:
+        """Return where the answer begins, behind its length."""
+        return HEAD + (len(_INSIDE) if self.walled else 0)
 
     @property
     def length(self) -> int:
         """Return the length that the answer is said to have; -1 before it is known."""
-        return int.from_bytes(self.received[:HEAD], "big") if len(self.received) >= HEAD else -1
+        told = self.received[self.start - HEAD : self.start]
+        return int.from_bytes(told, "big") if len(told) == HEAD else -1
 
     @property
     def complete(self) -> bool:
         """Tell whether the whole answer is there."""
-        return 0 <= self.length <= len(self.received) - HEAD
+        return 0 <= self.length <= len(self.received) - self.start
 
 
-def main(answer: Answer) -> None:
+def main(answer: Answer, way_in: Callable[[int, int], Enter | None], at: str) -> None:
     """Read questions from standard input and write what became of each to standard output.
 
     Arguments:
         answer: from a question to plain data; called in a process of its own.
+        way_in: from room and number of processes to what enters a sandbox; see `way_in` there.
+        at: an empty folder for it.
     """
     questions = json.loads(sys.stdin.buffer.read())
     out = os.dup(1)
@@ -79,7 +101,10 @@ def main(answer: Answer) -> None:
         os.dup2(nothing, stream)
     _call("prctl", _PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     _call("prctl", _PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
-    found = json.dumps(_all(questions, answer)).encode()
+    walled = any(question.get("walled") for question in questions)
+    enter = way_in(_ROOM, _MOST_PROCESSES) if walled else None
+    inside = None if enter is None else partial(enter, at)
+    found = json.dumps(_all(questions, answer, inside)).encode()
     _end_children()
     write(out, found)
 
@@ -91,17 +116,23 @@ def write(descriptor: int, data: bytes) -> None:
         view = view[os.write(descriptor, view[:_CHUNK]) :]
 
 
-def _all(questions: list[dict[str, Any]], answer: Answer) -> list[dict[str, str]]:
+def _all(
+    questions: list[dict[str, Any]], answer: Answer, enter: Callable[[], None] | None
+) -> list[dict[str, str]]:
     """Return for every question what was ``said``, as text, or why the answer was ``lost``."""
     found: list[dict[str, str]] = [{} for _ in questions]
     waiting, running = list(enumerate(questions)), list[_Asked]()
     most = os.cpu_count() or 1
     while waiting or running:
         while waiting and len(running) < most:
-            running.append(_begin(*waiting.pop(0), answer))
+            running.append(_begin(*waiting.pop(0), answer, enter))
         for asked in list(_over(running)):
             running.remove(asked)
-            found[asked.number] = _told(asked)
+            told = _told(asked)
+            if asked.barred:
+                waiting.append((asked.number, {**asked.question, "walled": False}))
+            else:
+                found[asked.number] = told
     return found
 
 
@@ -135,7 +166,9 @@ def _told(asked: _Asked) -> dict[str, str]:
         return {"lost": f"what it told was larger than {asked.most} bytes"}
     if asked.complete:
         _end(asked.process)
-        text = bytes(asked.received[HEAD : HEAD + asked.length]).decode("utf-8", "replace")
+        text = bytes(asked.received[asked.start : asked.start + asked.length]).decode(
+            "utf-8", "replace"
+        )
         return {"said": text}
     code = None if late else _ended(asked.process)
     if code is None:
@@ -164,11 +197,15 @@ def _code(status: int) -> int:
 
 
 def _end(process: int) -> None:
+    _kill(process)
+    with suppress(ChildProcessError):
+        os.waitpid(process, 0)
+
+
+def _kill(process: int) -> None:
     for end in (os.killpg, os.kill):
         with suppress(ProcessLookupError, PermissionError):
             end(process, signal.SIGKILL)
-    with suppress(ChildProcessError):
-        os.waitpid(process, 0)
 
 
 def _end_children() -> None:
@@ -185,24 +222,32 @@ def _end_children() -> None:
             return
         if not left:
             return
+        # The first process of a namespace ends when all others of it have been waited for.
         for process in left:
-            _end(process)
+            _kill(process)
+        time.sleep(_PAUSE)
 
 
-def _begin(number: int, question: dict[str, Any], answer: Answer) -> _Asked:
+def _begin(
+    number: int, question: dict[str, Any], answer: Answer, enter: Callable[[], None] | None
+) -> _Asked:
     """Start the process that answers a question."""
+    walled = enter is not None and bool(question.get("walled"))
     mine, its = os.pipe()
     process = os.fork()
     if process == 0:
         try:
-            _apart()
+            _apart(enter if walled else None)
+            if walled:
+                write(its, _INSIDE)
             _speak(its, question, answer)
         finally:
             exit_now(1)
     os.close(its)
     seconds = question["seconds"]
     deadline = time.monotonic() + seconds
-    return _Asked(number, process, mine, deadline, seconds, question["most"])
+    most = question["most"]
+    return _Asked(number, question, process, mine, deadline, seconds, most, walled)
 
 
 def _speak(pipe: int, question: dict[str, Any], answer: Answer) -> NoReturn:
@@ -214,11 +259,17 @@ def _speak(pipe: int, question: dict[str, Any], answer: Answer) -> NoReturn:
     exit_now(0)
 
 
-def _apart() -> None:
-    """Go on in a session of its own, with limits, and in a namespace of processes if possible."""
+def _apart(enter: Callable[[], None] | None) -> None:
+    """Go on in a session of its own, with limits, and in a namespace of processes if possible.
+
+    Arguments:
+        enter: enters a sandbox instead; None for none.
+    """
     os.setsid()
     _call("prctl", _PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    alone = _in_namespace()
+    if enter is not None:
+        enter()
+    alone = enter is not None or _in_namespace()
     physical = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     _lower(resource.RLIMIT_AS, max(_LEAST_MEMORY, physical // 2))
     _lower(resource.RLIMIT_CORE, 0)

@@ -121,7 +121,8 @@ def _descriptions(origins: Sequence[Origin]) -> dict[Origin, Any]:
     keys = {origin: (origin, tuple(sys.path), stamps(origin.top)) for origin in origins}
     new = [origin for origin, key in keys.items() if key not in _known]
     questions = [
-        {"do": DESCRIBE, "origin": [one.plugin, one.value, one.distribution]} for one in new
+        {"do": DESCRIBE, "origin": [one.plugin, one.value, one.distribution], "walled": True}
+        for one in new
     ]
     for origin, answer in zip(new, apart.ask(questions), strict=True):
         _known[keys[origin]] = answer

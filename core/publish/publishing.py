@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from femubench.core.errors import InputError, OutputError
+from femubench.core.errors import InputError, OutputError, harmless
 from femubench.core.files import MIB, read_text, resolved
 from femubench.core.publish.board import index_of
 from femubench.core.publish.submissions import SCHEMA, Submission, Verify, read_submission
@@ -22,8 +23,9 @@ KIND = "femubench leaderboard"
 DATA = "data"
 MOST_RUNS, MOST_RESULTS = 1_000, 200_000
 # What publish makes; everything else in the folder, such as .git or CNAME, is somebody's and stays.
-_FILES = ("index.html", "index.json", "leaderboard.csv", "feed.xml", "site.css", "site.js")
-OWN = (MARKER, DATA, *_FILES, "strategies", "cases", "classes")
+_FILES = ("index.html", "index.json", "leaderboard.csv", "site.css", "site.js")
+OWN = (MARKER, DATA, *_FILES, "feed.xml", "feed.json", "strategies", "cases", "classes")
+_ADDRESS = re.compile(r"(https?://[^\s\"'<>\\?#/][^\s\"'<>\\?#]*)?")
 # A folder with nothing but these counts as empty.
 _SPARE = frozenset({".git", ".nojekyll", "CNAME", ".gitignore", ".gitattributes"})
 Render = Callable[[Mapping[str, Any]], Mapping[str, str]]
@@ -49,6 +51,7 @@ def publish(
     verify: Verify | None = None,
     *,
     unverified: bool = True,
+    address: str | None = None,
 ) -> Published:
     """Merge result files into the site in a folder, all of them or none.
 
@@ -58,20 +61,22 @@ def publish(
         render: from the content of ``index.json`` to the pages by relative name.
         verify: checks what can be checked of a run.
         unverified: whether to take, marked as such, what that refuses.
+        address: where the site will be found; None for what it was told before.
 
     Raises:
-        InputError: for a file that is not sound, or a folder with something else in it.
+        InputError: for a file that is not sound, a folder with something else in it, or an address
+            that is none.
         OutputError: where the site cannot be written; then it is as it was.
     """
     folder = resolved(folder)
-    old = _published(folder)
+    old, home = _published(folder), _home(folder, address)
     merged = _merged([*old, *(_submission(file, verify, unverified) for file in files)])
-    index = index_of(merged)
+    index = {**index_of(merged), "address": home}
     pages = {
         **render(index),
         **{f"{DATA}/{item.name}": item.text for item in merged},
         "index.json": json.dumps(index, indent=1, sort_keys=True, allow_nan=False) + "\n",
-        MARKER: json.dumps({"kind": KIND, "schema": SCHEMA}) + "\n",
+        MARKER: json.dumps({"kind": KIND, "schema": SCHEMA, "address": home}) + "\n",
     }
     try:
         _replace(folder, pages)
@@ -89,6 +94,18 @@ def _submission(file: Path, verify: Verify | None, unverified: bool) -> Submissi
         if not unverified:
             raise
     return read_submission(file)
+
+
+def _home(folder: Path, address: str | None) -> str:
+    """Return the address of a site, which ends with a slash; empty where nobody has told it."""
+    file = folder / MARKER
+    told = address
+    if told is None and file.exists():
+        told = parse_json(read_text(file, MIB), file=file, expected=KIND).get("address")
+    if not _ADDRESS.fullmatch(told := str(told or "")):
+        expected = "http or https, without a query"
+        raise InputError(f"{harmless(told)!r} is no address of a site", expected=expected)
+    return f"{told.rstrip('/')}/" if told else ""
 
 
 def check_site(folder: Path) -> None:

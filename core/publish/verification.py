@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import chain
 from pathlib import Path
 from typing import Any, NoReturn, Protocol
@@ -15,10 +16,10 @@ from typing import Any, NoReturn, Protocol
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
 from femubench.core.run.provenance import plan_digest
-from femubench.core.schema.results import JobResult, Run
+from femubench.core.schema.results import JobResult, Nominal, Run
 from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.ranking import score_of
-from femubench.core.score.scoring import reference_of
+from femubench.core.score.scoring import given_errors, reference_of
 
 SANDBOX = "namespaces"  # what a run calls the one that it can have
 _AGAIN = "run it again with this version of femubench"
@@ -53,6 +54,7 @@ class Installed(Protocol):
 class _Known:
     """What this installation says of a case: measured figures and nominal errors."""
 
+    case: Case
     measured: Marks
     reference: Mapping[str, float]
 
@@ -64,7 +66,12 @@ class _Known:
             for name, block in found.blocks.items()
             for mode in block.modes
         }
-        return cls(measured, found.rms_percent)
+        return cls(case, measured, found.rms_percent)
+
+    @cached_property
+    def given(self) -> dict[str, float]:
+        """Return the errors of the model as drawn; nothing where it is the textbook model."""
+        return given_errors(self.case, self.reference)
 
 
 def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) -> None:
@@ -183,9 +190,16 @@ def _check_references(run: Run, known: Mapping[str, _Known], file: Path) -> None
     for key, stated, names in told:
         for name in names:
             found, own = stated.get(name, {}), known[name].reference
-            if found.keys() != own.keys() or not all(_near(found[b], own[b]) for b in own):
-                errors = ", ".join(f"{block} {error:.6g} %" for block, error in own.items())
-                _refuse(file, "not the errors of the textbook model", f"{key}.{name}", errors)
+            _check_errors(found, own, f"{key}.{name}", "textbook", file)
+
+
+def _check_errors(
+    found: Mapping[str, float], own: Mapping[str, float], key: str, nominal: Nominal, file: Path
+) -> None:
+    """Check the errors of a nominal model."""
+    if found.keys() != own.keys() or not all(_near(found[block], own[block]) for block in own):
+        errors = ", ".join(f"{block} {error:.6g} %" for block, error in own.items()) or "none"
+        _refuse(file, f"not the errors of the {nominal} model", key, errors)
 
 
 def _near(one: float, other: float) -> bool:
@@ -197,6 +211,9 @@ def _check_result(result: JobResult, known: _Known, file: Path, key: str) -> Non
     if result.status != "ok":
         if result.blocks:
             _refuse(file, f"errors of a job that is {result.status}", key, "none")
+        idle = result.status == "not-applicable" and result.nominal == "drawn"
+        own = known.given if idle else {}
+        _check_errors(result.start_percent, own, f"{key}.start_percent", "drawn", file)
         return
     found = [
         ((name, mode.modification, mode.number), mode.measured_hz)

@@ -203,7 +203,7 @@ def _attempt(
     strategy: Strategy, model: Model, measurement: Measurement, rng: np.random.Generator
 ) -> JobOutcome:
     try:
-        return _plain(strategy.update(model, measurement, rng))
+        return plain_outcome(strategy.update(model, measurement, rng))
     except BaseException as error:  # Ctrl-C does not reach a worker: this is the strategy's own
         status: Status = "failed"
         if isinstance(error, NotApplicable | Diverged):
@@ -216,8 +216,12 @@ def _attempt(
         return JobOutcome(status, reason, _traceback(error))
 
 
-def _plain(result: Result) -> JobOutcome:
-    """Return a result as an outcome; figures that are none raise TypeError or ValueError."""
+def plain_outcome(result: Result) -> JobOutcome:
+    """Return a result as an outcome.
+
+    Raises:
+        TypeError, ValueError: for figures that are none.
+    """
     if not isinstance(result, Result):
         raise TypeError(f"update returned {type(result).__name__}, expected UpdateResult")
     if not isinstance(result.model, Model):

@@ -16,7 +16,7 @@ from femubench.core.run.model_checks import check_model
 from femubench.core.schema.records import result_to_json
 from femubench.core.schema.results import JobResult, Nominal
 from femubench.core.score.predicted_spread import Spread
-from femubench.core.score.scoring import Reference, judge, score_of
+from femubench.core.score.scoring import Reference, given_errors, judge, score_of
 
 _JUDGED = ("model", "samples", "discrepancy_std")  # of an outcome, and no part of the result
 
@@ -92,6 +92,9 @@ def judged(
     )
     if outcome.model is not None:
         result = _scored(result, case, outcome, reference)
+    elif outcome.status == "not-applicable" and nominal == "drawn":
+        given = given_errors(case, reference.rms_percent)
+        result = replace(result, start_percent=given)
     return replace(result, score=score_of(result, reference.rms_percent))
 
 

@@ -11,6 +11,8 @@ from typing import Any, Literal
 from femubench.core.drawing.prediction import keep_drawings
 from femubench.core.errors import InputError
 from femubench.core.garbage import uncollected
+from femubench.core.pace import Advance, Told
+from femubench.core.run.jobs_left import JobsLeft
 from femubench.core.run.schedule import Show
 from femubench.core.run.slots import Slot, starts_of
 from femubench.core.run.store import Store
@@ -50,9 +52,15 @@ class Results:
     """Results as they come: into the store, to whoever watches, and back in the order of jobs."""
 
     def __init__(
-        self, slots: Sequence[Slot], store: Store | None, run: str, progress: Progress | None
+        self,
+        slots: Sequence[Slot],
+        store: Store | None,
+        run: str,
+        progress: Progress | None,
+        told: Told | None = None,
     ) -> None:
         self._slots, self._store, self._run, self._progress = slots, store, run, progress
+        self._told, self._left = told, JobsLeft((), (), 1)
         self._found: dict[int, JobResult] = {}
         if store is not None:
             # What is drawn of a case starts from the model that makes the ranks, which comes first.
@@ -77,6 +85,8 @@ class Results:
         if self._store is not None:
             self._store.append(self._run, result)
         self._tell(index, result)
+        if self._told is not None:
+            self._told(self._left.after(result))
 
     def show(self, slot: Slot, exhibit: Mapping[str, Any]) -> None:
         """Take the exhibit of a result that is about to come."""
@@ -84,8 +94,11 @@ class Results:
             self._store.exhibits.put(slot.key, exhibit)
 
     @uncollected()
-    def keep(self, known: Known) -> list[int]:
-        """Take the results that the store has, which lets go of them; return what is missing."""
+    def keep(self, known: Known, workers: int) -> list[int]:
+        """Take the results that the store has, which lets go of them; return what is missing.
+
+        That alone counts for how much is left.
+        """
         missing = []
         taken: dict[str, tuple[JobResult | None, bool]] = {}
         for index, slot in enumerate(self._slots):
@@ -102,7 +115,12 @@ class Results:
                 self._store.append(self._run, result)
             self._tell(index, result)
         # Seed after seed: what is there early says something of every case and strategy.
-        return sorted(missing, key=lambda index: self._slots[index].seed)
+        missing = sorted(missing, key=lambda index: self._slots[index].seed)
+        if self._told is not None:
+            jobs = ((slot.case.name, slot.strategy) for slot in (self._slots[i] for i in missing))
+            self._left = JobsLeft(jobs, self._found.values(), workers)
+            self._told(Advance(0, len(missing)))
+        return missing
 
     def _tell(self, index: int, result: JobResult) -> None:
         self._found[index] = result

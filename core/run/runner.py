@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
+from femubench.core.pace import Told
 from femubench.core.roles import Strategy
 from femubench.core.run.executor import Executor, LocalProcesses, worker_count
 from femubench.core.run.limits import Limits
@@ -44,6 +45,7 @@ def run_jobs(
     overwrite: Overwrite | None = None,
     resume: bool = False,
     progress: Progress | None = None,
+    told: Told | None = None,
     run_seed: int = 0,
     request: Mapping[str, Any] | None = None,
     starts: Starts = _AS_GIVEN,
@@ -58,6 +60,7 @@ def run_jobs(
         jobs, executor: number of workers, None for that of processors; or what runs the jobs.
         timeout, timeouts, memory: seconds of a job, None for no limit; of single strategies; bytes.
         store, overwrite, resume, progress: as for `femubench.rank`.
+        told: how far that is which is not in the store, and how long the rest takes.
         run_seed, request: seed of the run's own statistics, and what was asked for in plain data.
         starts: the nominal models, the cases as given where left out; what runs beside them.
 
@@ -82,8 +85,8 @@ def run_jobs(
         slots.meta = _meta(cases, slots, references, asked, starts)
         meta, known = recorded(stack, store, slots.meta, overwrite, resume)
         ending = stack.enter_context(ended(store, meta["run"]))
-        results = Results(slots, store, meta["run"], progress)
-        wanted = stack.enter_context(stopping()).until(results.keep(known))
+        results = Results(slots, store, meta["run"], progress, told)
+        wanted = stack.enter_context(stopping()).until(results.keep(known, place.workers))
         for one in place.computed(slots, wanted, references, limits, results.shelf):
             results.add(*one)
         ending |= _only_now(found := _run(meta, results.in_order()))

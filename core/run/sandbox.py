@@ -7,22 +7,24 @@ scenarios, stores, the working folder and home are not.
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import platform
+import resource
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Literal
 
 from femubench.core.errors import InputError
 from femubench.core.run import namespaces
-from femubench.core.run.namespaces import Walls
-from femubench.core.run.syscall_filter import known_processor
+from femubench.core.run.namespaces import FOLDER, Walls, go_apart
+from femubench.core.run.syscall_filter import known_processor, refuse_system_calls
 
 Sandbox = Literal["auto", "require", "off"]
 OFF = "it is switched off"
@@ -34,6 +36,8 @@ _DATA = frozenset({"scenarios", "papers"})  # parts of femubench that hold measu
 _MODULES = (".py", ".pyc", ".so", ".pth", ".zip", ".egg")
 _ABOUT = (".dist-info", ".egg-info", ".egg-link", ".libs", ".data")
 _PATIENCE = 20.0  # s
+_MOST_FILES = 1024  # open at a time: what pipes and sockets hold is in no count of memory
+_ENVIRONMENT_START = 47  # word of /proc/self/stat behind the name: proc_pid_stat(5), field 50
 _VARIABLES = frozenset(
     {"PATH", "LANG", "LANGUAGE", "TZ", "LD_LIBRARY_PATH", "VIRTUAL_ENV", "CONDA_PREFIX", "TERM"}
 )
@@ -76,6 +80,11 @@ def enclosure(mode: Sandbox) -> Enclosure:
 
 def missing() -> str | None:
     """Return why no sandbox is possible, None where one is."""
+    return _unfit() or _tried(tuple(sys.path))
+
+
+def _unfit() -> str | None:
+    """Return why none need be tried."""
     if sys.platform != "linux":
         return f"namespaces are of Linux, and this is {platform.system() or 'another system'}"
     release = platform.release()
@@ -84,7 +93,7 @@ def missing() -> str | None:
         return f"Linux {release} is older than 5.14"
     if not known_processor():
         return f"the system calls of {platform.machine()} are not known"
-    return _tried(tuple(sys.path))
+    return None
 
 
 @cache
@@ -136,7 +145,51 @@ def walls_around(hidden: Iterable[str], code: Iterable[str] = ()) -> Walls:
     return Walls(outermost, links, tuple(_outermost(inside)))
 
 
-def bare_environment(given: Iterable[str]) -> set[str]:
+def way_in(room: int, processes: int) -> Callable[[str], None] | None:
+    """Return what lets a process go on where it sees code alone; None where none need be tried.
+
+    It takes an empty folder and is `enter` for the rest.
+
+    Arguments:
+        room, processes: as for `enter`.
+    """
+    if _unfit() is not None:
+        return None
+    return partial(enter, walls_around(()), room=room, processes=processes)
+
+
+def enter(walls: Walls, at: str, room: int, processes: int) -> None:
+    """Go on in a process within walls, where no secret of the environment is left.
+
+    Arguments:
+        walls, at, room, processes: as for `go_apart`.
+
+    Raises:
+        OSError: where the system refuses the namespaces; the processes are as before then.
+    """
+    go_apart(walls, at, room, processes)
+    _forget_environment()
+    os.environ["HOME"] = os.environ["TMPDIR"] = tempfile.tempdir = FOLDER
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    most = _MOST_FILES if hard == resource.RLIM_INFINITY else min(_MOST_FILES, hard)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+    refuse_system_calls()
+
+
+def _forget_environment() -> None:
+    """Keep of the environment what programs need, also in the memory where it came from."""
+    kept = {name: os.environ[name] for name in _bare(os.environ)}
+    for name in tuple(os.environ):
+        del os.environ[name]
+    # Put there anew, the text lies elsewhere than what the first process was given.
+    os.environ.update(kept)
+    with open("/proc/self/stat", "rb") as stream:
+        words = stream.read().rpartition(b")")[2].split()
+    start, end = int(words[_ENVIRONMENT_START]), int(words[_ENVIRONMENT_START + 1])
+    ctypes.memset(start, 0, end - start)
+
+
+def _bare(given: Iterable[str]) -> set[str]:
     """Return the names of variables that a process in the sandbox keeps."""
     return {name for name in given if name in _VARIABLES or name.startswith(_FAMILIES)}
 

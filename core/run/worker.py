@@ -20,9 +20,8 @@ from typing import Any
 import psutil
 
 from femubench.core.run.limits import Limits
-from femubench.core.run.namespaces import FOLDER, Walls, go_apart
-from femubench.core.run.sandbox import bare_environment
-from femubench.core.run.syscall_filter import refuse_system_calls
+from femubench.core.run.namespaces import Walls
+from femubench.core.run.sandbox import enter
 
 READY = b"\1"
 LENGTH_BYTES = 8
@@ -34,8 +33,6 @@ _THREADS = (
     "VECLIB_MAXIMUM_THREADS",
     "NUMEXPR_NUM_THREADS",
 )
-_MOST_FILES = 1024  # open at a time: what pipes and sockets hold is in no count of memory
-_ENVIRONMENT_START = 47  # word of /proc/self/stat behind the name: proc_pid_stat(5), field 50
 _PR_SET_PDEATHSIG = 1
 _LIBC = ctypes.CDLL(None)
 # Where multiprocessing's server and tracker keep how to reach them.
@@ -82,7 +79,8 @@ def serve(
     _leave_the_family(output, scratch)
     _close_all_but(descriptor)
     if walls is not None:
-        _enter(walls, scratch, limits)
+        room = limits.file if limits.memory is None else min(limits.file, limits.memory)
+        enter(walls, scratch, room, limits.processes)
     _set_limits(limits)
     os.write(descriptor, READY)
     with warnings.catch_warnings():
@@ -109,29 +107,6 @@ def _leave_the_family(output: Connection, scratch: str) -> None:
     sys.argv = [""]
     # PYTHONWARNINGS and -W of the parent are for the parent.
     sys.warnoptions = []
-
-
-def _enter(walls: Walls, scratch: str, limits: Limits) -> None:
-    """Go on in a process within walls, where no secret of the environment is left."""
-    room = limits.file if limits.memory is None else min(limits.file, limits.memory)
-    go_apart(walls, scratch, room, limits.processes)
-    _forget_environment()
-    os.environ["HOME"] = os.environ["TMPDIR"] = tempfile.tempdir = FOLDER
-    _lower(resource.RLIMIT_NOFILE, _MOST_FILES)
-    refuse_system_calls()
-
-
-def _forget_environment() -> None:
-    """Keep of the environment what programs need, also in the memory where it came from."""
-    kept = {name: os.environ[name] for name in bare_environment(os.environ)}
-    for name in tuple(os.environ):
-        del os.environ[name]
-    # Put there anew, the text lies elsewhere than what the first process was given.
-    os.environ.update(kept)
-    with open("/proc/self/stat", "rb") as stream:
-        words = stream.read().rpartition(b")")[2].split()
-    start, end = int(words[_ENVIRONMENT_START]), int(words[_ENVIRONMENT_START + 1])
-    ctypes.memset(start, 0, end - start)
 
 
 def _close_all_but(descriptor: int) -> None:

@@ -95,6 +95,7 @@ class ResultRecord(Record):
     rigid_body_modes_expected: Whole | None = None
     negative_eigenvalues: Whole | None = None
     surplus_partners: Whole | None = None
+    start_percent: dict[Name, Percent] = {}
     parameter_count: Whole | None = None
     evaluations: Whole | None = None
     score: Score | None = None
@@ -268,7 +269,7 @@ def result_to_line(result: JobResult) -> tuple[str, str, str]:
     What has no value is left out.
     """
     figures = _fields(result, *_FIGURES)
-    figures = {name: value for name, value in figures.items() if value is not None}
+    figures = {name: value for name, value in figures.items() if value not in (None, {})}
     figures["reason"] = result.reason[:LONGEST_TEXT]
     errors = "rms_percent", "mean_mac"
     figures["blocks"] = {name: _fields(block, *errors) for name, block in result.blocks.items()}

@@ -98,6 +98,8 @@ class JobResult(_Stored):
             has all that handbooks give.
         surplus_partners: modes of it that could be partners of measured ones beyond those of the
             nominal model, where they are too many for a prediction; else 0.
+        start_percent: rms error by block of the model that a strategy was given which is not
+            applicable; empty where that is the textbook model.
     """
 
     __pydantic_config__: ClassVar = READING
@@ -124,6 +126,7 @@ class JobResult(_Stored):
     provenance: Mapping[str, Any] = field(default_factory=dict)
     nominal: Nominal = "drawn"
     surplus_partners: Whole | None = None
+    start_percent: Mapping[str, Percent] = field(default_factory=dict)
 
     if not TYPE_CHECKING:
 

@@ -27,16 +27,15 @@ def score_of(
 
     It is the geometric mean over the unseen blocks of (rms + 0.05 %) / (nominal rms + 0.05 %); of
     a case that holds nothing back, over the block of the given modes. A job without a model scores
-    10. Where a strategy is not applicable the model stays as it was, which scores 1.
+    10. A strategy that is not applicable scores as the model that it was given.
 
     Arguments:
         reference: rms error of the nominal model in percent by block name.
         shares: how much each block counts; alike by default.
     """
-    if result.status == "not-applicable":
-        return SCORE_OF_NOTHING_DONE
-    if result.status != "ok" or not reference:
-        return SCORE_OF_FAILURE
+    fixed = _score_without_errors(result)
+    if fixed is not None or not reference:
+        return SCORE_OF_FAILURE if fixed is None else fixed
     known = shares or dict.fromkeys(counted_blocks(reference), 1.0)
     return geometric_mean(
         (score_in(result, name, reference) for name in known), weights=known.values()
@@ -57,16 +56,25 @@ def score_in(
         reference: rms error of the nominal model in percent by block name.
         floor_percent: what is added to both errors.
     """
-    if result.status == "not-applicable":
-        return SCORE_OF_NOTHING_DONE
-    if result.status != "ok":
-        return SCORE_OF_FAILURE
+    fixed = _score_without_errors(result)
+    if fixed is not None:
+        return fixed
     if block == WHOLE:
         return SCORE_OF_FAILURE if result.score is None else result.score
-    if block not in result.blocks:
+    error = result.start_percent.get(block)
+    if result.status == "ok":
+        error = result.blocks[block].rms_percent if block in result.blocks else None
+    if error is None:
         return SCORE_OF_FAILURE
-    error = result.blocks[block].rms_percent
     return (error + floor_percent) / (reference[block] + floor_percent)
+
+
+def _score_without_errors(result: JobResult) -> float | None:
+    """Return the score of a job without model, or with the textbook model; None of any other."""
+    if result.status not in DONE:
+        return SCORE_OF_FAILURE
+    idle = result.status == "not-applicable" and not result.start_percent
+    return SCORE_OF_NOTHING_DONE if idle else None
 
 
 def geometric_mean(values: Iterable[float], weights: Iterable[float] | None = None) -> float:
@@ -196,9 +204,10 @@ def _scores_against(
     by_count: dict[int, tuple[list[int], list[list[float]]]] = {}
     for place, result in enumerate(results):
         errors = reference.get(result.case) or {}
-        if result.status == "not-applicable":
-            scores[place] = SCORE_OF_NOTHING_DONE
-        elif result.status == "ok" and errors:
+        fixed = _score_without_errors(result)
+        if fixed is not None:
+            scores[place] = fixed
+        elif errors:
             row = [score_in(result, name, errors) for name in blocks[result.case]]
             places, rows = by_count.setdefault(len(row), ([], []))
             places.append(place)

@@ -30,13 +30,14 @@ from femubench.core.schema.results import Block
 from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.partners import Choices, surplus_partners
 from femubench.core.score.predicted_spread import MORE, Spread
-from femubench.core.score.ranking import rank_results, score_of
+from femubench.core.score.ranking import TIE, rank_results, score_of
 from femubench.core.typing import FloatArray, IntArray
 
 __all__ = [
     "Judgement",
     "Reference",
     "frequency_error",
+    "given_errors",
     "judge",
     "leaderboard",
     "predict_block",
@@ -211,6 +212,20 @@ def reference_of(case: Case) -> Reference:
     modes = _modes_for(case.model, (case.measurement,))
     blocks, choices = _blocks(case, case.model, modes)
     return Reference(blocks, zero_tolerance(modes), rigid_modes_of(case.model), choices)
+
+
+def given_errors(case: Case, reference: Mapping[str, float]) -> dict[str, float]:
+    """Return the rms error by block of a case's own model; nothing where it is the reference's.
+
+    Arguments:
+        reference: rms error of the textbook model in percent by block name.
+
+    Raises:
+        ModelError: when the model has no modes.
+    """
+    own = {name: block.rms_percent for name, block in score_model(case, case.model).items()}
+    same = all(abs(error - reference[name]) <= TIE * error for name, error in own.items())
+    return {} if same else own
 
 
 def judge(

@@ -198,6 +198,7 @@ def _result(result: JobResult, case: int, strategy: int) -> dict[str, Any]:
         "status": result.status,
         "reason": shortened(plain(result.reason), _LONGEST_REASON),
         "score": clean(result.score),
+        "start": [clean(result.start_percent.get(name)) for name in BLOCKS],
         "rms": [None if block is None else clean(block.rms_percent) for block in blocks],
         "seconds": rounded(result.seconds, 4),
         "parameters": result.parameter_count,

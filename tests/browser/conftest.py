@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from click.testing import CliRunner
 from playwright.sync_api import Browser, Page, sync_playwright
 
@@ -21,6 +22,8 @@ from femubench.results import JobResult, Run, rank_results
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 STRATEGIES = ("unchanged", "baruch", "generic-ls", "local", "nobari", "kabe")
 CASES = ("frame", "hframe", "frame-solid")
+# Without asking for style sheets once more, which the policy of the site refuses.
+AXE = {"resultTypes": ["violations"], "preload": False}
 WIDE, NARROW = (1440, 900), (390, 844)
 
 
@@ -48,6 +51,15 @@ class View:
     messages: list[str] = field(default_factory=list)
     requests: list[str] = field(default_factory=list)
     dialogs: list[str] = field(default_factory=list)
+
+    def assert_accessible(self) -> None:
+        """Axe-core finds no serious fault in what is shown."""
+        assert [
+            (fault["id"], fault["help"], node["html"], node["failureSummary"])
+            for fault in Axe().run(self.page, options=AXE).response["violations"]
+            if fault["impact"] in ("serious", "critical")
+            for node in fault["nodes"]
+        ] == []
 
     def assert_quiet(self, *files: Path) -> None:
         """Nothing was said, nothing but the files was asked for, nothing popped up."""

@@ -196,6 +196,27 @@ def test_calibration_is_that_of_the_results(view: Callable[..., Any], tmp_path: 
     assert len({*ours}) > 2
 
 
+def test_who_was_not_applicable_stands_where_the_run_says(
+    view: Callable[..., Any], real: Any, tmp_path: Path
+) -> None:
+    given = {name: 1.5 * error for name, error in real.run.meta["reference"]["frame"].items()}
+
+    def spared(result: JobResult) -> JobResult:
+        if (result.case, result.strategy) != ("frame", "local"):
+            return result
+        return replace(result, status="not-applicable", blocks={}, start_percent=given)
+
+    listed = rank_results(map(spared, real.run.results), real.run.meta["reference"])
+    run, file = Run(real.run.meta, listed), tmp_path / "spared.html"
+    report(run, file)
+    page = view(file).page
+    page.wait_for_selector("html[data-ready=yes]")
+    assert_shows(page, run)
+    tick(page, "scenarios", "hframe", "frame-solid")
+    assert_shows(page, part(run, cases={"frame"}))
+    assert shown(page)["local"]["skill"] == pytest.approx(1.0 - 1.5, abs=0.02)
+
+
 def stated_run() -> Run:
     """Return a run whose unseen modes have a standard deviation of 1 % of their frequency."""
     run = synthetic_run(3, 7, failing=0.0)

@@ -441,6 +441,92 @@ class Hungry(Good):
         return super().finish(model)
 
 
+def _say_that_all_is_well() -> None:
+    """Do to this process what a plugin can that sets out to pass."""
+    from femubench.core.conformance import trial
+
+    trial.faults_of = lambda given: {}
+    trial.fingerprint = lambda item, path: {}
+    trial.first_difference = lambda before, after: None
+
+
+class _Forging:
+    def update(self, model: Model, measurement: Measurement, rng: Any) -> UpdateResult:
+        _say_that_all_is_well()
+        return super().update(model, measurement, rng)  # type: ignore[misc, no-any-return]
+
+
+class ForgingSymmetry(_Forging, Asymmetric):
+    """Hide that the stiffness is not symmetric."""
+
+
+class ForgingNumbers(_Forging, NotNumbers):
+    """Hide that the core is nan."""
+
+
+class ForgingSeeds(_Forging, Unseeded):
+    """Hide that two runs differ."""
+
+
+class ForgingCount(_Forging, Uncounted):
+    """Hide that there were unknowns."""
+
+
+class ForgingHistory(_Forging, BadHistory):
+    """Hide what is in its history."""
+
+
+class ForgingPromise(_Forging, ByIndex):
+    """Hide that a promise is broken."""
+
+
+class ForgingBytes(Good):
+    """Hand back bytes that are no answer."""
+
+    def finish(self, model: Model) -> UpdateResult:
+        from femubench.core.conformance import trial
+
+        trial.packed = lambda outcome, nominal: b"o" + bytes(100)
+        return super().finish(model)
+
+
+def _tell(text: bytes) -> None:
+    from femubench.core.conformance import trial
+
+    class Words:
+        def dump_json(self, _: object) -> bytes:
+            return text
+
+    trial._told = Words  # type: ignore[assignment]
+
+
+class ForgingWords(Good):
+    """Tell what is no observation."""
+
+    def finish(self, model: Model) -> UpdateResult:
+        _tell(b'{"problem": [], "kind": "splendid", "faults": 1}')
+        return super().finish(model)
+
+
+class ForgingLack(Good):
+    """Say that it was never given what it needs."""
+
+    def finish(self, model: Model) -> UpdateResult:
+        _tell(b'{"problem": "any", "kind": "lacking"}')
+        return super().finish(model)
+
+
+FORGED: Mapping[type[Strategy], str] = {
+    ForgingSymmetry: "symmetric",
+    ForgingNumbers: "finite",
+    ForgingSeeds: "deterministic",
+    ForgingCount: "parameter-count",
+    ForgingHistory: "figures",
+    ForgingPromise: "promises",
+    ForgingBytes: "picklable",
+    ForgingWords: "returns",
+    ForgingLack: "returns",
+}
 FAULTS: Mapping[type[Strategy], str] = {
     InPlace: "inputs",
     Normalising: "inputs",

@@ -18,10 +18,11 @@
   // Return the logarithm of the score in a block; without one, of the score that the result came with.
   function logScore(result, k) {
     const failure = Math.log(data.score_of_failure);
-    if (result?.status === "not-applicable") return 0;
-    if (result?.status !== "ok") return failure;
+    const idle = result?.status === "not-applicable";
+    if (idle && result.start.every((error) => error === null)) return 0;
+    if (!idle && result?.status !== "ok") return failure;
     if (k === null) return result.score === null ? failure : Math.log(result.score);
-    const [rms, reference] = [result.rms[k], referenceOf(result, k)];
+    const [rms, reference] = [(idle ? result.start : result.rms)[k], referenceOf(result, k)];
     return rms === null || reference === null ? failure : Math.log((rms + data.offset_percent) / (reference + data.offset_percent));
   }
 
@@ -163,11 +164,11 @@
   }
 
   // Return the rms error of a strategy in a block of a case, median over seeds; null without a model.
-  // "Not applicable" leaves the nominal error.
+  // "Not applicable" leaves the error of the model that was given.
   function errorOf(s, c, k) {
     const value = median(seeds.map((seed) => {
       const result = resultAt(s, c, seed);
-      return (result?.status === "not-applicable" ? referenceOf(result, k) : result?.status === "ok" ? result.rms[k] : null) ?? Infinity;
+      return (result?.status === "not-applicable" ? (result.start[k] ?? referenceOf(result, k)) : result?.status === "ok" ? result.rms[k] : null) ?? Infinity;
     }));
     return Number.isFinite(value) ? value : null;
   }

@@ -1,24 +1,22 @@
 "use strict";
 // Sorts tables by their heads and filters their rows; without it, the pages are read as they are.
-for (const table of document.querySelectorAll("table.sortable")) {
-  const { tHead: { rows: [{ cells: heads }] }, tBodies: [body] } = table;
+const byText = new Intl.Collator("en").compare;
+for (const { tHead: { rows: [{ cells: heads }] }, tBodies: [body] } of document.querySelectorAll("table.sortable")) {
   for (const head of heads) {
-    const { cellIndex: column, dataset: { kind } } = head;
-    const valueOf = kind === "number"
-      ? ({ dataset: { value } }) => (value === "" ? null : Number(value))
-      : (cell) => cell.textContent || null;
-    const compare = kind === "number" ? (a, b) => a - b : new Intl.Collator("en").compare;
     const button = document.createElement("button");
     button.type = "button";
     button.append(...head.childNodes);
     button.addEventListener("click", () => {
-      const falling = head.getAttribute("aria-sort") === "ascending";
-      const rows = [...body.rows].map((row) => [valueOf(row.cells[column]), row]);
+      const sign = head.getAttribute("aria-sort") === "ascending" ? -1 : 1;
+      const keyed = [...body.rows].map((row) => {
+        const { dataset: { value }, textContent } = row.cells[head.cellIndex];
+        return [value === undefined ? textContent : value && Number(value), row];
+      });
       // What has no value stays last in either direction.
-      rows.sort(([a], [b]) => (a === null || b === null ? (a === null) - (b === null) : compare(a, b) * (falling ? -1 : 1)));
-      body.append(...rows.map(([, row]) => row));
+      keyed.sort(([a], [b]) => (a === "") - (b === "") || sign * (typeof a === "number" ? a - b : byText(a, b)));
+      body.append(...keyed.map(([, row]) => row));
       for (const other of heads) other.removeAttribute("aria-sort");
-      head.setAttribute("aria-sort", falling ? "descending" : "ascending");
+      head.setAttribute("aria-sort", sign > 0 ? "ascending" : "descending");
     });
     head.append(button);
   }

@@ -1,0 +1,89 @@
+"""What a strategy handed back on a problem, judged in a process that runs no code of strategies.
+
+The worker of a strategy tells what it saw too, since wrong types do not travel; what it tells can
+only add faults to those that are found here.
+"""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from femubench.core.conformance.fingerprints import fingerprint
+from femubench.core.conformance.problems import Problem
+from femubench.core.conformance.results import Given, faults_of
+from femubench.core.conformance.trial import Observation
+from femubench.core.run.answers import AnswerError, unpacked
+from femubench.core.run.jobs import JobOutcome
+from femubench.core.run.workers import Ending
+from femubench.core.update.strategy import ParameterEstimate, UpdateResult
+
+_ESTIMATE = ("name", "before", "after", "unit", "std")
+_TRAVELLED = "picklable"  # the check that a result has arrived
+
+
+@dataclass(frozen=True)
+class Handed:
+    """What a strategy handed back, and what it is judged by.
+
+    Arguments:
+        problem: untouched.
+        answer: from the strategy's worker; nobody has looked into it yet.
+        promises: what the strategy says that it keeps.
+    """
+
+    problem: Problem
+    answer: bytes
+    promises: frozenset[str]
+
+
+def judge_handed(handed: Handed) -> bytes:
+    """Return faults and fingerprint of what was handed back as JSON; runs in a worker."""
+    try:
+        outcome = unpacked(handed.answer, handed.problem.model)
+    except AnswerError as error:
+        return _said({_TRAVELLED: str(error)}, {})
+    if outcome.model is None:
+        return _said({_TRAVELLED: outcome.reason or "there is no model in it"}, {})
+    result = _result(outcome)
+    with warnings.catch_warnings(), np.errstate(all="warn"):
+        warnings.simplefilter("ignore")
+        faults = faults_of(Given(handed.problem, result, handed.promises))
+    return _said(faults, fingerprint(result, "the result outside"))
+
+
+def _said(faults: Mapping[str, str], prints: Mapping[str, str]) -> bytes:
+    return json.dumps([faults, prints]).encode()
+
+
+def _result(outcome: JobOutcome) -> UpdateResult:
+    assert outcome.model is not None
+    return UpdateResult(
+        model=outcome.model,
+        parameters=tuple(
+            ParameterEstimate(*(item[name] for name in _ESTIMATE)) for item in outcome.parameters
+        ),
+        history=outcome.history,
+        diagnostics=outcome.diagnostics,
+        parameter_count=outcome.parameter_count or 0,
+    )
+
+
+def confirmed(told: Observation, ending: Ending) -> Observation:
+    """Return what a worker told of a result, with what was found outside of it.
+
+    Arguments:
+        told: of the strategy's worker.
+        ending: of `judge_handed`.
+    """
+    if ending.how != "answer":
+        faults, prints = {_TRAVELLED: f"it cannot be judged: {ending.reason}"}, {}
+    else:
+        faults, prints = json.loads(ending.answer)
+    if told.faults:  # why it did not arrive has been said
+        faults.pop(_TRAVELLED, None)
+    return replace(told, faults={**faults, **told.faults}, prints={**told.prints, **prints})

@@ -1,0 +1,262 @@
+"""The line that shows how far something is, and the time left in it, by a clock of our own."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterable, Iterator, Sequence
+
+import pytest
+from rich.console import Console
+from rich.progress import Progress
+
+from femubench.core.cli.progress import shown, spoken_left
+from femubench.core.inference.effort import Effort, Kind
+from femubench.core.library.reproduce import _Updates
+from femubench.core.pace import Advance, Pace
+from femubench.core.run.jobs_left import JobsLeft
+from femubench.papers import DONE, PAPERS
+from femubench.results import JobResult
+
+
+class Clock:
+    """A clock that stands until it is moved."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+def result(case: str, strategy: str, seconds: float, seed: int = 0) -> JobResult:
+    return JobResult(case, strategy, seed, "ok", seconds=seconds)
+
+
+def ran(
+    left: JobsLeft, clock: Clock, jobs: Sequence[JobResult], workers: int, besides: float = 0.0
+) -> Iterator[tuple[float, Advance]]:
+    """Yield the true time left after each job, and what is said; jobs begin in their order."""
+    free, ends = [0.0] * workers, []
+    for job in jobs:
+        first = free.index(min(free))
+        free[first] += job.seconds + besides
+        ends.append((free[first], job))
+    begin = clock.now
+    for end, job in sorted(ends, key=lambda pair: pair[0]):
+        clock.now = begin + end
+        yield max(free) - end, left.after(job)
+
+
+def pairs(jobs: Iterable[JobResult]) -> Iterator[tuple[str, str]]:
+    return ((job.case, job.strategy) for job in jobs)
+
+
+@pytest.mark.parametrize("besides", [0.0, 3.0])
+@pytest.mark.parametrize("workers", [1, 2, 4])
+def test_steady_jobs(clock: Clock, workers: int, besides: float) -> None:
+    """Right from the first round of all workers on."""
+    jobs = [result(f"case{k}", "a", 5.0) for k in range(40)]
+    left = JobsLeft(pairs(jobs), (), workers, clock)
+    said = list(ran(left, clock, jobs, workers, besides))
+    assert [advance.done for _, advance in said] == list(range(1, 41))
+    assert {advance.total for _, advance in said} == {40}
+    for true, advance in said[workers - 1 :]:
+        assert advance.left == pytest.approx(true, abs=5.0 + besides if workers > 1 else 1e-6)
+    assert said[-1][1].left == 0.0
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_jobs_of_different_lengths(clock: Clock, workers: int) -> None:
+    """What the strategies and the cases took tells what the pairs will take that are left.
+
+    The slow one comes last in every case, and the large case last: said before any of that is done.
+    """
+    sizes = {"small": 1.0, "middle": 2.0, "large": 40.0}
+    jobs = [
+        result(case, name, seconds * size, seed)
+        for seed in (1, 2, 3)
+        for case, size in sizes.items()
+        for name, seconds in {"quick": 0.1, "usual": 1.0, "slow": 9.0}.items()
+    ]
+    left = JobsLeft(pairs(jobs), (), workers, clock)
+    said = list(ran(left, clock, jobs, workers))
+    for true, advance in said[7:-1]:
+        assert advance.left == pytest.approx(true, rel=0.2, abs=1.0 if workers == 1 else 200.0)
+
+
+def test_the_first_estimate_takes_all_jobs_alike(clock: Clock) -> None:
+    jobs = [result("a", name, 2.0) for name in "xyz"]
+    left = JobsLeft(pairs(jobs), (), 1, clock)
+    clock.now += 3.0
+    first = left.after(jobs[0])
+    assert (first.done, first.total, first.what) == (1, 3, "a x")
+    assert first.left == pytest.approx(6.0)
+    assert first.current == pytest.approx(3.0)
+
+
+def test_a_run_that_goes_on_counts_what_is_to_be_done(clock: Clock) -> None:
+    """A thousand kept results are no speed, but tell that the slow jobs are those that are left."""
+    kept = [result("a", "quick", 0.1, seed) for seed in range(1000)]
+    kept += [result("a", "slow", 60.0)]
+    jobs = [result("a", "quick", 0.1, 1000), *(result("a", "slow", 60.0, k) for k in (1, 2))]
+    left = JobsLeft(pairs(jobs), kept, 1, clock)
+    said = list(ran(left, clock, jobs, 1))
+    assert [(advance.done, advance.total) for _, advance in said] == [(1, 3), (2, 3), (3, 3)]
+    for true, advance in said:
+        assert advance.left == pytest.approx(true, abs=1e-6)
+
+
+def test_jobs_that_take_no_time_of_their_own(clock: Clock) -> None:
+    jobs = [result("a", "unchanged", 0.0, seed) for seed in range(10)]
+    for true, advance in ran(JobsLeft(pairs(jobs), (), 1, clock), clock, jobs, 1, besides=2.0):
+        assert advance.left == pytest.approx(true)
+
+
+def test_a_kind_has_its_own_pace_and_that_of_the_others() -> None:
+    pace = Pace({"a": 1.0, "b": 10.0})
+    assert pace.of("b") == 0.0
+    pace.took("a", 3.0)
+    assert (pace.of("a"), pace.of("b")) == (3.0, 30.0)
+    pace.took("b", 90.0)
+    rate = 93.0 / 11.0
+    assert pace.of("b") == pytest.approx((10.0 * rate + 90.0) / 2.0)
+
+
+class TestEffort:
+    def said(self, clock: Clock) -> tuple[Effort, list[Advance]]:
+        said: list[Advance] = []
+        return Effort(None, said.append, clock), said
+
+    def work(self, effort: Effort, clock: Clock, kind: Kind, seconds: float) -> None:
+        with effort.piece(kind):
+            clock.now += seconds
+
+    def test_no_time_is_told_before_it_is_known(self, clock: Clock) -> None:
+        effort, said = self.said(clock)
+        with effort.scope({"single": (1, 3)}):
+            self.work(effort, clock, "single", 4.0)
+            assert [advance.left for advance in said] == [None, None]
+            assert said[-1].what == "single causes"
+            effort.explained(False)
+            self.work(effort, clock, "single", 4.0)
+            assert said[-1].left == pytest.approx(4.0)
+            effort.explained(True)
+            self.work(effort, clock, "single", 4.0)
+            assert said[-1].left == 0.0
+        assert (said[-1].done, said[-1].total) == (3, 3)
+
+    def test_what_a_stage_does_without_is_not_expected_after_it(self, clock: Clock) -> None:
+        effort, said = self.said(clock)
+        effort.explained(True)
+        with effort.scope({"advice": 1}):
+            with effort.scope({"single": 10}):
+                self.work(effort, clock, "single", 5.0)
+                assert said[-1].total == 11
+                effort.expect("single", 3)
+                self.work(effort, clock, "single", 5.0)
+                assert said[-1].total == 5
+                assert said[-1].left == pytest.approx(2 * 5.0 + 0.3 * 5.0)
+            self.work(effort, clock, "advice", 1.0)
+        assert (said[-1].done, said[-1].total, said[-1].left) == (3, 3, 0.0)
+
+    def test_what_nobody_expected_counts_too(self, clock: Clock) -> None:
+        effort, said = self.said(clock)
+        self.work(effort, clock, "unseen", 1.0)
+        assert (said[0].done, said[0].total) == (0, 1)
+        assert (said[-1].done, said[-1].total) == (1, 1)
+
+    def test_a_piece_that_is_overdue_takes_no_time_from_others(self, clock: Clock) -> None:
+        effort, said = self.said(clock)
+        effort.explained(True)
+        with effort.scope({"single": 3}):
+            self.work(effort, clock, "single", 5.0)
+            with effort.piece("single"):
+                assert said[-1].left == pytest.approx(10.0)
+                clock.now += 2.0
+                effort.step(7, 40)
+                assert said[-1].what == "single causes 7/40"
+                assert said[-1].left == pytest.approx(8.0)
+                clock.now += 50.0
+                effort.step(8, 40)
+                assert said[-1].left == pytest.approx(5.0)
+
+    def test_a_budget_is_spent_by_its_clock(self, clock: Clock) -> None:
+        effort = Effort(10.0, clock=clock)
+        clock.now += 9.0
+        assert not effort.stops()
+        clock.now += 1.0
+        assert effort.stops()
+        assert effort.cut
+
+
+@pytest.mark.parametrize("speed", [1.0, 7.0])
+def test_updates_of_the_papers_are_as_long_as_they_were(clock: Clock, speed: float) -> None:
+    """Every update at a speed that is not known, with what comes between them."""
+    papers, said = tuple(PAPERS), list[Advance]()
+    updates, begin = _Updates(papers, said.append, clock), clock.now
+    starts = {"frame": 0.0, "hframe": DONE["frame"][-1]}
+    whole = sum(row[-1] for row in DONE.values())
+    for paper in papers:
+        for end in DONE[paper][:-1]:
+            clock.now = begin + speed * (starts[paper] + end)
+            updates.step()
+            assert said[-1].left == pytest.approx(speed * (whole - starts[paper] - end))
+    assert (said[-1].done, said[-1].total) == (71, 71)
+    updates.step()  # one that nobody has counted
+    assert (said[-1].done, said[-1].total) == (72, 72)
+
+
+def test_a_piece_runs_down_and_no_further() -> None:
+    assert spoken_left(Advance(1, 2), 5.0) == "-:--:--"
+    advance = Advance(1, 5, left=4000.0, current=100.0)
+    assert [spoken_left(advance, since) for since in (0.0, 40.0, 100.0, 900.0)] == [
+        *("1:06:40", "1:06:00", "1:05:00", "1:05:00"),
+    ]
+
+
+def screen(text: str) -> list[str]:
+    """Return the lines that a terminal shows after a text."""
+    lines, row, column = [""], 0, 0
+    for code, step, letter in re.findall(r"(\x1b\[\??(\d*)[;\d]*[a-zA-Z])|([^\x1b])", text):
+        if code.endswith("A"):
+            row -= int(step or 1)
+        elif code.endswith("K"):
+            lines[row] = ""
+        elif letter == "\r":
+            column = 0
+        elif letter == "\n":
+            row, column = row + 1, 0
+            lines += [""] * (row + 1 - len(lines))
+        elif not code:
+            lines[row] = lines[row][:column].ljust(column) + letter + lines[row][column + 1 :]
+            column += 1
+    return lines
+
+
+def test_one_line_that_takes_itself_away(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+    plain = Progress.update
+    monkeypatch.setattr(
+        Progress, "update", lambda self, *a, **words: plain(self, *a, **words, refresh=True)
+    )
+    file = io.StringIO()
+    console = Console(file=file, force_terminal=True, width=80)
+    with shown("[red]frame", console, clock) as told:
+        clock.now += 65.0
+        told(Advance(3, 12, "single causes", 130.0, 5.0))
+        (line,) = (line for line in screen(file.getvalue()) if line.strip())
+        assert line.startswith("[red]frame: single causes ")
+        assert re.search(r" 3/12 +0:01:05 0:02:10 left *$", line)
+        assert len(line) <= 80
+        told(Advance(4, 12, "a name that is so long that it would never go into a line of these"))
+        (line,) = (line for line in screen(file.getvalue()) if line.strip())
+        assert re.search(r" 4/12 +0:01:05 -:--:-- left *$", line)
+        told(Advance(12, 12, "end", 0.0))
+    assert not "".join(screen(file.getvalue())).strip()
+    console.print("after")
+    assert [line for line in screen(file.getvalue()) if line.strip()] == ["after"]
