@@ -38,7 +38,7 @@ from femubench.results import (
     twin_skills,
 )
 
-Row = Mapping[Any, Any]
+_Row = Mapping[Any, Any]
 _Printed = Mapping[str, Mapping[int, float | None]]
 
 _FIGURES = {
@@ -128,7 +128,7 @@ def floors_said(run: Run) -> tuple[str, str]:
 
 
 def _leaderboard(
-    run: Run, rows: Sequence[Row], tiers: Mapping[str, int], letters: Mapping[str, str]
+    run: Run, rows: Sequence[_Row], tiers: Mapping[str, int], letters: Mapping[str, str]
 ) -> Table:
     """Return the ranking; columns that nothing is known of are left out."""
     heads = (
@@ -156,7 +156,7 @@ def _leaderboard(
     return Table([heads[k] for k in known], [[line[k] for k in known] for line in cells], names=1)
 
 
-def _marks(row: Row) -> str:
+def _marks(row: _Row) -> str:
     """Return what must not be overlooked: lost physics, and jobs that the errors leave out."""
     incomplete = row["ok"] + row["not_applicable"] < row["total"]
     return ("!" if row["unphysical"] else "") + ("*" if incomplete else "")

@@ -95,13 +95,8 @@ def _grid(run: Run, known: StudyAxes, x: str, y: str) -> Block:
         return f"{len(columns)} by {len(rows)} values: see the cells."
     found = {(row[x], row[y]): row for row in skill_by(run, x, y).to_dict("records")}
     heads = [Column(y, 24, left=True), *(Column(StudyAxes.text_of(v), 7) for v in columns)]
-    table = [
-        [
-            StudyAxes.text_of(r),
-            *(_skill(found[c, r]) if (c, r) in found else NOTHING for c in columns),
-        ]
-        for r in rows
-    ]
+    cells = [[_skill(found[c, r]) if (c, r) in found else None for c in columns] for r in rows]
+    table = [[StudyAxes.text_of(r), *line] for r, line in zip(rows, cells, strict=True)]
     said = f"Down: {StudyAxes.title_of(y)}; across: {StudyAxes.title_of(x)}. *: failures."
     return Table(heads, table, said)
 
@@ -133,12 +128,9 @@ def _cells(cells: Sequence[dict[Any, Any]]) -> Iterator[Block]:
 
 def _options(row: dict[Any, Any], names: Sequence[str]) -> str:
     """Return the options of a cell's strategy."""
-    told = {name.partition(".")[2]: row[name] for name in names if not _absent(row[name])}
-    return ", ".join(f"{name} {StudyAxes.text_of(v)}" for name, v in told.items()) or NOTHING
-
-
-def _absent(value: object) -> bool:
-    return value is None or value != value
+    told = {name.partition(".")[2]: row[name] for name in names if row[name] is not None}
+    said = (f"{name} {StudyAxes.text_of(v)}" for name, v in told.items() if v == v)
+    return ", ".join(said) or NOTHING
 
 
 def _skill(row: dict[Any, Any]) -> str:
@@ -149,4 +141,4 @@ def _skill(row: dict[Any, Any]) -> str:
 def _lost(row: dict[Any, Any]) -> str:
     """Return how many jobs of a cell gave no result, of how many."""
     parts = [f"{row[name]} {name}" for name in ("failed", "missing") if row[name]]
-    return f"{', '.join(parts)} of {row['jobs']}" if parts else f"0 of {row['jobs']}"
+    return f"{', '.join(parts) or 0} of {row['jobs']}"
