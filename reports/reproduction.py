@@ -12,13 +12,11 @@ from femubench.reports.blocks import (
     Items,
     Section,
     Table,
-    to_markdown,
-    to_terminal,
 )
 from femubench.reports.cells import plain
 from femubench.reports.digits import Digits, off
-from femubench.reports.markdown import escape
-from femubench.reports.terminal import WIDTH
+from femubench.reports.markdown import escape, to_markdown
+from femubench.reports.terminal import WIDTH, to_terminal
 from femubench.reproduction import (
     VERDICTS,
     Cell,

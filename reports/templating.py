@@ -6,7 +6,7 @@ from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from femubench.reports.cells import fixed, plain, shortened
+from femubench.reports.cells import chance, fixed, plain, sentence, shortened
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -25,7 +25,8 @@ def templates() -> Environment:
         lstrip_blocks=True,
         finalize=_one_line,
     )
-    room.filters.update(fixed=fixed, plain=plain, shortened=shortened)
+    room.filters.update(fixed=fixed, plain=plain, shortened=shortened, chance=chance)
+    room.filters["sentence"] = sentence
     return room
 
 
