@@ -366,30 +366,26 @@
       amplitude = Number(slider.value);
       paint();
     } });
-    const keys = {
-      ArrowLeft: turn(6, 0), ArrowRight: turn(-6, 0), ArrowUp: turn(0, 6), ArrowDown: turn(0, -6),
-      "+": zoom(1.15), "=": zoom(1.15), "-": zoom(1 / 1.15), r: reset, n: step(1), p: step(-1), " ": toggle,
-    };
+    const acts = [["Previous mode (P)", "‹", "p", step(-1)], ["Next mode (N)", "›", "n", step(1)],
+      ["Turn left", "←", "ArrowLeft", turn(6, 0)], ["Turn right", "→", "ArrowRight", turn(-6, 0)], ["Tilt up", "↑", "ArrowUp", turn(0, 6)], ["Tilt down", "↓", "ArrowDown", turn(0, -6)],
+      ["Zoom in (+)", "+", "+", zoom(1.15)], ["Zoom out (-)", "−", "-", zoom(1 / 1.15)], ["Reset the view (R)", "Reset", "r", reset]];
+    const keys = { " ": toggle, "=": zoom(1.15), ...Object.fromEntries(acts.map(([, , key, act]) => [key, act])) };
+    const [before, after, ...views] = acts.map(([label, sign, , act]) => bench.button(sign, act, { "aria-label": label, title: label }));
     drawing.addEventListener("keydown", (event) => {
       const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
       if (!act || event.ctrlKey || event.metaKey || event.altKey) return;
       event.preventDefault();
       act();
     });
-    const button = (label, sign, act) => bench.button(sign, act, { "aria-label": label, title: label });
     const flip = (name) => bench.tick(`${name[0].toUpperCase()}${name.slice(1)}`, show[name], (on) => {
       show[name] = on;
       draw();
     });
     root.append(el("div", { class: "case-structure" },
       el("div", { class: "controls" }, el("label", {}, "Strategy ", strategyList), el("label", {}, "Mode ", modeList),
-        el("span", { class: "controls" }, button("Previous mode (P)", "‹", keys.p), playButton, button("Next mode (N)", "›", keys.n)), el("label", {}, "Amplitude ", slider)),
+        el("span", { class: "controls" }, before, playButton, after), el("label", {}, "Amplitude ", slider)),
       drawing, told,
-      el("div", { class: "controls" },
-        el("span", { class: "controls", role: "group", "aria-label": "View" },
-          button("Turn left", "←", keys.ArrowLeft), button("Turn right", "→", keys.ArrowRight), button("Tilt up", "↑", keys.ArrowUp),
-          button("Tilt down", "↓", keys.ArrowDown), button("Zoom in (+)", "+", keys["+"]), button("Zoom out (-)", "−", keys["-"]), button("Reset the view (R)", "Reset", reset)),
-        Object.keys(show).map(flip)),
+      el("div", { class: "controls" }, el("span", { class: "controls", role: "group", "aria-label": "View" }, views), Object.keys(show).map(flip)),
       legend(), el("p", { class: "soft" }, HELP)));
     pick(shown[0]?.name);
     new ResizeObserver(() => {
