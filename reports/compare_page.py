@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from femubench.plot import Axis, Chart, Mark, Series
 from femubench.reports.blocks import (
     Block,
+    Cell,
     Column,
     Drawing,
     Items,
     Section,
     Table,
-    to_markdown,
-    to_terminal,
 )
 from femubench.reports.cells import NOTHING, fixed, plain, shortened
 from femubench.reports.html import to_html
+from femubench.reports.markdown import to_markdown
 from femubench.reports.svg import drawing
+from femubench.reports.terminal import to_terminal
 from femubench.results import METHOD
 
 _RATIOS = ("unseen", "used", "higher", "modified", "seconds")
@@ -37,18 +39,12 @@ _FOREST = (
     "change; the table has the figures."
 )
 _SAYS = {"lost": "lost", "gained": "gained", "other": "changed"}
-_BOARD = (
-    Column("strategy", 22, left=True),
-    Column("jobs", 4),
-    *(Column(name, max(len(name), 6)) for name in _RATIOS),
-    Column("lost", 4),
-)
 _PROOF = (
     Column("strategy", 20, left=True),
     Column("differing", 9),
-    Column("ratio", 6),
+    Column("ratio", 6, digits=3),
     Column("95 % interval", 15, left=True),
-    Column("p (Holm)", 8),
+    Column("p (Holm)", 8, say=lambda p: NOTHING if p is None else f"{p:.2g}"),
     Column("B is", 10, left=True, wrap=True),
 )
 
@@ -66,15 +62,13 @@ def comparison_text(data: Mapping[str, Any]) -> str:
 
 def comparison_markdown(data: Mapping[str, Any]) -> str:
     """Return a comparison in GitHub's Markdown."""
-    top = Section(headline(data), [Items(tuple(zip("AB", _sides(data), strict=True)))], level=1)
-    return to_markdown([top, *_sections(data)])
+    return to_markdown([_top(data), *_sections(data)], headline(data))
 
 
 def comparison_html(data: Mapping[str, Any]) -> str:
     """Return a comparison as one document that needs no script and no network."""
-    sides = _sides(data)
-    top = Section("", [Items(tuple(zip("AB", sides, strict=True)))])
-    return to_html([top, *_sections(data)], title=" against ".join(sides), heading=headline(data))
+    sections, title = [_top(data), *_sections(data)], " against ".join(_sides(data))
+    return to_html(sections, title=title, heading=headline(data))
 
 
 def headline(data: Mapping[str, Any]) -> str:
@@ -110,14 +104,20 @@ def _sides(data: Mapping[str, Any]) -> tuple[str, str]:
     return before, after
 
 
+def _top(data: Mapping[str, Any]) -> Section:
+    return Section("", [Items(tuple(zip("AB", _sides(data), strict=True)))])
+
+
 def _sections(data: Mapping[str, Any], *, screen: bool = False) -> Iterator[Section]:
     """Yield the parts; lists are cut on the screen, and tables show what differs."""
     differing = [shortened(plain(line), _LONGEST) for line in data["environment"]]
     notes = [shortened(plain(note), _LONGEST) for note in data["notes"]]
     yield from _listed("Ended otherwise", map(_change, data["changes"]), screen)
     yield from _listed("Beyond a threshold", map(_excess, data["excesses"]), screen)
-    rows, told = _proofs(data["evidence"]), [] if screen else _drawn(data["evidence"])
-    yield Section("Is it more than chance?", [*told, Table(_PROOF, rows), _EVIDENCE])
+    evidence = data["evidence"]
+    told = [] if screen else _drawn(evidence)
+    proof = Table(_PROOF, [*map(_proof, evidence)])
+    yield Section("Is it more than chance?", [*told, proof, _EVIDENCE])
     legend = f"{_LEGEND} {_TELLING}" if screen else _LEGEND
     yield Section("Ratios", [_ratios(data["rows"], screen), legend])
     yield from _listed("Only in A", _jobs(data["only_before"]), screen)
@@ -149,16 +149,27 @@ def _ratios(rows: Iterable[Mapping[str, Any]], screen: bool) -> Table:
     cells = []
     for row in rows:
         name, scenario, values = plain(row["strategy"]), row["scenario"], row["values"]
-        signs = [_arrow(key, values[key]) for key in _RATIOS]
-        if screen and scenario is not None and not (any(signs[:-1]) or values["failures"]):
+        same = not any(_arrow(key, values[key]) for key in _RATIOS[:-1])
+        if screen and scenario is not None and same and not values["failures"]:
             continue
         if scenario is not None:
             name = 2 * _BLANK + plain(scenario) if screen else f"{name}, {plain(scenario)}"
-        figures = [fixed(values[key], 2 if key == "seconds" else 3, 6) for key in _RATIOS]
-        if not screen:
-            figures = [text + sign for text, sign in zip(figures, signs, strict=True)]
-        cells.append([name, str(row["jobs"]), *figures, f"{values['failures']:.0f}"])
-    return Table(_BOARD, cells)
+        cells.append([name, row["jobs"], *map(values.get, _RATIOS), values["failures"]])
+    says = (None if screen else partial(_told, key) for key in _RATIOS)
+    figures = [
+        Column(key, max(len(key), 6), digits=_digits(key), say=say)
+        for key, say in zip(_RATIOS, says, strict=True)
+    ]
+    columns = [Column("strategy", 22, left=True), Column("jobs", 4), *figures, Column("lost", 4)]
+    return Table(columns, cells)
+
+
+def _digits(name: str) -> int:
+    return 2 if name == "seconds" else 3
+
+
+def _told(name: str, ratio: float | None) -> str:
+    return fixed(ratio, _digits(name), 6) + _arrow(name, ratio)
 
 
 def _arrow(name: str, ratio: float | None) -> str:
@@ -167,20 +178,11 @@ def _arrow(name: str, ratio: float | None) -> str:
     return " \u25b2" if off > room else " \u25bc" if off < -room else ""
 
 
-def _proofs(evidence: Iterable[Mapping[str, Any]]) -> list[list[str]]:
-    return [
-        [
-            plain(item["strategy"]),
-            f"{item['differing']} of {item['structures']}",
-            fixed(item["ratio"], 3, 6),
-            NOTHING
-            if item["low"] is None or item["high"] is None
-            else f"{fixed(item['low'], 3, 6)} - {fixed(item['high'], 3, 6)}",
-            NOTHING if item["p"] is None else f"{item['p']:.2g}",
-            item["verdict"],
-        ]
-        for item in evidence
-    ]
+def _proof(item: Mapping[str, Any]) -> list[Cell]:
+    low, high = item["low"], item["high"]
+    ends = None if low is None or high is None else f"{fixed(low, 3, 6)} - {fixed(high, 3, 6)}"
+    differing = f"{item['differing']} of {item['structures']}"
+    return [item["strategy"], differing, item["ratio"], ends or NOTHING, item["p"], item["verdict"]]
 
 
 def _change(item: Mapping[str, Any]) -> str:

@@ -61,7 +61,7 @@ def diagnosis_html(data: Data) -> str:
         brand=f"Diagnosis of {data['case']}",
         foot=f"femubench {data.get('version') or ''}, {seconds}. The numbers are those of bench "
         "diagnose --json.",
-        scripts=("site.js", "diagnosis.js"),
+        scripts=("sortable.js", "diagnosis.js"),
     )
 
 
