@@ -28,14 +28,11 @@ def pages_of(index: Data) -> dict[str, str]:
         index: the content of ``index.json``.
     """
     pages = {board["page"]: _board_page(index, board) for board in index["boards"]}
+    releases = {item["name"]: _release(item["versions"][0]) for item in index["strategies"]}
     pages["leaderboard.csv"] = _csv(
-        {
-            "class": board["class"],
-            **row,
-            **_release(item["versions"][0]),
-            "marks": "; ".join(_flags(row)),
-        }
-        for board, item, row in _places(index)
+        {"class": kind, **row, **releases[row["strategy"]], "marks": "; ".join(_flags(row))}
+        for kind, rows in ((board["class"], board["rows"]) for board in index["boards"])
+        for row in rows
     )
     for item in index["strategies"]:
         stem = item["page"].removesuffix(".html")
@@ -80,7 +77,6 @@ def _strategy_page(item: Data, index: Data) -> str:
         plain(item["name"]) or "a strategy without name",
         answer=[answer],
         chart=history_of(item["versions"]),
-        places=[(board, row) for board, owner, row in _places(index) if owner is item],
         pages={case["name"]: case["page"] for case in index["cases"]},
     )  # fmt: skip
 
@@ -129,14 +125,6 @@ def _on_case(strategies: Iterable[Data], name: str, digest: str) -> list[tuple[D
         return (bool(row["unphysical"] or row["conflict"]),), row["score"], item["name"]
 
     return [entry for _, entry in ranked(found, order)]
-
-
-def _places(index: Data) -> Iterator[tuple[Data, Data, Data]]:
-    """Yield every board with every strategy and its row there."""
-    strategies = {item["name"]: item for item in index["strategies"]}
-    for board in index["boards"]:
-        for row in board["rows"]:
-            yield board, strategies[row["strategy"]], row
 
 
 def _flags(row: Data) -> list[str]:

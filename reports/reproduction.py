@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 
 from femubench.reports.blocks import (
     Block,
@@ -122,12 +123,20 @@ def _chapters(studies: Iterable[Study], words: Words, folder: str) -> Iterator[S
         for table, cells in _grouped(study.cells).items():
             title = heading(table)
             yield Section(title, list(cells_in_words(cells, words)), level=3)
-        yield from _remarks("What the re-run shows", study.findings)
-        for extra in study.extras:
-            yield Section(extra.title, list(extra_blocks(extra)), level=3)
-        if study.figures:
-            found = [_drawing(figure, folder) for figure in study.figures]
-            yield Section("Figures", found, level=3)
+        yield from parts_of(study, partial(_drawing, folder=folder))
+
+
+def parts_of(study: Study, drawn: Callable[[Figure], Drawing]) -> Iterator[Section]:
+    """Yield what follows the tables of a paper.
+
+    Arguments:
+        drawn: makes the block of a figure.
+    """
+    yield from _remarks("What the re-run shows", study.findings)
+    for extra in study.extras:
+        yield Section(extra.title, list(_extra_blocks(extra)), level=3)
+    if study.figures:
+        yield Section("Figures", [drawn(figure) for figure in study.figures], level=3)
 
 
 def _grouped(cells: Iterable[Cell]) -> dict[str, list[Cell]]:
@@ -178,7 +187,7 @@ def digits_of(cells: Iterable[Cell]) -> dict[str, Digits]:
     return {unit: Digits.of(figures) for unit, figures in printed.items()}
 
 
-def extra_blocks(extra: Extra) -> Iterator[Block]:
+def _extra_blocks(extra: Extra) -> Iterator[Block]:
     """Return a table; a column of sentences that the screen has no room for stands below it."""
     columns = list(zip(*extra.rows, strict=True)) or [()] * len(extra.columns)
     figures = (all(not cell or cell[0] in _NUMERIC for cell in cells) for cells in columns[1:])

@@ -14,6 +14,7 @@ from typing import NamedTuple
 from markupsafe import Markup
 
 from femubench.reports import reproduction as words
+from femubench.reports.blocks import Drawing
 from femubench.reports.cells import plain
 from femubench.reports.digits import off
 from femubench.reports.svg import drawing, embedded
@@ -54,7 +55,7 @@ def reproduction_html(studies: Sequence[Study], drawings: Mapping[str, str]) -> 
         papers=papers,
         cells=[cell for study in studies for cell in study.cells],
         options=[option for paper in papers for option in paper.options],
-        drawings={f.name: _shown(f, drawings[f.name]) for s in studies for f in s.figures},
+        drawn=lambda one: Drawing(one.title, one.caption, _shown(one, drawings[one.name])),
         drawing=drawing, embedded=embedded, faults=_FAULTS, off=off, places_of=places_of,
         say=words, tally=_tally, verdicts=VERDICTS,
     )  # fmt: skip
