@@ -17,8 +17,7 @@ from typing import Any
 import femubench
 from femubench import Run
 from femubench.core.display import counted
-from femubench.reports.markdown import floors_sentence
-from femubench.reports.terminal import board_text
+from femubench.reports.runs import board_text, floors_said
 from femubench.results import run_to_json
 
 ROOT = Path(__file__).parents[1]
@@ -111,7 +110,8 @@ def main() -> None:
     file_of(words.board).write_text(text.replace('{"case"', '\n{"case"') + "\n", encoding="utf-8")
     put("leaderboard", f"```\n{board_text(run)}\n```", ROOT / board.page)
     if words.board == "default":
-        put("floors", floors_sentence(run), ROOT / "docs" / "scoring.md")
+        label, said = floors_said(run)
+        put("floors", f"**{label}**: {said}", ROOT / "docs" / "scoring.md")
     print(f"{counted(len(run.results), 'job')} in {file_of(words.board)}")
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from femubench import hookimpl
 
 CLASSES = {
-    "terminal": "terminal:TerminalReporter",
+    "terminal": "runs:TerminalReporter",
     "html": "htmls:HtmlReporter",
-    "markdown": "markdown:MarkdownReporter",
+    "markdown": "runs:MarkdownReporter",
     "csv": "csvs:CsvReporter",
     "modes-csv": "csvs:ModesCsvReporter",
     "json": "jsons:JsonReporter",

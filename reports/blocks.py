@@ -1,21 +1,14 @@
-"""A report as sections of text, lists, tables and drawings, for the screen and in Markdown."""
+"""A report as sections of text, lists, tables and drawings, which every form of it shows alike."""
 
 from __future__ import annotations
 
-import re
-import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import zip_longest
-from typing import Literal
-from urllib.parse import quote
+from typing import Any, Literal
 
-from femubench.reports.cells import plain, shortened
-from femubench.reports.markdown import escape, table
-from femubench.reports.terminal import WIDTH, aligned_table
+from femubench.reports.cells import chance, fixed, plain, whole
 
-# What at the start of a line makes a heading, a list or a rule of it.
-_STARTERS = re.compile(r"^(\d*)([#+\-=.)])")
+Cell = str | float | None
 
 
 @dataclass(frozen=True)
@@ -24,36 +17,60 @@ class Column:
 
     Arguments:
         title: its header.
-        width: the most characters that a cell takes on the screen.
+        width: the most characters that a cell takes on the screen; 0 for what the others leave.
         left: whether it holds words rather than figures.
         wrap: whether a longer cell goes on below, instead of being cut.
+        say: how a number is written; None for `digits`.
+        digits: decimals where there is room; 0 for a count.
+        bar: the look of a bar in HTML, of a length as its number; empty for none.
     """
 
     title: str
     width: int
     left: bool = False
     wrap: bool = False
+    say: Callable[[Any], str] | None = None
+    digits: int = 0
+    bar: str = ""
 
     @property
     def side(self) -> Literal["left", "right"]:
         """Return where the cells stand."""
         return "left" if self.left else "right"
 
+    def text(self, cell: Cell, width: int = 7) -> str:
+        """Return a cell on one line; `width` is what a number with decimals has."""
+        if isinstance(cell, str):
+            return plain(cell)
+        if self.say is not None:
+            return self.say(cell)
+        return fixed(cell, self.digits, width) if self.digits else whole(cell, max(width, 4))
+
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of raw cells; the columns together fit on the screen.
+    """Rows of cells; a table that is wider than the screen goes on below there.
 
     Arguments:
         columns, rows: headers and cells.
         caption: one line on the whole, may be empty.
-        tones: a word for each row that HTML may style it by; nothing may rest on it alone.
+        tones: a word for each row that HTML may know it by; nothing may rest on it alone.
+        most: rows on the screen; None for all.
+        names: the place of the column that stands in every part of a table on the screen.
+        sortable: whether a reader of the HTML may sort it by any column.
+        folded: in HTML, what stands for it until it is asked for; empty where it always shows.
+        full: the number whose bar is full.
     """
 
     columns: Sequence[Column]
-    rows: Sequence[Sequence[str]]
+    rows: Sequence[Sequence[Cell]]
     caption: str = ""
     tones: Sequence[str] = ()
+    most: int | None = None
+    names: int = 0
+    sortable: bool = False
+    folded: str = ""
+    full: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -61,12 +78,52 @@ class Items:
     """A list of remarks.
 
     Arguments:
-        entries: label, which may be empty, and text.
+        entries: label, which may be empty, text, and what is said about it.
         whole: whether words wider than the screen stay whole, as commands must to be copied.
+        look: in HTML ``tiles`` or ``parameters``, or a list that is styled by this word.
     """
 
-    entries: Sequence[tuple[str, str]]
+    entries: Sequence[tuple[str, ...]]
     whole: bool = False
+    look: str = ""
+
+
+@dataclass(frozen=True)
+class Card:
+    """Something that was found, with everything that is known of it.
+
+    Arguments:
+        title, at: what it is, and where.
+        number: among its like.
+        chances: names and probabilities, each with a bar.
+        lines: clauses.
+        facts: entries of a list.
+    """
+
+    title: str
+    at: str
+    number: int
+    chances: Sequence[tuple[str, float | None]]
+    lines: Sequence[str]
+    facts: Sequence[tuple[str, ...]]
+
+    @property
+    def text(self) -> str:
+        """Return all of it but the title in one line."""
+        parts = [*(f"{name} {chance(p)}" for name, p in self.chances), *self.lines]
+        return "; ".join([*parts, *(f"{name} {', '.join(said)}" for name, *said in self.facts)])
+
+
+@dataclass(frozen=True)
+class Cards:
+    """What was found, one by one."""
+
+    cards: Sequence[Card]
+
+    @property
+    def entries(self) -> Sequence[tuple[str, ...]]:
+        """Return them as a list of remarks."""
+        return [(f"{card.title} {card.at}".strip(), card.text) for card in self.cards]
 
 
 @dataclass(frozen=True)
@@ -86,7 +143,14 @@ class Drawing:
     file: str = ""
 
 
-Block = str | Table | Items | Drawing
+@dataclass(frozen=True)
+class Row:
+    """Small figures beside each other."""
+
+    drawings: Sequence[Drawing]
+
+
+Block = str | Table | Items | Cards | Drawing | Row
 
 
 @dataclass(frozen=True)
@@ -95,84 +159,12 @@ class Section:
 
     Arguments:
         level: 2 for a chapter, 3 for a part of one.
+        area: where HTML has it: ``first`` under the heading, ``beside`` it, or in its turn.
+        look: what HTML styles it by.
     """
 
     title: str
     blocks: Sequence[Block]
     level: int = 2
-
-
-def to_terminal(sections: Iterable[Section]) -> str:
-    """Return plain text of 80 columns at most; whatever a terminal would obey is taken out."""
-    return "\n\n".join("\n".join(_screen(section)) for section in sections)
-
-
-def to_markdown(sections: Iterable[Section]) -> str:
-    """Return GitHub's Markdown; whatever it or HTML would obey is escaped."""
-    return "\n\n".join(part for section in sections for part in _document(section))
-
-
-def _screen(section: Section) -> Iterator[str]:
-    if section.title:
-        yield shortened(plain(section.title), WIDTH)
-    for block in section.blocks:
-        if isinstance(block, str):
-            yield textwrap.fill(plain(block), WIDTH, break_on_hyphens=False)
-        elif isinstance(block, Items):
-            yield from (_entry(label, text, whole=block.whole) for label, text in block.entries)
-        elif isinstance(block, Drawing):
-            yield _entry(block.title, block.caption)
-        else:
-            if block.caption:
-                yield textwrap.fill(plain(block.caption), WIDTH, break_on_hyphens=False)
-            rows = [line for row in block.rows for line in _lines(row, block.columns)]
-            heads = [(column.title, column.side) for column in block.columns]
-            yield textwrap.indent(aligned_table(rows, *zip(*heads, strict=True)), "  ")
-
-
-def _entry(label: str, text: str, *, whole: bool = False) -> str:
-    return textwrap.fill(
-        plain(f"{label}: {text}" if label else text),
-        WIDTH, initial_indent="  ", subsequent_indent="      ",
-        break_on_hyphens=False, break_long_words=not whole,
-    )  # fmt: skip
-
-
-def _lines(row: Sequence[str], columns: Sequence[Column]) -> list[list[str]]:
-    """Return the lines that a row takes on the screen."""
-    cells = [
-        textwrap.wrap(plain(cell), column.width)
-        if column.wrap
-        else [shortened(plain(cell), column.width)]
-        for cell, column in zip(row, columns, strict=True)
-    ]
-    return [list(line) for line in zip_longest(*cells, fillvalue="")] or [[""] * len(columns)]
-
-
-def _document(section: Section) -> Iterator[str]:
-    if section.title:
-        yield f"{'#' * section.level} {escape(section.title)}"
-    for block in section.blocks:
-        if isinstance(block, str):
-            yield _line(escape(block))
-        elif isinstance(block, Items):
-            yield "\n".join(f"- {_labelled(label, text)}" for label, text in block.entries)
-        elif isinstance(block, Drawing):
-            if block.file:
-                yield f"![{escape(block.title)}]({quote(block.file)})"
-            yield _labelled(block.title, block.caption)
-        else:
-            if block.caption:
-                yield _line(escape(block.caption))
-            heads = [escape(column.title) for column in block.columns]
-            rows = (map(escape, row) for row in block.rows)
-            yield table(heads, rows, "".join(column.side[0] for column in block.columns))
-
-
-def _labelled(label: str, text: str) -> str:
-    return f"**{escape(label)}**: {escape(text)}" if label else _line(escape(text))
-
-
-def _line(text: str) -> str:
-    """Return escaped text that stays a paragraph wherever it starts."""
-    return _STARTERS.sub(r"\1\\\2", text)
+    area: Literal["", "first", "beside"] = ""
+    look: str = ""

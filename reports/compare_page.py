@@ -1,31 +1,52 @@
-"""A comparison of two runs on the screen, in Markdown and as one HTML document."""
+"""A comparison of two runs: sections for the screen, for Markdown and for one HTML document."""
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 from femubench.plot import Axis, Chart, Mark, Series
+from femubench.reports.blocks import (
+    Block,
+    Cell,
+    Column,
+    Drawing,
+    Items,
+    Section,
+    Table,
+)
 from femubench.reports.cells import NOTHING, fixed, plain, shortened
-from femubench.reports.markdown import escape, table
+from femubench.reports.html import to_html
+from femubench.reports.markdown import to_markdown
 from femubench.reports.svg import drawing
-from femubench.reports.templating import styled_page
-from femubench.reports.terminal import WIDTH, aligned_table
+from femubench.reports.terminal import to_terminal
 from femubench.results import METHOD
 
 _RATIOS = ("unseen", "used", "higher", "modified", "seconds")
-_NAME = 26
 _BLANK = "\u2800"  # stands for an indent until the table is made, which strips all white space
-_MOST_LINES = 20
+_MOST_LINES = 20  # of a list on the screen
+_LONGEST = 300
 _LEGEND = (
     "Ratios B / A, less than 1 is better in B: unseen (errors that make the skill); used, higher, "
     "modified (rms frequency error + 0.05 %); seconds (sums). Means are geometric, over cases and "
-    "seeds."
+    "seeds. lost: results that A has and B has not."
 )
+_TELLING = "Scenarios where nothing differs are left out."
 _EVIDENCE = f"{METHOD} The interval of the mean ratio is by bootstrap over structures."
+_FOREST = (
+    "Mean ratio of the errors, B / A, logarithmic, with its 95 % interval. The line is at no "
+    "change; the table has the figures."
+)
 _SAYS = {"lost": "lost", "gained": "gained", "other": "changed"}
-_HEADS = ("strategy", "scenario", "jobs", *_RATIOS, "lost")
+_PROOF = (
+    Column("strategy", 20, left=True),
+    Column("differing", 9),
+    Column("ratio", 6, digits=3),
+    Column("95 % interval", 15, left=True),
+    Column("p (Holm)", 8, say=lambda p: NOTHING if p is None else f"{p:.2g}"),
+    Column("B is", 10, left=True, wrap=True),
+)
 
 
 def comparison_text(data: Mapping[str, Any]) -> str:
@@ -35,76 +56,19 @@ def comparison_text(data: Mapping[str, Any]) -> str:
         data: what `bench compare --format json` writes.
     """
     before, after = _sides(data)
-    parts = [_wrapped(f"A {before}, B {after}: {headline(data)}")]
-    parts += _listed("Ended otherwise", [_change(item) for item in data["changes"]])
-    parts += _listed("Beyond a threshold", [_excess(item) for item in data["excesses"]])
-    rows = [
-        [shortened(cells[0] if cells[1] == "all" else 2 * _BLANK + cells[1], _NAME), *cells[2:]]
-        for cells in map(_cells, _telling(data["rows"]))
-    ]
-    heads = ("strategy", "jobs", "unseen", "used", "high.", "mod.", "s", "lost")
-    board = aligned_table(rows, heads, ("left", *("right",) * 7))
-    parts.append(board.replace(_BLANK, " "))
-    parts.append(_wrapped(_LEGEND + " Scenarios where nothing differs are left out."))
-    titles = ("strategy", "struc-\ntures", "differ", "ratio", "95 % interval", "p", "B is")
-    lines = [[shortened(row[0], 18), *row[1:]] for row in map(_proof, data["evidence"])]
-    align = ("left", "right", "right", "right", "left", "right", "left")
-    parts.append(aligned_table(lines, titles, align))
-    parts.append(_wrapped(_EVIDENCE))
-    for title, lines_of in _lists(data):
-        parts += _listed(title, lines_of)
-    return "\n\n".join(parts)
+    top = Section("", [f"A {before}, B {after}: {headline(data)}"])
+    return to_terminal([top, *_sections(data, screen=True)]).replace(_BLANK, " ")
 
 
 def comparison_markdown(data: Mapping[str, Any]) -> str:
     """Return a comparison in GitHub's Markdown."""
-    before, after = map(escape, _sides(data))
-    parts = [
-        f"# {escape(headline(data))}",
-        table(["", ""], (["A", before], ["B", after]), "ll"),
-    ]
-    parts += _bullets("Ended otherwise", [_change(item) for item in data["changes"]])
-    parts += _bullets("Beyond a threshold", [_excess(item) for item in data["excesses"]])
-    rows = [[escape(cell) for cell in _cells(row)] for row in data["rows"]]
-    parts += ["## Ratios", table(_HEADS, rows, "llrrrrrrr"), _LEGEND]
-    rows = [[escape(cell) for cell in _proof(item)] for item in data["evidence"]]
-    heads = ("strategy", "structures", "differing", "ratio", "95 % interval", "p (Holm)", "B is")
-    parts += ["## Is it more than chance?", table(heads, rows, "lrrrlrl"), _EVIDENCE]
-    for title, lines in _lists(data):
-        parts += _bullets(title, lines)
-    return "\n\n".join(parts)
+    return to_markdown([_top(data), *_sections(data)], headline(data))
 
 
 def comparison_html(data: Mapping[str, Any]) -> str:
     """Return a comparison as one document that needs no script and no network."""
-    before, after = _sides(data)
-    return styled_page("compare.html").render(
-        headline=headline(data),
-        before=before,
-        after=after,
-        worse=data["worse"],
-        excesses=[_excess(item) for item in data["excesses"]],
-        changes=[(_SAYS[item["kind"]], _job(item), item) for item in data["changes"]],
-        heads=_HEADS,
-        rows=[(row["scenario"] is None, _cells(row), _tones(row)) for row in data["rows"]],
-        proofs=map(_proof, data["evidence"]),
-        forest=drawing(
-            forest(data["evidence"]), "Their 95 % intervals; the table has the figures."
-        ),
-        lists=[(title, lines) for title, lines in _lists(data) if lines],
-        legend=_LEGEND,
-        evidence=_EVIDENCE,
-    )
-
-
-def _sides(data: Mapping[str, Any]) -> tuple[str, str]:
-    """Return the names of A and B, with the strategies of two names that are compared."""
-    before, after = (
-        plain(data[side])
-        + (f" ({', '.join(plain(item[side]) for item in data['against'])})" * bool(data["against"]))
-        for side in ("before", "after")
-    )
-    return before, after
+    sections, title = [_top(data), *_sections(data)], " against ".join(_sides(data))
+    return to_html(sections, title=title, heading=headline(data))
 
 
 def headline(data: Mapping[str, Any]) -> str:
@@ -130,58 +94,101 @@ def forest(evidence: Sequence[Mapping[str, Any]]) -> Chart:
     return Chart("interval", "B over A", *axes, tuple(series), (Mark("x", 1.0, "no change"),))
 
 
-def _telling(rows: Iterable[Mapping[str, Any]]) -> Iterator[Mapping[str, Any]]:
-    """Leave out the scenarios where only times differ."""
+def _sides(data: Mapping[str, Any]) -> tuple[str, str]:
+    """Return the names of A and B, with the strategies of two names that are compared."""
+    before, after = (
+        plain(data[side])
+        + (f" ({', '.join(plain(item[side]) for item in data['against'])})" * bool(data["against"]))
+        for side in ("before", "after")
+    )
+    return before, after
+
+
+def _top(data: Mapping[str, Any]) -> Section:
+    return Section("", [Items(tuple(zip("AB", _sides(data), strict=True)))])
+
+
+def _sections(data: Mapping[str, Any], *, screen: bool = False) -> Iterator[Section]:
+    """Yield the parts; lists are cut on the screen, and tables show what differs."""
+    differing = [shortened(plain(line), _LONGEST) for line in data["environment"]]
+    notes = [shortened(plain(note), _LONGEST) for note in data["notes"]]
+    yield from _listed("Ended otherwise", map(_change, data["changes"]), screen)
+    yield from _listed("Beyond a threshold", map(_excess, data["excesses"]), screen)
+    evidence = data["evidence"]
+    told = [] if screen else _drawn(evidence)
+    proof = Table(_PROOF, [*map(_proof, evidence)])
+    yield Section("Is it more than chance?", [*told, proof, _EVIDENCE])
+    legend = f"{_LEGEND} {_TELLING}" if screen else _LEGEND
+    yield Section("Ratios", [_ratios(data["rows"], screen), legend])
+    yield from _listed("Only in A", _jobs(data["only_before"]), screen)
+    yield from _listed("Only in B", _jobs(data["only_after"]), screen)
+    yield from _listed("Not compared: other case files", _jobs(data["other_cases"]), screen)
+    yield from _listed("Environment", differing or ["nothing differs"], screen)
+    yield from _listed("Notes", notes, screen)
+    yield from _listed("Thresholds that nothing was held against", data["untested"], screen)
+
+
+def _listed(title: str, lines: Iterable[str], screen: bool) -> Iterator[Section]:
+    found = list(lines)
+    shown = found[:_MOST_LINES] if screen else found
+    more = [f"... and {len(found) - len(shown)} more"] if len(shown) < len(found) else []
+    if found:
+        yield Section(title, [Items([("", line) for line in [*shown, *more]])])
+
+
+def _drawn(evidence: Sequence[Mapping[str, Any]]) -> list[Block]:
+    shown = drawing(forest(evidence), _FOREST)
+    return [Drawing("B over A", _FOREST, shown)] if shown else []
+
+
+def _ratios(rows: Iterable[Mapping[str, Any]], screen: bool) -> Table:
+    """Return the ratios, those that got worse or better with an arrow where there is room for it.
+
+    The screen leaves out the scenarios where only times differ.
+    """
+    cells = []
     for row in rows:
-        values = [row["values"][name] for name in _RATIOS if name != "seconds"]
-        differs = any(value is not None and abs(value - 1.0) > 5e-4 for value in values)
-        if row["scenario"] is None or differs or row["values"]["failures"]:
-            yield row
-
-
-def _cells(row: Mapping[str, Any]) -> list[str]:
-    values = row["values"]
-    return [
-        plain(row["strategy"]),
-        "all" if row["scenario"] is None else plain(row["scenario"]),
-        str(row["jobs"]),
-        *(fixed(values[name], 2 if name == "seconds" else 3, 6) for name in _RATIOS),
-        f"{values['failures']:.0f}",
+        name, scenario, values = plain(row["strategy"]), row["scenario"], row["values"]
+        same = not any(_arrow(key, values[key]) for key in _RATIOS[:-1])
+        if screen and scenario is not None and same and not values["failures"]:
+            continue
+        if scenario is not None:
+            name = 2 * _BLANK + plain(scenario) if screen else f"{name}, {plain(scenario)}"
+        cells.append([name, row["jobs"], *map(values.get, _RATIOS), values["failures"]])
+    says = (None if screen else partial(_told, key) for key in _RATIOS)
+    figures = [
+        Column(key, max(len(key), 6), digits=_digits(key), say=say)
+        for key, say in zip(_RATIOS, says, strict=True)
     ]
+    columns = [Column("strategy", 22, left=True), Column("jobs", 4), *figures, Column("lost", 4)]
+    return Table(columns, cells)
 
 
-def _tones(row: Mapping[str, Any]) -> list[str]:
-    """Return how every cell is shown: up, down or nothing."""
-    tones = ["", "", ""]
-    for name in _RATIOS:
-        value = row["values"][name]
-        far = 0.25 if name == "seconds" else 5e-4
-        off = 0.0 if value is None else value - 1.0
-        tones.append("up" if off > far else "down" if off < -far else "")
-    return [*tones, "up" if row["values"]["failures"] else ""]
+def _digits(name: str) -> int:
+    return 2 if name == "seconds" else 3
 
 
-def _proof(item: Mapping[str, Any]) -> list[str]:
-    known = item["low"] is not None and item["high"] is not None
-    return [
-        plain(item["strategy"]),
-        str(item["structures"]),
-        str(item["differing"]),
-        fixed(item["ratio"], 3, 6),
-        f"{fixed(item['low'], 3, 6)} - {fixed(item['high'], 3, 6)}" if known else NOTHING,
-        NOTHING if item["p"] is None else f"{item['p']:.2g}",
-        item["verdict"],
-    ]
+def _told(name: str, ratio: float | None) -> str:
+    return fixed(ratio, _digits(name), 6) + _arrow(name, ratio)
 
 
-def _job(item: Mapping[str, Any]) -> str:
-    return f"{plain(item['strategy'])}, {plain(item['case'])}, seed {item['seed']}"
+def _arrow(name: str, ratio: float | None) -> str:
+    """Return where a ratio went, nothing where it stayed; times scatter."""
+    off, room = (ratio or 1.0) - 1.0, 0.25 if name == "seconds" else 5e-4
+    return " \u25b2" if off > room else " \u25bc" if off < -room else ""
+
+
+def _proof(item: Mapping[str, Any]) -> list[Cell]:
+    low, high = item["low"], item["high"]
+    ends = None if low is None or high is None else f"{fixed(low, 3, 6)} - {fixed(high, 3, 6)}"
+    differing = f"{item['differing']} of {item['structures']}"
+    return [item["strategy"], differing, item["ratio"], ends or NOTHING, item["p"], item["verdict"]]
 
 
 def _change(item: Mapping[str, Any]) -> str:
     said = f" ({plain(item['reason'])})" if item["reason"] else ""
-    kind = _SAYS[item["kind"]]
-    return f"{kind}: {_job(item)}: {item['before']} -> {item['after']}{said}"
+    job = f"{plain(item['strategy'])}, {plain(item['case'])}, seed {item['seed']}"
+    return f"{_SAYS[item['kind']]}: {job}: {item['before']} -> {item['after']}{said}"
 
 
 def _excess(item: Mapping[str, Any]) -> str:
@@ -190,39 +197,11 @@ def _excess(item: Mapping[str, Any]) -> str:
     return f"{plain(item['strategy'])}, {where}: {item['metric']} {value}"
 
 
-def _lists(data: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:
-    yield "Only in A", _jobs(data["only_before"])
-    yield "Only in B", _jobs(data["only_after"])
-    yield "Not compared: other case files", _jobs(data["other_cases"])
-    differing = [shortened(plain(line), 300) for line in data["environment"]]
-    yield "Environment", differing or ["nothing differs"]
-    yield "Notes", [shortened(plain(note), 300) for note in data["notes"]]
-    if data["untested"]:
-        yield "Thresholds that nothing was held against", list(data["untested"])
-
-
-def _jobs(jobs: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return a line for every strategy and case."""
-    found: dict[tuple[str, str], list[str]] = {}
+def _jobs(jobs: Iterable[Mapping[str, Any]]) -> Iterator[str]:
+    """Yield a line for every strategy and case."""
+    found: dict[str, list[str]] = {}
     for job in jobs:
-        found.setdefault((plain(job["strategy"]), plain(job["case"])), []).append(str(job["seed"]))
-    return [
-        f"{strategy}, {case}, seed{'s' if len(seeds) > 1 else ''} {', '.join(seeds)}"
-        for (strategy, case), seeds in found.items()
-    ]
-
-
-def _listed(title: str, lines: Sequence[str]) -> list[str]:
-    if not lines:
-        return []
-    more = [f"  ... and {len(lines) - _MOST_LINES} more"] if len(lines) > _MOST_LINES else []
-    shown = [_wrapped(line, "  ") for line in lines[:_MOST_LINES]]
-    return ["\n".join([f"{title} ({len(lines)})", *shown, *more])]
-
-
-def _bullets(title: str, lines: Sequence[str]) -> list[str]:
-    return [f"## {title}", "\n".join(f"- {escape(line)}" for line in lines)] if lines else []
-
-
-def _wrapped(text: str, indent: str = "") -> str:
-    return textwrap.fill(text, WIDTH, initial_indent=indent, subsequent_indent=2 * indent)
+        key = f"{plain(job['strategy'])}, {plain(job['case'])}"
+        found.setdefault(key, []).append(str(job["seed"]))
+    for key, seeds in found.items():
+        yield f"{key}, seed{'s' if len(seeds) > 1 else ''} {', '.join(seeds)}"

@@ -16,23 +16,17 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 class CsvReporter:
     """One line a job."""
 
-    name = "csv"
-    suffix = ".csv"
+    name, suffix, frame = "csv", ".csv", staticmethod(results_frame)
 
     def render(self, run: Run) -> str:
-        """Return the results as CSV."""
-        return harmless_csv(results_frame(run))
+        """Return the rows as CSV."""
+        return harmless_csv(self.frame(run))
 
 
-class ModesCsvReporter:
+class ModesCsvReporter(CsvReporter):
     """One line a measured mode of every job."""
 
-    name = "modes-csv"
-    suffix = ".modes.csv"
-
-    def render(self, run: Run) -> str:
-        """Return the paired modes as CSV."""
-        return harmless_csv(modes_frame(run))
+    name, suffix, frame = "modes-csv", ".modes.csv", staticmethod(modes_frame)
 
 
 def harmless_csv(frame: pd.DataFrame) -> str:

@@ -1,246 +1,332 @@
-"""A diagnosis for the screen and in Markdown, from the data of ``bench diagnose --json``.
+"""A diagnosis as a report of any form, from the data of ``bench diagnose --json``.
 
 The argument `data` of all functions is what `diagnosis_to_json` gives, fresh or read from a file
-through `diagnosis_from_json`.
+through `diagnosis_from_json`. Files of earlier versions hold no structure, and medians alone.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
-from femubench.reports.blocks import Block, Column, Items, Section, Table, to_markdown, to_terminal
-from femubench.reports.cells import NOTHING, fixed, plain
-from femubench.reports.diagnosis_words import (
-    CAUSES,
-    FAULTS,
-    GAINS,
-    numbered,
-    pairs_of,
-    sentence,
-    sits,
-    weight,
+from femubench import InputError
+from femubench.plot import MOST_ROWS, evidence, residual_dots, residuals, strongest_places, svg
+from femubench.reports import diagnosis_words as words
+from femubench.reports.blocks import (
+    Block,
+    Card,
+    Cards,
+    Cell,
+    Column,
+    Drawing,
+    Items,
+    Row,
+    Section,
+    Table,
 )
-from femubench.reports.figures import chance, estimate, figure, rms, signed
-from femubench.reports.markdown import escape
+from femubench.reports.cells import chance, figure, plain, sentence, signed
+from femubench.reports.diagnosis_words import Data
+from femubench.reports.markdown import to_markdown
+from femubench.reports.terminal import to_terminal
 
-Data = Mapping[str, Any]
-
-_MOST_RIVALS, _MOST_PLACES, _MOST_CHANGES, _MOST_ADVICE = 8, 5, 8, 5
+_MOST_RESIDUALS = 2000
 _LEAST = 0.005  # what two decimals show
 _WHEN = ("before", "after")
-_GAINS = {**GAINS, "cross_validated_percent": "each used mode left out in turn"}
+_KINDS = {"frequency": "Frequencies", "shape": "Mode shapes, rms over the sensors"}
+_MAP, _SMALL = (4.8, 3.7), (3.4, 2.4)  # inch
+_EVIDENCE = "Thick lines and large dots: strong evidence. Numbers: the causes. "
 
 
 def diagnosis_text(data: Data) -> str:
     """Return a diagnosis as plain text of 80 columns at most."""
-    return to_terminal(diagnosis_sections(data))
+    return to_terminal([Section("", [_heading(data)]), *_sections(data)])
 
 
 def diagnosis_markdown(data: Data) -> str:
     """Return a diagnosis in GitHub's Markdown."""
-    title = f"# Diagnosis of {escape(data['case'])}"
-    return f"{title}\n\n{to_markdown(diagnosis_sections(data))}"
+    sections = [Section("", [_heading(data)]), *_sections(data)]
+    return to_markdown(sections, f"Diagnosis of {data['case']}")
+
+
+def diagnosis_html(data: Data) -> str:
+    """Return a diagnosis as a document that needs nothing but itself; it reads without scripts."""
+    from femubench.reports.html import to_html
+
+    seconds = f"{figure(data['seconds'], 2)} s"
+    return to_html(
+        _sections(data, page=True),
+        title=f"Diagnosis of {data['case']}: {data['verdict']}",
+        heading=_heading(data),
+        brand=f"Diagnosis of {data['case']}",
+        foot=f"femubench {data.get('version') or ''}, {seconds}. The numbers are those of bench "
+        "diagnose --json.",
+        scripts=("sortable.js", "diagnosis.js"),
+    )
 
 
 def summary_lines(data: Data) -> list[str]:
     """Return the verdict and its causes, a line each, for a comment or a list."""
-    causes = (plain(f"{_at(cause)}: {_cause(cause)}") for cause in data["causes"])
-    return [line for line in (plain(data["sentence"]), *causes) if line]
+    cards = [_card(number, cause) for number, cause in enumerate(data["causes"], 1)]
+    told = (": ".join(entry) for entry in Cards(cards).entries)
+    return [line for line in map(plain, (data["sentence"], *told)) if line]
 
 
-def diagnosis_sections(data: Data) -> list[Section]:
-    """Return what a diagnosis says, the verdict first, for a report of any form."""
-    found: dict[str, list[Data]] = {}
-    for row in data["locations"]:
-        found.setdefault(row["indicator"], []).append(row)
-    written = data.get("written")
-    parts: list[tuple[str, list[Block]]] = [
-        ("", [data["sentence"]] if data["sentence"] else []),
-        ("", [_verdict(data)]),
-        (
-            "Plausibility checks of the model, before any fit",
-            _items((look["where"], _look(look)) for look in data["looks"]),
-        ),
-        (
-            "The stated scatter does not fit what is left",
-            _items(("", row["warning"]) for row in (data.get("scatter") or ()) if row["warning"]),
-        ),
-        ("Residuals in standard deviations, measured minus predicted", _residuals(data)),
-        (
-            FAULTS,
-            _items((_at(c), _cause(c)) for _, c in numbered(data["causes"], faults=True)),
-        ),
-        (
-            CAUSES.get(data["verdict"], "Causes"),
-            [
-                *_items((_at(c), _cause(c)) for _, c in numbered(data["causes"])),
-                *_items(("", sentence(weight(row))) for row in data["evidence"]),
-                *([data["reason"]] if data["reason"] else []),
-            ],
-        ),
-        ("Rivals", _items(((_pair_at(r), _rival(r)) for r in data["rivals"]), _MOST_RIVALS)),
-        (
-            "What to measure next",
-            _items((("", _advice(item)) for item in data["advice"]), _MOST_ADVICE),
-        ),
-        ("The smallest that these data would have shown", _visible(data)),
-        ("Gain: frequency error before and after", _gain(data)),
-        ("Where the error sits, 1 at the largest", _items((k, _top(v)) for k, v in found.items())),
-        ("Notes", _items(("", note) for note in data["notes"])),
-        ("", [f"The extended case is in {written}"] if written else []),
+def _heading(data: Data) -> str:
+    return data["sentence"] or f"The verdict on {data['case']} is {data['verdict']}."
+
+
+def _sections(data: Data, *, page: bool = False) -> list[Section]:
+    """Return what a diagnosis says; of a page the verdict, causes and faults stand at the top."""
+    verdict, base, reason = data["verdict"], data["base"], sentence(data["reason"])
+    name = verdict if page else f"{data['case']}: {verdict}"
+    said = Items([(name, f"{words.MEANINGS[verdict]}.")], look=f"verdict {verdict}")
+    warned = [("", row["warning"]) for row in data.get("scatter") or () if row["warning"]]
+    looks = [(words.place(look["where"]), words.look(look)) for look in data["looks"]]
+    notes = [("", note) for note in data["notes"]]
+    if data.get("written"):
+        notes.append(("", f"The extended case is in {data['written']}"))
+    next_title = "What cannot be distinguished" if reason else ""
+    if data["advice"]:
+        next_title = f"{next_title}, and what to measure next" if reason else "What to measure next"
+    gain_title = "How far off the model is" if verdict == "none" else "What it gains"
+    textbook = [f"Taken at the textbook value: {', '.join(base)}."] if base else []
+    found = (
+        Section("", [said, Items(_tiles(data), look="tiles")], area="first"),
+        Section(words.CAUSES.get(verdict, ""), [*_cards(data), *textbook], area="first"),
+        Section("", [_map(data)] if page else [], area="beside"),
+        Section(words.FAULTS, _cards(data, faults=True), area="beside"),
+        Section("The stated scatter does not fit what is left", [Items(warned)] * bool(warned),
+                area="beside", look="notes"),
+        Section(next_title, [*([reason] if reason else []), *_advice(data)]),
+        Section(gain_title, _gain(data)),
+        Section("How well it fits", list(_fit(data, page=page))),
+        Section("Where it is", list(_where(data))),
+        Section("Rivals", [*_rivals(data), *map(words.weight, data["evidence"])]),
+        Section("The smallest that these data would have shown", _visible(data)),
+        Section("Classical indicators of where the error sits", _indicators(data, page=page)),
+        Section("Plausibility checks of the model, before any fit", [Items(looks)] * bool(looks)),
+        Section("Notes", [Items(notes)] * bool(notes)),
+    )  # fmt: skip
+    return [section for section in found if section.blocks]
+
+
+def _tiles(data: Data) -> list[tuple[str, ...]]:
+    """Return the figures that matter most, each with a title and what it is."""
+    nothing, none = data["nothing"], data["verdict"] == "none"
+    sure = nothing if none or nothing is None else 1.0 - nothing
+    found = "Nothing is missing" if none else "Something is missing"
+    tiles: list[tuple[str, ...]] = [(found, chance(sure), "probability, before any name is given")]
+    told = [(key, name) for key, name in words.GAINS.items() if data["gain"][key]]
+    for key, name in told[:1] if not none else ():
+        kind, pairs = next(iter(_errors(data).items()))
+        before, after = map(words.percent, pairs[key])
+        said = f"{kind} frequency error, before → after"
+        tiles.append((f"Error on {name}", f"{before} → {after}", said))
+    tiles.append(("What is left", *words.adequacy(data)))
+    scales = ((f"{figure(r['scale'], 2)} {r['unit']}", r["class"]) for r in data["model_error"])
+    return [*tiles, *(("Model error", *scale) for scale in scales)]
+
+
+def _cards(data: Data, *, faults: bool = False) -> list[Block]:
+    """Return the causes, or the faults of the data and of what was typed in, with their numbers."""
+    cards = [
+        _card(number, cause)
+        for number, cause in enumerate(data["causes"], 1)
+        if (cause.get("side", "model") != "model") is faults
     ]
-    return [Section(title, blocks) for title, blocks in parts if blocks]
+    return [Cards(cards)] if cards else []
 
 
-def _items(entries: Iterable[tuple[str, str]], most: int | None = None) -> list[Block]:
-    """Return a list of remarks and how many more there are; nothing where there is none."""
-    listed = list(entries)
-    hidden = len(listed[most:]) if most else 0
-    more = [f"... and {hidden} more in the JSON"] if hidden else []
-    return [Items(listed[:most]), *more] if listed else []
-
-
-def _verdict(data: Data) -> str:
-    said = [f"{data['case']}: {data['verdict']}"]
-    if data["nothing"] is not None:
-        said.append(f"that nothing is missing has probability {chance(data['nothing'])}")
-    if data["base"]:
-        said.append(f"taken at the textbook value: {', '.join(data['base'])}")
-    return "; ".join(said) + "."
-
-
-def _look(look: Data) -> str:
-    known = [change for change in look["changes"] if change["percent"] is not None]
-    changes = [
-        f"mode {change['mode']} {signed(change['percent'], 2)} %"
-        for change in known[:_MOST_CHANGES]
-    ]
-    more = len(known) - len(changes)
-    by = f" ({look['effect']})" if look["effect"] else ""
-    tail = f" and {more} more" if more else ""
-    corrected = f" If corrected{by}: {', '.join(changes)}{tail}." if changes else by
-    return f"{look['what']}{corrected}"
-
-
-def _residuals(data: Data) -> list[Block]:
-    """Return the residuals, a mode a row, and how likely their sum is."""
-    rows = data["residuals"]
-    shapes = any(row["kind"] == "shape" for row in rows)
-    columns = [
-        Column("mode", 6),
-        Column("measured\nHz", 10),
-        Column("frequency\nbefore", 9),
-        Column("frequency\nafter", 9),
-    ]
-    if shapes:
-        columns += [
-            Column("shape\nsensors", 7),
-            Column("shape rms\nbefore", 9),
-            Column("shape rms\nafter", 9),
-        ]
-    modes = dict.fromkeys(row["mode"] for row in rows if row["mode"] is not None)
-    lines = [_mode_row(mode, rows, shapes)[: len(columns)] for mode in modes]
-    text = [
-        f"mass {figure(row['measured'])} kg: {signed(row['before'])} before, "
-        f"{signed(row['after'])} after"
-        for row in rows
-        if row["kind"] == "mass"
-    ]
-    return [*([Table(columns, lines)] if lines else []), *text, _chi_square(data)]
-
-
-def _mode_row(mode: int, rows: Iterable[Data], shapes: bool) -> list[str]:
-    own = [row for row in rows if row["mode"] == mode]
-    frequency = next((row for row in own if row["kind"] == "frequency"), {})
-    shape = [row for row in own if row["kind"] == "shape"]
-    return [
-        str(mode),
-        figure(frequency.get("measured"), 6),
-        signed(frequency.get("before")),
-        signed(frequency.get("after")),
-        str(len(shape)),
-        figure(rms(row["before"] for row in shape), 3),
-        figure(rms(row["after"] for row in shape), 3),
-    ]
-
-
-def _chi_square(data: Data) -> str:
-    before, after = data["chi2"]
-    noise = "ordinary scatter of the elements" + (" and model error" if data["model_error"] else "")
-    text = (
-        f"Chi-square, {noise} counted as noise: "
-        f"{figure(before)} before, {figure(after)} after, {data['data_count']} data"
+def _card(number: int, cause: Data) -> Card:
+    sure = [("probability", cause["probability"])]
+    if cause["place"] != "all" and cause["place_probability"] is not None:
+        sure.append(("at this place", cause["place_probability"]))
+    said = "textbook value, not fitted"
+    return Card(
+        cause["effect"],
+        words.at(cause["place"]),
+        number,
+        sure,
+        [line for line in (words.elsewhere(cause), cause["summary"]) if plain(line)],
+        [
+            (item["name"], words.parameter(item), *([said] if item.get("textbook") else []))
+            for item in cause["parameters"]
+        ],
     )
-    if data["adequacy_p"] is None:
-        return f"{text}."
-    return f"{text}. Noise alone leaves as much with probability {data['adequacy_p']:.2g}."
 
 
-def _cause(cause: Data) -> str:
-    parts = [f"probability {chance(cause['probability'])}", sits(cause), cause["summary"]]
-    parts = [part for part in parts if part]
-    return "; ".join([*parts, *(_parameter(item) for item in cause["parameters"])])
-
-
-def _parameter(item: Data) -> str:
-    unit = f" {item['unit']}" if item["unit"] else ""
-    source = " (textbook)" if item["textbook"] else ""
-    return f"{item['name']} {estimate(item['value'], item['std'])}{unit}{source}"
-
-
-def _at(item: Data) -> str:
-    if item["place"] == "all":
-        return f"{item['effect']}, everywhere"
-    return f"{item['effect']} at {item['place']}" if item["place"] else str(item["effect"])
-
-
-def _pair_at(rival: Data) -> str:
-    """Return effects and places of a combination, each effect beside its place."""
-    return " + ".join(_at({"effect": effect, "place": place}) for effect, place in pairs_of(rival))
-
-
-def _rival(rival: Data) -> str:
-    text = (
-        f"probability {chance(rival['probability'])}, "
-        f"lowers chi-square by {figure(rival['delta_chi2'])}"
+def _advice(data: Data) -> list[Block]:
+    rows = [[item["measurement"], *[item["separation"]] * 2] for item in data["advice"]]
+    columns = (
+        Column("measurement", 0, left=True, wrap=True),
+        Column("distance,\nσ²", 9, say=partial(figure, digits=3)),
+        Column("odds", 20, say=words.odds),
     )
-    return text if rival["angle"] is None else f"{text}, {rival['angle']:.1f} degrees away"
+    said = (
+        "What separates the explanations most comes first: with the distance in squared standard "
+        "deviations that it would open between them, and the odds that this stands for."
+    )
+    return [Table(columns, rows, most=8), said] if rows else []
 
 
-def _advice(item: Data) -> str:
-    return f"{item['measurement']} (separates by {figure(item['separation'], 3)} sigma squared)"
-
-
-def _visible(data: Data) -> list[Block]:
-    columns = [
-        *(Column("effect", 32, left=True), Column("at its best place", 22, left=True)),
-        *(Column("size", 10), Column("unit", 8, left=True)),
-    ]
-    rows = [
-        [item["effect"], item["place"], figure(item["size"], 3), item["unit"]]
-        for item in data["smallest_visible"]
-    ]
-    return [Table(columns, rows)] if rows else []
+def _errors(data: Data) -> dict[str, Data]:
+    """Return the frequency errors by kind, those of a run first."""
+    kinds = {"rms": data.get("gain_rms") or {}, "median": data["gain"]}
+    return {kind: pairs for kind, pairs in kinds.items() if any(pairs.values())}
 
 
 def _gain(data: Data) -> list[Block]:
-    """Return the errors as rms, as in a run, and as medians, which alone files of old have."""
-    columns = [Column("", 32, left=True)]
-    columns += [Column(f"{kind} %\n{when}", 9) for kind in ("rms", "median") for when in _WHEN]
-    pairs = [
-        (title, (data.get("gain_rms") or {}).get(key), data["gain"][key])
-        for key, title in _GAINS.items()
-    ]
+    """Return the errors before and after."""
+    kinds = _errors(data)
+    columns = [Column("frequency error", 17, left=True, wrap=True)]
+    for kind in kinds:
+        columns += [Column(f"{kind}\n{t}", 8, say=words.percent, bar=t) for t in _WHEN]
+    rows: list[list[Cell]] = []
+    for key, name in reversed(words.GAINS.items()):
+        pairs = [pairs.get(key) or (None, None) for pairs in kinds.values()]
+        if any(map(any, pairs)):
+            rows.append(
+                [name, *(value for pair in pairs for value in pair), words.times(*pairs[0])]
+            )
+    most = max((cell for row in rows for cell in row if isinstance(cell, float)), default=0.0)
+    said = (
+        "Nothing was added to the model, so nothing changes."
+        if data["verdict"] == "none"
+        else "Held-out modes and modified structures had no part in the naming."
+    )
+    table = Table([*columns, Column("change", 18, left=True)], rows, full=most or 1.0)
+    return [f"Over the modes, rms as in bench run. {said}", table] if rows else []
+
+
+def _fit(data: Data, *, page: bool) -> Iterator[Block]:
+    """Yield the residuals, as drawings in a page, and whether they are noise."""
+    yield (
+        "Measured minus predicted in standard deviations of the measurement: 19 of 20 data that "
+        "are noise alone lie within ±2" + (", the shaded band. ○ before, ◆ after." * page or ".")
+    )
+    drawings = []
+    before_after = [Column(when, 9, say=signed) for when in _WHEN]
+    kind: Any
+    for kind, title in _KINDS.items():
+        dots = residual_dots(data, kind)
+        if page and dots:
+            size = 4.6, 1.0 + 0.27 * min(len(dots), MOST_ROWS)
+            said = "; ".join(f"{dot.name} {dot.text}" for dot in dots[:12])
+            drawn = _drawn(partial(residuals, data, kind=kind), f"dots-{kind}", title, said, size)
+            more = f"{len(dots) - MOST_ROWS} more in the table below." * (len(dots) > MOST_ROWS)
+            drawings.append(Drawing(title, more, drawn))
+        elif dots:
+            say = partial(figure, digits=3) if kind == "shape" else signed
+            heads = [Column(title, 36, left=True), *(Column(when, 9, say=say) for when in _WHEN)]
+            yield Table(heads, [[dot.name, dot.before, dot.after] for dot in dots])
+    if drawings:
+        yield Row(drawings)
+    yield words.chi_square(data)
+    found = data["residuals"]
+    if page and found:
+        columns = (
+            *(Column("mode", 5), Column("kind", 9, left=True), Column("sensor", 16, left=True)),
+            *(Column("measured", 9, say=partial(figure, digits=6)), *before_after),
+        )
+        keys = ("mode", "kind", "sensor", "measured", *_WHEN)
+        cells = [[row[key] for key in keys] for row in found[:_MOST_RESIDUALS]]
+        yield Table(columns, cells, sortable=True, folded=f"All {len(found)} residuals")
+        if found[_MOST_RESIDUALS:]:
+            yield f"{len(found) - _MOST_RESIDUALS} more in the JSON."
+
+
+def _where(data: Data) -> Iterator[Block]:
+    """Yield the evidence by place; HTML ties its rows to the drawing."""
+    spots = strongest_places(data)
+    if not spots:
+        yield "No place stands out."
+        return
+    guess = data["verdict"] in ("unknown", "not-confirmed")
+    among = ", among explanations that do not hold" if guess else ""
+    said = f"The probability that a cause sits there, 1 at the most probable place{among}."
+    named = [words.place(spot.place) for spot in spots]
+    columns = (
+        *(Column("place", 40, left=True), Column("cause", 9, left=True)),
+        Column("evidence", 8, digits=2, bar="evidence"),
+    )
+    rows = [(name, spot.causes, spot.value) for name, spot in zip(named, spots, strict=True)]
+    tones = [name if name == "everywhere" else str(k) for k, name in enumerate(named)]
+    yield said
+    yield Table(columns, rows, tones=tones)
+    if data["causes"]:
+        yield (
+            "The probability of each cause is that of the effect wherever it sits, and that of its "
+            "place if the effect is there. Values ± one standard deviation."
+        )
+
+
+def _rivals(data: Data) -> list[Block]:
+    columns = (
+        Column("explanation", 0, left=True, wrap=True),
+        Column("probability", 11, say=chance),
+        Column("lowers\nchi-square", 10, say=figure),
+        Column("angle,\ndegrees", 7, digits=1),
+    )
     rows = [
-        [title, *(fixed(v, 3, 7) for v in (*(rms or (None, None)), *median))]
-        for title, rms, median in pairs
-        if median
+        [words.pair_at(rival), *(rival[key] for key in ("probability", "delta_chi2", "angle"))]
+        for rival in data["rivals"]
     ]
-    return [Table(columns, rows)]
+    said = "A small angle: the data see it and the winner alike."
+    return [said, Table(columns, rows, most=8, sortable=True)] if rows else []
 
 
-def _top(rows: Sequence[Data]) -> str:
-    known = [row for row in rows if (row["value"] or 0.0) >= _LEAST]
-    best = sorted(known, key=lambda row: -row["value"])[:_MOST_PLACES]
-    return ", ".join(f"{row['place']} {row['value']:.2f}" for row in best) or NOTHING
+def _visible(data: Data) -> list[Block]:
+    columns = (
+        *(Column("effect", 26, left=True), Column("at its best place", 22, left=True)),
+        *(Column("size", 10, say=partial(figure, digits=3)), Column("unit", 12, left=True)),
+    )
+    rows = [
+        [r["effect"], words.place(r["place"]), r["size"], words.unit_of(r)]
+        for r in data["smallest_visible"]
+    ]
+    said = (
+        "What is smaller stays hidden. For springs in place of something rigid: the stiffest that "
+        "shows."
+    )
+    return [said, Table(columns, rows, sortable=True)] if rows else []
+
+
+def _indicators(data: Data, *, page: bool) -> list[Block]:
+    """Return what knows of no cause, with a small drawing each in a page."""
+    found: dict[str, list[Data]] = {}
+    for row in data["locations"]:
+        found.setdefault(row["indicator"], []).append(row)
+    found.pop("evidence", None)
+    drawings = []
+    for number, (name, rows) in enumerate(found.items()):
+        top = words.strongest(rows, _LEAST)
+        meaning = f"{words.INDICATORS[name]}. " if name in words.INDICATORS else ""
+        draw = partial(evidence, data, indicator=name, names=False)
+        title = f"Indicator {name}"
+        drawn = _drawn(draw, f"where-{number}", title, f"Highest: {top}.", _SMALL) if page else ""
+        drawings.append(Drawing(name, f"{meaning}{top}", drawn))
+    said = "They know of no cause, point at places and name nothing. 1 at the largest."
+    return [said, Row(drawings)] if drawings else []
+
+
+def _map(data: Data) -> Block:
+    """Return the structure with causes and evidence."""
+    listed = ", ".join(f"{s.place} {s.value:.2f}" for s in strongest_places(data)[:5])
+    says = f"Evidence by place: {listed}." if listed else "No place stands out."
+    drawn = _drawn(partial(evidence, data), "map", "Evidence on the structure", says, _MAP)
+    if not drawn:
+        return "This file holds no geometry, so there is no drawing."
+    return Row([Drawing("", f"{_EVIDENCE * bool(listed)}▲ sensor.", drawn)])
+
+
+def _drawn(
+    draw: Callable[..., object], name: str, title: str, says: str, size: tuple[float, float]
+) -> str:
+    """Return a drawing in the colours of the page; nothing where there is no geometry."""
+    from markupsafe import Markup
+
+    try:
+        return Markup(svg(draw, name=name, title=title, caption=says, size=size, themed=True))
+    except InputError:
+        return ""

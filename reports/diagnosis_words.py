@@ -1,13 +1,12 @@
-"""Words and figures on the page of a diagnosis."""
+"""Words on a diagnosis; `data` is all, or an entry, of the JSON of ``bench diagnose``."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from femubench.reports.cells import NOTHING, plain
-from femubench.reports.figures import chance, estimate, figure, signed
+from femubench.reports.cells import NOTHING, chance, estimate, figure, first_of, plain, signed
 
 Data = Mapping[str, Any]
 
@@ -21,8 +20,6 @@ MEANINGS = {
     "not-confirmed": "the best explanation fits the data it was found with, and does not help as "
     "it ought to on data held back; the causes below are a guess, not a finding",
 }
-# A sign of its own for every verdict, so that colour is not needed.
-MARKS = {"none": "✓", "named": "●", "ambiguous": "?", "unknown": "✕", "not-confirmed": "!"}
 CAUSES = {
     "named": "What is missing",
     "ambiguous": "Candidates, among which these data cannot decide",
@@ -31,10 +28,10 @@ CAUSES = {
 }
 FAULTS = "What is wrong with the data, or was typed in wrongly"
 GAINS = {
-    "used_percent": "used modes",
     "held_out_percent": "held-out modes",
     "modified_percent": "modified structure",
     "cross_validated_percent": "used modes, each left out in turn",
+    "used_percent": "used modes",
 }
 INDICATORS = {
     "force-residual": "forces that the measured shapes would need in the model",
@@ -42,15 +39,9 @@ INDICATORS = {
     "mdlac": "match of the frequency changes with those that a softer element would make",
     "ecomac": "difference of measured and predicted shapes at every sensor",
 }
-_MOST_CHANGES, _MOST_PLACES = 6, 5
+_MOST_CHANGES, _MOST_PLACES = 8, 5
 _NOISE, _LIMIT = 0.05, 1e-3
 _LARGEST_ODDS = 1e6
-
-
-def numbered(causes: Sequence[Data], *, faults: bool = False) -> list[tuple[int, Data]]:
-    """Return causes, or faults of the data and of what was typed in, with their numbers."""
-    sides = ((i, cause, cause.get("side", "model")) for i, cause in enumerate(causes, 1))
-    return [(i, cause) for i, cause, side in sides if (side != "model") is faults]
 
 
 def percent(value: float | None) -> str:
@@ -62,14 +53,10 @@ def times(before: float | None, after: float | None) -> str:
     """Return by how much an error fell or rose."""
     if before is None or after is None or min(before, after) <= 0.0:
         return ""
-    ratio = before / after
-    if 0.95 < ratio < 1.05:
+    if 0.95 < before / after < 1.05:
         return "about the same"
-    return (
-        f"{figure(ratio, 2)} times smaller"
-        if ratio > 1.0
-        else f"{figure(1 / ratio, 2)} times larger"
-    )
+    word = "smaller" if before > after else "larger"
+    return f"{figure(max(before, after) / min(before, after), 2)} times {word}"
 
 
 def adequacy(data: Data) -> tuple[str, str]:
@@ -85,33 +72,42 @@ def adequacy(data: Data) -> tuple[str, str]:
     return ("a little more than noise" if p >= _LIMIT else "more than noise"), said
 
 
-def sentence(clause: str) -> str:
-    """Return a clause with a capital and a full stop."""
-    text = plain(clause)
-    return text and f"{text[0].upper()}{text[1:]}" + ("" if text[-1] in ".!?" else ".")
+def chi_square(data: Data) -> str:
+    """Return how much is left of the data."""
+    before, after = map(figure, data["chi2"])
+    error = " and the model error" if data["model_error"] else ""
+    return (
+        f"Chi-square, with the ordinary scatter of the elements{error} counted as noise: {before} "
+        f"before, {after} after, {data['data_count']} data. What is left is "
+        f"{': '.join(adequacy(data))}."
+    )
 
 
-def place_at(place: str) -> str:
-    """Return a place as it follows an effect."""
-    return "everywhere" if place == "all" else place
+def place(name: str) -> str:
+    """Return where something sits."""
+    return "everywhere" if name == "all" else name
+
+
+def at(name: str) -> str:
+    """Return where something sits, as it follows what it is."""
+    return f"at {name}" if name not in ("", "all") else place(name)
+
+
+def pair_at(rival: Data) -> str:
+    """Return the effects of a combination, each with its place."""
+    effects, places = rival["effect"].split(" + "), rival["place"].split(" + ")
+    if len(effects) != len(places):
+        effects, places = [rival["effect"]], [rival["place"]]
+    return " + ".join(f"{what} {at(p)}".strip() for what, p in zip(effects, places, strict=True))
 
 
 def weight(row: Data) -> str:
     """Return what data and prior say for the first explanation against another one."""
     against = "no cause at all" if row["against"] == "nothing" else plain(row["against"])
     return (
-        f"against {against}, the data add {signed(row['data'])} to the logarithm of the odds, "
-        f"the prior {signed(row['prior'])}"
+        f"Against {against}, the data add {signed(row['data'])} to the logarithm of the odds, "
+        f"the prior {signed(row['prior'])}."
     )
-
-
-def sits(cause: Data) -> str:
-    """Return how sure the place of a cause is, and where else it may sit."""
-    if cause["place"] == "all" or cause["place_probability"] is None:
-        return ""
-    text = f"at this place {chance(cause['place_probability'])}"
-    more = elsewhere(cause)
-    return f"{text}; {more}" if more else text
 
 
 def elsewhere(cause: Data) -> str:
@@ -119,63 +115,26 @@ def elsewhere(cause: Data) -> str:
     mirrors = len(cause["mirrors"])
     parts = [f"one of {mirrors + 1} mirror places"] if mirrors else []
     others = [f"{name} {chance(p)}" for name, p in cause["places"] if name != cause["place"]]
-    more = len(others) - _MOST_PLACES
     if others and cause["place"] != "all":
-        listed = ", ".join(others[:_MOST_PLACES]) + (f" and {more} more" if more > 0 else "")
-        parts.append(f"else at {listed}")
+        parts.append(f"else at {first_of(others, _MOST_PLACES)}")
     return "; ".join(parts)
 
 
-def scale(row: Data) -> str:
-    """Return the size of a model error with its unit."""
-    return f"{figure(row['scale'], 2)} {row['unit']}".strip()
-
-
-def pairs_of(rival: Data) -> list[tuple[str, str]]:
-    """Return effects and places of a combination, each effect beside its place."""
-    effects, places = rival["effect"].split(" + "), rival["place"].split(" + ")
-    if len(effects) != len(places):
-        return [(rival["effect"], rival["place"])]
-    return list(zip(effects, places, strict=True))
-
-
-def pair_at(rival: Data) -> str:
-    """Return the effects of a combination, each with its place."""
-    return " + ".join(_at(*pair) for pair in pairs_of(rival))
-
-
-def _at(effect: str, place: str) -> str:
-    words = effect.replace("-", " ")
-    if place == "all":
-        return f"{words} everywhere"
-    return f"{words} at {place}" if place else words
-
-
 def parameter(item: Data) -> str:
-    """Return the value of a parameter with its deviation."""
-    unit = f" {item['unit']}" if item["unit"] else ""
-    return f"{estimate(item['value'], item['std'])}{unit}{_share(item)}"
-
-
-def _share(item: Data) -> str:
-    """Return a relative change in percent."""
+    """Return the value of a parameter with its deviation, a relative change in percent too."""
     value, std = item["value"], item["std"]
+    text = f"{estimate(value, std)} {item['unit']}".strip()
     if item["wording"] != "change" or value is None or not abs(value) < 10.0:
-        return ""
+        return text
     spread = "" if std is None else f" ± {figure(100.0 * std, 2)}"
-    return f" ({signed(100.0 * value)}{spread} %)"
+    return f"{text} ({signed(100.0 * value)}{spread} %)"
 
 
-def size(item: Data) -> str:
-    """Return an effect's size, in percent too where it is a share of something."""
-    text = f"{figure(item['size'], 3)} {item['unit']}".strip()
-    share = item["wording"] != "value" and item["size"] is not None
-    return text + (f" ({figure(100.0 * item['size'], 2)} %)" if share else "")
-
-
-def width(value: float | None, most: float) -> str:
-    """Return the length of a bar in percent of the longest one."""
-    return "0" if value is None else f"{min(100.0, 100.0 * abs(value) / (most or 1.0)):.1f}"
+def unit_of(size: Data) -> str:
+    """Return the unit of an effect's size; in percent where it is a share of something."""
+    if size["wording"] == "value" or size["size"] is None:
+        return str(size["unit"])
+    return f"{size['unit']} ({figure(100.0 * size['size'], 2)} %)".strip()
 
 
 def odds(separation: float | None) -> str:
@@ -186,9 +145,20 @@ def odds(separation: float | None) -> str:
     return "over a million to 1" if against > _LARGEST_ODDS else f"{figure(against, 2)} to 1"
 
 
-def look_changes(look: Data) -> str:
-    """Return how the frequencies change if the model is corrected."""
-    known = [c for c in look["changes"] if c["percent"] is not None]
-    text = ", ".join(f"mode {c['mode']} {signed(c['percent'])} %" for c in known[:_MOST_CHANGES])
-    more = len(known) - _MOST_CHANGES
-    return f"{text} and {more} more" if more > 0 else text
+def look(found: Data) -> str:
+    """Return what is odd about a model, and how the frequencies change if it is corrected."""
+    effect = f" ({found['effect']})" if found["effect"] else ""
+    changes = [
+        f"mode {change['mode']} {signed(change['percent'], 2)} %"
+        for change in found["changes"]
+        if change["percent"] is not None
+    ]
+    corrected = f" If corrected{effect}: {first_of(changes, _MOST_CHANGES)}." if changes else effect
+    return f"{found['what']}{corrected}"
+
+
+def strongest(rows: Iterable[Data], least: float) -> str:
+    """Return where an indicator is largest, and its values."""
+    known = [row for row in rows if (row["value"] or 0.0) >= least]
+    best = sorted(known, key=lambda row: -row["value"])[:_MOST_PLACES]
+    return ", ".join(f"{row['place']} {row['value']:.2f}" for row in best) or NOTHING

@@ -30,12 +30,12 @@ class Digits:
 
         A table prints 0.930 where the number has become 0.93.
         """
-        texts = [repr(float(value)) for value in printed if math.isfinite(value)]
-        plain = [text for text in texts if "e" not in text and _fits(float(text))]
-        powers = [f"{float(text):e}" for text in texts if not _fits(float(text))]
+        known = [float(value) for value in printed if math.isfinite(value)]
+        plain = [repr(value).partition(".")[2] for value in known if _fits(value)]
+        powers = [f"{value:e}".partition("e")[0] for value in known if not _fits(value)]
         return Digits(
-            max((len(text.partition(".")[2].rstrip("0")) for text in plain), default=0),
-            max((len(_mantissa(text)) for text in powers), default=1),
+            max((len(decimals.rstrip("0")) for decimals in plain), default=0),
+            max((len(digits.strip("-0").replace(".", "")) for digits in powers), default=1),
         )
 
     def printed(self, value: float, unit: str = "") -> str:
@@ -75,8 +75,3 @@ def off(percent: float | None, unit: str = "") -> str:
 
 def _fits(value: float) -> bool:
     return value == 0.0 or _LEAST <= abs(value) < _MOST
-
-
-def _mantissa(text: str) -> str:
-    """Return the digits of 1.230000e+04 that count: 123."""
-    return text.partition("e")[0].replace(".", "").replace("-", "").rstrip("0") or "0"

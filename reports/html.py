@@ -1,21 +1,51 @@
-"""A report as one HTML document: nothing but itself is needed to read it, no script runs."""
+"""Blocks of a report as one HTML document: nothing but itself is needed to read it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
+from markupsafe import Markup
+
 from femubench.reports.blocks import Section
+from femubench.reports.cells import plain
 from femubench.reports.svg import embedded
-from femubench.reports.templating import templates
+from femubench.reports.templating import asset, templates
 
 
-def to_html(sections: Iterable[Section], *, title: str, heading: str) -> str:
+def to_html(
+    sections: Iterable[Section],
+    *,
+    title: str,
+    heading: str,
+    brand: str = "",
+    foot: str = "",
+    scripts: Iterable[str] = (),
+) -> str:
     """Return a document; whatever comes from data is escaped.
 
     Arguments:
         sections: of level 2 and 3, in reading order.
         title: in the title bar.
         heading: at the top, the line that matters most.
+        brand, foot: one line above all, and one below; may be empty.
+        scripts: names of assets; the document reads without them.
     """
-    page = templates().get_template("report.html")
-    return page.render(title=title, heading=heading, sections=list(sections), embedded=embedded)
+    room = templates().overlay(finalize=_shown)
+    return room.get_template("report.html").render(
+        title=title,
+        heading=heading,
+        brand=brand,
+        foot=foot,
+        sections=list(sections),
+        style=Markup(asset("page.css") + asset("report.css")),
+        script=Markup("".join(map(asset, scripts))),
+        embedded=embedded,
+    )
+
+
+def _shown(value: object) -> object:
+    """Return text on one line, a number and its percent sign together."""
+    if isinstance(value, Markup):
+        return value
+    text = plain(value).replace(" %", "\N{NO-BREAK SPACE}%")
+    return text.replace("> ", ">\N{NO-BREAK SPACE}").replace("< ", "<\N{NO-BREAK SPACE}")

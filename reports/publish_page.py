@@ -28,9 +28,11 @@ def pages_of(index: Data) -> dict[str, str]:
         index: the content of ``index.json``.
     """
     pages = {board["page"]: _board_page(index, board) for board in index["boards"]}
+    releases = {item["name"]: _release(item["versions"][0]) for item in index["strategies"]}
     pages["leaderboard.csv"] = _csv(
-        {"class": board["class"], **row, **_release(item), "marks": "; ".join(_flags(row))}
-        for board, item, row in _places(index)
+        {"class": kind, **row, **releases[row["strategy"]], "marks": "; ".join(_flags(row))}
+        for kind, rows in ((board["class"], board["rows"]) for board in index["boards"])
+        for row in rows
     )
     for item in index["strategies"]:
         stem = item["page"].removesuffix(".html")
@@ -42,7 +44,8 @@ def pages_of(index: Data) -> dict[str, str]:
         title = plain(item["title"]) or plain(item["name"])
         pages[item["page"]] = _page("case", index, item, title, rows=rows)
     style = asset("page.css") + asset("site.css")
-    return pages | feeds_of(index) | {"site.css": style, "site.js": asset("site.js")}
+    script = asset("sortable.js") + asset("site.js")
+    return pages | feeds_of(index) | {"site.css": style, "site.js": script}
 
 
 def _page(kind: str, index: Data, item: Data, title: str, **parts: Any) -> str:  # noqa: ANN401
@@ -74,7 +77,6 @@ def _strategy_page(item: Data, index: Data) -> str:
         plain(item["name"]) or "a strategy without name",
         answer=[answer],
         chart=history_of(item["versions"]),
-        places=[(board, row) for board, owner, row in _places(index) if owner is item],
         pages={case["name"]: case["page"] for case in index["cases"]},
     )  # fmt: skip
 
@@ -123,14 +125,6 @@ def _on_case(strategies: Iterable[Data], name: str, digest: str) -> list[tuple[D
         return (bool(row["unphysical"] or row["conflict"]),), row["score"], item["name"]
 
     return [entry for _, entry in ranked(found, order)]
-
-
-def _places(index: Data) -> Iterator[tuple[Data, Data, Data]]:
-    """Yield every board with every strategy and its row there."""
-    strategies = {item["name"]: item for item in index["strategies"]}
-    for board in index["boards"]:
-        for row in board["rows"]:
-            yield board, strategies[row["strategy"]], row
 
 
 def _flags(row: Data) -> list[str]:
@@ -207,16 +201,15 @@ def _chart(title: str, rows: Sequence[tuple[str, str, Data]]) -> Chart:
     return Chart("interval", title, x, y, tuple(series), marks, note=note)
 
 
-def _release(item: Data) -> dict[str, Any]:
-    return {key: item["versions"][0][key] for key in ("version", "femubench", "last")}
+def _release(version: Data) -> dict[str, Any]:
+    return {key: version[key] for key in ("version", "femubench", "last")}
 
 
 def _lines(item: Data) -> Iterator[dict[str, Any]]:
     """Yield a line a version and case."""
     for version in item["versions"]:
-        told = {key: version[key] for key in ("version", "femubench", "last")}
         for row in version["cases"]:
-            yield {**told, **row, "seeds": " ".join(map(str, row["seeds"]))}
+            yield {**_release(version), **row, "seeds": " ".join(map(str, row["seeds"]))}
 
 
 def _csv(rows: Iterable[Data]) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 
 from femubench.reports.blocks import (
     Block,
@@ -12,13 +13,11 @@ from femubench.reports.blocks import (
     Items,
     Section,
     Table,
-    to_markdown,
-    to_terminal,
 )
 from femubench.reports.cells import plain
 from femubench.reports.digits import Digits, off
-from femubench.reports.markdown import escape
-from femubench.reports.terminal import WIDTH
+from femubench.reports.markdown import escape, to_markdown
+from femubench.reports.terminal import WIDTH, to_terminal
 from femubench.reproduction import (
     VERDICTS,
     Cell,
@@ -52,9 +51,9 @@ _VERDICTS: dict[Verdict, tuple[str, str, str, str, str]] = {
     "does-not-follow": ("✗", "no", "does not follow", "do not follow",
         "it does not follow from the text under any reading that was tried"),
 }  # fmt: skip
-_SHORT = {verdict: f"{sign} {short}" for verdict, (sign, short, *_) in _VERDICTS.items()}
-WORDS = {verdict: f"{sign} {whole}" for verdict, (sign, _, whole, *_) in _VERDICTS.items()}
-MEANING = {verdict: meaning for verdict, (*_, meaning) in _VERDICTS.items()}
+_SHORT: Words = {verdict: f"{sign} {short}" for verdict, (sign, short, *_) in _VERDICTS.items()}
+WORDS: Words = {verdict: f"{sign} {whole}" for verdict, (sign, _, whole, *_) in _VERDICTS.items()}
+MEANING: Words = {verdict: meaning for verdict, (*_, meaning) in _VERDICTS.items()}
 AGREE = (
     "Two figures agree when ours rounds to the printed one or lies within the tolerance of the "
     "row's kind. Of several grounds the weakest makes the verdict; the note names them all."
@@ -124,12 +123,20 @@ def _chapters(studies: Iterable[Study], words: Words, folder: str) -> Iterator[S
         for table, cells in _grouped(study.cells).items():
             title = heading(table)
             yield Section(title, list(cells_in_words(cells, words)), level=3)
-        yield from _remarks("What the re-run shows", study.findings)
-        for extra in study.extras:
-            yield Section(extra.title, list(extra_blocks(extra)), level=3)
-        if study.figures:
-            found = [_drawing(figure, folder) for figure in study.figures]
-            yield Section("Figures", found, level=3)
+        yield from parts_of(study, partial(_drawing, folder=folder))
+
+
+def parts_of(study: Study, drawn: Callable[[Figure], Drawing]) -> Iterator[Section]:
+    """Yield what follows the tables of a paper.
+
+    Arguments:
+        drawn: makes the block of a figure.
+    """
+    yield from _remarks("What the re-run shows", study.findings)
+    for extra in study.extras:
+        yield Section(extra.title, list(_extra_blocks(extra)), level=3)
+    if study.figures:
+        yield Section("Figures", [drawn(figure) for figure in study.figures], level=3)
 
 
 def _grouped(cells: Iterable[Cell]) -> dict[str, list[Cell]]:
@@ -180,7 +187,7 @@ def digits_of(cells: Iterable[Cell]) -> dict[str, Digits]:
     return {unit: Digits.of(figures) for unit, figures in printed.items()}
 
 
-def extra_blocks(extra: Extra) -> Iterator[Block]:
+def _extra_blocks(extra: Extra) -> Iterator[Block]:
     """Return a table; a column of sentences that the screen has no room for stands below it."""
     columns = list(zip(*extra.rows, strict=True)) or [()] * len(extra.columns)
     figures = (all(not cell or cell[0] in _NUMERIC for cell in cells) for cells in columns[1:])
@@ -219,11 +226,10 @@ def _columns(titles: Sequence[str], rows: Sequence[Sequence[str]], sides: str) -
 def _narrowed(widths: Sequence[int], least: Sequence[int], room: int) -> list[int]:
     """Return widths of which the largest give way until all fit, or none has room to give."""
     narrow = list(widths)
-    while sum(narrow) > room:
-        free = [place for place, width in enumerate(narrow) if width > least[place]]
-        if not free:
-            break
-        narrow[max(free, key=lambda place: narrow[place])] -= 1
+    for most in range(max(widths), 0, -1):
+        for place, width in enumerate(narrow):
+            if sum(narrow) > room and width == most > least[place]:
+                narrow[place] -= 1
     return narrow
 
 

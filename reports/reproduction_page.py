@@ -8,25 +8,15 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import count
+from functools import cached_property
 from typing import NamedTuple
 
 from markupsafe import Markup
 
+from femubench.reports import reproduction as words
+from femubench.reports.blocks import Drawing
 from femubench.reports.cells import plain
-from femubench.reports.digits import Digits, off
-from femubench.reports.reproduction import (
-    AGREE,
-    DEVIATION,
-    MEANING,
-    WORDS,
-    cells_in_words,
-    digits_of,
-    extra_blocks,
-    heading,
-    sentence_of_counts,
-    summary,
-)
+from femubench.reports.digits import off
 from femubench.reports.svg import drawing, embedded
 from femubench.reports.templating import templates
 from femubench.reproduction import (
@@ -51,6 +41,8 @@ _INKS = {
     "#e69f00": "orange", "#cc79a7": "purple", "#56b4e9": "sky",
 }  # fmt: skip
 
+Key = tuple[str, str, str]  # table, row and column of a cell
+
 
 def reproduction_html(studies: Sequence[Study], drawings: Mapping[str, str]) -> str:
     """Return studies as one HTML document that needs nothing besides itself.
@@ -58,156 +50,116 @@ def reproduction_html(studies: Sequence[Study], drawings: Mapping[str, str]) -> 
     Arguments:
         drawings: SVG of every figure by its name.
     """
-    numbers = count(1)
-    papers = [_Paper(study, *_worked_through(study, numbers)) for study in studies]
-    offers = [offer for paper in papers for offer in paper.offers]
+    papers = [_Paper(study, f"p{number}") for number, study in enumerate(studies)]
     return templates().get_template("reproduction.html").render(
         papers=papers,
         cells=[cell for study in studies for cell in study.cells],
-        offers=offers,
-        options=[one for offer in offers for one in offer.options[1:]],
-        words=WORDS, meaning=MEANING, reading=(AGREE, DEVIATION), verdicts=VERDICTS, faults=_FAULTS,
-        drawings={f.name: _shown(f, drawings[f.name]) for s in studies for f in s.figures},
-        cells_in_words=cells_in_words, digits_of=digits_of, drawing=drawing, embedded=embedded,
-        extra_blocks=extra_blocks, heading=heading, off=off, places_of=places_of,
-        sentence=sentence_of_counts, summary=summary, tally=_tally,
+        options=[option for paper in papers for option in paper.options],
+        drawn=lambda one: Drawing(one.title, one.caption, _shown(one, drawings[one.name])),
+        drawing=drawing, embedded=embedded, faults=_FAULTS, off=off, places_of=places_of,
+        say=words, tally=_tally, verdicts=VERDICTS,
     )  # fmt: skip
 
 
-Key = tuple[str, str, str]  # table, row and column of a cell
-
-
-class _Change(NamedTuple):
-    """How many cells more a table has of a verdict, and the variable of the style for it."""
-
-    variable: str
-    table: str
-    verdict: Verdict
-    more: int
-
-
 class _Option(NamedTuple):
-    """A way to read a text, and the cells that it is about."""
+    """A way to read a text: its cells, and how many more a table has of a verdict then."""
 
+    convention: str
     key: str
     label: str
-    agreeing: str
     cells: Mapping[Key, Cell]
-    changes: Sequence[_Change]
+    more: Mapping[tuple[str, Verdict], int]
+
+    @property
+    def agreeing(self) -> str:
+        verdicts = [cell.verdict for cell in self.cells.values()]
+        unseen = verdicts.count("cannot-be-checked")
+        if unseen == len(verdicts):
+            return f"{unseen} cells, none of which can be checked"
+        wrong = sum(map(verdicts.count, _FAULTS))
+        return f"{len(verdicts) - wrong - unseen} of {len(verdicts)} cells agree"
+
+    def changes(self, verdicts: Sequence[Verdict], table: str = "") -> Iterator[tuple[str, int]]:
+        """Yield variables of the style and how many cells more each stands for."""
+        for (own, verdict), number in self.more.items():
+            if number and verdict in verdicts and table in ("", own):
+                yield re.sub(r"\W", "-", f"--{self.convention}-{own}-{verdict}"), number
 
 
-class _Offer(NamedTuple):
-    """A convention and what can be chosen, that which was judged first."""
-
-    name: str
-    convention: Convention
-    table: str
-    options: Sequence[_Option]
-
-
-class _Spot(NamedTuple):
-    """A cell on the page: as judged, and by the key of every other option."""
-
-    id: str
-    cell: Cell
-    others: Sequence[tuple[str, Cell]]
-
-
-class _Table(NamedTuple):
-    """A printed table with its spots by row and column, and conventions that begin in it."""
-
-    id: str
-    printed: PrintedTable
-    cells: Sequence[Cell]
-    digits: Mapping[str, Digits]
-    spots: Mapping[tuple[str, str], _Spot]
-    offers: Sequence[_Offer]
-
-
-class _Paper(NamedTuple):
-    study: Study
-    tables: Sequence[_Table]
-    offers: Sequence[_Offer]
-
-
-def _worked_through(study: Study, numbers: Iterator[int]) -> tuple[list[_Table], list[_Offer]]:
-    """Return the tables of a study and what can be chosen in them.
+class _Paper:
+    """A study as the page has it.
 
     Arguments:
-        numbers: of tables, cells and conventions, unique in the page.
+        study: shown.
+        name: the stem of all ids.
     """
-    cells = {(cell.table, cell.row, cell.column): cell for cell in study.cells}
-    offers = [_offer(one, cells, f"v{next(numbers)}") for one in study.conventions()]
-    others = [one for offer in offers for one in offer.options[1:]]
-    tables = []
-    for printed, found in as_printed(study.tables, study.cells):
-        spots = {}
-        for place, cell in found.items():
-            key = (cell.table, *place)
-            changed = [(one.key, one.cells[key]) for one in others if key in one.cells]
-            spots[place] = _Spot(f"c{next(numbers)}", cell, changed)
-        begun = [offer for offer in offers if offer.table == printed.table]
-        if own := list(found.values()):
-            name = f"t{next(numbers)}"
-            tables.append(_Table(name, printed, own, digits_of(own), spots, begun))
-    return tables, offers
+
+    def __init__(self, study: Study, name: str) -> None:
+        self.study, self._name = study, name
+        self._cells = {_key(cell): cell for cell in study.cells}
+        self._ids = {key: f"{name}c{number}" for number, key in enumerate(self._cells)}
+
+    def id_of(self, cell: Cell) -> str:
+        """Return where a cell stands on the page."""
+        return self._ids[_key(cell)]
+
+    def others(self, cell: Cell) -> list[tuple[_Option, Cell]]:
+        """Return a cell under the options that may change it."""
+        return [(one, one.cells[_key(cell)]) for one in self.options if _key(cell) in one.cells]
+
+    @cached_property
+    def tables(self) -> list[tuple[str, PrintedTable, dict[tuple[str, str], Cell]]]:
+        """Return id, layout and cells of every table that has some."""
+        found = as_printed(self.study.tables, self.study.cells)
+        return [(f"{self._name}t{k}", table, own) for k, (table, own) in enumerate(found) if own]
+
+    @cached_property
+    def conventions(self) -> list[tuple[str, Convention, list[_Option]]]:
+        """Return conventions by the table that they begin in; what was judged is first."""
+        found = []
+        for number, convention in enumerate(self.study.conventions()):
+            options = list(self._read(convention, f"{self._name}v{number}"))
+            found.append((next(iter(options[0].cells))[0], convention, options))
+        return found
+
+    @cached_property
+    def options(self) -> list[_Option]:
+        """Return what can be chosen besides what was judged."""
+        return [option for *_, options in self.conventions for option in options[1:]]
+
+    def _read(self, convention: Convention, name: str) -> Iterator[_Option]:
+        own = {key: cell for key, cell in self._cells.items() if key in convention.keys}
+        judged = Counter((cell.table, cell.verdict) for cell in own.values())
+        yield _Option(name, f"{name}-0", convention.judged, own, {})
+        for number, choice in enumerate(convention.choices, 1):
+            cells = own | under(choice, self.study.cells)
+            more = Counter((cell.table, cell.verdict) for cell in cells.values())
+            more.subtract(judged)
+            yield _Option(name, f"{name}-{number}", choice.label, cells, more)
 
 
-def _offer(convention: Convention, cells: Mapping[Key, Cell], name: str) -> _Offer:
-    """Return a convention with the cells that any of its choices changes, under each of them."""
-    own = {key: cell for key, cell in cells.items() if key in convention.keys}
-    before = Counter((cell.table, cell.verdict) for cell in own.values())
-    read: list[tuple[str, Mapping[Key, Cell]]] = [(convention.judged, {})]
-    read += [(choice.label, under(choice, list(cells.values()))) for choice in convention.choices]
-    options = []
-    for rank, (label, changed) in enumerate(read):
-        found = {key: changed.get(key, cell) for key, cell in own.items()}
-        more = Counter((cell.table, cell.verdict) for cell in found.values())
-        more.subtract(before)
-        changes = [
-            _Change(re.sub(r"\W", "-", f"--{name}-{table}-{verdict}"), table, verdict, number)
-            for (table, verdict), number in more.items()
-            if number
-        ]
-        options.append(_Option(f"{name}-{rank}", label, _agreeing(found.values()), found, changes))
-    return _Offer(name, convention, next(iter(own.values())).table, options)
-
-
-def _agreeing(cells: Iterable[Cell]) -> str:
-    verdicts = [cell.verdict for cell in cells]
-    unseen = verdicts.count("cannot-be-checked")
-    if unseen == len(verdicts):
-        return f"{unseen} cells, none of which can be checked"
-    wrong = sum(map(verdicts.count, _FAULTS))
-    return f"{len(verdicts) - wrong - unseen} of {len(verdicts)} cells agree"
+def _key(cell: Cell) -> Key:
+    return cell.table, cell.row, cell.column
 
 
 def _tally(
     cells: Sequence[Cell],
-    offers: Iterable[_Offer],
+    options: Iterable[_Option],
     verdicts: Sequence[Verdict] = _FAULTS,
-    table: str | None = None,
+    table: str = "",
 ) -> Markup:
-    """Return how many cells have one of some verdicts, which follows what is chosen.
+    """Return how many cells have one of some verdicts; the number follows what is chosen.
 
     Arguments:
         cells: as judged.
-        offers: that change some of them.
-        table: the only one that counts; None: all.
+        options: that change some of them.
+        table: the only one that counts; empty: all.
     """
     judged = sum(cell.verdict in verdicts for cell in cells)
-    variables = {
-        change.variable
-        for offer in offers
-        for option in offer.options
-        for change in option.changes
-        if change.verdict in verdicts and table in (None, change.table)
-    }
-    if not variables:
-        return Markup(judged)
-    total = " + ".join([str(judged), *(f"var({name}, 0)" for name in sorted(variables))])
+    changes = sorted({name for one in options for name, _ in one.changes(verdicts, table)})
+    total = " + ".join([str(judged), *(f"var({name}, 0)" for name in changes)])
     shown = '<span class="tally" style="counter-reset: n calc({})"><span>{}</span></span>'
-    return Markup(shown).format(total, judged)
+    return Markup(shown).format(total, judged) if changes else Markup(judged)
 
 
 def _shown(figure: Figure, svg: str) -> Markup:

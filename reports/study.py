@@ -7,26 +7,16 @@ from functools import partial
 from typing import Any
 
 from femubench import InputError
-from femubench.plot import heat_map, svg
-from femubench.reports.blocks import (
-    Block,
-    Column,
-    Drawing,
-    Items,
-    Section,
-    Table,
-    to_markdown,
-    to_terminal,
-)
+from femubench.reports.blocks import Block, Column, Drawing, Items, Section, Table
 from femubench.reports.cells import NOTHING, fixed, interval, plain
-from femubench.reports.html import to_html
-from femubench.reports.markdown import escape
+from femubench.reports.markdown import to_markdown
+from femubench.reports.runs import failures
 from femubench.reports.summary import header, lead, notes_of, troubles
+from femubench.reports.terminal import to_terminal
 from femubench.results import Run, StudyAxes, skill_by
 
-_MOST_ON_SCREEN = 60  # cells, and values along the columns of a table
+_MOST_ON_SCREEN = 60  # cells
 _MOST_COLUMNS = 9
-_MOST_FAILURES = 20
 _SHORT = {"sensors_left_out": "left out"}
 _COUNTED = (
     "A cell is a leaderboard of its own: every structure counts once, a job that failed or is "
@@ -41,18 +31,19 @@ _PICTURE = (
 
 def study_text(run: Run) -> str:
     """Return a study as plain text of 80 columns."""
-    return to_terminal(_sections(run, short=True))
+    return to_terminal(_sections(run))
 
 
 def study_markdown(run: Run) -> str:
     """Return a study in GitHub's Markdown."""
-    return f"# {escape(_title(run))}\n\n{to_markdown(_sections(run))}"
+    return to_markdown([*_sections(run), _about(run)], _title(run))
 
 
 def study_html(run: Run) -> str:
     """Return a study as one HTML document that needs nothing besides itself."""
-    title = _title(run)
-    sections = _sections(run, drawing=_drawing(run))
+    from femubench.reports.html import to_html
+
+    title, sections = _title(run), [*_sections(run, _drawing(run)), _about(run)]
     return to_html(sections, title=f"femubench: {title}", heading=title)
 
 
@@ -60,34 +51,28 @@ def _title(run: Run) -> str:
     return plain(StudyAxes.of(run).title) or f"Study {plain(run.meta.get('run', ''))}"
 
 
-def _sections(run: Run, *, short: bool = False, drawing: Block | None = None) -> Iterator[Section]:
-    """Yield the parts of the report.
-
-    Arguments:
-        short: for the screen: without what would fill pages of it.
-        drawing: the heat map, or why there is none.
-    """
+def _sections(run: Run, *drawing: Block) -> Iterator[Section]:
     known = StudyAxes.of(run)
     x, y = known.pictured
-    yield Section("", [lead(run)])
-    picture = [drawing] if drawing is not None else []
-    yield Section(f"Skill by {x} and {y}", [*picture, _grid(run, known, x, y)])
+    yield Section("", [lead(run)], area="first")
+    yield Section(f"Skill by {x} and {y}", [*drawing, _grid(run, known, x, y)])
     cells = skill_by(run).to_dict("records")
-    title = f"Cells ({len(cells)})"
-    if short and len(cells) > _MOST_ON_SCREEN:
-        said = f"{len(cells)} cells: see the report, or `skill_by` in Python."
-        yield Section(title, [said])
-    else:
-        yield Section(title, [*_cells(cells), _COUNTED])
-    yield from _failures(run, short=short)
-    notes = [("Note", note) for note in notes_of(run)]
-    if notes:
+    yield Section(f"Cells ({len(cells)})", [*_cells(cells), _COUNTED])
+    if failed := failures(troubles(run.results)):
+        yield Section("Failures", failed)
+    if notes := [("Note", note) for note in notes_of(run)]:
         yield Section("Notes", [Items(notes)])
-    if not short:
-        yield Section("Study", [_axes(known), Items(list(header(run)))])
+
+
+def _about(run: Run) -> Section:
+    known = StudyAxes.of(run)
+    axes = [(name, ", ".join(map(StudyAxes.text_of, known.values(name)))) for name in known.names]
+    return Section("Study", [Items([*axes, *header(run)])])
 
 
 def _drawing(run: Run) -> Block:
+    from femubench.plot import heat_map, svg
+
     known = StudyAxes.of(run)
     x, y = known.pictured
     columns, rows = len(known.values(x)), len(known.values(y))
@@ -110,18 +95,10 @@ def _grid(run: Run, known: StudyAxes, x: str, y: str) -> Block:
         return f"{len(columns)} by {len(rows)} values: see the cells."
     found = {(row[x], row[y]): row for row in skill_by(run, x, y).to_dict("records")}
     heads = [Column(y, 24, left=True), *(Column(StudyAxes.text_of(v), 7) for v in columns)]
-    table = [
-        [
-            StudyAxes.text_of(r),
-            *(_skill(found[c, r]) if (c, r) in found else NOTHING for c in columns),
-        ]
-        for r in rows
-    ]
-    return Table(
-        heads,
-        table,
-        f"Down: {StudyAxes.title_of(y)}; across: {StudyAxes.title_of(x)}. *: failures.",
-    )
+    cells = [[_skill(found[c, r]) if (c, r) in found else None for c in columns] for r in rows]
+    table = [[StudyAxes.text_of(r), *line] for r, line in zip(rows, cells, strict=True)]
+    said = f"Down: {StudyAxes.title_of(y)}; across: {StudyAxes.title_of(x)}. *: failures."
+    return Table(heads, table, said)
 
 
 def _cells(cells: Sequence[dict[Any, Any]]) -> Iterator[Block]:
@@ -129,38 +106,31 @@ def _cells(cells: Sequence[dict[Any, Any]]) -> Iterator[Block]:
     names = list(cells[0])
     axes = names[: names.index("skill")]
     options = [name for name in axes if "." in name]
-    plain_axes = [name for name in axes if name not in options]
+    bare = [name for name in axes if name not in options]
     lost = any(row["failed"] + row["missing"] for row in cells)
-    heads = [
-        *(Column(_SHORT.get(name, name), 16, left=True, wrap=True) for name in plain_axes),
-        *([Column("options", 14, left=True, wrap=True)] if options else []),
-        Column("skill", 8),
-        Column("95 % interval", 16),
-        *([Column("failed", 14, wrap=True)] if lost else []),
-    ]
+    heads = [Column(_SHORT.get(name, name), 16, left=True, wrap=True) for name in bare]
+    heads += [Column("options", 14, left=True, wrap=True)] if options else []
+    heads += [Column("skill", 8), Column("95 % interval", 18)]
+    heads += [Column("failed", 14, wrap=True)] if lost else []
     rows = [
         [
-            *(StudyAxes.text_of(row[name]) for name in plain_axes),
+            *(StudyAxes.text_of(row[name]) for name in bare),
             *([_options(row, options)] if options else []),
-            _skill(row),
-            interval(row["skill_low"], row["skill_high"]),
+            *(_skill(row), interval(row["skill_low"], row["skill_high"])),
             *([_lost(row)] if lost else []),
         ]
         for row in cells
     ]
-    yield Table(heads, rows)
+    yield Table(heads, rows, most=_MOST_ON_SCREEN)
     if not lost:
         yield "No job failed or is missing."
 
 
 def _options(row: dict[Any, Any], names: Sequence[str]) -> str:
     """Return the options of a cell's strategy."""
-    told = {name.partition(".")[2]: row[name] for name in names if not _absent(row[name])}
-    return ", ".join(f"{name} {StudyAxes.text_of(v)}" for name, v in told.items()) or NOTHING
-
-
-def _absent(value: object) -> bool:
-    return value is None or value != value
+    told = {name.partition(".")[2]: row[name] for name in names if row[name] is not None}
+    said = (f"{name} {StudyAxes.text_of(v)}" for name, v in told.items() if v == v)
+    return ", ".join(said) or NOTHING
 
 
 def _skill(row: dict[Any, Any]) -> str:
@@ -171,29 +141,4 @@ def _skill(row: dict[Any, Any]) -> str:
 def _lost(row: dict[Any, Any]) -> str:
     """Return how many jobs of a cell gave no result, of how many."""
     parts = [f"{row[name]} {name}" for name in ("failed", "missing") if row[name]]
-    return f"{', '.join(parts)} of {row['jobs']}" if parts else f"0 of {row['jobs']}"
-
-
-def _failures(run: Run, *, short: bool) -> Iterator[Section]:
-    found = troubles(run.results)
-    if not found:
-        return
-    shown = found[:_MOST_FAILURES] if short else found
-    heads = [
-        Column("case", 20, left=True, wrap=True),
-        Column("strategy", 18, left=True, wrap=True),
-        Column("status", 12, left=True),
-        Column("reason", 24, left=True, wrap=True),
-    ]
-    rows = [
-        [t.case, t.strategy, t.status + (f" x{len(t.seeds)}" if t.seeds[1:] else ""), t.reason]
-        for t in shown
-    ]
-    more = [f"... and {len(found) - len(shown)} more."] if len(shown) < len(found) else []
-    yield Section("Failures", [Table(heads, rows), *more])
-
-
-def _axes(known: StudyAxes) -> Items:
-    return Items(
-        [(name, ", ".join(map(StudyAxes.text_of, known.values(name)))) for name in known.names]
-    )
+    return f"{', '.join(parts) or 0} of {row['jobs']}"

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from femubench.reports.cells import interval, plain
+from femubench.reports.cells import first_of, interval, plain
 from femubench.results import (
     JobResult,
     PairedMode,
@@ -192,10 +192,8 @@ def _how_sure(name: str, tiers: Sequence[Sequence[str]], count: int) -> Iterator
     elif len(beside) == count - 1 > 0:
         yield "No other strategy is shown to differ from it: all are in tier 1."
     elif beside:
-        more = f" and {len(beside) - 4} more" if len(beside) > 4 else ""
         below = f"{count - 1 - len(beside)} of {count} are below"
-        named = ", ".join(beside[:4])
-        yield f"Beside it in tier 1, not shown to differ from it: {named}{more}; {below}."
+        yield f"Beside it in tier 1, not shown to differ from it: {first_of(beside, 4)}; {below}."
 
 
 def notes_of(run: Run) -> list[str]:
@@ -205,10 +203,10 @@ def notes_of(run: Run) -> list[str]:
     starts = run.meta.get("starts") or {}
     models = sum(len(starts.get(case, ("drawn",))) for case in cases_of(run))
     jobs = models * len(strategies_of(run)) * len(seeds_of(run))
-    if "finished" in run.meta and run.meta["finished"] is None:
-        notes.append(f"the run has not ended: {len(run.results)} of {jobs} jobs are there")
-    elif run.meta.get("interrupted") is True:
-        notes.append(f"the run was interrupted: {len(run.results)} of {jobs} jobs are there")
+    still = "finished" in run.meta and run.meta["finished"] is None
+    if still or run.meta.get("interrupted") is True:
+        how = "has not ended" if still else "was interrupted"
+        notes.append(f"the run {how}: {len(run.results)} of {jobs} jobs are there")
     elif len(run.results) < jobs:
         notes.append(f"{jobs - len(run.results)} of {jobs} jobs are missing and score as failures")
     return notes

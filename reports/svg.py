@@ -43,13 +43,15 @@ def embedded(svg: str, prefix: str, label: str) -> Markup:
     """Return a drawing for the middle of a document.
 
     Arguments:
-        svg: a document of its own.
+        svg: a document of its own; what `drawing` made stays as it is.
         prefix: put before every id, as a page with several drawings must not have one twice.
         label: what a screen reader says where the drawing names nothing itself.
 
     Raises:
         ValueError: when it is no SVG.
     """
+    if isinstance(svg, Markup):
+        return svg
     root = ElementTree.fromstring(svg)
     if root.tag != f"{{{_SVG}}}svg":
         raise ValueError(f"{label}: not a drawing but {root.tag!r}")

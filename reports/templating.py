@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
 from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from femubench.reports.cells import fixed, plain, shortened
+from femubench.reports.cells import chance, fixed, plain, sentence, shortened
 
 if TYPE_CHECKING:
-    from jinja2 import Environment, Template
+    from jinja2 import Environment
 
 
 @cache
@@ -27,21 +25,9 @@ def templates() -> Environment:
         lstrip_blocks=True,
         finalize=_one_line,
     )
-    room.filters.update(fixed=fixed, plain=plain, shortened=shortened)
+    room.filters.update(fixed=fixed, plain=plain, shortened=shortened, chance=chance)
+    room.filters["sentence"] = sentence
     return room
-
-
-@cache
-def styled_page(name: str) -> Template:
-    """Return a template of a page without scripts, with its style and policy."""
-    from markupsafe import Markup
-
-    style = asset("page.css") + asset("site.css")
-    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
-    # Nothing but this very style may take effect, whatever a name smuggles in.
-    policy = f"default-src 'none'; base-uri 'none'; form-action 'none'; style-src 'sha256-{digest}'"
-    shared = {"style": Markup(style), "policy": Markup(policy)}
-    return templates().get_template(name, globals=shared)
 
 
 def asset(name: str) -> str:

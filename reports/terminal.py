@@ -1,128 +1,20 @@
-"""The leaderboard and the failures, 80 columns wide."""
+"""Blocks of a report on the screen, 80 columns wide."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import zip_longest
 
-from femubench.reports.cells import fixed, interval, plain, shortened, whole
-from femubench.reports.summary import Trouble, lead, notes_of, spared, troubles, unconverged
-from femubench.reports.twins import drawn_from, suspicions
-from femubench.results import (
-    Run,
-    interval_kind,
-    leaderboard,
-    ranked,
-    tell_apart,
-    twin_skills,
-)
-
-if TYPE_CHECKING:
-    import pandas as pd
+from femubench.reports.blocks import Block, Cards, Column, Items, Row, Section, Table
+from femubench.reports.cells import plain, shortened
 
 WIDTH = 80
-_NAME_WIDTH = 16
-_MOST_FAILURES = 20
-_MOST_WIDTHS = (20, _NAME_WIDTH, 13)
-_HEADERS = (
-    *("#", "strategy", "skill", "from\ndrawn", "high\n%", "mod.\n%", "given\n%"),
-    *("rigid\nlost", "neg.\neig.", "par.", "s"),
-)
-_ALIGN = ("right", "left", *("right" for _ in _HEADERS[2:]))
 
 
-class TerminalReporter:
-    """Plain text for the screen."""
-
-    name = "terminal"
-    suffix = ".txt"
-
-    def render(self, run: Run) -> str:
-        """Return the ranking, the failures and what the columns mean."""
-        parts = [board_text(run)]
-        failed = troubles(run.results)
-        if failed:
-            parts.append(failures(failed))
-        parts += [textwrap.fill(text, WIDTH) for text in _notes(run)]
-        return "\n\n".join(parts)
-
-
-def board_text(run: Run) -> str:
-    """Return the ranking, what its columns mean, and which strategies differ from the best."""
-    board = leaderboard(run)
-    parts = [ranking(board)]
-    if interval_kind(run) == "seeds":
-        parts.append(intervals(board))
-    parts.append("\n".join(_legend(run, board)))
-    if board["skill_tests"].notna().any():
-        parts.append(_tests(board))
-    if board["coverage90"].notna().any():
-        parts.append(_stated(board))
-    if len(board) > 1:
-        parts.append(_first_tier(run, board))
-    parts += _twins(run, board)
-    return "\n\n".join(parts)
-
-
-def ranking(board: pd.DataFrame) -> str:
-    """Return the leaderboard as a text of 80 columns at most."""
-    return aligned_table([_row(row) for row in board.to_dict("records")], _HEADERS, _ALIGN)
-
-
-def intervals(board: pd.DataFrame) -> str:
-    """Return median and 95 % interval of the skill over the seeds."""
-    found = board[["strategy", "skill", "skill_low", "skill_high"]].itertuples(index=False)
-    rows = [
-        [shortened(plain(name), _NAME_WIDTH), fixed(skill, 3), interval(low, high)]
-        for name, skill, low, high in found
-    ]
-    heads = ("strategy", "median skill", "95 % interval")
-    return aligned_table(rows, heads, ("left", "right", "left"))
-
-
-def failures(failed: list[Trouble]) -> str:
-    """Return a table of the failures with their reasons, the first ones where there are many."""
-    from tabulate import tabulate
-
-    rows = []
-    for item in failed[:_MOST_FAILURES]:
-        often = f" x{len(item.seeds)}" if len(item.seeds) > 1 else ""
-        rows.append((plain(item.case), plain(item.strategy), item.status + often, item.reason))
-    headers = ("case", "strategy", "status", "reason")
-    # tabulate pads a header by two; columns are two apart.
-    columns = zip(*([f"{header}  " for header in headers], *rows), strict=True)
-    needed = [max(map(len, column)) for column in columns][:3]
-    widths = [min(width, most) for width, most in zip(needed, _MOST_WIDTHS, strict=True)]
-    text: str = tabulate(
-        rows,
-        headers=headers,
-        tablefmt="simple",
-        disable_numparse=True,
-        maxcolwidths=[*widths, WIDTH - sum(widths) - 6],
-    )
-    more = len(failed) - _MOST_FAILURES
-    return text + (f"\n... and {more} more in the report" if more > 0 else "")
-
-
-def _row(row: dict[Any, Any]) -> list[str]:
-    return [
-        _marks(row) + whole(row["rank"]),
-        shortened(plain(row["strategy"]), _NAME_WIDTH),
-        fixed(row["skill"], 3),
-        fixed(row["skill_drawn"], 3),
-        *(fixed(row[f"{block}_percent"], 2, 4) for block in ("higher", "modified", "used")),
-        whole(row["rigid_modes_lost"], 5),
-        whole(row["negative_eigenvalues"], 4),
-        whole(row["parameters"], 5),
-        fixed(row["seconds"], 2, 4),
-    ]
-
-
-def _marks(row: dict[Any, Any]) -> str:
-    """Return what must not be overlooked: lost physics, and jobs that the errors leave out."""
-    incomplete = row["ok"] + row["not_applicable"] < row["total"]
-    return ("!" if row["unphysical"] else "") + ("*" if incomplete else "")
+def to_terminal(sections: Iterable[Section]) -> str:
+    """Return plain text of 80 columns at most; whatever a terminal would obey is taken out."""
+    return "\n\n".join("\n".join(_screen(section)) for section in sections)
 
 
 def aligned_table(rows: list[list[str]], headers: tuple[str, ...], align: tuple[str, ...]) -> str:
@@ -138,74 +30,71 @@ def aligned_table(rows: list[list[str]], headers: tuple[str, ...], align: tuple[
     return "\n".join(line.rstrip() for line in text.splitlines())
 
 
-def _tests(board: pd.DataFrame) -> str:
-    """Return the order of the strategies on tests alone."""
-    rows = ranked(
-        board.to_dict("records"), lambda row: ((), 1.0 - row["skill_tests"], str(row["strategy"]))
-    )
-    named = (
-        f"{_marks(row)}{plain(row['strategy'])} {fixed(row['skill_tests'], 2)}" for _, row in rows
-    )
-    return textwrap.fill(f"skill on tests alone, no computed truths: {', '.join(named)}", WIDTH)
+def _screen(section: Section) -> Iterator[str]:
+    if section.title:
+        yield shortened(plain(section.title), WIDTH)
+    for block in section.blocks:
+        yield from _shown(block, "  " if section.title else "")
 
 
-def _stated(board: pd.DataFrame) -> str:
-    """Return how often the intervals that strategies state hold the truth."""
-    rows = board[board["coverage90"].notna()].to_dict("records")
-    named = (f"{plain(row['strategy'])} {100.0 * row['coverage90']:.0f} %" for row in rows)
-    return textwrap.fill(f"unseen modes inside the stated 90 % interval: {', '.join(named)}", WIDTH)
+def _shown(block: Block, indent: str) -> Iterator[str]:
+    if isinstance(block, str):
+        yield _filled(block)
+    elif isinstance(block, Table):
+        if block.caption:
+            yield _filled(block.caption)
+        yield textwrap.indent("\n\n".join(_parts(block, WIDTH - len(indent))), indent)
+        if more := len(block.rows[block.most :]) if block.most else 0:
+            yield f"... and {more} more in the report"
+    elif isinstance(block, Items | Cards):
+        whole = isinstance(block, Items) and block.whole
+        yield from (_entry(*entry, whole=whole) for entry in block.entries)
+    else:
+        drawings = block.drawings if isinstance(block, Row) else (block,)
+        yield from (_entry(one.title, one.caption) for one in drawings)
 
 
-def _twins(run: Run, board: pd.DataFrame) -> Iterator[str]:
-    """Return the skills on twins beside those on their cases, and who may know these."""
-    found = twin_skills(run)
-    if found:
-        named = (
-            f"{plain(name)} {fixed(found[name].skill, 3)} ({fixed(found[name].original_skill, 3)})"
-            for name in board["strategy"]
-            if name in found
-        )
-        said = f"skill on {drawn_from(run)}, in brackets on the cases: {', '.join(named)}"
-        yield textwrap.fill(said, WIDTH)
-    yield from (textwrap.fill(f"?: {told}", WIDTH) for told in suspicions(run))
+def _filled(text: str) -> str:
+    return textwrap.fill(plain(text), WIDTH, break_on_hyphens=False)
 
 
-def _first_tier(run: Run, board: pd.DataFrame) -> str:
-    """Return of which strategies no difference from the best is shown, or why nothing is tested."""
-    tested = tell_apart(run, list(board["strategy"]))
-    if not tested.tiers:
-        return textwrap.fill(tested.note, WIDTH)
-    rows = {row["strategy"]: row for row in board.to_dict("records")}
-    named = [
-        f"{_marks(row)}{plain(row['strategy'])} {fixed(row['skill'], 3)} "
-        f"({interval(row['skill_low'], row['skill_high'])})"
-        for row in (rows[name] for name in tested.tiers[0])
+def _entry(label: str, *texts: str, whole: bool = False) -> str:
+    text = ", ".join(texts)
+    return textwrap.fill(
+        plain(f"{label}: {text}" if label else text),
+        WIDTH, initial_indent="  ", subsequent_indent="      ",
+        break_on_hyphens=False, break_long_words=not whole,
+    )  # fmt: skip
+
+
+def _parts(table: Table, room: int) -> Iterator[str]:
+    """Yield a table in parts that fit on the screen."""
+    rows = [
+        [c.text(cell, c.width) for c, cell in zip(table.columns, row, strict=True)]
+        for row in table.rows[: table.most]
     ]
-    others = len(rows) - len(named)
-    if not others:
-        best = f"{named[0]}, 95 % interval over structures"
-        return textwrap.fill(f"no strategy is shown to differ from the best, {best}", WIDTH)
-    said = "tier 1, no difference from the best shown (95 % interval over structures)"
-    below = f"{others} of {len(rows)} are below"
-    return textwrap.fill(f"{said}: {', '.join(named)}; {below}", WIDTH)
+    widths = []
+    for column, *cells in zip(table.columns, *rows, strict=True):
+        longest = max(map(len, cells), default=0)
+        widths.append(max(min(longest, column.width), *map(len, column.title.split("\n"))))
+    parts: list[list[int]] = [[]]
+    for place, width in enumerate(widths):
+        if parts[-1] and sum(widths[k] + 2 for k in parts[-1]) + width > room:
+            parts.append([table.names])
+        parts[-1].append(place)
+    for part in parts:
+        spare = max(0, room + 2 - sum(widths[k] + 2 for k in part))
+        columns = [table.columns[k] for k in part]
+        most = [column.width or widths[k] + spare for k, column in zip(part, columns, strict=True)]
+        lines = [line for row in rows for line in _lines([row[k] for k in part], columns, most)]
+        heads = [(column.title, column.side) for column in columns]
+        yield aligned_table(lines, *zip(*heads, strict=True))
 
 
-def _notes(run: Run) -> Iterator[str]:
-    yield from (f"Note: {note}." for note in notes_of(run))
-    moving = unconverged(run.results)
-    if moving:
-        named = ", ".join(f"{plain(name)} ({count})" for name, count in moving.items())
-        yield f"Still moving at their last iteration (jobs): {named}."
-    for reason, names in spared(run.results).items():
-        listed = ", ".join(map(plain, names))
-        yield f"Not applicable, counted as the model that was given: {listed}: {reason}."
-
-
-def _legend(run: Run, board: pd.DataFrame) -> Iterator[str]:
-    yield textwrap.fill(lead(run), WIDTH)
-    yield "high, mod., given: rms frequency error of the modes, median over the cases"
-    if board["unphysical"].any():
-        why = "rigid modes lost, negative eigenvalues or surplus partners"
-        yield textwrap.fill(f"!: unphysical ({why}), below all others", WIDTH)
-    if (board["ok"] + board["not_applicable"] < board["total"]).any():
-        yield "*: some jobs gave no model: ten times the error, left out of the errors shown"
+def _lines(row: Sequence[str], columns: Sequence[Column], widths: Sequence[int]) -> list[list[str]]:
+    """Return the lines that a row takes on the screen."""
+    cells = [
+        textwrap.wrap(cell, width) if column.wrap else [shortened(cell, width)]
+        for cell, column, width in zip(row, columns, widths, strict=True)
+    ]
+    return [list(line) for line in zip_longest(*cells, fillvalue="")] or [[""] * len(columns)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from femubench.reports.cells import plain
+from femubench.reports.cells import first_of, plain
 from femubench.reports.page.rounding import clean
 from femubench.results import Run, twin_skills, unsteady
 
@@ -17,14 +17,9 @@ MEANING = (
 
 def twins_by_strategy(run: Run) -> dict[str, dict[str, Any]]:
     """Return by strategy, in plain data, its skill on twins and on their cases, and what is odd."""
+    keys = ("skill", "original_skill", "p", "suspicious")
     return {
-        name: {
-            "skill": clean(found.skill),
-            "original_skill": clean(found.original_skill),
-            "p": clean(found.p),
-            "suspicious": found.suspicious,
-            "known": list(found.known),
-        }
+        name: {**{key: clean(getattr(found, key)) for key in keys}, "known": list(found.known)}
         for name, found in twin_skills(run).items()
     }
 
@@ -41,7 +36,8 @@ def suspicions(run: Run) -> list[str]:
     told = [
         f"{plain(name)} knows the cases? skill {found.original_skill:.3f} on them, "
         f"{found.skill:.3f} on their twins"
-        + (f" (more than twice the error on the twins of {_few(found.known)})" * bool(found.known))
+        + f" (more than twice the error on the twins of {first_of(found.known, 3)})"
+        * bool(found.known)
         for name, found in twin_skills(run).items()
         if found.suspicious
     ]
@@ -49,8 +45,3 @@ def suspicions(run: Run) -> list[str]:
         f"{plain(name)} gave two answers to one job: {plain(what)}"
         for name, what in unsteady(run).items()
     ]
-
-
-def _few(names: tuple[str, ...]) -> str:
-    more = len(names) - 3
-    return ", ".join(map(plain, names[:3])) + (f" and {more} more" if more > 0 else "")

@@ -384,9 +384,10 @@ def test_the_screen_is_80_columns_wide(data: Data) -> None:
 
 def test_scenarios_stand_indented_below_their_strategy(data: Data) -> None:
     lines = comparison_text(compared(data, scaled(data, "softer", 1.5))).splitlines()
-    place = next(k for k, line in enumerate(lines) if line.startswith("softer "))
+    place = next(k for k, line in enumerate(lines) if line.startswith("  softer  "))
+    place = next(k for k in range(len(lines)) if k > place and lines[k].startswith("  softer  "))
     assert [line.split()[0] for line in lines[place + 1 : place + 3]] == ["corner", "other"]
-    assert all(line.startswith("  ") for line in lines[place + 1 : place + 3])
+    assert all(line.startswith("    ") for line in lines[place + 1 : place + 3])
 
 
 def test_a_threshold_that_nothing_is_held_against_is_told(data: Data) -> None:

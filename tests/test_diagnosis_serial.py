@@ -20,8 +20,8 @@ from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_json
 from femubench.core.errors import InputError
 from femubench.core.schema.diagnosis import Evidence, Gain, Rival
+from femubench.reports.cells import chance
 from femubench.reports.diagnosis import diagnosis_markdown, diagnosis_text, summary_lines
-from femubench.reports.figures import chance
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))
 import diagnosis_toys as toys
@@ -169,24 +169,26 @@ class TestTerminal:
     def test_order_and_content(self) -> None:
         text = words(toys.made(gain_rms=Gain((5.5, 0.25), (3.6, 0.8))))
         parts = [
-            "toy: named; that nothing is missing has probability < 0.1 %; "
-            "taken at the textbook value: shear-deformation, rotary-inertia.",
-            "tube: J equals Jp and tube is no circle.",
-            "If corrected (torsion-constant): mode 1 -3.25 %.",
-            "4 226.8 +12.3 -0.2 3 3.54 1",
-            "7 275.2 – +0.5 0 – –",
-            "mass 2.125 kg: +0.3 before, +0.3 after",
-            "9201 before, 55.25 after, 61 data. Noise alone leaves as much with probability 0.61.",
+            "toy: named: one explanation stands alone",
+            "Something is missing: > 99.9 %, probability, before any name is given",
             "joint-rotation at type:T: probability 94.2 %; the joints rotate; "
             "bending 31000 ± 1200 N m/rad; torsion 20500 N m/rad",
-            "joint-offset at type:T: probability 3.1 %, lowers chi-square by 812.5, "
-            "10.4 degrees away",
-            "torsion-constant, everywhere + added-mass at J3: probability 0.2 %",
-            "weigh the structure (separates by 140 sigma squared)",
+            "Taken at the textbook value: shear-deformation, rotary-inertia.",
+            "weigh the structure 140 over a million to 1",
+            "rms rms median median frequency error before after before after",
+            "used modes 5.5 % 0.25 % 4.25 % 0.125 % 22 times smaller "
+            "held-out modes 3.6 % 0.8 % 3.4 % 0.75 % 4.5 times smaller",
+            "4: 226.8 Hz +12.3 -0.2 7: 275.2 Hz – +0.5 mass 2.125 kg +0.3 +0.3",
+            "4: 3 sensors 3.54 1",
+            "9201 before, 55.25 after, 61 data. What is left is noise: noise alone leaves as much "
+            "with probability 61.4 %.",
+            "J1 1.00 J3 0.50",
+            "joint-offset at type:T 3.1 % 812.5 10.4",
+            "torsion-constant everywhere + added-mass at 0.2 % 801.2 – J3",
             "added-mass J3 0.0123 kg",
-            "rms % rms % median % median % before after before after",
-            "used modes 5.500 0.250 4.250 0.125 held-out modes 3.600 0.800 3.400 0.750",
-            "evidence: J1 1.00, J3 0.50 ecomac: p2 1.00",
+            "ecomac: difference of measured and predicted shapes at every sensor. p2 1.00",
+            "tube: J equals Jp and tube is no circle.",
+            "If corrected (torsion-constant): mode 1 -3.25 %.",
             "Mode 9 found no partner.",
         ]
         found = [text.find(part) for part in parts]
@@ -225,16 +227,16 @@ class TestTerminal:
             assert "What is missing" not in text
         group = words(toys.made("ambiguous"))
         assert "these data cannot decide" in group
-        assert "shear-deformation, everywhere: probability 97.0 %; multiple 1 (textbook)" in group
-        assert "their sensitivities are 1.8 degrees apart" in group
+        assert "shear-deformation everywhere: probability 97.0 %; multiple 1, textbook" in group
+        assert "Their sensitivities are 1.8 degrees apart" in group
         assert "joint-rotation" not in words(toys.made("none"))
 
     def test_cross_validation_is_said(self) -> None:
-        told = "each used mode left out in turn"
+        told = "used modes, each left out in turn"
         cross = Gain((4.0, 0.5), cross_validated_percent=(5.0, 1.5))
         assert told not in words(toys.made())
         rms = replace(cross, cross_validated_percent=(6.0, 2.5))
-        assert f"{told} 6.000 2.500 5.000 1.500" in words(toys.made(gain=cross, gain_rms=rms))
+        assert "used modes, each 6 % 2.5 % 5 % 1.5 %" in words(toys.made(gain=cross, gain_rms=rms))
         assert "held-out" not in words(toys.made(gain=cross))
 
     def test_where_it_was_written(self) -> None:
@@ -244,7 +246,7 @@ class TestTerminal:
     def test_lengthy_tables_end_with_a_count(self) -> None:
         text = words(toys.made(rivals=toys.RIVALS * 10))
         assert text.count("joint-offset") == 4
-        assert "... and 12 more in the JSON" in text
+        assert "... and 12 more in the report" in text
 
     def test_nothing_to_tell(self) -> None:
         """Empty tables leave no headings behind."""
@@ -252,7 +254,7 @@ class TestTerminal:
             ("rivals", "advice", "smallest_visible", "residuals", "looks", "locations", "notes"), ()
         )
         text = words(toys.made("none", **empty))
-        for heading in ("Rivals", "next", "smallest", "Plausibility checks", "Where", "Notes"):
+        for heading in ("Rivals", "next", "smallest", "Plausibility checks", "Classical", "Notes"):
             assert heading not in text
         assert "Chi-square" in text
 
@@ -273,9 +275,9 @@ class TestMarkdown:
 
     def test_shows_what_the_screen_shows(self) -> None:
         text = diagnosis_markdown(data_of(toys.made()))
-        assert "| 4 | 226.8 | +12.3 | -0.2 | 3 | 3.54 | 1 |" in text
+        assert "| 4: 226.8 Hz | +12.3 | -0.2 |" in text
         assert "- **joint-rotation at type:T**: probability 94.2 %; the joints rotate;" in text
-        assert "- **torsion-constant, everywhere + added-mass at J3**: probability 0.2 %" in text
+        assert "| torsion-constant everywhere + added-mass at J3 | 0.2 % | 801.2 | – |" in text
 
     def test_hostile_names(self) -> None:
         """Nothing of a name is obeyed: no tag, no link, no emphasis, no new row or heading."""
@@ -288,7 +290,7 @@ class TestMarkdown:
         assert "alert(1)" in unescaped
         assert "[" not in unescaped
         assert "`" not in unescaped
-        bold = re.compile(r"^- \*\*[^*]+\*\*: [^*]*$|^[^*]*$")
+        bold = re.compile(r"^(- )?\*\*[^*]+\*\*: [^*]*$|^[^*]*$")
         assert all(bold.match(line) for line in unescaped.splitlines())
         assert len(re.findall(r"^# ", text, re.MULTILINE)) == 1
 
@@ -328,8 +330,10 @@ def test_no_certainty_is_claimed(probability: float | None, text: str) -> None:
 def test_shapes_take_no_columns_where_there_are_none() -> None:
     bare = tuple(row for row in toys.residuals() if row.kind == "frequency")
     text = diagnosis_text(data_of(replace(toys.made(), residuals=bare)))
-    assert "shape" not in text
-    assert "mass" not in text.partition("Chi-square")[0].partition("Residuals")[2]
+    residuals = text.partition("How well it fits")[2].partition("Chi-square")[0]
+    assert "Frequencies" in residuals
+    assert "shape" not in residuals
+    assert "mass" not in residuals
 
 
 @pytest.mark.parametrize(
@@ -354,6 +358,4 @@ def test_digits_follow_the_deviation(value: float, std: float | None, text: str)
 
 def test_places_that_do_not_belong_to_effects_one_by_one() -> None:
     rival = Rival("joint-offset + added-mass", "a + b + c", 3.0, 0.2)
-    assert "joint-offset + added-mass at a + b + c: probability 20.0 %" in words(
-        toys.made(rivals=(rival,))
-    )
+    assert "joint-offset + added-mass at a + b + c 20.0 %" in words(toys.made(rivals=(rival,)))

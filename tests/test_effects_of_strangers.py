@@ -25,9 +25,8 @@ from femubench.core.look.look import look
 from femubench.core.plugin.loader import load_plugins
 from femubench.diagnosis import registered_effects
 from femubench.effect import Effect
-from femubench.reports.diagnosis import diagnosis_text
-from femubench.reports.diagnosis_page import diagnosis_html
-from femubench.reports.figures import figure, signed
+from femubench.reports.cells import figure, signed
+from femubench.reports.diagnosis import diagnosis_html, diagnosis_text
 
 OURS = ("youngs-modulus", "density", "torsion-constant")
 

@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
 from femubench.core.modal.measurement import Measurement
+from femubench.core.pace import Advance
 from femubench.core.run import workers
 from femubench.core.run.executor import LocalProcesses
 from femubench.core.run.jobs import JobOutcome
@@ -134,6 +135,19 @@ def test_progress_counts_every_job_once(everything: dict[str, Any]) -> None:
     assert [done for _, done, _ in seen] == list(range(1, 14))
     assert {total for _, _, total in seen} == {13}
     assert {name for name, _, _ in seen} == set(everything["run"].meta["strategies"])
+
+
+def test_a_run_that_goes_on_tells_of_what_is_to_be_done_alone(
+    everything: dict[str, Any], tmp_path: Path
+) -> None:
+    store, told = Store(tmp_path), list[Advance]()
+    options: dict[str, Any] = {"jobs": 1, "store": store, "overwrite": "missing"}
+    run_jobs([everything["case"]], [toys.Unchanged()], **options)
+    both = [toys.Unchanged(), toys.Softer()]
+    run = run_jobs([everything["case"]], both, told=told.append, **options)
+    assert len(run.results) == 2
+    assert [(advance.done, advance.total) for advance in told] == [(0, 1), (1, 1)]
+    assert [advance.left for advance in told] == [None, 0.0]
 
 
 def test_the_store_has_what_the_run_returned(everything: dict[str, Any]) -> None:

@@ -18,12 +18,12 @@ from femubench.core.score.comparison import Against, compare_runs
 from femubench.core.score.statistics import Groups
 from femubench.papers.printed import printed
 from femubench.reports.htmls import HtmlReporter
-from femubench.reports.markdown import MarkdownReporter
 from femubench.reports.page import data as page
 from femubench.reports.page.data import page_data
 from femubench.reports.page.document import SCRIPTS, STYLES, asset, embedded_json
 from femubench.reports.page.papers import papers_of
 from femubench.reports.page.rounding import compact_json, plain_data, rounded
+from femubench.reports.runs import MarkdownReporter
 from femubench.results import (
     Block,
     JobResult,
@@ -286,8 +286,8 @@ class TestDocument:
 
     def test_every_asset_of_the_run_page_is_in_it(self) -> None:
         others = (
-            "compare",
             "diagnosis",
+            "feed",
             "identification",
             "site",
             "report",

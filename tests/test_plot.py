@@ -322,7 +322,7 @@ class TestEvidence:
         ax = plot.evidence(diagnosis_toys.made(locations=()))
         listed = labels(ax)
         causes = data_of()["causes"]
-        assert len(listed) == len(causes)
+        assert listed[len(causes) :] == ["evidence by place, of all explanations"]
         assert all(any(text.startswith(f"{k} ") for text in listed) for k in range(1, len(causes)))
         marks = [a for a in ax.get_lines() if str(a.get_gid()).startswith("finding-")]
         assert all(mark.get_marker() in "DosX" for mark in marks)

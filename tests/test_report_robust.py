@@ -20,8 +20,7 @@ from femubench.core.cli.main import bench
 from femubench.core.run.upkeep import exported
 from femubench.reports.csvs import CsvReporter
 from femubench.reports.htmls import HtmlReporter
-from femubench.reports.markdown import MarkdownReporter
-from femubench.reports.terminal import TerminalReporter
+from femubench.reports.runs import MarkdownReporter, TerminalReporter
 from femubench.results import Run, Store, results_frame, run_to_json
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))

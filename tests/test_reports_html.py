@@ -11,15 +11,17 @@ from xml.etree import ElementTree
 
 import pytest
 
-from femubench.reports.blocks import Drawing, Items, Section, to_markdown, to_terminal
+from femubench.reports.blocks import Drawing, Items, Section
 from femubench.reports.digits import Digits, off
 from femubench.reports.html import to_html
+from femubench.reports.markdown import to_markdown
 from femubench.reports.reproduction import (
     reproduction_markdown,
     reproduction_text,
 )
 from femubench.reports.reproduction_page import reproduction_html
 from femubench.reports.svg import embedded
+from femubench.reports.terminal import to_terminal
 from femubench.reproduction import Ground, Page, Study
 
 sys.path.insert(0, str(Path(__file__).parent / "toys"))

@@ -19,7 +19,7 @@ from femubench.core.schema.results import Block, JobResult, Run
 from femubench.core.score.comparison import Against, compare_runs
 from femubench.core.score.statistics import Evidence, ScoreTable, evidence_of, structures_of
 from femubench.core.typing import FloatArray
-from femubench.reports.terminal import TerminalReporter
+from femubench.reports.runs import TerminalReporter
 from femubench.results import (
     interval_kind,
     leaderboard,
@@ -236,13 +236,12 @@ class TestScreen:
         text = TerminalReporter().render(run_of(scores, TWENTY))
         assert max(map(len, text.splitlines())) <= 80
         said = " ".join(text.split())
-        assert "tier 1, no difference from the best shown (95 % interval over structures)" in said
-        tier = said.partition("structures): ")[2]
-        number = r"0\.\d{3}"
-        found = re.findall(rf"(\w+) ({number}) \(({number}) to ({number})\)", tier)
+        number = r"(0\.\d{3})"
+        skills = dict(re.findall(rf"\d  (\w+) +{number} ", text))
+        found = re.findall(rf"(\w+) +{number} to {number} +1 ", text)
         assert {name for name, *_ in found} == {"first", "second"}
-        assert all(float(low) < float(skill) < float(high) for _, skill, low, high in found)
-        assert "1 of 3 are below" in tier
+        assert all(float(low) < float(skills[name]) < float(high) for name, low, high in found)
+        assert "1 of 3 are below" in said.partition("Beside it in tier 1, not shown to differ")[2]
 
     def test_says_why_nothing_is_tested(self) -> None:
         scores = {"first": np.full((20, 3, 9), 0.1), "second": np.full((20, 3, 9), 5.0)}

@@ -149,8 +149,7 @@ Writers = tuple[Callable[[Any], str], ...]
 
 
 def _diagnosis_writers() -> Writers:
-    from femubench.reports.diagnosis import diagnosis_markdown, diagnosis_text
-    from femubench.reports.diagnosis_page import diagnosis_html
+    from femubench.reports.diagnosis import diagnosis_html, diagnosis_markdown, diagnosis_text
 
     return diagnosis_text, diagnosis_markdown, diagnosis_html, _plain_json
 

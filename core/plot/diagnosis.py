@@ -108,7 +108,7 @@ def residual_dots(diagnosis: Diagnosis | Data, kind: Kind) -> list[ResidualDot]:
     """
     rows = _data(diagnosis)["residuals"]
     if kind == "frequency":
-        named = {"frequency": "{mode}: {measured:.4g} Hz", "mass": "mass {measured:.4g} kg"}
+        named = {"frequency": "{mode}: {measured:.6g} Hz", "mass": "mass {measured:.6g} kg"}
         return [
             ResidualDot(
                 text.format(mode=row["mode"], measured=row["measured"] or math.nan),
@@ -274,7 +274,9 @@ def evidence(
     A planar structure is drawn in its plane, any other one in a parallel projection from above a
     corner. Causes stand where they sit, by what they are (a ring is a spring, a square a mass, a
     cross a fault of a sensor, a coloured member is another one) and with their numbers, and are
-    listed below; shades are places where they may sit, a halo evidence everywhere.
+    listed below; several that cover everything take turns along the members. Shades are the
+    evidence of all explanations together, not the probability of a cause's place; a halo is
+    evidence for something everywhere.
 
     Arguments:
         diagnosis: or its JSON as plain data, which holds the structure.
@@ -327,10 +329,15 @@ def draw_spots(
     """
     view = view_of(structure)
     places = [structure.place(spot.place) for spot in spots]
+    shades: dict[str, tuple[str, float]] = {}
+    if any(place.kind != "all" for place in places):
+        shades["evidence by place, of all explanations"] = COLOURS["e3"], 6.0
     if any(place.kind == "all" for place in places):
+        halo = "evidence for something everywhere"
+        shades[halo] = COLOURS["halo"], 9.0
         lines = view.flat(structure.lines)
         draw_lines(ax, lines, colors=COLOURS["halo"], linewidths=11.0, gid="everywhere-1",
-                   label="_evidence for something everywhere")  # fmt: skip
+                   label=f"_{halo}")  # fmt: skip
     draw_structure(ax, structure, view)
     # Weak ones first, so that strong ones lie on top.
     for number in reversed(range(len(spots))):
@@ -339,8 +346,19 @@ def draw_spots(
     frame_axes(ax, view, view.flat(structure.points), pad=room, scales=False, directions=names)
     if names:
         draw_sensors(ax, structure, view)
-        draw_findings(ax, structure, view, findings, draw_names(ax, structure, view))
+        names_at = draw_names(ax, structure, view)
+        draw_findings(ax, structure, view, findings, names_at, _handles(shades))
     return ax
+
+
+def _handles(shades: Mapping[str, tuple[str, float]]) -> list[Any]:
+    """Return what a list of shades, with colour and width by their names, needs."""
+    from matplotlib.lines import Line2D
+
+    return [
+        Line2D([], [], label=name, color=colour, linewidth=width)
+        for name, (colour, width) in shades.items()
+    ]
 
 
 def _draw_spot(

@@ -21,7 +21,17 @@ from femubench.core.plot.structure import (
     frame_axes,
     view_of,
 )
-from femubench.core.plot.style import CAUSE, INK, PAGE, name_of, own_axes, place_names
+from femubench.core.plot.style import (
+    AFTER,
+    BEFORE,
+    CAUSE,
+    INK,
+    PAGE,
+    SOFT,
+    name_of,
+    own_axes,
+    place_names,
+)
 from femubench.core.typing import FloatArray
 from femubench.core.update.strategy import UpdateResult
 
@@ -31,6 +41,8 @@ if TYPE_CHECKING:
 _MARKS: dict[Symbol, str] = {"change": "D", "spring": "o", "mass": "s", "fault": "X"}
 _MOST_BADGES = 4  # of one finding
 _MOST_LISTED, _LONGEST = 8, 72
+_EVERYWHERE = (CAUSE, AFTER, BEFORE, SOFT)  # causes that cover everything take turns
+_DASH = 3.0  # line widths
 _ROBUST = 3.0  # medians at which the colours of changes end
 
 
@@ -93,25 +105,30 @@ def draw_findings(
     view: View,
     findings: Sequence[Finding],
     taken: FloatArray | None = None,
+    further: Sequence[Any] = (),
 ) -> None:
     """Draw findings at their places, numbered where they are causes, and list them below.
 
     Arguments:
         taken: points on the page that numbers are to avoid, (n, 2).
+        further: handles that the list ends with.
     """
     changed = [f.value for f in findings if f.symbol == "change" and f.value is not None]
     end = scale_end(changed)
     handles: list[Any] = []
     badges: list[tuple[FloatArray, str]] = []
+    covering = [f for f in findings if f.number and f.kind == "all" and f.symbol == "change"]
     # What covers everything lies below what has a place.
     for finding in sorted(findings, key=lambda finding: finding.kind != "all"):
         look = _look(finding, end)
+        if len(covering) > 1 and finding in covering:
+            look |= _turn(covering.index(finding), len(covering))
         lines = lines_of(wireframe, view, finding)
         gid = f"finding-{len(handles)}"
         at = lines.mean(axis=1) if len(lines) and finding.kind != "all" else np.empty((0, 2))
         if len(lines) and (finding.symbol == "change" or finding.kind == "pair"):
-            dashed = "dashed" if finding.kind == "pair" else "solid"
-            draw_lines(ax, lines, **look, gid=gid, linestyles=dashed, zorder=2.7,
+            dashed = {"linestyle": "dashed"} if finding.kind == "pair" else {}
+            draw_lines(ax, lines, **look, **dashed, gid=gid, zorder=2.7,
                        label=f"_{name_of(finding.label)}")  # fmt: skip
         elif len(at):
             ax.plot(*at.T, gid=gid, **_mark(finding, look))
@@ -125,7 +142,13 @@ def draw_findings(
     at_badges = np.array([point for point, _ in badges]).reshape(-1, 2)
     place_names(ax, at_badges, [number for _, number in badges], avoid=taken, size=8.5,
                 color=PAGE, weight="bold", bbox=badge, zorder=5)  # fmt: skip
-    _list_below(ax, handles)
+    _list_below(ax, handles, further)
+
+
+def _turn(place: int, count: int) -> dict[str, Any]:
+    """Return the look of one of several lines along the same members: each shows in its turn."""
+    dashes = (-_DASH * place, (_DASH, _DASH * (count - 1)))
+    return {"color": _EVERYWHERE[place % len(_EVERYWHERE)], "linestyle": dashes}
 
 
 def _look(finding: Finding, end: float) -> dict[str, Any]:
@@ -162,17 +185,18 @@ def _handle(finding: Finding, look: dict[str, Any]) -> Any:  # noqa: ANN401 - an
     text = f"{finding.number or ''} {finding.label}{where}".strip()
     shown: dict[str, Any] = {**_mark(finding, look), "label": name_of(text, _LONGEST)}
     if finding.symbol == "change" and not finding.points:
-        shown = {**look, "label": shown["label"]}
+        shown = {**look, "linestyle": "solid", "label": shown["label"]}
     return Line2D([], [], **shown)
 
 
-def _list_below(ax: Axes, handles: Sequence[Any]) -> None:
+def _list_below(ax: Axes, handles: Sequence[Any], further: Sequence[Any]) -> None:
     from matplotlib.lines import Line2D
 
     more = len(handles) - _MOST_LISTED
     listed = list(handles[:_MOST_LISTED])
     if more > 0:
         listed.append(Line2D([], [], linestyle="none", label=f"and {more} more"))
+    listed += further
     if listed:
         ax.legend(
             handles=listed, loc="upper center", bbox_to_anchor=(0.5, 0.0), frameon=False,

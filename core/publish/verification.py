@@ -190,7 +190,7 @@ def _check_references(run: Run, known: Mapping[str, _Known], file: Path) -> None
     for key, stated, names in told:
         for name in names:
             found, own = stated.get(name, {}), known[name].reference
-            _check_errors(found, own, f"{key}.{name}", "textbook", file)
+            _check_errors(found, own, f"{key}.{name}", nominal="textbook", file=file)
 
 
 def _check_errors(

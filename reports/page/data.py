@@ -134,37 +134,30 @@ def _downloads(run: Run) -> tuple[list[dict[str, str]], list[str]]:
     found, notes, room = [], [], MOST_DOWNLOADS
     for title, kind, reporter in _FILES:
         packed = gzip.compress(reporter.render(run).encode(), 6, mtime=0)
-        if len(packed) > room:
-            notes.append(
-                f"{title}: too large for the page; `bench report -f {reporter.name}` has it"
-            )
-            continue
-        room -= len(packed)
         name = f"{plain(run.meta.get('run', '')) or 'run'}{reporter.suffix}"
         text = base64.b64encode(packed).decode("ascii")
-        found.append({"title": title, "name": name, "type": kind, "gzip": text})
+        if (room := room - len(packed)) >= 0:
+            found.append({"title": title, "name": name, "type": kind, "gzip": text})
+        else:
+            room += len(packed)
+            more = f"`bench report -f {reporter.name}` has it"
+            notes.append(f"{title}: too large for the page; {more}")
     return found, notes
 
 
 def _strategies(run: Run) -> list[dict[str, Any]]:
     """Return the strategies with what they cite, their version, and what twins and repeats say."""
-    citations, twins, differing = (
-        run.meta.get("citations") or {},
-        twins_by_strategy(run),
-        unsteady(run),
-    )
-    versions = {
-        result.strategy: plain(result.provenance["strategy"])
-        for result in reversed(run.results)
-        if result.provenance.get("strategy") is not None
-    }
+    citations, twins = run.meta.get("citations") or {}, twins_by_strategy(run)
+    differing = unsteady(run)
+    said = [(found.strategy, found.provenance.get("strategy")) for found in reversed(run.results)]
+    versions = {name: plain(version) for name, version in said if version is not None}
     return [
         {
             "name": name,
             "citation": citations.get(name, ""),
             "version": versions.get(name, ""),
-            **({"twins": twins[name]} if name in twins else {}),
-            **({"unsteady": plain(differing[name])} if name in differing else {}),
+            "twins": twins.get(name),
+            "unsteady": name in differing,
         }
         for name in strategies_of(run)
     ]
@@ -234,34 +227,32 @@ def _details(
     seed, room = first_seed(run), MOST_DETAILS
     cases, strategies = list(stages), strategies_of(run)
     done = [result for result in run.results if result.seed == seed and result.status == "ok"]
-    shown = {
-        f"{cases.index(result.case)}:{strategies.index(result.strategy)}": result
-        for result in sorted(done, key=lambda result: result.rank or 0)
-    }
     found: dict[str, dict[str, Any]] = {}
-    for key, result in shown.items():
+    shown = []
+    for result in sorted(done, key=lambda result: result.rank or 0):
+        key = f"{cases.index(result.case)}:{strategies.index(result.strategy)}"
         entry = {**_detail(result), "exhibit": None}
         if (size := len(compact_json({key: entry}))) <= room:
             found[key], room = entry, room - size
+            shown.append((entry, result))
     drawn = 0
-    for key, entry in found.items():
-        name = shown[key].key
-        exhibit = exhibits.of(name) if exhibits is not None and name else None
-        picture = plain_data(_fitting(exhibit, stages[shown[key].case]))
+    for entry, result in shown:
+        exhibit = exhibits.of(result.key) if exhibits is not None and result.key else None
+        picture = plain_data(_fitting(exhibit, stages[result.case]))
         if picture is not None and (size := len(compact_json(picture))) <= room:
             entry["exhibit"], room, drawn = picture, room - size, drawn + 1
-    notes = []
-    if shown and not drawn:
+    notes, models = [], f"of {len(done)} models of seed {seed}"
+    if done and not drawn:
         notes.append("no shapes, receptances and element changes to draw come with these results")
-    elif drawn < len(shown):
+    elif drawn < len(done):
         notes.append(
-            f"{len(shown) - drawn} of {len(shown)} models of seed {seed} have no shapes, "
-            "receptances and changes to draw: they are not in the store, or there was no room"
+            f"{len(done) - drawn} {models} have no shapes, receptances and changes to draw: they "
+            "are not in the store, or there was no room"
         )
-    if len(found) < len(shown):
+    if len(found) < len(done):
         notes.append(
-            f"{len(shown) - len(found)} of {len(shown)} models of seed {seed} are without modes, "
-            "history and parameters, to keep the page small; those with the best scores have them"
+            f"{len(done) - len(found)} {models} are without modes, history and parameters, to keep "
+            "the page small; those with the best scores have them"
         )
     return found, notes
 
@@ -290,7 +281,9 @@ def _detail(result: JobResult) -> dict[str, Any]:
             for name, block in result.blocks.items()
             for mode in block.modes
         ],
-        "history": [_numbers(step) for step in result.history],
+        "history": [
+            {name: rounded(value, 5) for name, value in step.items()} for step in result.history
+        ],
         "parameters": [
             {
                 "name": plain(item.get("name", "")),
@@ -300,7 +293,3 @@ def _detail(result: JobResult) -> dict[str, Any]:
             for item in result.parameters
         ],
     }
-
-
-def _numbers(named: Mapping[str, float]) -> dict[str, Any]:
-    return {name: rounded(value, 5) for name, value in named.items()}

@@ -12,7 +12,7 @@ STYLES = ("page.css", "run.css", "case.css")
 # One classic script; each file adds to what those before it have made.
 SCRIPTS = (
     *("vendor/d3.min.js", "vendor/plot.umd.min.js"),
-    *("core.js", "charts.js", "heat.js", "structure.js"),
+    *("core.js", "sortable.js", "charts.js", "structure.js"),
     *("ranking.js", "filters.js", "overview.js", "case_matrix.js", "board.js"),
     *("case_tables.js", "case.js", "app.js"),
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from functools import cache
 from importlib.resources import files
@@ -20,20 +21,15 @@ def papers_of(run: Run) -> dict[str, dict[str, dict[int, float]]]:
     A case counts as that of a paper when it has its name and its measured frequencies.
     """
     found = {}
-    for case in cases_of(run):
-        paper = _printed().get(case)
-        if paper is None:
-            continue
+    for case in filter(_printed().__contains__, cases_of(run)):
+        paper = _printed()[case]
         measured = {mode.number: mode.measured_hz for _, mode in measured_modes(run, case)}
-        modes = range(1, len(paper["measured"]) + 1)
         if all(
-            number in measured and abs(measured[number] / hertz - 1.0) <= _SAME
-            for number, hertz in zip(modes, paper["measured"], strict=True)
+            math.isclose(measured.get(number, 0.0), hertz, rel_tol=_SAME)
+            for number, hertz in enumerate(paper["measured"], 1)
         ):
-            found[case] = {
-                name: dict(zip(modes, column, strict=True))
-                for name, column in paper["strategies"].items()
-            }
+            columns = paper["strategies"].items()
+            found[case] = {name: dict(enumerate(column, 1)) for name, column in columns}
     return found
 
 

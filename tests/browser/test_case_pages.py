@@ -296,6 +296,40 @@ def test_changes_of_the_stiffness(shown: Callable[..., Page]) -> None:
     assert section.locator(".case-list li").count() == 5
 
 
+def test_many_changes_are_drawn_by_their_colours_while_the_view_moves(
+    shown: Callable[..., Page],
+) -> None:
+    page = shown("frame")
+    page.evaluate(
+        """() => {
+            const all = d3.range(200);
+            const nodes = d3.range(201).map((k) => [k / 10, 0, 0]);
+            const none = "members joints sensors springs masses supports measured".split(" ");
+            const stage = {
+              ...Object.fromEntries(none.map((name) => [name, []])), plane: "3d", nodes,
+              elements: all.map((k) => [k, k + 1]), member_of: all.map(() => 0),
+              element_labels: all.map((k) => `element ${k}`) };
+            const shape = nodes.map((_, k) => [0, 0, Math.sin(k / 20)]);
+            const elements = all.map((k) => (k % 2 ? 0.1 : 0.2));
+            const exhibit = { modes: [{ hz: 12, paired: null, shape }], elements };
+            const root = bench.el("div", { id: "tried" });
+            document.querySelector("main").prepend(root);
+            bench.structure(root, stage, [{ name: "many", exhibit, modes: [] }]);
+        }"""
+    )
+    found = page.locator("#tried .found")
+    expect(found).to_have_count(200)
+    assert found.last.locator("title").text_content().startswith("element ")
+    page.focus("#tried svg.case-view")
+    page.keyboard.press("ArrowLeft")
+    expect(found).to_have_count(2)
+    expect(found).to_have_count(200)
+    page.keyboard.press("Space")
+    expect(found).to_have_count(2)
+    page.keyboard.press("Space")
+    expect(found).to_have_count(200)
+
+
 def test_a_page_without_pictures_says_so(
     view: Callable[..., Any], real: Any, tmp_path: Path
 ) -> None:

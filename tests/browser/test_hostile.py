@@ -16,7 +16,7 @@ import pytest
 from femubench.core.schema.records import finite
 from femubench.reports.csvs import CsvReporter
 from femubench.reports.htmls import HtmlReporter
-from femubench.reports.markdown import MarkdownReporter
+from femubench.reports.runs import MarkdownReporter
 from femubench.results import Run, run_to_json
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "toys"))

@@ -55,7 +55,7 @@ def test_why(view: Callable[..., Any], pages: Path, size: tuple[int, int]) -> No
     cells, why = page.locator(".cell.does-not-follow:visible"), page.locator(".why:visible")
     assert why.count() == 0
     cells.first.hover()
-    assert toys.REASON in why.inner_text()
+    page.locator(".why:visible", has_text=toys.REASON).wait_for()
     box = why.bounding_box()
     assert box["x"] >= 0
     assert box["x"] + box["width"] <= size[0]
@@ -64,7 +64,7 @@ def test_why(view: Callable[..., Any], pages: Path, size: tuple[int, int]) -> No
     why.wait_for(state="hidden")
     page.mouse.move(1, 1)
     cells.nth(1).tap()
-    assert "mode 5" in why.inner_text()
+    page.locator(".why:visible", has_text="mode 5").wait_for()
     page.touchscreen.tap(5, 5)
     why.wait_for(state="hidden")
 
@@ -73,13 +73,13 @@ def test_why_with_the_keyboard(view: Callable[..., Any], pages: Path) -> None:
     page = view(pages / "reproduce.html").page
     cells, why = page.locator(".cell.does-not-follow:visible"), page.locator(".why:visible")
     cells.nth(1).focus()
-    assert "mode 5" in why.inner_text()
+    page.locator(".why:visible", has_text="mode 5").wait_for()
     page.keyboard.press("Shift+Tab")
-    assert "mode 4" in why.inner_text()
+    page.locator(".why:visible", has_text="mode 4").wait_for()
     page.keyboard.press("Escape")
     why.wait_for(state="hidden")
     page.keyboard.press("Enter")
-    assert "mode 4" in why.inner_text()
+    page.locator(".why:visible", has_text="mode 4").wait_for()
     page.keyboard.press("Escape")
     why.wait_for(state="hidden")
     assert page.evaluate("document.activeElement.dataset.printed") == "911.3"
@@ -90,7 +90,7 @@ def test_a_square_says_why_and_leads_to_its_cell(view: Callable[..., Any], pages
     square, why = page.locator("nav .square.misprint").first, page.locator(".why:visible")
     square.focus()
     page.keyboard.press("Enter")
-    assert toys.EVIL in why.inner_text()
+    page.locator(".why:visible", has_text=toys.EVIL).wait_for()
     page.keyboard.press("Escape")
     why.wait_for(state="hidden")
     square.click()

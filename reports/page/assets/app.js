@@ -9,9 +9,7 @@
     const bytes = Uint8Array.from(atob(gzip), (letter) => letter.charCodeAt(0));
     const file = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).blob();
     const href = URL.createObjectURL(new Blob([file], { type }));
-    const link = document.createElement("a");
-    Object.assign(link, { href, download: name });
-    link.click();
+    Object.assign(document.createElement("a"), { href, download: name }).click();
     setTimeout(() => URL.revokeObjectURL(href), 1000);
   }
   function missing(text) {
@@ -33,10 +31,8 @@
     }
     const href = route.page === "board" ? "#board" : bench.caseHref(route.name);
     for (const a of document.querySelectorAll("#pages a")) {
-      a.toggleAttribute("aria-current", false);
-      if (a.getAttribute("href") !== href) continue;
-      a.setAttribute("aria-current", "page");
-      a.closest("ul").scrollLeft = a.offsetLeft - 40;
+      a.ariaCurrent = a.getAttribute("href") === href ? "page" : null;
+      if (a.ariaCurrent) a.closest("ul").scrollLeft = a.offsetLeft - 40;
     }
     document.title = `${route.page === "board" ? "Leaderboard" : route.name} · femubench ${data.run}`;
     if (!moved) return;
@@ -52,8 +48,8 @@
       event.preventDefault();
       document.getElementById("main").focus();
     });
-    put("facts", data.header.map(([title, text]) => [el("dt", {}, title), el("dd", {}, text)]).flat());
-    put("downloads", data.downloads.map((file) => el("button", { type: "button", class: "button", "data-file": file.name, onclick: () => download(file) }, file.title)));
+    put("facts", data.header.flatMap(([title, text]) => [el("dt", {}, title), el("dd", {}, text)]));
+    put("downloads", data.downloads.map((file) => bench.button(file.title, () => download(file), { "data-file": file.name })));
     put("notes", el("h2", {}, "Notes on this run"), el("ul", {}, data.notes.map((note) => el("li", {}, note))));
     document.getElementById("notes").hidden = !data.notes.length;
     put("pages", [["#board", "Leaderboard"], ...data.cases.map(({ name, title }) => [bench.caseHref(name), name, title])].map(([href, text, title]) => el("li", {}, el("a", { href, title: title || null }, text))));

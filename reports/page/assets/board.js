@@ -1,120 +1,93 @@
 // The leaderboard: a sortable table, filters that compute it anew, and the scores case by case.
 {
-  const { el, data, number, share, small, ranking, overview } = bench;
+  const { el, data, number, count, share, small, cell, ranking, overview } = bench;
   const LAZY = 4000; // rows times cases from which intervals come after the table
-  const state = { filter: null, text: "", key: "rank", down: false, rows: [] };
+  const state = { filter: null, rows: [], drawn: false, timer: 0 };
   const parts = {};
-  const lines = new Map();
 
-  const column = (key, title, hint, say, more = {}) => ({ key, title, hint, cell: (row) => value(row[key], say), ...more });
-  const shown = (key) => data.board.some((row) => row[key] !== null);
+  bench.blockName = (k) => (data.blocks[k] === "used" ? "given" : data.blocks[k]);
+  bench.errorLeft = ({ logs }, place) => (logs[0][place] === null ? null : bench.median(logs.map((own) => Math.exp(own[place]))));
   const twinsOf = (row) => data.strategies[row.index].twins;
+
+  // A column: key, title, hint, what makes its cell of a row; words are left, and figures of skill sort downwards first.
+  const figure = (key, title, hint, say, more) => ({ key, title, hint, cell: (row) => cell(row[key], say), right: true, ...more });
+  const skill = (key, title, hint) => (key === "skill" || data.board.some((row) => row[key] !== null)) && figure(key, title, hint, share, { down: true });
   const COLUMNS = [
-    column("rank", "Rank", null, bench.count),
-    { key: "strategy", title: "Strategy", text: true, cell: nameCell },
-    column("skill", "Skill", `part of the ${ranking.yardstick}'s error on ${data.scored_on} that is taken away: 1 is all of it, 0 none, less than 0 is worse; more is better`, share, { down: true }),
-    { title: "95 % interval", cell: ({ skill_low: low, skill_high: high }) => el("td", { class: "right range", "data-low": low ?? "", "data-high": high ?? "" }, low === null ? "–" : `${share(low)} to ${share(high)}`) },
-    shown("skill_drawn") && column("skill_drawn", "From drawn", `skill of the start from the models as drawn, against the ${ranking.yardstick}s too`, share, { down: true }),
-    shown("skill_tests") && column("skill_tests", "On tests", "skill on tests alone, without computed truths", share, { down: true }),
-    data.strategies.some((s) => s.twins) && { key: "twins", title: "On twins", down: true, hint: "skill on similar structures under other names, drawn when the run began; beside it, in brackets, on the cases that have such twins", by: (row) => twinsOf(row)?.skill,
-      cell: (row) => value(twinsOf(row)?.skill, (v) => (twinsOf(row) ? `${share(v)} (${share(twinsOf(row).original_skill)})` : number(v))) },
-    ...data.blocks.map((block, k) => column(`${block}_percent`, `${block === "used" ? "given" : block} rms, %`, `rms frequency error of the ${block === "used" ? "modes that were given; no part of the skill" : `${block} modes`}; median over the cases`, small, { block: k })),
-    column("coverage90", "In 90 %", "share of unseen modes in the 90 % interval that the strategy states", share),
-    column("crps_percent", "CRPS, %", "continuous ranked probability score of unseen modes in percent of the frequency, mean over the structures; the absolute error where no uncertainty is stated", small),
-    { key: "flags", title: "Flags", text: true, cell: flagCell, by: (row) => row.rigid_modes_lost + row.negative_eigenvalues + (row.ok ? 0 : 1e9) },
-    { key: "coverage", title: "Models", hint: "jobs that gave a model", text: true, cell: coverageCell, by: (row) => -row.ok - row.not_applicable / 1e6 },
-    { key: "tier", title: "Tier", hint: "1: no difference from the best shown; 2: none from the best of the others", by: (row) => overview.tierOf.get(row.index), cell: (row) => el("td", { class: "right" }, bench.count(overview.tierOf.get(row.index))) },
-    { key: "letters", title: "Group", hint: "strategies that share a letter: no difference shown", text: true, by: (row) => overview.letters(row.index), cell: (row) => el("td", { class: "letters" }, overview.letters(row.index)) },
-    column("parameters", "Un\u00adknowns", "free parameters, median over the cases", bench.count),
-    column("seconds", "Time, s", "wall time, median over the cases", small),
+    figure("rank", "Rank", null, count),
+    { key: "strategy", title: "Strategy", cell: nameCell },
+    skill("skill", "Skill", `part of the ${ranking.yardstick}'s error on ${data.scored_on} that is taken away: 1 is all of it, 0 none, less than 0 is worse; more is better`),
+    { title: "95 % interval", right: true, cell: ({ skill_low: low, skill_high: high }) => el("td", { class: "right range", "data-low": low ?? "", "data-high": high ?? "" }, low === null ? "–" : `${share(low)} to ${share(high)}`) },
+    skill("skill_drawn", "From drawn", `skill of the start from the models as drawn, against the ${ranking.yardstick}s too`),
+    skill("skill_tests", "On tests", "skill on tests alone, without computed truths"),
+    data.strategies.some(({ twins }) => twins) && { key: "twins", title: "On twins", right: true, down: true, cell: (row) => cell(twinsOf(row)?.skill, (v) => (twinsOf(row) ? `${share(v)} (${share(twinsOf(row).original_skill)})` : number(v))),
+      hint: "skill on similar structures under other names, drawn when the run began; beside it, in brackets, on the cases that have such twins" },
+    ...data.blocks.map((block, k) => figure(`${block}_percent`, `${bench.blockName(k)} rms, %`, `rms frequency error of the ${block === "used" ? "modes that were given; no part of the skill" : `${block} modes`}; median over the cases`, small, { block: k })),
+    figure("coverage90", "In 90 %", "share of unseen modes in the 90 % interval that the strategy states", share),
+    figure("crps_percent", "CRPS, %", "continuous ranked probability score of unseen modes in percent of the frequency, mean over the structures; the absolute error where no uncertainty is stated", small),
+    { key: "flags", title: "Flags", cell: flagCell },
+    { key: "coverage", title: "Models", hint: "jobs that gave a model", cell: coverageCell },
+    { key: "tier", title: "Tier", right: true, hint: "1: no difference from the best shown; 2: none from the best of the others", cell: ({ index }) => cellOf("right", overview.tierOf.get(index) ?? "", count(overview.tierOf.get(index))) },
+    { key: "letters", title: "Group", hint: "strategies that share a letter: no difference shown", cell: ({ index }) => cellOf("letters", overview.letters(index), overview.letters(index)) },
+    figure("parameters", "Un\u00adknowns", "free parameters, median over the cases", count),
+    figure("seconds", "Time, s", "wall time, median over the cases", small),
   ].filter(Boolean);
 
-  function value(v, say, name = "") {
-    return el("td", { class: `right ${name}`, "data-value": v ?? "" }, say(v ?? null));
+  // Return a cell of words that sorts by something else.
+  function cellOf(name, sort, ...content) {
+    return el("td", { class: name, "data-sort": sort }, content);
   }
   function nameCell(row) {
-    return el("th", { scope: "row", class: "name" }, el("button", { type: "button", class: "expand", title: "scores case by case", "aria-expanded": "false", "aria-controls": `cases-${row.index}`, onclick: () => toggle(row.index) }, row.strategy));
+    const open = ({ currentTarget: button }) => toggle(row, button);
+    return el("th", { scope: "row", class: "name" }, el("button", { type: "button", class: "expand", title: "scores case by case", "aria-expanded": "false", "aria-controls": `cases-${row.index}`, onclick: open }, row.strategy));
   }
   function flagCell(row) {
+    const { rigid_modes_lost: lost, negative_eigenvalues: negative } = row;
     const flags = [
-      row.rigid_modes_lost && `${bench.plural(row.rigid_modes_lost, "rigid mode")} lost`,
-      row.negative_eigenvalues && bench.plural(row.negative_eigenvalues, "negative eigenvalue"),
-      row.unphysical && !row.rigid_modes_lost && !row.negative_eigenvalues && "unphysical",
-      !row.unphysical && !row.ok && "no model",
-      twinsOf(row)?.suspicious && "knows the cases?",
-      data.strategies[row.index].unsteady && "two answers to one job",
+      lost && `${bench.plural(lost, "rigid mode")} lost`, negative && bench.plural(negative, "negative eigenvalue"),
+      row.unphysical && !lost && !negative && "unphysical", !row.unphysical && !row.ok && "no model",
+      twinsOf(row)?.suspicious && "knows the cases?", data.strategies[row.index].unsteady && "two answers to one job",
     ].filter(Boolean).map((flag) => el("span", { class: "flag" }, el("span", { "aria-hidden": "true" }, "▲ "), flag));
-    return el("td", { class: `flags ${flags.length ? "" : "soft"}`, "data-lost": row.rigid_modes_lost, "data-negative": row.negative_eigenvalues }, flags.length ? flags : "none");
+    return el("td", { class: flags.length ? "flags" : "flags soft", "data-lost": lost, "data-negative": negative, "data-sort": lost + negative + (row.ok ? 0 : 1e9) }, flags.length ? flags : "none");
   }
   function coverageCell(row) {
     const misses = d3.rollups(row.results.filter((r) => r.status !== "ok"), (own) => own.length, (r) => r.status);
     if (row.total > row.results.length) misses.push(["missing", row.total - row.results.length]);
     const told = misses.map(([status, n]) => el("div", { class: status === "not-applicable" ? "soft" : "bad" }, `${n} ${bench.statusWord(status)}`));
-    return el("td", { class: "coverage", "data-ok": row.ok, "data-total": row.total }, `${row.ok} of ${row.total}`, told);
+    return el("td", { class: "coverage", "data-ok": row.ok, "data-total": row.total, "data-sort": -row.ok - row.not_applicable / 1e6 }, `${row.ok} of ${row.total}`, told);
   }
 
+  // Return the scores of a strategy case by case.
   function detail(row) {
-    const heads = ["Case", "Error left", ...data.blocks.map((b) => `${b} rms, %`), "MAC", "Unknowns", "Time, s", "Outcome"];
-    const body = row.cases.map((c, place) => {
+    const seeds = row.logs.length;
+    const lines = row.cases.map((c, place) => {
       const own = row.results.filter((r) => r.c === c);
       const fine = own.filter((r) => r.status === "ok");
-      const mid = (pick) => bench.median(fine.map(pick).filter((v) => v !== null));
-      const seeds = row.logs.length;
+      const middle = (pick, say) => cell(bench.median(fine.map(pick).filter((v) => v !== null)), say);
       const said = [
         fine.length && (seeds > 1 ? `${fine.length} of ${seeds} seeds ok` : "✓ ok"),
         own.some((r) => r.unphysical) && "▲ unphysical",
         ...new Set(own.filter((r) => r.status !== "ok").map((r) => `${bench.statusText(r.status)}${r.reason ? `: ${r.reason}` : ""}`)),
         own.length < seeds && `${bench.statusText("missing")}${seeds > 1 ? ` for ${bench.plural(seeds - own.length, "seed")}` : ""}`,
       ];
-      return el("tr", {}, el("th", { scope: "row" }, el("a", { href: bench.caseHref(data.cases[c].name) }, data.cases[c].name)),
-        value(bench.errorLeft(row, place), number), data.blocks.map((_, k) => value(mid((r) => r.rms[k]), small)),
-        value(mid((r) => bench.median(r.mac.filter((v) => v !== null))), number), value(mid((r) => r.parameters), bench.count), value(mid((r) => r.seconds), small),
-        el("td", { class: "said" }, said.filter(Boolean).join("; ")));
+      return [bench.caseLink(data.cases[c]), cell(bench.errorLeft(row, place)), ...data.blocks.map((_, k) => middle((r) => r.rms[k], small)),
+        middle((r) => bench.median(r.mac.filter((v) => v !== null))), middle((r) => r.parameters, count), middle((r) => r.seconds, small),
+        el("td", { class: "said" }, said.filter(Boolean).join("; "))];
     });
+    const heads = ["Case", "Error left", ...data.blocks.map((block) => `${block} rms, %`), "MAC", "Unknowns", "Time, s", "Outcome"];
     const { citation, version } = data.strategies[row.index];
-    return [
-      citation ? el("p", { class: "soft" }, citation, version ? ` (version ${version})` : "") : null,
-      el("table", {}, el("caption", { class: "hidden" }, `${row.strategy}, case by case; medians over the seeds`),
-        el("thead", {}, el("tr", {}, heads.map((h, k) => el("th", { scope: "col", class: k && k < heads.length - 1 ? "right" : "" }, h)))), el("tbody", {}, body)),
-    ];
+    return [citation && el("p", { class: "soft" }, citation, version && ` (version ${version})`), bench.table(`${row.strategy}, case by case; medians over the seeds`, heads, lines)];
   }
-  function toggle(index) {
-    const line = lines.get(index);
-    const button = line.tr.querySelector(".expand");
-    const open = button.getAttribute("aria-expanded") !== "true";
+  function toggle(row, button) {
+    const [open, line] = [button.getAttribute("aria-expanded") !== "true", button.closest("tr")];
     button.setAttribute("aria-expanded", String(open));
-    if (open && !line.more) {
-      line.more = el("tr", { class: "more", id: `cases-${index}` }, el("td", { colspan: COLUMNS.length }, el("div", { class: "inner" }, detail(line.row))));
-      line.tr.after(line.more);
-    }
-    if (line.more) line.more.hidden = !open;
-  }
-
-  // Put the rows in order without computing anything anew; nothing stays at the end.
-  function order() {
-    const by = COLUMNS.find(({ key }) => key === state.key).by ?? ((row) => row[state.key]);
-    const keyed = state.rows.map((row) => [by(row) ?? null, row]);
-    keyed.sort(([a, p], [b, q]) => (a === null) - (b === null) || (a !== null && (state.down ? d3.descending(a, b) : d3.ascending(a, b))) || p.rank - q.rank);
-    parts.body.append(...keyed.flatMap(([, row]) => [lines.get(row.index).tr, lines.get(row.index).more].filter(Boolean)));
-    for (const th of parts.heads) {
-      if (th.dataset.key === state.key) th.setAttribute("aria-sort", state.down ? "descending" : "ascending");
-      else th.removeAttribute("aria-sort");
-    }
-  }
-  function sortBy({ key, down }) {
-    Object.assign(state, { key, down: state.key === key ? !state.down : Boolean(down) });
-    order();
-  }
-  function head() {
-    parts.heads = COLUMNS.map((own) => el("th", { scope: "col", class: own.text ? null : "right", "data-key": own.key },
-      own.key ? el("button", { type: "button", title: own.hint, onclick: () => sortBy(own) }, own.title) : own.title));
-    return el("thead", {}, el("tr", {}, parts.heads));
+    if (!line.nextElementSibling?.matches(".more")) line.after(el("tr", { class: "more", id: `cases-${row.index}` }, el("td", { colspan: COLUMNS.length }, el("div", { class: "inner" }, detail(row)))));
+    line.nextElementSibling.hidden = !open;
   }
 
   // Compute rows, ranks and figures for the filter as it is, and draw them.
-  function update() {
-    const text = state.text.toLowerCase();
-    const strategies = new Set([...state.filter.strategies].filter((s) => data.strategies[s].name.toLowerCase().includes(text)));
+  function update(changed) {
+    Object.assign(state.filter, changed);
+    const strategies = new Set([...state.filter.strategies].filter((s) => data.strategies[s].name.toLowerCase().includes(state.filter.text)));
     const filter = { ...state.filter, strategies };
     const rows = ranking.rows(filter);
     state.rows = rows;
@@ -127,64 +100,53 @@
       draw(rows);
       setTimeout(() => state.rows === rows && finish(), 0);
     } else finish();
-    clearTimeout(parts.timer);
+    clearTimeout(state.timer);
     const below = () => {
       parts.matrix.replaceChildren(...bench.caseMatrix(rows, filter));
       parts.figures.replaceChildren(...overview.figures(rows, filter));
     };
-    if (parts.drawn) parts.timer = setTimeout(below, 60);
+    if (state.drawn) state.timer = setTimeout(below, 60);
     else below();
-    parts.drawn = true;
+    state.drawn = true;
   }
   function draw(rows) {
-    lines.clear();
-    for (const row of rows) {
+    const { blocks } = state.filter;
+    const hidden = ({ block }) => block !== undefined && !blocks.includes(block);
+    const lines = rows.map((row) => {
       const name = [row.unphysical && "unphysical", row.strategy === data.baseline && "baseline"].filter(Boolean).join(" ");
-      lines.set(row.index, { row, tr: el("tr", { class: name, "data-strategy": row.strategy }, COLUMNS.map((own) => own.cell(row))), more: null });
-    }
-    parts.body.replaceChildren(...(rows.length ? [] : [el("tr", {}, el("td", { colspan: COLUMNS.length }, "Nothing to show: no result passes the filters."))]));
-    order();
+      return el("tr", { class: name, "data-strategy": row.strategy }, COLUMNS.map((column) => Object.assign(column.cell(row), { hidden: hidden(column) })));
+    });
+    parts.body.replaceChildren(...(rows.length ? lines : [el("tr", {}, el("td", { colspan: COLUMNS.length }, "Nothing to show: no result passes the filters."))]));
+    parts.sort();
     const kind = ranking.intervalKind(rows);
-    COLUMNS.forEach((own, k) => {
-      if (!own.key) parts.heads[k].textContent = `95 % interval${kind ? ` over ${kind}` : ""}`;
-      for (const tr of [parts.heads[k].parentNode, ...[...lines.values()].map((line) => line.tr)]) tr.children[k].hidden = own.block !== undefined && !state.filter.blocks.includes(own.block);
+    COLUMNS.forEach((column, k) => {
+      if (!column.key) parts.heads[k].textContent = `95 % interval${kind && ` over ${kind}`}`;
+      parts.heads[k].hidden = hidden(column);
     });
     const [changed, fewer] = [!ranking.isWhole(state.filter), rows.length < data.strategies.length];
-    const count = `${rows.length} of ${bench.plural(data.strategies.length, "strategy", "strategies")}, ${rows[0]?.cases.length ?? 0} of ${bench.plural(data.cases.length, "case")}, ${state.filter.blocks.length} of ${bench.plural(data.blocks.length, "block")}.`;
-    const anew = changed ? " Skills, intervals, errors and ranks are computed anew for these; the tiers and groups are those of the whole run." : fewer ? " Ranks are among these; the tiers and groups are those of the whole run." : "";
-    parts.status.textContent = count + anew;
+    const anew = changed ? "Skills, intervals, errors and ranks are computed anew for these" : "Ranks are among these";
+    parts.status.textContent = `${rows.length} of ${bench.plural(data.strategies.length, "strategy", "strategies")}, ${rows[0]?.cases.length ?? 0} of ${bench.plural(data.cases.length, "case")}, ${blocks.length} of ${bench.plural(data.blocks.length, "block")}.`
+      + (changed || fewer ? ` ${anew}; the tiers and groups are those of the whole run.` : "");
     parts.status.classList.toggle("changed", changed || fewer);
   }
 
-  // Return the heading and the lines below it that say what the run shows.
-  function finding() {
-    const [first, ...rest] = data.finding;
-    return [el("h1", { tabindex: "-1" }, first ?? "Leaderboard"), rest.length ? el("p", { class: "finding" }, rest.join(" ")) : null];
-  }
-
-  bench.errorLeft = (row, place) => (row.logs[0][place] === null ? null : bench.median(row.logs.map((logs) => Math.exp(logs[place]))));
   bench.board = {
-    // Replace parts of the filter ({scenarios, blocks, strategies: Sets or lists, text}) and draw anew.
-    setFilter(given) {
-      const { filter } = state;
-      if (given.scenarios) filter.scenarios = new Set(given.scenarios);
-      if (given.blocks) filter.blocks = d3.sort(given.blocks);
-      if (given.strategies) filter.strategies = new Set(given.strategies);
-      if (given.text !== undefined) state.text = given.text;
-      update();
-    },
     rows: () => state.rows,
     // Return the page of the leaderboard.
     page() {
-      state.filter = ranking.everything();
+      state.filter = { ...ranking.everything(), text: "" };
       parts.body = el("tbody");
       parts.status = el("p", { class: "status", role: "status" });
       for (const name of ["top", "figures"]) parts[name] = el("div", { class: "columns" });
-      parts.matrix = el("div", {});
-      const table = el("table", { id: "board-table", class: "board" }, el("caption", { class: "hidden" }, "Leaderboard; the buttons in the head sort it"), head(), parts.body);
-      const page = el("section", { id: "board" }, finding(), parts.top, el("h2", {}, "Leaderboard"), el("p", { class: "lead" }, data.lead, " Every rms is over the modes of a block, and the median over the cases."),
-        bench.filters(), parts.status, bench.scroll("Leaderboard", table), parts.matrix, el("h2", {}, "How the strategies compare"), parts.figures);
-      update();
+      parts.matrix = el("div");
+      parts.heads = COLUMNS.map(({ key, title, hint, right, down }) => el("th", { scope: "col", class: right && "right", title: hint, "data-key": key, "data-still": !key, "data-down": down, "aria-sort": key === "rank" && "ascending" }, title));
+      const table = el("table", { id: "board-table", class: "board", "aria-label": "Leaderboard; the buttons in the head sort it" }, el("thead", {}, el("tr", {}, parts.heads)), parts.body);
+      parts.sort = sortable(table);
+      const [first, ...rest] = data.finding;
+      const page = el("section", { id: "board" }, el("h1", { tabindex: "-1" }, first ?? "Leaderboard"), rest.length > 0 && el("p", { class: "finding" }, rest.join(" ")), parts.top,
+        el("h2", {}, "Leaderboard"), el("p", { class: "lead" }, data.lead, " Every rms is over the modes of a block, and the median over the cases."),
+        bench.filters(update), parts.status, bench.scroll(table), parts.matrix, el("h2", {}, "How the strategies compare"), parts.figures);
+      update({});
       return page;
     },
   };

@@ -4,7 +4,7 @@
   const MOST_CURVES = 8;
   const MOST_ROWS = 40;
   const FARTHEST = 1000;
-  const LEVELS = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95];
+  const LEVELS = [...d3.range(0.1, 0.95, 0.1).map((level) => Number(level.toFixed(1))), 0.95];
   const { tiers, groups, note, pairs } = data.statistics;
   const tierOf = new Map(tiers.flatMap((tier, t) => tier.map((s) => [s, t + 1])));
   const lettersOf = d3.rollup(groups.flatMap((group, g) => group.map((s) => [s, bench.letter(g)])), (own) => own.map(([, letter]) => letter).join(" "), ([s]) => s);
@@ -18,33 +18,31 @@
 
   function skills(rows) {
     const shown = first(rows, MOST_ROWS);
-    const name = (row) => `${row.strategy}${tiers.length > 1 && tierOf.has(row.index) ? `, tier ${tierOf.get(row.index)}` : ""}${row.unphysical ? " ▲" : ""}`;
+    const nameOf = (row) => `${row.strategy}${tiers.length > 1 && tierOf.has(row.index) ? `, tier ${tierOf.get(row.index)}` : ""}${row.unphysical ? " ▲" : ""}`;
+    const names = shown.map(nameOf);
     const kind = ranking.intervalKind(rows);
     const drawn = shown.filter((row) => row.skill_drawn !== null);
     const given = `${ranking.yardstick}s`;
     return bench.draw({
       kind: "interval", title: `Skill of every strategy on ${data.scored_on}`,
-      note: `${kind ? `The line is the 95 % interval over ${kind}. ` : ""}0: the ${given}, which no data have changed; 1: no error left.${shown.some((row) => row.unphysical) ? " ▲: unphysical." : ""}${left(rows, shown)}`,
-      x: { label: "skill, part of the error taken away", unit: "1", high: 1 },
-      y: { label: "", unit: "", names: shown.map(name) },
+      note: `${kind && `The line is the 95 % interval over ${kind}. `}0: the ${given}, which no data have changed; 1: no error left.${shown.some((row) => row.unphysical) ? " ▲: unphysical." : ""}${left(rows, shown)}`,
+      x: { label: "skill, part of the error taken away", unit: "1", high: 1 }, y: { names }, marks: [{ axis: "x", value: 0, label: "without data" }],
       series: [
-        { name: `from the ${given}`, x: shown.map((row) => row.skill), y: shown.map(name), low: shown.map((row) => row.skill_low), high: shown.map((row) => row.skill_high), names: shown.map(name) },
-        ...(drawn.length ? [{ name: "from the models as drawn", role: "nominal", x: drawn.map((row) => row.skill_drawn), y: drawn.map(name), names: drawn.map(name) }] : []),
+        { name: `from the ${given}`, names, x: shown.map((row) => row.skill), y: names, low: shown.map((row) => row.skill_low), high: shown.map((row) => row.skill_high) },
+        ...(drawn.length ? [{ name: "from the models as drawn", role: "nominal", x: drawn.map((row) => row.skill_drawn), y: drawn.map(nameOf), names: drawn.map(nameOf) }] : []),
       ],
-      marks: [{ axis: "x", value: 0, label: "without data" }],
-      height: 17 * shown.length + 70,
     });
   }
 
   function calibration(rows) {
     const shown = rows.filter((row) => row.stated.length).slice(0, MOST_CURVES);
     if (!shown.length) return null;
+    const modes = new Set(d3.extent(shown, (row) => d3.sum(row.stated, (f) => f.modes)));
     return bench.draw({
       kind: "calibration", title: "Are stated uncertainties true?",
-      note: `Share of unseen modes inside the interval of each level that a strategy states; over ${d3.extent(shown, (row) => d3.sum(row.stated, (f) => f.modes)).filter((n, k, both) => !k || n > both[0]).join(" to ")} modes, every structure counts alike. On the diagonal: true; below it: too sure; above: too cautious.`,
+      note: `Share of unseen modes inside the interval of each level that a strategy states; over ${[...modes].join(" to ")} modes, every structure counts alike. On the diagonal: true; below it: too sure; above: too cautious.`,
       x: { label: "stated level", unit: "1", low: 0, high: 1 }, y: { label: "share of unseen modes inside", unit: "1", low: 0, high: 1 },
       series: shown.map((row) => ({ name: row.strategy, x: LEVELS, y: LEVELS.map((level) => ranking.covered(row, level)) })),
-      height: 330,
     });
   }
 
@@ -68,7 +66,7 @@
     return bench.draw({
       kind: "steps", title: "Performance profiles",
       note: `How often is a strategy within a factor τ of the best one? ${bench.plural(problems.length, "problem")}, one a case and block; rms errors with ${offset} % added as in the score. Left edge: how often it is the best; high and left is good.${left(rows, shown)}`,
-      x: { label: "factor τ of the best rms error", unit: "1", log: true, low: 1, high: end }, y: { label: "share of problems", unit: "1", low: 0, high: 1.02 }, series, height: 360,
+      x: { label: "factor τ of the best rms error", unit: "1", log: true, low: 1, high: end }, y: { label: "share of problems", unit: "1", low: 0, high: 1.02 }, series,
     });
   }
 
@@ -77,12 +75,12 @@
     if (!found.length) return null;
     const series = [["physical", false, 2], ["unphysical", true, 1]].map(([name, unphysical, style]) => {
       const own = found.filter((row) => row.unphysical === unphysical);
-      return { name, style, x: own.map((r) => r.seconds), y: own.map((r) => 1 - r.skill), names: own.map((r) => r.strategy) };
+      return { name, style, x: own.map((row) => row.seconds), y: own.map((row) => 1 - row.skill), names: own.map((row) => row.strategy) };
     });
     return bench.draw({
       kind: "scatter", title: "Accuracy against cost",
       note: `What is left of the error (1 − skill; 1 = the ${ranking.yardstick}) against wall time, median over the cases. Low and left is good.`,
-      x: { label: "wall time, median over the cases", unit: "s", log: true }, y: { label: "error left", unit: "1", log: true }, height: 360,
+      x: { label: "wall time, median over the cases", unit: "s", log: true }, y: { label: "error left", unit: "1", log: true },
       marks: [{ axis: "y", value: 1, label: ranking.yardstick }], series: series.filter((s) => s.x.length),
     });
   }
@@ -94,24 +92,23 @@
       const values = rows.map((row) => bench.median(row.perStructure.map((logs) => logs[c])));
       return values.map((v) => d3.sum(values, (w) => (w < v - data.tie ? 1 : w <= v + data.tie ? 0.5 : 0)) + 0.5);
     });
-    return d3.sort(rows.map((row, k) => ({ s: row.index, name: row.strategy, rank: d3.mean(places, (own) => own[k]) })), (item) => item.rank, (item) => item.s);
+    return d3.sort(rows.map(({ index, strategy }, k) => ({ s: index, name: strategy, rank: d3.mean(places, (own) => own[k]) })), (item) => item.rank, (item) => item.s);
   }
 
   function comparison() {
     const ranks = meanRanks();
     if (ranks.length < 2) return null;
     const shown = ranks.slice(0, MOST_ROWS);
-    const named = ({ s, name }) => (lettersOf.has(s) ? `${name} · ${lettersOf.get(s)}` : name);
+    const names = shown.map(({ s, name }) => (lettersOf.has(s) ? `${name} · ${lettersOf.get(s)}` : name));
     const apart = pairs.filter(([, , p]) => p < 0.05).length;
     const chart = bench.draw({
       kind: "interval", title: "Which strategies differ by more than chance",
-      note: [note, pairs.length ? `${apart} of ${bench.plural(pairs.length, "pair")} differ. Strategies that share a letter: no difference shown.` : "", `Ranks are by score alone, and for the whole run whatever the filter.${left(ranks, shown)}`].filter(Boolean).join(" "),
-      x: { label: "mean rank over the structures (1 is best)", unit: "", low: 1 }, y: { label: "", unit: "", names: shown.map(named) },
-      series: [{ name: "mean rank", x: shown.map((item) => item.rank), y: shown.map(named), names: shown.map(named) }],
-      height: 19 * shown.length + 70,
+      note: [note, pairs.length && `${apart} of ${bench.plural(pairs.length, "pair")} differ. Strategies that share a letter: no difference shown.`, `Ranks are by score alone, and for the whole run whatever the filter.${left(ranks, shown)}`].filter(Boolean).join(" "),
+      x: { label: "mean rank over the structures (1 is best)", low: 1 }, y: { names },
+      series: [{ name: "mean rank", x: shown.map((item) => item.rank), y: names, names }],
     });
     const listed = groups.map((group, g) => el("li", {}, el("b", {}, `${bench.letter(g)}: `), ranks.filter((item) => group.includes(item.s)).map((item) => item.name).join(", ")));
-    if (listed.length) chart.append(el("details", { class: "numbers" }, el("summary", {}, "Groups in words"), el("ul", {}, listed)));
+    if (listed.length) chart.append(bench.fold("Groups in words", () => el("ul", {}, listed), "numbers"));
     return chart;
   }
 

@@ -30,23 +30,21 @@
   // data count where there are any; what several cases of a structure share counts once.
   function gridOf(filter) {
     const whole = isWhole(filter);
-    const [cases, known, open] = [[], [], []];
-    data.cases.forEach(({ reference, scenario, structure }, c) => {
-      const own = byCase.get(c) ?? [];
-      if (!filter.scenarios.has(scenario) || !(own.length || has(reference))) return;
-      const there = filter.blocks.filter((k) => (has(reference) ? data.blocks[k] in reference : own.some((r) => r.rms[k] !== null)));
-      if (!there.length && !whole) return;
-      cases.push(c);
-      if (has(reference)) known.push(...there.map((k) => ({ c, k, data: `${structure}:${k}:${reference[data.blocks[k]].toPrecision(9)}` })));
-      else open.push(...(whole ? [null] : there).map((k) => ({ c, k, weight: 1 })));
-    });
+    const shown = d3.range(data.cases.length).map((c) => {
+      const { reference, scenario } = data.cases[c];
+      const [own, known] = [byCase.get(c) ?? [], has(reference)];
+      const there = filter.blocks.filter((k) => (known ? data.blocks[k] in reference : own.some((r) => r.rms[k] !== null)));
+      return filter.scenarios.has(scenario) && (own.length || known) && (there.length || whole) ? { c, known, there: known || !whole ? there : [null] } : null;
+    }).filter(Boolean);
     const unseen = (listed) => (listed.some(({ k }) => data.blocks[k] !== "used") ? listed.filter(({ k }) => data.blocks[k] !== "used") : listed);
-    const counted = unseen(known);
-    const often = d3.rollup(counted, (same) => same.length, (unit) => unit.data);
-    for (const unit of counted) unit.weight = 1 / often.get(unit.data);
-    const units = [...counted, ...unseen(open)];
+    const unitsOf = (wanted) => unseen(shown.flatMap(({ c, known, there }) => (known === wanted ? there.map((k) => ({ c, k, weight: 1 })) : [])));
+    const counted = unitsOf(true);
+    const shared = ({ c, k }) => `${structureOf(c)}:${k}:${data.cases[c].reference[data.blocks[k]].toPrecision(9)}`;
+    for (const [, same] of d3.group(counted, shared)) for (const unit of same) unit.weight = 1 / same.length;
+    const units = [...counted, ...unitsOf(false)];
     const structures = [...new Set(units.map((unit) => structureOf(unit.c)))];
     for (const unit of units) unit.structure = structures.indexOf(structureOf(unit.c));
+    const cases = shown.map(({ c }) => c);
     const tested = new Set(cases.filter((c) => data.cases[c].test));
     return { cases, blocks: filter.blocks, units, structures, whole, tests: tested.size && tested.size < cases.length ? tested : null };
   }
@@ -63,32 +61,31 @@
   const skillOf = (logs) => 1 - Math.exp(d3.mean(logs));
 
   function rowOf(s, grid) {
-    const place = new Map(grid.cases.map((c, i) => [c, i]));
-    const logs = seeds.map((seed) => grid.units.map(({ c, k }) => logScore(resultAt(s, c, seed), k)));
-    const structured = (weight) => logs.map((own) => means(own, grid.units, (unit) => unit.structure, grid.structures.length, weight));
+    const { cases, structures, units, blocks } = grid;
+    const place = new Map(cases.map((c, i) => [c, i]));
+    const logs = seeds.map((seed) => units.map(({ c, k }) => logScore(resultAt(s, c, seed), k)));
+    const structured = (weight) => logs.map((own) => means(own, units, (unit) => unit.structure, structures.length, weight));
     const perStructure = structured();
     const skills = perStructure.map(skillOf);
     const tests = grid.tests && structured((unit) => (grid.tests.has(unit.c) ? unit.weight : 0)).map(skillOf);
     const results = (byStrategy.get(s) ?? []).filter((r) => place.has(r.c));
     const fine = results.filter((r) => r.status === "ok");
     const strategy = data.strategies[s].name;
+    const forecasts = fine.flatMap((r) => blocks.flatMap((k) => (r.forecast[k] ? [{ c: r.c, ...r.forecast[k] }] : [])));
     const row = {
       index: s, strategy, rank: 0, skill: median(skills), skill_low: null, skill_high: null,
       skill_drawn: (grid.whole && data.board.find((own) => own.strategy === strategy)?.skill_drawn) ?? null,
       skill_tests: tests && Number.isFinite(tests[0]) ? median(tests) : null,
       rigid_modes_lost: d3.sum(fine, (r) => r.lost), negative_eigenvalues: d3.sum(fine, (r) => r.negative),
       parameters: middle(fine, (r) => r.parameters), seconds: middle(fine, (r) => r.seconds),
+      ...Object.fromEntries(data.blocks.map((block, k) => [`${block}_percent`, middle(fine, (r) => r.rms[k])])),
       ok: fine.length, not_applicable: results.filter((r) => r.status === "not-applicable").length,
-      total: grid.cases.length * seeds.length, unphysical: results.some((r) => r.unphysical),
-      logs: logs.map((own) => means(own, grid.units, (unit) => place.get(unit.c), grid.cases.length)),
-      perStructure, skills, results, cases: grid.cases, structures: grid.structures,
+      total: cases.length * seeds.length, unphysical: results.some((r) => r.unphysical),
+      logs: logs.map((own) => means(own, units, (unit) => place.get(unit.c), cases.length)),
+      perStructure, skills, results, cases, structures,
+      stated: forecasts.filter(({ levels }) => levels), crps_percent: byStructure(forecasts, ({ crps }) => crps),
     };
-    data.blocks.forEach((b, k) => (row[`${b}_percent`] = middle(fine, (r) => r.rms[k])));
-    const forecasts = fine.flatMap((r) => grid.blocks.flatMap((k) => (r.forecast[k] ? [{ c: r.c, ...r.forecast[k] }] : [])));
-    row.stated = forecasts.filter(({ levels }) => levels);
-    row.crps_percent = byStructure(forecasts, ({ crps }) => crps);
-    row.coverage90 = covered(row, 0.9);
-    return row;
+    return { ...row, coverage90: covered(row, 0.9) };
   }
   // Return the mean over the modes of every structure, then over structures; null without any.
   function byStructure(forecasts, total) {
@@ -121,34 +118,26 @@
   function overStructures(rows) {
     const n = rows[0].structures.length;
     const random = d3.randomLcg(20260 + n);
-    const counts = new Float64Array(n * RESAMPLES);
-    for (let t = 0; t < RESAMPLES; t += 1) for (let i = 0; i < n; i += 1) counts[t * n + Math.floor(random() * n)] += 1;
-    const tail = data.statistics.tails[n];
-    const left = new Float64Array(RESAMPLES);
+    const drawn = Uint16Array.from({ length: n * RESAMPLES }, () => Math.floor(random() * n));
     for (const row of rows) {
-      const own = row.structures.map((_, i) => d3.mean(row.perStructure, (logs) => logs[i]));
-      for (let t = 0; t < RESAMPLES; t += 1) {
-        left[t] = 0;
-        for (let i = 0; i < n; i += 1) left[t] += (counts[t * n + i] * own[i]) / n;
-      }
-      left.sort();
-      [row.skill_low, row.skill_high] = [1 - tail, tail].map((q) => 1 - Math.exp(d3.quantileSorted(left, q)));
+      const own = row.structures.map((_, i) => d3.mean(row.perStructure, (logs) => logs[i]) / n);
+      const left = new Float64Array(RESAMPLES);
+      for (let t = 0; t < drawn.length; t += 1) left[Math.floor(t / n)] += own[drawn[t]];
+      const tail = data.statistics.tails[n];
+      [row.skill_low, row.skill_high] = ends(left, [1 - tail, tail]).map((log) => 1 - Math.exp(log));
     }
   }
   function overSeeds(rows) {
-    const n = seeds.length;
     for (const row of rows) {
       const random = d3.randomLcg(20260 + row.index);
-      const drawn = Float64Array.from({ length: RESAMPLES }, () => median(row.skills.map(() => row.skills[Math.floor(random() * n)])));
-      drawn.sort();
-      [row.skill_low, row.skill_high] = [0.025, 0.975].map((q) => d3.quantileSorted(drawn, q));
+      const drawn = Float64Array.from({ length: RESAMPLES }, () => median(row.skills.map(() => row.skills[Math.floor(random() * row.skills.length)])));
+      [row.skill_low, row.skill_high] = ends(drawn, [0.025, 0.975]);
     }
   }
+  const ends = (drawn, tails) => tails.map((q) => d3.quantileSorted(drawn.sort(), q));
   // Return what intervals are over: "structures", "seeds" or "" where there are none.
-  function intervalKind(rows) {
-    if (!rows.length) return "";
-    if (rows[0].structures.length >= data.statistics.fewest) return "structures";
-    return seeds.length > 1 ? "seeds" : "";
+  function intervalKind([first]) {
+    return first?.structures.length >= data.statistics.fewest ? "structures" : first && seeds.length > 1 ? "seeds" : "";
   }
   // Fill the 95 % intervals in.
   function intervals(rows, filter) {

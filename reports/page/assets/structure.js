@@ -3,11 +3,12 @@
   const { el, svg } = bench;
   // How a mode shape is first seen, and where nothing moves: azimuth and elevation in degrees.
   const START = { "out-of-plane": [32, 34], "in-plane": [14, 12], "3d": [34, 24] };
-  const FLAT = { "out-of-plane": [0, 90], "in-plane": [0, 0], "3d": START["3d"] };
+  const FLAT = { ...START, "out-of-plane": [0, 90], "in-plane": [0, 0] };
   const CYCLE = 2400; // ms of one period on the screen
   const REACH = 0.22; // of the radius of the structure, a reading of 1 at an amplitude of 1
-  const LETTER = 6.4; // px a letter takes at 12 px
   const MOST_LABELS = 12; // of findings that are told in words on the drawing
+  const MANY = 100; // findings; more are drawn by colours while the view moves
+  const MOST_BENT = 300; // nodes with smooth lines between them; those of more lie close enough
   const LONGEST = 40; // letters beside a place
   const ROBUST = 3; // medians at which colours of changes end
   const BLOCKS = { used: "used", higher: "held out", modified: "modified, held out" };
@@ -18,15 +19,31 @@
   const add = (a, b, factor = 1) => a.map((value, k) => value + factor * b[k]);
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const mix = (a, b, share) => a.map((value, k) => (1 - share) * value + share * b[k]);
-  const move = ([x, y]) => `M${x.toFixed(1)},${y.toFixed(1)}`;
-  const straight = (points) => points.map((p, i) => `${i ? "L" : "M"}${p[0].toFixed(1)},${p[1].toFixed(1)}`).join("");
-  const smooth = d3.line().curve(d3.curveCardinal).digits(1);
+  const percent = (value, plus = "+") => `${value < 0 ? "−" : plus}${d3.format(Math.abs(value) >= 0.0995 ? ".0f" : ".2~r")(100 * Math.abs(value))} %`;
+  const hz = (value) => `${Number(Math.abs(value).toPrecision(5))}${value < 0 ? "i" : ""} Hz`;
 
-  /** Return centre and size (radius in m) of the nodes. */
-  const extent = (nodes) => {
-    const sides = [0, 1, 2].map((k) => d3.extent(nodes, (node) => node[k]));
-    return { centre: sides.map(([low, high]) => (low + high) / 2), radius: Math.max(Math.hypot(...sides.map(([low, high]) => high - low)) / 2, 1e-9) };
+  const straight = d3.line().digits(1);
+  const smooth = d3.line().curve(d3.curveCardinal).digits(1);
+  const ring = ([x, y], r) => `M${(x - r).toFixed(1)},${y.toFixed(1)}a${r},${r} 0 1 0 ${2 * r},0a${r},${r} 0 1 0 ${-2 * r},0`;
+  const box = ([x, y], r) => `M${(x - r).toFixed(1)},${(y - r).toFixed(1)}h${2 * r}v${2 * r}h${-2 * r}Z`;
+  const cross = ([x, y], r) => straight([[x - r, y - r], [x + r, y + r]]) + straight([[x - r, y + r], [x + r, y - r]]);
+  const SIGNS = { spring: ["ring", ring], mass: ["solid", box], fault: ["cross", cross], change: ["solid", ring] };
+
+  const zigzag = (from, to) => {
+    const [dx, dy] = add(to, from, -1);
+    const length = Math.hypot(dx, dy) || 1;
+    const side = (share, off) => [from[0] + share * dx - (off * dy) / length, from[1] + share * dy + (off * dx) / length];
+    return straight([from, ...d3.range(1, 9).map((k) => side(k / 9, k % 2 ? 4 : -4)), to]) + straight([side(1, -7), side(1, 7)]);
   };
+  const arrow = (from, to) => {
+    const [dx, dy] = add(to, from, -1);
+    const length = Math.hypot(dx, dy);
+    const head = Math.min(8, 0.6 * length) / (length || 1);
+    const back = (side) => [to[0] - head * (dx - 0.5 * side * dy), to[1] - head * (dy + 0.5 * side * dx)];
+    return straight([from, to]) + (length < 2 ? "" : straight([back(1), to, back(-1)]));
+  };
+  /** Return the lines of a structure as one path; nodes without elements are dots. */
+  const outline = (chains, points, pen = points.length > MOST_BENT ? straight : smooth) => (chains.length ? chains.map((nodes) => pen(nodes.map((node) => points[node]))) : points.map((p) => straight([p, p]))).join("");
 
   /** Return the nodes of every member in order, as chains to draw smooth lines through. */
   const chainsOf = (stage) => stage.elements.reduce((found, [start, stop], i) => {
@@ -36,9 +53,34 @@
     return found;
   }, []).map(({ nodes }) => nodes);
 
+  /** Return centre and size (radius in m) of the nodes. */
+  const extent = (nodes) => {
+    const sides = [0, 1, 2].map((k) => d3.extent(nodes, (node) => node[k]));
+    return { centre: sides.map((side) => d3.mean(side)), radius: Math.max(Math.hypot(...sides.map(([low, high]) => high - low)) / 2, 1e-9) };
+  };
+
+  /** Return the projection of points and of directions in m to px, with the directions of the page. */
+  const camera = ({ turn: [azimuth, elevation], zoom = 1, fit = 1 }, frame, width, height) => {
+    const [a, e] = [(azimuth * Math.PI) / 180, (elevation * Math.PI) / 180];
+    const right = [Math.cos(a), Math.sin(a), 0];
+    const up = [-Math.sin(e) * Math.sin(a), Math.sin(e) * Math.cos(a), Math.cos(e)];
+    const scale = (zoom * fit * Math.min(width, height * 1.6)) / (2 * frame.radius);
+    const direct = (way) => [scale * dot(way, right), -scale * dot(way, up)];
+    return { right, up, direct, project: (xyz) => add([width / 2, height / 2], direct(add(xyz, frame.centre, -1))) };
+  };
+
+  /** Return the scale at which the structure fills the drawing with its shapes. */
+  const fitted = (turn, frame, stage, reach, width, height, margin = 40) => {
+    const { project } = camera({ turn }, frame, width, height);
+    const axes = new Map(stage.sensors.filter(({ rotation }) => reach && !rotation).map(({ axis }) => [axis.map(Math.abs).join(), axis]));
+    const points = stage.nodes.flatMap((node) => [node, ...[...axes.values()].flatMap((axis) => [add(node, axis, reach), add(node, axis, -reach)])]).map(project);
+    const half = (k, size) => Math.max(d3.max(points, (p) => Math.abs(p[k] - size / 2)), 1);
+    return Math.min((width / 2 - margin) / half(0, width), (height / 2 - 30) / half(1, height));
+  };
+
   /** Return the motion of a sensor in a shape: of its node, or of the nearest point of an element. */
   const motionAt = (stage, shape, { node, xyz }) => {
-    if (node !== null && node !== undefined) return shape[node];
+    if ((node ?? null) !== null) return shape[node];
     const spots = stage.elements.map(([i, j]) => {
       const along = add(stage.nodes[j], stage.nodes[i], -1);
       const share = Math.min(Math.max(dot(add(xyz, stage.nodes[i], -1), along) / (dot(along, along) || 1), 0), 1);
@@ -48,228 +90,126 @@
     return mix(shape[best.i], shape[best.j], best.share);
   };
 
-  /** Return what the sensors read of a shape; null for rotations, which shapes do not have. */
-  const readings = (stage, shape) => stage.sensors.map((sensor) => (sensor.rotation ? null : dot(motionAt(stage, shape, sensor), sensor.axis)));
-
-  /** Return the factor that brings measured readings nearest to predicted ones, and their MAC. */
-  const match = (measured, predicted) => {
-    const known = d3.zip(measured, predicted).filter(([m, p]) => m !== null && p !== null);
+  /** Return what is drawn of a picked mode: shape, measured arrows scaled to it, MAC. */
+  const picture = (stage, { measured, predicted }, modes) => {
+    const shape = predicted?.shape ?? null;
+    if (!measured) return { shape, arrows: null, mac: null, scored: null };
+    const scored = (modes ?? []).find((item) => item.mode === measured.mode && (item.modification ?? null) === (measured.modification ?? null)) ?? null;
+    if (!shape) return { shape, arrows: measured.shape, mac: scored && scored.mac, scored };
+    // Rotations are not in the shapes.
+    const read = stage.sensors.map((sensor) => (sensor.rotation ? null : dot(motionAt(stage, shape, sensor), sensor.axis)));
+    const known = d3.zip(measured.shape, read).filter(([m, p]) => m !== null && p !== null);
     const [mm, mp, pp] = [d3.sum(known, ([m]) => m * m), d3.sum(known, ([m, p]) => m * p), d3.sum(known, ([, p]) => p * p)];
-    return { factor: mm ? mp / mm : 0, mac: mm * pp ? (mp * mp) / (mm * pp) : 0 };
+    const arrows = measured.shape.map((value) => (value === null || !mm ? null : (mp / mm) * value));
+    return { shape, arrows, mac: scored?.mac ?? (mm * pp ? (mp * mp) / (mm * pp) : 0), scored };
   };
 
-  /** Return the projection of points in m to px, with the directions of the page. */
-  const camera = ({ turn: [azimuth, elevation], zoom, fit }, frame, width, height) => {
-    const [a, e] = [(azimuth * Math.PI) / 180, (elevation * Math.PI) / 180];
-    const right = [Math.cos(a), Math.sin(a), 0];
-    const up = [-Math.sin(e) * Math.sin(a), Math.sin(e) * Math.cos(a), Math.cos(e)];
-    const scale = (zoom * fit * Math.min(width, height * 1.6)) / (2 * frame.radius);
-    const project = (xyz) => {
-      const from = add(xyz, frame.centre, -1);
-      return [width / 2 + scale * dot(from, right), height / 2 - scale * dot(from, up)];
-    };
-    return { project, right, up };
+  /** Return the modes that can be picked, every measured one and then what the model has besides, by their keys. */
+  const modesOf = (stage, entry) => {
+    const own = entry?.exhibit?.modes ?? [];
+    const partner = ({ mode, modification }) => own.find((item) => item.paired === mode && (item.modification ?? null) === (modification ?? null)) ?? null;
+    const modes = [...stage.measured.map((measured) => ({ measured, predicted: partner(measured) })),
+      ...own.filter((item) => item.paired === null).map((predicted) => ({ measured: null, predicted }))];
+    return new Map(modes.map(({ measured, predicted }) => {
+      const { modification } = measured ?? predicted;
+      const group = `${modification ? `With “${modification}”` : "As tested"}${measured ? "" : ", model only"}`;
+      const text = measured ? `${measured.mode} (${BLOCKS[measured.block]}), ${hz(measured.hz)}` : `not measured, ${hz(predicted.hz)}`;
+      return [`${measured ? `m${measured.mode}` : `p${predicted.hz}`}/${modification ?? ""}`, { measured, predicted, group, text }];
+    }));
   };
 
-  /** Return the scale at which the structure fills the drawing with its shapes. */
-  const fitted = (turn, frame, stage, reach, width, height, margin = 40) => {
-    const { project } = camera({ turn, zoom: 1, fit: 1 }, frame, width, height);
-    const axes = reach ? [...new Map(stage.sensors.filter(({ rotation }) => !rotation).map(({ axis }) => [axis.map(Math.abs).join(), axis])).values()] : [];
-    const points = stage.nodes.flatMap((node) => [node, ...axes.flatMap((axis) => [add(node, axis, reach), add(node, axis, -reach)])]).map(project);
-    const half = (k, size) => Math.max(...points.map((p) => Math.abs(p[k] - size / 2)), 1);
-    return Math.min((width / 2 - margin) / half(0, width), (height / 2 - 30) / half(1, height));
+  /** Return the sentence under the picture. */
+  const sentence = ({ measured, predicted }, name, { mac, scored }) => {
+    const { modification } = measured ?? predicted;
+    const after = modification ? `, with “${modification}”` : "";
+    if (!measured) return `${name}: a mode at ${hz(predicted.hz)} that no measured mode belongs to${after}`;
+    const head = `Mode ${measured.mode} (${BLOCKS[measured.block]})${after}: measured ${hz(measured.hz)}`;
+    if (!name) return `${head}; no predicted shapes are stored`;
+    const own = predicted ? predicted.hz : (scored?.predicted_hz ?? null);
+    if (own === null) return `${head}; ${name} has no ${modification && !scored ? "stored shape" : "mode"} that belongs to it`;
+    const error = 100 * (own / measured.hz - 1);
+    return `${head}, ${name} ${hz(own)} (${bench.percent(error, 2).replace(/^.(?=0\.00$)/, "")} %)${mac === null ? "" : `, MAC ${mac.toFixed(3)}`}${predicted ? "" : "; its shape is not stored"}`;
   };
 
   /** Return what was found with its lines and points in m; changes of elements where nothing better is known. */
   const foundIn = (stage, exhibit) => {
     const whole = stage.members.length ? stage.members.map(({ ends }) => ends.map((end) => stage.joints[end].xyz)) : stage.elements.map((pair) => pair.map((k) => stage.nodes[k]));
-    const given = exhibit?.findings ?? [];
-    if (given.length) {
-      return given.map((finding) => ({ ...finding, lines: finding.kind === "all" ? whole
-        : finding.kind === "pair" && finding.points.length === 2 ? [finding.points]
-          : finding.spans.filter(({ member }) => whole[member]).map(({ member, start, end }) => [mix(...whole[member], start), mix(...whole[member], end)]) }));
-    }
+    const linesOf = ({ kind, points, spans }) => {
+      if (kind === "all") return whole;
+      if (kind === "pair" && points.length === 2) return [points];
+      return spans.filter(({ member }) => whole[member]).map(({ member, start, end }) => [mix(...whole[member], start), mix(...whole[member], end)]);
+    };
+    if (exhibit?.findings?.length) return exhibit.findings.map((finding) => ({ ...finding, lines: linesOf(finding) }));
     return (exhibit?.elements ?? []).map((value, k) => ({ kind: "element", symbol: "change", norm: true, points: [], value,
       label: `${stage.element_labels[k] || "joint arm"} ${value === null ? "?" : percent(value, "")}`, lines: [stage.elements[k].map((node) => stage.nodes[node])] })).filter(({ value }) => value);
   };
 
-  const percent = (value, plus = "+") => `${value < 0 ? "\u2212" : plus}${d3.format(Math.abs(value) >= 0.0995 ? ".0f" : ".2~r")(100 * Math.abs(value))} %`;
-
   /** Return the change at which colours end: the largest, or three medians where that is less. */
+  const isSized = ({ symbol, value }) => symbol === "change" && value;
   const scaleEnd = (found) => {
-    const sizes = found.filter(({ symbol, value }) => symbol === "change" && value).map(({ value }) => Math.abs(value));
+    const sizes = found.filter(isSized).map(({ value }) => Math.abs(value));
     return Math.min(d3.max(sizes) ?? 1, ROBUST * (d3.median(sizes) ?? 1));
   };
 
-  /** Return what writes names at free places around points, where there are any. */
-  const namer = (layer, width, taken = []) => (text, [x, y], kind = "", must = false) => {
-    const wide = (kind === "strong" ? 1.15 : 1) * LETTER * text.length;
-    const spots = [[8, -7], [8, 15], [-8 - wide, -7], [-8 - wide, 15], [-wide / 2, -12], [-wide / 2, 21]];
-    const boxAt = ([dx, dy]) => ({ l: x + dx - 1, r: x + dx + wide + 1, t: y + dy - 11, b: y + dy + 3 });
-    const free = (o) => o.l >= 0 && o.r <= width && !taken.some((box) => o.l < box.r && o.r > box.l && o.t < box.b && o.b > box.t);
-    const spot = spots.find((one) => free(boxAt(one))) ?? (must ? spots[0] : null);
-    if (!spot) return;
-    taken.push(boxAt(spot));
-    layer.append(svg("text", { x: Math.max(Math.min(x + spot[0], width - wide - 3), 2), y: y + spot[1], class: kind }, text));
-  };
-
-  const zigzag = (from, to) => {
-    const [dx, dy] = add(to, from, -1);
-    const length = Math.hypot(dx, dy) || 1;
-    const side = (share, off) => [from[0] + share * dx - (off * dy) / length, from[1] + share * dy + (off * dx) / length];
-    return straight([from, ...d3.range(1, 9).map((k) => side(k / 9, k % 2 ? 4 : -4)), to]) + straight([side(1, -7), side(1, 7)]);
-  };
-
-  const arrow = (from, to) => {
-    const [dx, dy] = add(to, from, -1);
-    const length = Math.hypot(dx, dy);
-    const head = Math.min(8, 0.6 * length) / (length || 1);
-    const back = (side) => [to[0] - head * (dx - 0.5 * side * dy), to[1] - head * (dy + 0.5 * side * dx)];
-    return straight([from, to]) + (length < 2 ? "" : straight([back(1), to, back(-1)]));
-  };
-
-  const SIGNS = {
-    spring: ([x, y]) => svg("circle", { cx: x, cy: y, r: 6, class: "ring" }),
-    mass: ([x, y]) => svg("rect", { x: x - 6, y: y - 6, width: 12, height: 12, class: "solid" }),
-    fault: ([x, y]) => svg("path", { d: straight([[x - 6, y - 6], [x + 6, y + 6]]) + straight([[x - 6, y + 6], [x + 6, y - 6]]), class: "cross" }),
-    change: ([x, y]) => svg("circle", { cx: x, cy: y, r: 6, class: "solid" }),
-  };
-
   /** Draw what was found: coloured members, a ring at a spring's end, a square at a mass. */
-  const drawFound = (layer, write, found, end, project) => {
-    const words = found.length <= MOST_LABELS;
-    const order = d3.sort(found, ({ kind }) => (kind === "all" ? 0 : 1), ({ value }) => Math.abs(value ?? 0));
-    const told = [];
-    for (const { label, lines, points, symbol, value, kind, norm } of order) {
-      const share = value ? Math.min(Math.abs(value) / (end || 1), 1) : 1;
+  const drawFound = (layer, write, found, end, project, moving) => {
+    const looks = found.map((item, k) => {
+      const { label, lines, points, symbol, value, kind, norm } = item;
+      const share = value ? Math.round(20 * Math.min(Math.abs(value) / (end || 1), 1)) / 20 : 1;
       const sort = value === null || symbol !== "change" ? "other" : norm ? "norm" : value > 0 ? "more" : "less";
-      const [flat, middles] = [lines.map((line) => line.map(project)), kind === "all" || kind === "pair" ? [] : lines.map((line) => project(mix(...line, 0.5)))];
-      const group = svg("g", { class: `found ${sort}`, style: { "--share": `${Math.round(35 + 65 * share)}%` } }, svg("title", {}, label));
-      if (symbol === "change" || kind === "pair") group.append(svg("path", { d: flat.map(straight).join(""), "stroke-width": (3 + 5 * share).toFixed(1), "stroke-dasharray": kind === "pair" ? "5 4" : null }));
-      const at = [...(kind === "pair" ? [] : points.map(project)), ...(symbol === "change" ? [] : middles)];
-      group.append(...at.map(SIGNS[symbol]));
-      layer.append(group);
-      const anchor = [...at, ...middles][0];
-      const short = bench.shortened(label, LONGEST);
-      if (kind === "all") told.push([`everywhere: ${short}`, [4, 22], "strong", true]);
-      else if (anchor) told.push(words ? [short, anchor, "strong", true] : [percent(value ?? 0, norm ? "" : "+"), anchor]);
+      const pair = kind === "pair";
+      const middles = kind === "all" || pair ? [] : lines.map((line) => project(mix(...line, 0.5)));
+      const at = [...(pair ? [] : points.map(project)), ...(symbol === "change" ? [] : middles)];
+      const paths = symbol === "change" || pair ? lines.map((line) => straight(line.map(project))).join("") : "";
+      return { label, kind, value, norm, share, sort, pair, paths, signs: at.map((p) => SIGNS[symbol][1](p, 6)).join(""), sign: SIGNS[symbol][0], anchor: [...at, ...middles][0], size: Math.abs(value ?? 0), k };
+    });
+    const order = d3.sort(looks, ({ kind }) => kind !== "all", ({ size }) => size);
+    const grouped = d3.groups(order, (look) => (moving && found.length > MANY ? [look.sort, look.share, look.pair, look.sign].join() : look.k));
+    for (const [, own] of grouped) {
+      const [{ sort, share, pair, sign, label }] = own;
+      const joined = (key) => own.map((look) => look[key]).join("");
+      layer.append(svg("g", { class: `found ${sort}`, style: { "--share": `${35 + 65 * share}%` } }, own.length === 1 && svg("title", {}, label),
+        svg("path", { d: joined("paths"), "stroke-width": 3 + 5 * share, "stroke-dasharray": pair ? "5 4" : null }), svg("path", { d: joined("signs"), class: sign })));
     }
     // The largest come first where there is not room for all.
-    for (const one of told.reverse().slice(0, 2 * MOST_LABELS)) write(...one);
+    for (const { label, kind, value, norm, anchor } of order.filter(({ kind, anchor }) => kind === "all" || anchor).reverse().slice(0, 2 * MOST_LABELS)) {
+      const short = bench.shortened(label, LONGEST);
+      if (kind === "all") write(`everywhere: ${short}`, [-6, 22], { name: "strong", must: true });
+      else if (found.length > MOST_LABELS) write(percent(value ?? 0, norm ? "" : "+"), anchor);
+      else write(short, anchor, { name: "strong", must: true });
+    }
   };
 
   /** Draw joints, sensors, attachments and the directions of the page. */
   const drawFixed = (layer, write, stage, show, { project, right, up }, radius, height) => {
-    const mark = (kind, d) => layer.append(svg("path", { class: kind, d }));
+    const mark = (name, d) => layer.append(svg("path", { class: name, d }));
+    const attached = (items, draw) => (show.attachments ? items : []).forEach((item) => {
+      const [kind, d, text, at] = draw(item, project(item.xyz));
+      mark(kind, d);
+      write(text, at, { must: true });
+    });
     for (const { node, xyz, name, type } of stage.joints) {
-      const [x, y] = project(stage.nodes[node] ?? xyz);
-      layer.append(svg("circle", { cx: x, cy: y, r: 3, class: "joint" }));
-      if (show.joints) write(type && type !== name ? `${name} (${type})` : name, [x, y], "", true);
+      const at = project(stage.nodes[node] ?? xyz);
+      mark("joint", ring(at, 3));
+      if (show.joints) write(type && type !== name ? `${name} (${type})` : name, at, { must: true });
     }
-    for (const { xyz, axis, stiffness } of show.attached ? stage.springs : []) {
-      const [from, tip] = [project(xyz), project(add(xyz, axis, -0.12 * radius))];
+    attached(stage.springs, ({ xyz, axis, stiffness }, from) => {
+      const tip = project(add(xyz, axis, -0.12 * radius));
       const to = Math.hypot(...add(tip, from, -1)) < 12 ? add(from, [0, 26]) : tip;
-      mark("attached line", zigzag(from, to));
-      write(`${bench.heat.scientific(stiffness)} N/m`, to, "", true);
-    }
-    for (const { xyz, fixed } of show.attached ? stage.supports : []) {
-      const [x, y] = project(xyz);
-      mark("attached", `${straight([[x, y], [x - 8, y + 13], [x + 8, y + 13]])}Z`);
-      write(`held ${fixed.join(" ")}`, [x, y + 8], "", true);
-    }
-    for (const { xyz, kg } of show.attached ? stage.masses : []) {
-      const [x, y] = project(xyz);
-      mark("attached", `M${x - 5},${y - 5}h10v10h-10Z`);
-      write(kg < 1 ? `${Number((1000 * kg).toPrecision(3))} g` : `${Number(kg.toPrecision(3))} kg`, [x, y], "", true);
-    }
+      return ["attached line", zigzag(from, to), `${bench.number(stiffness)} N/m`, to];
+    });
+    attached(stage.supports, ({ fixed }, [x, y]) => ["attached", `${straight([[x, y], [x - 8, y + 13], [x + 8, y + 13]])}Z`, `held ${fixed.join(" ")}`, [x, y + 8]]);
+    attached(stage.masses, ({ kg }, at) => ["attached", box(at, 5), kg < 1 ? `${Number((1000 * kg).toPrecision(3))} g` : `${Number(kg.toPrecision(3))} kg`, at]);
     for (const { xyz, axis, rotation, label } of stage.sensors) {
       const at = project(xyz);
-      mark("measured", `M${at[0] - 2.5},${at[1] - 2.5}h5v5h-5Z${show.sensors && !rotation ? arrow(at, project(add(xyz, axis, 0.09 * radius))) : ""}`);
-      if (show.sensors) write(label, at, "measured-name");
+      mark("measured", box(at, 2.5) + (show.sensors && !rotation ? arrow(at, project(add(xyz, axis, 0.09 * radius))) : ""));
+      if (show.sensors) write(label, at, { name: "measured-name" });
     }
     ["x", "y", "z"].forEach((name, k) => {
-      const way = [right[k], -up[k]];
-      mark("axis", arrow([34, height - 34], add([34, height - 34], way, 24)));
-      if (24 * Math.hypot(...way) > 6) layer.append(svg("text", { x: 31 + 32 * way[0], y: height - 30 + 32 * way[1], class: "soft" }, name));
+      const [dx, dy] = [right[k], -up[k]];
+      mark("axis", arrow([34, height - 34], [34 + 24 * dx, height - 34 + 24 * dy]));
+      if (24 * Math.hypot(dx, dy) > 6) layer.append(svg("text", { x: 31 + 32 * dx, y: height - 30 + 32 * dy, class: "soft" }, name));
     });
-  };
-
-  /** Return the lines of a structure as one path; nodes without elements are dots. */
-  const outline = (chains, points) => chains.length ? chains.map((nodes) => smooth(nodes.map((node) => points[node]))).join("") : points.map((p) => `${move(p)}h0`).join("");
-
-  const hz = (value) => (value < 0 ? `${(-value).toPrecision(5)}i` : Number(value.toPrecision(5)).toString()) + " Hz";
-  const same = (a, b) => (a ?? null) === (b ?? null);
-
-  /** Return the modes that can be picked: every measured one, then what the model has besides. */
-  const modesOf = (stage, entry) => {
-    const own = entry && entry.exhibit ? entry.exhibit.modes : [];
-    const measured = stage.measured.map((mode) => ({
-      measured: mode,
-      predicted: own.find((item) => item.paired === mode.mode && same(item.modification, mode.modification)) ?? null,
-    }));
-    const alone = own.filter((item) => item.paired === null).map((item) => ({ measured: null, predicted: item }));
-    return [...measured, ...alone];
-  };
-
-  const keyOf = (mode) =>
-    mode.measured ? `m${mode.measured.mode}/${mode.measured.modification ?? ""}`
-      : `p${mode.predicted.hz}/${mode.predicted.modification ?? ""}`;
-
-  const optionText = (mode) => {
-    const { measured, predicted } = mode;
-    if (!measured) return `not measured, ${hz(predicted.hz)}`;
-    return `${measured.mode} (${BLOCKS[measured.block]}), ${hz(measured.hz)}`;
-  };
-
-  /** Return the sentence under the picture. */
-  const sentence = (mode, name, mac, scored) => {
-    const { measured, predicted } = mode;
-    const change = (measured ?? predicted).modification;
-    const after = change ? `, with \u201c${change}\u201d` : "";
-    if (!measured) return `${name}: a mode at ${hz(predicted.hz)} that no measured mode belongs to${after}`;
-    const head = `Mode ${measured.mode} (${BLOCKS[measured.block]})${after}: measured ${hz(measured.hz)}`;
-    if (!name) return `${head}; no predicted shapes are stored`;
-    const own = predicted ? predicted.hz : scored ? scored.predicted_hz : null;
-    if (own === null) return `${head}; ${name} has no ${change && !scored ? "stored shape" : "mode"} that belongs to it`;
-    const size = Math.abs(100 * (own / measured.hz - 1)).toFixed(2);
-    const signed = `${Number(size) === 0 ? "" : own < measured.hz ? "\u2212" : "+"}${size} %`;
-    const likeness = mac === null ? "" : `, MAC ${mac.toFixed(3)}`;
-    return `${head}, ${name} ${hz(own)} (${signed})${likeness}${predicted ? "" : "; its shape is not stored"}`;
-  };
-
-  const choice = (label, options, change) => {
-    const select = el("select", { "aria-label": label }, ...options);
-    select.addEventListener("change", () => change(select.value));
-    return [el("label", { class: "case-field" }, `${label} `, select), select];
-  };
-
-  const option = (value, text) => {
-    const item = el("option", {}, text);
-    item.value = value;
-    return item;
-  };
-
-  const button = (label, sign, act) => {
-    return el("button", { type: "button", class: "case-button", "aria-label": label, title: label, onclick: act }, sign);
-  };
-
-  const check = (label, on, change) => {
-    const box = el("input", { type: "checkbox" });
-    box.checked = on;
-    box.addEventListener("change", () => change(box.checked));
-    return el("label", { class: "case-check" }, box, ` ${label}`);
-  };
-
-  /** Fill the list of modes, in groups by modification. */
-  const fillModes = (select, modes) => {
-    const groups = new Map();
-    modes.forEach((mode) => {
-      const change = (mode.measured ?? mode.predicted).modification;
-      const name = `${change ? `With \u201c${change}\u201d` : "As tested"}${mode.measured ? "" : ", model only"}`;
-      if (!groups.has(name)) groups.set(name, el("optgroup", { label: name }));
-      groups.get(name).append(option(keyOf(mode), optionText(mode)));
-    });
-    select.replaceChildren(...groups.values());
   };
 
   /** Play: call paint with the phase of the motion while the view is in the page and on screen. */
@@ -293,180 +233,161 @@
     return state;
   };
 
-  /** Return what is drawn of a picked mode: shape, measured arrows scaled to it, MAC. */
-  const picture = (stage, mode, modes) => {
-    const shape = mode.predicted ? mode.predicted.shape : null;
-    if (!mode.measured) return { shape, arrows: null, mac: null, scored: null };
-    const { shape: measured, mode: number, modification } = mode.measured;
-    const scored = (modes ?? []).find((item) => item.mode === number && same(item.modification, modification)) ?? null;
-    if (!shape) return { shape, arrows: measured, mac: scored && scored.mac, scored };
-    const { factor, mac } = match(measured, readings(stage, shape));
-    const arrows = measured.map((value) => (value === null ? null : factor * value));
-    return { shape, arrows, mac: scored && scored.mac !== null ? scored.mac : mac, scored };
-  };
-
-  const legend = () => {
-    const item = (kind, text) => el("li", {}, el("span", { class: `case-key ${kind}`, "aria-hidden": "true" }), text);
-    return el("ul", { class: "case-legend" }, item("shape", "predicted (thick line)"), item("measured", "measured at the sensors (arrow, ring)"),
-      item("still", "undeformed (thin line)"), item("attached", "masses, springs, supports"), item("more", "found stiffer or more"), item("less", "found softer or less"), item("ring", "found: a spring"));
-  };
-
-  /**
-   * Return two strategies' changes as drawings beside each other, on one scale where they are comparable.
-   *
-   * shown: [{name, exhibit}].
-   */
+  /** Return changes of strategies [{name, exhibit}] as drawings, on one scale where they are comparable. */
   bench.findings = (stage, shown) => {
-    const own = shown.map(({ exhibit }) => foundIn(stage, exhibit));
-    const words = own.map((found) => new Set(found.flatMap(({ label, norm }) => (norm ? ["norm"] : label.split(", ").map((text) => text.split(" ")[0])))));
-    const shared = own.length === 2 && own.every((found) => found.length) && !words[0].isDisjointFrom(words[1]);
+    const all = shown.map(({ exhibit }) => foundIn(stage, exhibit));
+    const words = all.map((found) => new Set(found.flatMap(({ label, norm }) => (norm ? ["norm"] : label.split(", ").map((text) => text.split(" ")[0])))));
+    const shared = all.length === 2 && all.every((found) => found.length) && !words[0].isDisjointFrom(words[1]);
+    const [width, height, turn, frame] = [Math.min(640, Math.max(document.documentElement.clientWidth - 60, 280)), 360, FLAT[stage.plane] ?? FLAT["3d"], extent(stage.nodes)];
+    const { project } = camera({ turn, fit: fitted(turn, frame, stage, 0, width, height, 90) }, frame, width, height);
     return shown.map(({ name }, k) => {
-      const [found, end] = [own[k], scaleEnd(shared ? own.flat() : own[k])];
-      const norm = found.some((item) => item.norm);
-      const title = `${name}: ${norm ? "change of every element matrix as a share of what it was (Frobenius norm)" : "what it reports to have changed"}`;
-      const width = Math.min(640, Math.max(document.documentElement.clientWidth - 60, 280));
-      const [height, turn, frame] = [360, FLAT[stage.plane] ?? FLAT["3d"], extent(stage.nodes)];
-      const eye = camera({ turn, zoom: 1, fit: fitted(turn, frame, stage, 0, width, height, 90) }, frame, width, height);
-      const [marks, names] = [svg("g", {}), svg("g", { class: "names" })];
-      const write = namer(names, width);
+      const [found, end] = [all[k], scaleEnd(shared ? all.flat() : all[k])];
+      const title = `${name}: ${found.some(({ norm }) => norm) ? "change of every element matrix as a share of what it was (Frobenius norm)" : "what it reports to have changed"}`;
+      const [marks, names] = [svg("g"), svg("g")];
+      const write = bench.writer(names, [0, 0, width, height]);
       const large = d3.sort(found, ({ value }) => -Math.abs(value ?? Infinity));
       const told = `Largest: ${large.slice(0, 3).map(({ label }) => label).join("; ")}.`;
-      drawFound(marks, write, found, end, eye.project);
-      for (const joint of stage.joints) write(joint.name, eye.project(joint.xyz), "soft");
-      const picture = svg("svg", { viewBox: `0 0 ${width} ${height}`, width, height, class: "case-map structure", role: "img", "aria-label": `${title}. ${told}` },
-        svg("path", { class: "still", d: outline(chainsOf(stage), stage.nodes.map(eye.project)) }), marks, names);
-      const ends = found.some(({ symbol, value }) => symbol === "change" && value)
-        ? `Green is stiffer or more, purple softer or less; colours end at ${percent(end, "")}${found.some(({ symbol, value }) => symbol === "change" && Math.abs(value ?? 0) > 1.001 * end) ? ", and what lies beyond has that colour and its number" : ""}${shared ? "; the scale is the same for both" : shown.length > 1 ? "; the scale is this strategy's own, as the two changed different things" : ""}.` : "";
-      const rows = () => large.map(({ label, value }) => el("tr", {}, el("th", { scope: "row" }, label), el("td", { class: "num", "data-value": value }, value === null ? "\u2013" : (100 * value).toFixed(2))));
-      const all = el("details", { ontoggle: () => {
-        if (all.children.length < 2) all.append(bench.scroll(`Everything: ${title}`, el("table", { class: "case-table" },
-          el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "What was found"), el("th", { scope: "col" }, "Change in %"))), el("tbody", {}, rows()))));
-      } }, el("summary", {}, "Everything as a table"));
-      return el("figure", { class: "case-figure" }, el("figcaption", {}, title), picture, el("p", { class: "case-told" }, `${told} ${ends}`), all);
+      drawFound(marks, write, found, end, project, false);
+      for (const joint of stage.joints) write(joint.name, project(joint.xyz), { name: "soft" });
+      const beyond = found.some((item) => isSized(item) && Math.abs(item.value) > 1.001 * end) ? ", and what lies beyond has that colour and its number" : "";
+      const whose = shared ? "; the scale is the same for both" : shown.length > 1 ? "; the scale is this strategy's own, as the two changed different things" : "";
+      const colours = found.some(isSized) ? ` Green is stiffer or more, purple softer or less; colours end at ${percent(end, "")}${beyond}${whose}.` : "";
+      const rows = large.map(({ label, value }) => [label, bench.cell(value, (v) => (v === null ? "–" : (100 * v).toFixed(2)))]);
+      return el("figure", { class: "case-figure" }, el("figcaption", {}, title),
+        svg("svg", { viewBox: `0 0 ${width} ${height}`, width, height, class: "case-map structure", role: "img", "aria-label": `${title}. ${told}` },
+          svg("path", { class: "still", d: outline(chainsOf(stage), stage.nodes.map(project)) }), marks, names),
+        el("p", { class: "case-told" }, told, colours),
+        bench.fold("Everything as a table", () => bench.scroll(bench.table(`Everything: ${title}`, ["What was found", "Change in %"], rows))));
     });
   };
 
-  /**
-   * Show a structure, its mode shapes and what was found on it; returns {pick(name)} to choose the strategy.
-   *
-   * stage: of the case. exhibits: [{name, exhibit, modes}], one a strategy; exhibit may be null.
-   */
+  const legend = () => el("ul", { class: "legend" }, [["shape", "predicted (thick line)"], ["measured", "measured at the sensors (arrow, ring)"], ["still", "undeformed (thin line)"],
+    ["attached", "masses, springs, supports"], ["more", "found stiffer or more"], ["less", "found softer or less"], ["ring", "found: a spring"]]
+    .map(([kind, text]) => el("li", {}, el("span", { class: `case-key ${kind}`, "aria-hidden": "true" }), text)));
+
+  /** Show a structure, its mode shapes and what strategies [{name, exhibit or null, modes}] found on it; returns {pick(name)}. */
   bench.structure = (root, stage, exhibits) => {
-    const shown = (exhibits ?? []).filter((entry) => entry.exhibit);
+    const shown = exhibits.filter((entry) => entry.exhibit);
     const start = START[stage.plane] ?? START["3d"];
     const [view, frame, chains] = [{ turn: start, zoom: 1, fit: 1 }, extent(stage.nodes), chainsOf(stage)];
-    const layers = { still: svg("path", { class: "still" }), found: svg("g", {}), shape: svg("path", { class: "shape" }), fixed: svg("g", {}), arrows: svg("path", { class: "measured line" }), names: svg("g", { class: "names" }) };
+    const layers = { still: svg("path", { class: "still" }), found: svg("g"), fixed: svg("g"), names: svg("g"), shape: svg("path", { class: "shape" }), arrows: svg("path", { class: "measured line" }) };
     const drawing = svg("svg", { class: "case-view structure", tabindex: "0", role: "application", "aria-roledescription": "structure view" }, Object.values(layers));
     const told = el("p", { class: "case-told", role: "status" });
-    const show = { joints: stage.plane !== "matrices", sensors: false, attached: true, measured: true, found: true };
-    let [entry, modes, at, now, amplitude, found] = [shown[0] ?? null, [], 0, { shape: null, arrows: null }, 1, []];
-    let size = [0, 0]; // read once: asked for at every frame it would lay out the page
-    const eyeNow = () => camera(view, frame, ...size);
-    const paint = (eye = eyeNow()) => {
+    const show = { joints: stage.plane !== "matrices", sensors: false, attachments: true, measured: true, found: true };
+    let [entry, modes, at, now, amplitude, found] = [shown[0] ?? null, new Map(), null, { shape: null, arrows: null }, 1, []];
+    let [size, flat, moving, settling] = [[0, 0], { nodes: [], ways: [], arrows: [] }, false, null];
+
+    // At every frame: what moves. The rest is drawn once more when the view changes.
+    const paint = () => {
+      if (!size[0]) return;
       const reach = REACH * amplitude * frame.radius * play.phase;
-      layers.shape.setAttribute("d", now.shape ? outline(chains, stage.nodes.map((node, i) => eye.project(add(node, now.shape[i], reach)))) : "");
-      layers.arrows.setAttribute("d", now.arrows && show.measured ? stage.sensors.map((sensor, i) => {
-        if (now.arrows[i] === null || sensor.rotation) return "";
-        const tip = eye.project(add(sensor.xyz, sensor.axis, now.arrows[i] * reach));
-        return `${arrow(eye.project(sensor.xyz), tip)}${move(add(tip, [-3.5, 0]))}a3.5,3.5 0 1 0 7,0a3.5,3.5 0 1 0 -7,0`;
-      }).join("") : "");
+      layers.shape.setAttribute("d", now.shape ? outline(chains, flat.nodes.map((p, i) => add(p, flat.ways[i], reach))) : "");
+      layers.arrows.setAttribute("d", flat.arrows.map(([from, way]) => arrow(from, add(from, way, reach)) + ring(add(from, way, reach), 3.5)).join(""));
     };
     const draw = () => {
       if (!size[0]) return;
-      const eye = eyeNow();
+      const eye = camera(view, frame, ...size);
       for (const layer of [layers.found, layers.fixed, layers.names]) layer.replaceChildren();
-      const write = namer(layers.names, size[0]);
-      layers.still.setAttribute("d", outline(chains, stage.nodes.map(eye.project)));
+      const write = bench.writer(layers.names, [0, 0, ...size]);
+      const arrows = stage.sensors.map(({ xyz, axis, rotation }, i) => !rotation && (now.arrows?.[i] ?? null) !== null && [eye.project(xyz), eye.direct(axis.map((v) => now.arrows[i] * v))]);
+      flat = { nodes: stage.nodes.map(eye.project), ways: (now.shape ?? []).map(eye.direct), arrows: show.measured ? arrows.filter(Boolean) : [] };
+      layers.still.setAttribute("d", outline(chains, flat.nodes));
       layers.still.classList.toggle("alone", !now.shape);
-      if (show.found) drawFound(layers.found, write, found, scaleEnd(found), eye.project);
+      if (show.found) drawFound(layers.found, write, found, scaleEnd(found), eye.project, moving || play.playing);
       drawFixed(layers.fixed, write, stage, show, eye, frame.radius, size[1]);
-      paint(eye);
+      paint();
     };
     const play = player(drawing, paint);
+    // Draw a view that has been moved, in full once it rests.
+    const move = () => {
+      moving = true;
+      draw();
+      clearTimeout(settling);
+      settling = setTimeout(() => {
+        moving = false;
+        if (found.length > MANY) draw();
+      }, 250);
+    };
     const describe = (text) => {
       told.textContent = text;
       drawing.setAttribute("aria-label", `Structure in three dimensions. ${text}. ${play.playing ? "Playing" : "Paused"}. ${HELP}`);
     };
-    const pickMode = (index) => {
-      at = (index + modes.length) % modes.length;
-      modeList.value = keyOf(modes[at]);
-      now = picture(stage, modes[at], entry && entry.modes);
-      describe(sentence(modes[at], entry ? entry.name : "", now.mac, now.scored));
+    const pickMode = (key) => {
+      at = key;
+      modeList.value = key;
+      now = picture(stage, modes.get(key), entry?.modes);
+      describe(sentence(modes.get(key), entry?.name, now));
       draw();
     };
-    const pickStrategy = (name) => {
-      const key = modes.length ? keyOf(modes[at]) : "";
+    const pick = (name) => {
       entry = shown.find((item) => item.name === name) ?? entry;
       if (entry) strategyList.value = entry.name;
       [modes, found] = [modesOf(stage, entry), foundIn(stage, entry?.exhibit)];
-      fillModes(modeList, modes);
-      if (modes.length) return pickMode(Math.max(modes.findIndex((mode) => keyOf(mode) === key), 0));
+      modeList.replaceChildren(...d3.groups(modes, ([, mode]) => mode.group).map(([label, own]) => el("optgroup", { label }, own.map(([value, { text }]) => el("option", { value }, text)))));
+      if (modes.size) return pickMode(modes.has(at) ? at : modes.keys().next().value);
       now = { shape: null, arrows: null };
       describe("No modes are stored");
       draw();
     };
-    const step = (by) => modes.length && pickMode(at + by);
-    const turn = (azimuth, elevation) => {
-      view.turn = [view.turn[0] + azimuth, Math.min(Math.max(view.turn[1] + elevation, -90), 90)];
-      draw();
+    const step = (by) => () => {
+      const keys = [...modes.keys()];
+      if (keys.length) pickMode(keys[(keys.indexOf(at) + by + keys.length) % keys.length]);
     };
-    const picked = d3.select(drawing);
+    const turn = (azimuth, elevation) => () => {
+      view.turn = [view.turn[0] + azimuth, Math.min(Math.max(view.turn[1] + elevation, -90), 90)];
+      move();
+    };
     // A page that scrolls past must not get stuck here: the wheel zooms once the view is in use.
     const zoomer = d3.zoom().scaleExtent([0.3, 12])
       .filter((event) => (event.type === "wheel" ? document.activeElement === drawing || event.ctrlKey : (event.touches?.length ?? 0) > 1))
       .on("zoom", ({ transform }) => {
         view.zoom = transform.k;
-        draw();
+        move();
       });
-    const dragger = d3.drag().filter((event) => !event.button && (event.touches?.length ?? 1) < 2).on("drag", ({ dx, dy }) => turn(-0.4 * dx, 0.4 * dy));
-    picked.call(zoomer).on("dblclick.zoom", null).call(dragger).style("touch-action", null);
+    const dragger = d3.drag().filter((event) => !event.button && (event.touches?.length ?? 1) < 2).on("drag", ({ dx, dy }) => turn(-0.4 * dx, 0.4 * dy)());
+    const picked = d3.select(drawing).call(zoomer).on("dblclick.zoom", null).call(dragger).style("touch-action", null);
     const zoom = (factor) => () => zoomer.scaleBy(picked, factor);
     const toggle = () => {
       play.playing = !play.playing;
       playButton.textContent = play.playing ? "Pause" : "Play";
       describe(told.textContent);
       play.go();
+      draw();
     };
     const reset = () => {
       [view.turn, play.angle, play.phase] = [start, 0, 1];
       zoomer.transform(picked, d3.zoomIdentity);
-      draw();
     };
-    const [modeField, modeList] = choice("Mode", [], (key) => pickMode(modes.findIndex((mode) => keyOf(mode) === key)));
-    const [strategyField, strategyList] = choice("Strategy", shown.map((item) => option(item.name, item.name)), pickStrategy);
+    const modeList = bench.select("Mode", [], null, pickMode);
+    const strategyList = bench.select("Strategy", shown.map(({ name }) => [name, name]), null, pick);
     strategyList.disabled = shown.length === 0;
-    const playButton = el("button", { type: "button", class: "case-button case-play", onclick: toggle }, "Play");
+    const playButton = bench.button("Play", toggle, { class: "button case-play" });
     const slider = el("input", { type: "range", min: "0", max: "3", step: "0.1", value: "1", oninput: () => {
       amplitude = Number(slider.value);
       paint();
     } });
-    const keys = {
-      ArrowLeft: () => turn(6, 0), ArrowRight: () => turn(-6, 0), ArrowUp: () => turn(0, 6), ArrowDown: () => turn(0, -6),
-      "+": zoom(1.15), "=": zoom(1.15), "-": zoom(1 / 1.15), r: reset, n: () => step(1), p: () => step(-1), " ": toggle,
-    };
+    const acts = [["Previous mode (P)", "‹", "p", step(-1)], ["Next mode (N)", "›", "n", step(1)],
+      ["Turn left", "←", "ArrowLeft", turn(6, 0)], ["Turn right", "→", "ArrowRight", turn(-6, 0)], ["Tilt up", "↑", "ArrowUp", turn(0, 6)], ["Tilt down", "↓", "ArrowDown", turn(0, -6)],
+      ["Zoom in (+)", "+", "+", zoom(1.15)], ["Zoom out (-)", "−", "-", zoom(1 / 1.15)], ["Reset the view (R)", "Reset", "r", reset]];
+    const keys = { " ": toggle, "=": zoom(1.15), ...Object.fromEntries(acts.map(([, , key, act]) => [key, act])) };
+    const [before, after, ...views] = acts.map(([label, sign, , act]) => bench.button(sign, act, { "aria-label": label, title: label }));
     drawing.addEventListener("keydown", (event) => {
       const act = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
       if (!act || event.ctrlKey || event.metaKey || event.altKey) return;
       event.preventDefault();
       act();
     });
-    const flip = (name) => (on) => {
+    const flip = (name) => bench.tick(`${name[0].toUpperCase()}${name.slice(1)}`, show[name], (on) => {
       show[name] = on;
       draw();
-    };
+    });
     root.append(el("div", { class: "case-structure" },
-      el("div", { class: "case-controls" }, strategyField, modeField,
-        el("span", { class: "case-group" }, button("Previous mode (P)", "\u2039", () => step(-1)), playButton, button("Next mode (N)", "\u203a", () => step(1))),
-        el("label", { class: "case-field" }, "Amplitude ", slider)),
+      el("div", { class: "controls" }, el("label", {}, "Strategy ", strategyList), el("label", {}, "Mode ", modeList),
+        el("span", { class: "controls" }, before, playButton, after), el("label", {}, "Amplitude ", slider)),
       drawing, told,
-      el("div", { class: "case-controls" },
-        el("span", { class: "case-group", role: "group", "aria-label": "View" },
-          button("Turn left", "\u2190", keys.ArrowLeft), button("Turn right", "\u2192", keys.ArrowRight), button("Tilt up", "\u2191", keys.ArrowUp),
-          button("Tilt down", "\u2193", keys.ArrowDown), button("Zoom in (+)", "+", keys["+"]), button("Zoom out (-)", "\u2212", keys["-"]), button("Reset the view (R)", "Reset", reset)),
-        check("Joints", show.joints, flip("joints")), check("Sensors", show.sensors, flip("sensors")), check("Attachments", show.attached, flip("attached")),
-        check("Measured", show.measured, flip("measured")), check("Found", show.found, flip("found"))),
-      legend(), el("p", { class: "case-hint" }, HELP)));
-    pickStrategy(shown[0] ? shown[0].name : "");
+      el("div", { class: "controls" }, el("span", { class: "controls", role: "group", "aria-label": "View" }, views), Object.keys(show).map(flip)),
+      legend(), el("p", { class: "soft" }, HELP)));
+    pick(shown[0]?.name);
     new ResizeObserver(() => {
       if (!drawing.clientWidth) return;
       size = [drawing.clientWidth, drawing.clientHeight];
@@ -474,6 +395,6 @@
       draw();
     }).observe(drawing);
     if (shown.length && !matchMedia("(prefers-reduced-motion: reduce)").matches) toggle();
-    return { pick: pickStrategy };
+    return { pick };
   };
 }
