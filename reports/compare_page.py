@@ -13,12 +13,12 @@ from femubench.reports.blocks import (
     Items,
     Section,
     Table,
-    to_markdown,
-    to_terminal,
 )
 from femubench.reports.cells import NOTHING, fixed, plain, shortened
 from femubench.reports.html import to_html
+from femubench.reports.markdown import to_markdown
 from femubench.reports.svg import drawing
+from femubench.reports.terminal import to_terminal
 from femubench.results import METHOD
 
 _RATIOS = ("unseen", "used", "higher", "modified", "seconds")
