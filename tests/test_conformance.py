@@ -30,6 +30,7 @@ from femubench.core.conformance.place_words import known_place
 from femubench.core.conformance.problems import PROBLEMS, problem
 from femubench.core.errors import InputError
 from femubench.core.plugin.loader import load_plugins
+from femubench.core.run import sandbox
 from femubench.core.run.limits import MIB
 from femubench.core.run.workers import Ending
 
@@ -153,6 +154,17 @@ def test_a_strategy_that_changes_the_checks_in_its_process_changes_no_verdict(
     found = kit.judged(check, Bench(toy()))
     assert found.status == "fail", found
     assert "\n" not in found.message
+
+
+@pytest.mark.skipif(sandbox.missing() is not None, reason="no sandbox here")
+def test_a_strategy_is_checked_in_the_sandbox(tmp_path: Path) -> None:
+    file = tmp_path / "held_out.csv"
+    file.write_text("123.4")
+    checks = {check.name: check for check in checks_of("strategy")}
+    assert kit.judged(checks["returns"], Bench(toys.Nosy(str(file)))).status == "pass"
+    # What it does find is told.
+    shown = kit.judged(checks["returns"], Bench(toys.Nosy(toys.__file__)))
+    assert "Strategies that break one rule each" in shown.message
 
 
 @pytest.mark.parametrize("told", [b"", b"null", b"{}", b'["splendid", ""]', b"[" * 9999, b"\xff"])

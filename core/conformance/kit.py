@@ -6,7 +6,7 @@ import json
 import os
 import pickle
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, TypeAlias, get_args
 
@@ -173,9 +173,10 @@ class Bench:
         missing = [want for want in dict.fromkeys(wants) if want not in self._seen]
         self._seen |= {want: kept for want in missing if (kept := self._unrun(want)) is not None}
         tasks = {want: (run_trial, self._trial(want)) for want in missing if want not in self._seen}
+        apart = replace(self.limits, sandbox="auto")
         told = {
             want: told_by(want.problem, ending)
-            for want, ending in run_apart(tasks, self.limits, self._jobs).items()
+            for want, ending in run_apart(tasks, apart, self._jobs).items()
         }
         handed = {
             want: (judge_handed, self._handed(want, answer))

@@ -516,6 +516,24 @@ class ForgingLack(Good):
         return super().finish(model)
 
 
+@dataclass(frozen=True)
+class Nosy(Good):
+    """Fail with what is in a file.
+
+    Arguments:
+        file: its path.
+    """
+
+    file: str = ""
+
+    def finish(self, model: Model) -> UpdateResult:
+        try:
+            text = Path(self.file).read_text(encoding="utf-8")
+        except OSError:
+            return super().finish(model)
+        raise ValueError(text)
+
+
 FORGED: Mapping[type[Strategy], str] = {
     ForgingSymmetry: "symmetric",
     ForgingNumbers: "finite",
