@@ -103,7 +103,7 @@ def _grid(run: Run, known: StudyAxes, x: str, y: str) -> Block:
 
 def _cells(cells: Sequence[dict[Any, Any]]) -> Iterator[Block]:
     """Yield every cell with its interval and what of it failed."""
-    names = list(cells[0])
+    names = [str(name) for name in cells[0]]
     axes = names[: names.index("skill")]
     options = [name for name in axes if "." in name]
     bare = [name for name in axes if name not in options]

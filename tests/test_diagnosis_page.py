@@ -145,7 +145,7 @@ class TestPage:
         assert not any(key.startswith("on") for _, attributes in page.tags for key in attributes)
         assert not {"\x1b", "\u202e", "\x07"} & set(text)
         assert "alert(1)" in page.text
-        assert "nan" not in re.sub(r"<style>.*?</style>", "", text, flags=re.DOTALL).lower()
+        assert "nan" not in re.sub(r"<(style|script)>.*?</\1>", "", text, flags=re.DOTALL).lower()
 
     def test_without_geometry(self) -> None:
         """Files of earlier versions hold none."""
