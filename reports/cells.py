@@ -30,6 +30,11 @@ def first_of(entries: Sequence[object], most: int) -> str:
     return ", ".join(map(plain, entries[:most])) + (f" and {more} more" if more > 0 else "")
 
 
+def joined(names: Sequence[str]) -> str:
+    """Return names as in a sentence."""
+    return " and ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
+
+
 def fixed(value: float | None, digits: int = 2, width: int = 5) -> str:
     """Return a number with as many decimals, up to `digits`, as fit into a width."""
     if value is None or not math.isfinite(value):

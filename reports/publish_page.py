@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from femubench.plot import Axis, Chart, Mark, Series
-from femubench.reports.cells import fixed, interval, plain, shortened
+from femubench.reports.cells import fixed, interval, joined, plain, shortened
 from femubench.reports.feed import feeds_of, headline_of
 from femubench.reports.svg import drawing
 from femubench.reports.templating import asset, templates
@@ -86,7 +86,7 @@ def _answer(board: Data) -> Iterator[str]:
     first = [row for row in board["rows"] if row["rank"] == 1]
     others = [row for row in board["rows"] if _stand(row) in _OTHERS]
     if first:
-        who = " and ".join(plain(row["strategy"]) for row in first)
+        who = joined([plain(row["strategy"]) for row in first])
         yield f"{who} {'lead' if first[1:] else 'leads'} with {_told_skill(first[0])}."
     else:
         yield "Nobody leads: no strategy has all cases of the ranking."

@@ -59,6 +59,8 @@ _MORE_FIGURES = {
     "crps_percent": Column("CRPS\n%", 4, digits=2),
     "evaluations": Column("eval.", 5),
 }
+# No reason for a second table by themselves.
+_BESIDE = {_MORE_FIGURES[name].title for name in ("crps_percent", "evaluations")}
 _LEGEND = {
     "high, mod., given": "rms frequency error in percent over the higher modes and those after a "
     "design change, which no strategy is given, and over the modes that it was given; a mode "
@@ -128,7 +130,12 @@ def floors_said(run: Run) -> tuple[str, str]:
 
 
 def _leaderboard(
-    run: Run, rows: Sequence[_Row], tiers: Mapping[str, int], letters: Mapping[str, str]
+    run: Run,
+    rows: Sequence[_Row],
+    tiers: Mapping[str, int],
+    letters: Mapping[str, str],
+    *,
+    screen: bool,
 ) -> Table:
     """Return the ranking; columns that nothing is known of are left out."""
     heads = (
@@ -153,6 +160,8 @@ def _leaderboard(
         for k, head in enumerate(heads)
         if k < _ALWAYS or {head.text(line[k]) for line in cells} - {NOTHING, ""}
     ]
+    if screen and not {heads[k].title for k in known[_ALWAYS:]} - _BESIDE:
+        known = known[:_ALWAYS]
     return Table([heads[k] for k in known], [[line[k] for k in known] for line in cells], names=1)
 
 
@@ -166,12 +175,12 @@ def _board(run: Run, title: str = "") -> Iterator[Section]:
     """Yield the leaderboard, what its columns mean, and what the run shows."""
     rows = leaderboard(run).to_dict("records")
     tested = tell_apart(run, [row["strategy"] for row in rows])
-    table = _leaderboard(run, rows, tested.tier_of(), tested.letters())
+    table = _leaderboard(run, rows, tested.tier_of(), tested.letters(), screen=not title)
     yield Section(title, [table])
     known = " ".join([*(c.title.replace("\n", " ") for c in table.columns), *map(_marks, rows)])
     legend = [entry for entry in _LEGEND.items() if entry[0].partition(",")[0] in known]
     if title or not tested.tiers:
-        legend.append(("tier, group", tested.note))
+        legend.append(("tier, group" if tested.tiers else "#", tested.note))
     yield Section("", [lead(run), Items(legend)])
     if said := finding(run, rows, tested.tiers):
         yield Section("", [" ".join(said)])

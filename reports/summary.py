@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from femubench.reports.cells import first_of, interval, plain
+from femubench.reports.cells import first_of, interval, joined, plain
 from femubench.results import (
     JobResult,
     PairedMode,
@@ -23,6 +23,7 @@ _HEADER = (
     *("run", "started", "seed", "seeds", "jobs", "timeout"),
     *("versions", "machine", "git_commit"),
 )
+_SHOWN = 0.0005  # skill that is printed as more than 0
 _TITLES = {"jobs": "workers", "timeout": "timeout in s", "git_commit": "git commit"}
 
 
@@ -162,14 +163,14 @@ def finding(
     first = [plain(row["strategy"]) for row in board if row["rank"] == best["rank"]]
     leads = "leads: it takes" if len(first) == 1 else "share the first rank: each takes"
     told = [
-        f"{' and '.join(first)} {leads} away {100.0 * skill:.0f} % of the {models}' error on "
+        f"{joined(first)} {leads} away {100.0 * skill:.0f} % of the {models}' error on "
         f"{data} (skill {skill:.3f}{sure})."
-        if skill > 0.0
+        if skill >= _SHOWN
         else f"No strategy improves on the {models} on {data}; the best, {name}, has a skill of "
         f"{skill:.3f}{sure}.",
         *_how_sure(name, tiers, len(board)),
     ]
-    if skill > 0.0 >= best["skill_low"]:
+    if skill >= _SHOWN and best["skill_low"] <= 0.0:
         told.append(f"Its interval holds 0: an improvement on the {models} is not shown.")
     idle = [row["skill_drawn"] for row in board if row["strategy"] == run.meta.get("baseline")]
     if idle and math.isfinite(idle[0]):

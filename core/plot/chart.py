@@ -260,7 +260,7 @@ def _lay_out(chart: Chart, key: Literal["x", "y"], ax: Axes) -> None:
         few = 1 if chart.kind in _LINES else max(1, len(values) // 10)
         if (key == "x") == (chart.y.names is not None):
             spread = [v for s in chart.series for v in (*s.low, *s.high)]
-            values, few = values + spread, few * (3 if spread else 1)
+            values, few = values + spread, few * (3 if any(_usable(v, axis) for v in spread) else 1)
         wide = 0.0 if chart.kind in _LINES and key == "x" else 0.05
         pad, zero = 0.12 if chart.kind == "scatter" else wide, chart.kind == "bars" and key == "y"
         reach = ends_of(values, axis, pad=pad, few=few, zero=zero)

@@ -115,7 +115,7 @@
     const spread = [...all("low"), ...all("high")];
     const few = joined ? 1 : Math.max(1, Math.floor(all("x").length / 10));
     const pad = kind === "scatter" ? 0.12 : 0.05;
-    const fewOf = (own) => (own.length > 0 ? 3 * few : few);
+    const fewOf = (own) => (own.some(Number.isFinite) ? 3 * few : few);
     const height = interval ? 18 * figure.y.names.length : 250;
     const y = axisOf(figure.y, "y", height, [...all("y"), ...(interval ? [] : spread)], { pad, few: fewOf(interval ? [] : spread), zero: bars, width });
     const x = axisOf(figure.x, "x", width - y.space - 16, [...all("x"), ...(interval ? spread : [])], { pad: joined ? 0 : pad, few: fewOf(interval ? spread : []) });

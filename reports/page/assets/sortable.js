@@ -10,7 +10,7 @@ function sortable(table) {
 
   function keyOf({ dataset, textContent }) {
     const key = dataset.sort ?? dataset.value ?? textContent.trim();
-    return key === "" ? null : isNaN(key) ? key : Number(key);
+    return key === "" ? null : Number.isFinite(Number(key)) ? Number(key) : key;
   }
   function compare(a, b) {
     if (typeof a === "number" && typeof b === "number") return a - b;
