@@ -44,8 +44,13 @@ class Disk:
     names: set[str] = field(default_factory=set)
 
     def sync(self, descriptor: int) -> None:
-        """Take what is in a file or folder now; stands for `os.fsync`."""
+        """Take what is in a file or folder now; stands for `os.fsync`.
+
+        Stores of earlier tests may still sync theirs, on timers of their own.
+        """
         path = Path(os.readlink(f"/proc/self/fd/{descriptor}"))
+        if not path.is_relative_to(self.folder.resolve()):
+            return
         if path.is_dir():
             self.names |= {file.name for file in path.iterdir()}
         else:
