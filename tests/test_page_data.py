@@ -220,7 +220,7 @@ class TestStatistics:
 
     def test_markdown_has_groups_coverage_and_the_test(self) -> None:
         text = MarkdownReporter().render(SMALL)
-        assert "| ok | tier | group |" in text
+        assert "| eval. | tier | group |" in text
         assert "Wilcoxon's signed rank test" in text
 
 
@@ -254,7 +254,7 @@ class TestPapers:
         assert papers_of(run)["frame"]["baruch"][4] == 911.3
         assert papers_of(frame_run(1.01)) == {}
         text = MarkdownReporter().render(run)
-        assert "| *baruch, as the paper prints it* | 226.8 (+0.00) | 275.2" in text
+        assert "| baruch, as the paper prints it | 226.8 (+0.00) | 275.2" in text
 
 
 def page_file(paper: str) -> dict[str, Any]:
