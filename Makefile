@@ -20,7 +20,7 @@ NUMERICAL := $(addprefix tests/test_,advice*.py assembly.py asymmetric_frame.py 
 	beam_elements.py calibration.py challenge.py close_modes.py condensation.py diagnos*.py effects_*.py eigen.py \
 	element_strategies.py exhibits.py expansion.py frame_extensions.py frf.py kernels.py \
 	localisation.py look*.py matrix_strategies.py pairing.py papers_*.py preload.py rigid_modes.py \
-	scenarios.py scoring.py sections.py sensitiv*.py sparse_eigen.py suite.py truths_*.py)
+	scenarios.py scoring.py sections.py sensitiv*.py sparse_eigen.py stretched_twins.py suite.py truths_*.py)
 # What counts processes, memory or seconds has the machine to itself, and the browser its one run.
 ALONE := $(addprefix tests/,browser $(addprefix test_,harness_*.py report_robust.py untrusted.py))
 # A file stays on one worker, and with it what its tests share; in the order of names, since those with

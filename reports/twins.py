@@ -9,9 +9,11 @@ from femubench.reports.page.rounding import clean
 from femubench.results import Run, twin_skills, unsteady
 
 MEANING = (
-    "Twins are similar structures under other names, drawn from a seed when the run began: other "
-    "sizes, moduli and densities, of which the truth follows exactly. A strategy that reckons errs "
-    "on them as on their cases; one that is clearly better on the cases may know these by heart."
+    "Twins are other structures under other names, drawn from a seed when the run began: similar "
+    "ones have other sizes, moduli and densities, of which the truth follows exactly; stretched "
+    "ones also other spans, sections and walls, of which it follows from solids that were solved "
+    "before. A strategy that reckons errs on them about as on their cases; one that is clearly "
+    "better on the cases may know these by heart."
 )
 
 
@@ -28,7 +30,9 @@ def drawn_from(run: Run) -> str:
     """Return how many twins there were, and from which seed."""
     told = run.meta.get("twins") or {}
     twins = told.get("of") or {}
-    return f"{len(twins)} twins of {len(set(twins.values()))} cases, seed {told.get('seed')}"
+    stretched = sum("stretched" in kinds for kinds in (told.get("kinds") or {}).values())
+    some = f" ({stretched} stretched)" * bool(stretched)
+    return f"{len(twins)} twins{some} of {len(set(twins.values()))} cases, seed {told.get('seed')}"
 
 
 def suspicions(run: Run) -> list[str]:

@@ -165,6 +165,10 @@ EDITS: dict[str, tuple[Edit, str]] = {
         lambda d: d["meta"]["twins"]["of"].pop("suite/bracket~2"),
         "meta.twins: these are not the",
     ),
+    "twins of another kind": (
+        lambda d: d["meta"]["twins"]["kinds"].update({"suite/bracket~1": ["stretched"]}),
+        "meta.twins.kinds: its twins are of other kinds",
+    ),
     "twins of another case": (
         lambda d: d["meta"]["twins"]["of"].update({"suite/bracket~1": "frame"}),
         "meta.twins: they are of other cases",

@@ -53,7 +53,7 @@ from femubench.core.score.scoring import judge, reference_of
 from femubench.core.score.twin_skill import twin_skills
 from femubench.core.twin.disguise import disguised
 from femubench.core.twin.similarity import Similarity, matrix_factors, similar_case, similar_frame
-from femubench.core.twin.twins import Twin, again, twin_of, twins_of
+from femubench.core.twin.twins import SimilarStructures, Twin, again, twin_of, twins_of
 from femubench.core.typing import SparseArray
 from femubench.results import leaderboard
 
@@ -116,7 +116,7 @@ def builtin(name: str) -> Case:
 
 @cache
 def twin(name: str) -> Twin:
-    return twin_of(builtin(name), 1, 5)
+    return twin_of(builtin(name), 1, 5, (SimilarStructures(),))
 
 
 def rms(case: Case) -> np.ndarray:
@@ -431,12 +431,12 @@ def test_the_command_prints_the_seed(tmp_path: Path) -> None:
     words = ["run", "suite/bracket", "-s", "unchanged", "--twins", "1:77", "-j", "1"]
     answer = CliRunner().invoke(bench, [*words, "--store", str(tmp_path / "s")])
     assert answer.exit_code == 0, answer.output
-    assert "1 twin (seed 77)" in " ".join(answer.output.split())
+    assert "1 twin (seed 77; 1 stretched and similar)" in " ".join(answer.output.split())
 
 
 def test_no_strategy_of_ours_is_marked_where_order_and_rounding_decide() -> None:
     names = ["local", "offset", "sparse", "eigensensitivity", "baruch"]
-    cases = ["suite/mast-on-pad", "suite/arch", "frame-solid"]
+    cases = ["suite/tapered-cantilever", "suite/arch", "frame-solid"]
     run = rank(cases, names, twins=(2, 21), nominal="textbook", jobs=2)
     found = twin_skills(run)
     assert sorted(found) == sorted(names)

@@ -127,8 +127,18 @@ def solve(system: System, count: int, guess: float) -> Modes:
     Raises:
         ValueError: where an eigenpair leaves a residual over 1e-5, or an eigenvalue is negative.
     """
-    shift = (2 * np.pi * guess) ** 2
-    factor = factorised(system.stiffness + shift * system.mass)
+    factor = factorised(system.stiffness + shift_at(guess) * system.mass)
+    return lowest(system, factor, count, guess)
+
+
+def shift_at(guess: float) -> float:
+    """Return what the eigenvalues of a solve near a frequency in Hz are moved by, rad^2/s^2."""
+    return float((2 * np.pi * guess) ** 2)
+
+
+def lowest(system: System, factor: linalg.SuperLU, count: int, guess: float) -> Modes:
+    """Return the lowest modes; as `solve`, of a system that is factorised at its guess already."""
+    shift = shift_at(guess)
     inverse = linalg.LinearOperator(system.stiffness.shape, matvec=factor.solve)
     start = np.random.default_rng(0).standard_normal(system.mass.shape[0])
     values, vectors = linalg.eigsh(

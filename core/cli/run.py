@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -51,7 +52,7 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @click.option(
     "--twins", callback=twins_of, metavar="N[:SEED]",
-    help="Draw N twins of every case whose truth was computed, similar structures under other "
+    help="Draw N twins of every case whose truth was computed, other structures under other "
     "names, and say who is good on the cases but not on them; run one job of each strategy twice.",
 )  # fmt: skip
 @click.option(
@@ -217,7 +218,10 @@ def _header(plan: Plan, place: str) -> str:
 
 
 def _twins(plan: Plan) -> str:
-    """Return how many twins there are, and from which seed; nothing where none was asked for."""
+    """Return how many twins of which kind there are, from which seed; nothing of none."""
     if not plan.request.twins:
         return ""
-    return f"{counted(len(plan.beside.twins), 'twin')} (seed {plan.request.twin_seed}), "
+    twins = plan.beside.twins
+    kinds = Counter(" and ".join(twin.families) for twin in twins)
+    told = "".join(f"; {number} {kind}" for kind, number in kinds.items())
+    return f"{counted(len(twins), 'twin')} (seed {plan.request.twin_seed}{told}), "

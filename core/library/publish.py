@@ -20,6 +20,7 @@ from femubench.core.publish.submissions import Verify, read_submission
 from femubench.core.publish.verification import verify
 from femubench.core.schema.records import run_to_json
 from femubench.core.schema.results import Run
+from femubench.core.twin.twins import Twin
 
 
 def publish(
@@ -105,7 +106,7 @@ class InstalledCases:
         """Return the kinds of structure and of truth of a case."""
         return self._classes.get(name, ())
 
-    def twins(self, cases: Sequence[Case], number: int, seed: int) -> Sequence[Case]:
+    def twins(self, cases: Sequence[Case], number: int, seed: int) -> Sequence[Twin]:
         """Return the twins that a run of these cases draws from a seed."""
         return drawn_twins(cases, self._classes, number, seed)
 

@@ -59,6 +59,7 @@ class _Twins(_Record):
     seed: Annotated[int, Field(ge=0)]
     number: Annotated[int, Field(ge=0, le=1_000)]
     of: dict[Name, Name]
+    kinds: dict[Name, list[_Word]] = {}
     again: dict[Name, Name]
     cases: dict[Name, _Case]
     reference: dict[Name, dict[Literal["used", "higher", "modified"], float]]

@@ -20,6 +20,7 @@ from femubench.core.schema.results import JobResult, Nominal, Run
 from femubench.core.score.leaderboard import leaderboard
 from femubench.core.score.ranking import score_of
 from femubench.core.score.scoring import given_errors, reference_of
+from femubench.core.twin.twins import Twin
 
 SANDBOX = "namespaces"  # what a run calls the one that it can have
 _AGAIN = "run it again with this version of femubench"
@@ -41,7 +42,7 @@ class Installed(Protocol):
         """Return the kinds of structure and of truth of a case."""
         ...
 
-    def twins(self, cases: Sequence[Case], number: int, seed: int) -> Sequence[Case]:
+    def twins(self, cases: Sequence[Case], number: int, seed: int) -> Sequence[Twin]:
         """Return the twins that a run of these cases draws from a seed."""
         ...
 
@@ -153,11 +154,14 @@ def _own_twins(
     if {name: twin.digest for name, twin in drawn.items()} != stated:
         what = f"these are not the twins that seed {told['seed']} draws"
         _refuse(file, what, "meta.twins", _AGAIN)
+    kinds = {name: list(twin.families) for name, twin in drawn.items()}
+    if told.get("kinds") != kinds:
+        _refuse(file, "its twins are of other kinds", "meta.twins.kinds", _AGAIN)
     if any(told["of"][name] != name.rpartition("~")[0] for name in drawn) or not told["again"]:
         _refuse(file, "they are of other cases, or nothing ran twice", "meta.twins", _AGAIN)
     if not set(told["again"].values()) <= set(run.meta["cases"]):
         _refuse(file, "what ran twice is no case of the run", "meta.twins.again", _AGAIN)
-    return drawn
+    return dict(drawn)
 
 
 def _check_complete(run: Run, file: Path) -> None:

@@ -49,6 +49,7 @@ class Beside:
                 "seed": self.seed,
                 "number": self.number,
                 "of": {twin.name: twin.origin for twin in self.twins},
+                "kinds": {twin.name: list(twin.families) for twin in self.twins},
                 "again": self._again,
                 "cases": {name: {"digest": digest} for name, digest in digests.items()},
                 "reference": {twin.name: references[twin.name].rms_percent for twin in self.twins},

@@ -128,6 +128,7 @@ class _TwinsMeta(BaseModel):
     seed: Whole
     number: Whole
     of: dict[Name, Name]
+    kinds: dict[Name, list[Name]] = {}
     again: dict[Name, Name]
     cases: dict[Name, _CaseMeta]
     reference: dict[Name, dict[Name, Percent]]

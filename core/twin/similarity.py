@@ -187,7 +187,7 @@ def _scaled(matrix: SparseArray, factor: SparseArray) -> SparseArray:
 
 def similar_frame(frame: Frame, by: Similarity) -> Frame:
     """Return the frame of the similar structure; what is no length, modulus or density stays."""
-    sections = {id(m.section): _section(m.section, by.length) for m in frame.members}
+    sections = {id(m.section): similar_section(m.section, by.length) for m in frame.members}
     changed: dict[str, Any] = {
         "joints": [Joint(j.name, by.moved(j.xyz), j.type) for j in frame.joints],
         "members": [
@@ -212,7 +212,8 @@ def similar_frame(frame: Frame, by: Similarity) -> Frame:
     return replace(frame, gravity=gravity, **own)
 
 
-def _section(section: Section, length: float) -> Section:
+def similar_section(section: Section, length: float) -> Section:
+    """Return a section of the same form with all its lengths times a factor."""
     fourth: dict[str, Any] = {
         name: length**4 * getattr(section, name) for name in ("Iy", "Iz", "J", "Jp")
     }

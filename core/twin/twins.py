@@ -13,6 +13,7 @@ from femubench.core.case.case import Case
 from femubench.core.errors import NotApplicable
 from femubench.core.twin.disguise import disguised
 from femubench.core.twin.similarity import Similarity, similar_case
+from femubench.core.twin.stretched_case import StretchedStructures
 
 MARK = "~"  # between the name of a case and the number of its twin
 AGAIN = f"{MARK}again"
@@ -21,15 +22,18 @@ AGAIN = f"{MARK}again"
 class TruthFamily(Protocol):
     """What knows the truth of other structures than that of a case.
 
-    Similar structures are one family. Another one is of structures whose geometry or sections vary,
-    with frequencies and shapes between those of solid models that were solved beforehand.
+    Attributes:
+        name: of the family, in one word.
     """
+
+    name: str
 
     def variant(self, case: Case, rng: np.random.Generator) -> Case:
         """Return a case with another nominal model, and with what is measured on that structure.
 
         Arguments:
-            case: name, used modes and modifications are kept.
+            case: name, used modes and modifications are kept; the digest too, unless the truth
+                follows from other files than those of the case.
             rng: draws the structure.
 
         Raises:
@@ -41,12 +45,15 @@ class TruthFamily(Protocol):
 class SimilarStructures:
     """The family of similar structures, which every linear elastic case has."""
 
+    name = "similar"
+
     def variant(self, case: Case, rng: np.random.Generator) -> Case:
         """Return the case of a similar structure."""
         return similar_case(case, Similarity.drawn(rng))
 
 
-SIMILAR: tuple[TruthFamily, ...] = (SimilarStructures(),)
+# A structure of its own geometry where its truth is known, and then a similar one.
+FAMILIES: tuple[TruthFamily, ...] = (StretchedStructures(), SimilarStructures())
 
 
 @dataclass(frozen=True, repr=False)
@@ -56,10 +63,12 @@ class Twin(Case):
     Arguments:
         origin: name of the case that it is a twin of.
         twin_seed: from which it was drawn; noise too is drawn with it.
+        families: names of those that changed the structure, one after another.
     """
 
     origin: str = ""
     twin_seed: int = 0
+    families: tuple[str, ...] = ()
 
     @property
     def drawn_as(self) -> str:
@@ -68,7 +77,8 @@ class Twin(Case):
 
     def conditions(self, seed: int) -> Mapping[str, float | str]:
         """Return of which case it is a twin, and the seed that it was drawn from."""
-        return {"twin_of": self.origin, "twin_seed": self.twin_seed}
+        kind = " and ".join(self.families)
+        return {"twin_of": self.origin, "twin_seed": self.twin_seed, "twin_kind": kind}
 
 
 @dataclass(frozen=True, repr=False)
@@ -91,7 +101,7 @@ class Again(Case):
         return {"again": self.origin}
 
 
-def twin_of(case: Case, number: int, seed: int, families: Sequence[TruthFamily] = SIMILAR) -> Twin:
+def twin_of(case: Case, number: int, seed: int, families: Sequence[TruthFamily] = FAMILIES) -> Twin:
     """Return a twin of a case.
 
     The first one keeps the order of joints, members and sensors: a strategy without chance answers
@@ -109,16 +119,17 @@ def twin_of(case: Case, number: int, seed: int, families: Sequence[TruthFamily] 
     """
     words = [seed, number, *case.name.encode()]
     rng = np.random.default_rng(np.random.SeedSequence(words))
-    found, reasons = case, []
+    found, used, reasons = case, [], []
     for family in families:
         try:
             found = family.variant(found, rng)
+            used.append(family.name)
         except NotApplicable as error:
             reasons.append(str(error))
     if found is case:
         raise NotApplicable("; ".join(reasons) or "there is no family of structures")
     name = f"{case.name}{MARK}{number}"
-    told = f"twin {number} from seed {seed} of {case.name}: {case.digest}"
+    told = f"twin {number} from seed {seed} of {case.name}: {found.digest}"
     renamed = replace(
         disguised(found, rng if number > 1 else None),
         name=name,
@@ -127,11 +138,11 @@ def twin_of(case: Case, number: int, seed: int, families: Sequence[TruthFamily] 
         structure=case.structure or case.name,
     )
     own = {field.name: getattr(renamed, field.name) for field in fields(Case)}
-    return Twin(**own, origin=case.name, twin_seed=seed)
+    return Twin(**own, origin=case.name, twin_seed=seed, families=tuple(used))
 
 
 def twins_of(
-    cases: Sequence[Case], number: int, seed: int, families: Sequence[TruthFamily] = SIMILAR
+    cases: Sequence[Case], number: int, seed: int, families: Sequence[TruthFamily] = FAMILIES
 ) -> Iterator[Twin]:
     """Yield twins of every case that can have some; arguments as for `twin_of`.
 

@@ -62,3 +62,20 @@ class Drawn(Strategy):
     ) -> UpdateResult:
         factor = 1.0 + 0.02 * float(rng.uniform())
         return UpdateResult(replace(model, stiffness=(factor * model.stiffness)))
+
+
+class Ratios(Memory):
+    """Knows ratios of frequencies by heart, and scales them by those that it is given."""
+
+    name = "ratios"
+
+    def update(
+        self, model: Model, measurement: Measurement, rng: np.random.Generator
+    ) -> UpdateResult:
+        # The mean of what is given says the scale better than one frequency.
+        given = np.sort(measurement.frequencies)
+        scale = float(np.exp(np.mean(np.log(given / self.known[: len(given)]))))
+        modes = solve_modes(model).elastic.take(slice(0, len(self.known)))
+        moved = np.square(2.0 * np.pi * scale * self.known) - modes.eigenvalues
+        change = LowRank(model.mass_times(modes.shapes), np.diag(moved))
+        return UpdateResult(replace(model, stiffness_change=change), parameter_count=len(moved))

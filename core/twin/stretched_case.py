@@ -1,0 +1,234 @@
+"""Twins with spans, sections and walls of their own, of which solids give what is measured."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from femubench.core.case.case import Case
+from femubench.core.errors import NotApplicable
+from femubench.core.fem.frame import Frame, GroundSpring, Joint, Place, PointMass, Vector
+from femubench.core.fem.model import Model
+from femubench.core.fem.sections import Section, rectangular_tube, solid_rectangle
+from femubench.core.fem.sensors import Sensors
+from femubench.core.files import read_bytes
+from femubench.core.modal.measurement import Measurement
+from femubench.core.twin.nearness import is_as_near, nearness
+from femubench.core.twin.reduced_solid import LARGEST, ReducedSolid
+from femubench.core.twin.similarity import similar_section
+from femubench.core.typing import FloatArray
+
+FILE = "stretch.npz"  # in the folder of a case
+_MOST_DRAWS = 100
+_LEAST_SHIFT = 0.04  # of ratios of frequencies: who knows them must not find them again
+_GAIN_SHARE = 0.5  # of the variance of the largest reading: a sensor's gain, alike in every mode
+_SCALED = "section"  # the factor of sections that are given by numbers
+_Part = TypeVar("_Part", PointMass, GroundSpring)
+
+
+class StretchedStructures:
+    """The family of structures that are stretched piecewise; solids of some cases are kept."""
+
+    name = "stretched"
+
+    def variant(self, case: Case, rng: np.random.Generator) -> Case:
+        """Return the case of a stretched structure.
+
+        Raises:
+            NotApplicable: for a case without the file of a stretched solid, or where no stretch is
+                as hard as the case.
+            InputError: where that file cannot be read.
+        """
+        file = case.folder / FILE
+        if not file.is_file() or case.model.structure is None:
+            raise NotApplicable(f"no stretched solid of {case.name} is known")
+        found = _as_hard(case, ReducedSolid.read(file), rng)
+        content = hashlib.sha256(read_bytes(file, LARGEST)).hexdigest()
+        told = f"{case.digest} stretched by {content}"
+        return replace(found, digest=hashlib.sha256(told.encode()).hexdigest())
+
+
+def _as_hard(case: Case, solid: ReducedSolid, rng: np.random.Generator) -> Case:
+    """Return a stretched case with other ratios, and a drawing about as near to the truth.
+
+    Where the drawing tells two modes apart by chance alone, a stretch may leave one without a
+    partner: that says nothing of a strategy.
+    """
+    known = nearness(case)
+    for _ in range(_MOST_DRAWS):
+        found = stretched_case(case, solid, solid.drawn(rng), rng)
+        shift = np.log(found.measurement.frequencies / case.measurement.frequencies)
+        if float(np.std(shift)) >= _LEAST_SHIFT and is_as_near(nearness(found), known):
+            return found
+    raise NotApplicable(f"no stretch of {case.name} is as hard as it is")
+
+
+def stretched_case(
+    case: Case, solid: ReducedSolid, factors: FloatArray, rng: np.random.Generator | None
+) -> Case:
+    """Return the case of a stretched structure: model, modes, and changes.
+
+    Arguments:
+        case: a frame.
+        solid: of the structure of the case.
+        factors: of the stretch, (factors,).
+        rng: draws what a test scatters, at the deviations of the case; None for no scatter.
+    """
+    frame = case.model.frame_structure.frame
+    test = _Test.of(case, solid, factors, rng)
+    changes = tuple(
+        replace(
+            change,
+            masses=_at_places(frame, solid, factors, change.masses),
+            springs=_at_places(frame, solid, factors, change.springs),
+            measurement=test.measured(change.measurement, number),
+        )
+        for number, change in enumerate(case.modifications, start=1)
+    )
+    return replace(
+        case,
+        model=Model.of(stretched_frame(frame, solid, factors)),
+        measurement=test.measured(case.measurement, 0),
+        modifications=changes,
+        # What is told of the files is of the structure that it was.
+        notes=(),
+        matches=(),
+        lines=None,
+    )
+
+
+def stretched_frame(frame: Frame, solid: ReducedSolid, factors: FloatArray) -> Frame:
+    """Return the drawing with joints and sections where and as large as the stretch has them."""
+    corners = solid.moved(factors, frame.corners)
+    joints = [
+        Joint(joint.name, _vector(xyz), joint.type)
+        for joint, xyz in zip(frame.joints, corners, strict=True)
+    ]
+    sections = {id(m.section): _section(m.section, solid, factors) for m in frame.members}
+    return replace(
+        frame,
+        joints=tuple(joints),
+        members=tuple(replace(m, section=sections[id(m.section)]) for m in frame.members),
+        masses=_at_places(frame, solid, factors, frame.masses),
+        springs=_at_places(frame, solid, factors, frame.springs),
+    )
+
+
+def _vector(xyz: FloatArray) -> Vector:
+    x, y, z = (float(value) for value in xyz)
+    return x, y, z
+
+
+def _section(section: Section, solid: ReducedSolid, factors: FloatArray) -> Section:
+    sizes = solid.sizes(factors, section.name)
+    if sizes is None:
+        return section
+    width, height, wall = map(float, sizes)
+    if not width:
+        return similar_section(section, float(factors[solid.names.index(_SCALED)]))
+    shape = rectangular_tube(width, height, wall) if wall else solid_rectangle(width, height)
+    return replace(shape, name=section.name)
+
+
+def _at_places(
+    frame: Frame, solid: ReducedSolid, factors: FloatArray, parts: Iterable[_Part]
+) -> tuple[_Part, ...]:
+    """Return what is attached at places where the stretch has these."""
+    return tuple(replace(part, at=_place(frame, solid, factors, part.at)) for part in parts)
+
+
+def _place(frame: Frame, solid: ReducedSolid, factors: FloatArray, place: Place) -> Place:
+    """Return a place; a part of a member may grow more than the rest."""
+    if place.member is None or place.s is None:
+        return place
+    ends = frame.members[frame.member_index[place.member]].ends
+    start, stop = (np.array(frame.joint(name).xyz) for name in ends)
+    points = np.array([start, start + place.s * (stop - start), stop])
+    first, here, last = solid.moved(factors, points)
+    share = np.linalg.norm(here - first) / np.linalg.norm(last - first)
+    return Place(member=place.member, s=float(share))
+
+
+@dataclass(frozen=True)
+class _Test:
+    """What a test of the stretched structure would record.
+
+    Arguments:
+        gains: of the sensors, alike in all modes and states, (sensors,).
+        weighed: mass in kg.
+    """
+
+    solid: ReducedSolid
+    factors: FloatArray
+    gains: FloatArray
+    weighed: float
+    rng: np.random.Generator | None
+
+    @classmethod
+    def of(
+        cls,
+        case: Case,
+        solid: ReducedSolid,
+        factors: FloatArray,
+        rng: np.random.Generator | None,
+    ) -> _Test:
+        measured, mass = case.measurement, solid.mass(factors)
+        gains = np.ones(len(measured.sensors))
+        if rng is not None:
+            spread = float(solid.arrays["shape_scatter"]) * np.sqrt(_GAIN_SHARE)
+            gains += spread * rng.standard_normal(len(gains))
+            if measured.total_mass is not None:
+                value, std = measured.total_mass
+                mass *= 1.0 + std / value * rng.standard_normal()
+        return cls(solid, factors, gains, mass, rng)
+
+    def measured(self, known: Measurement, change: int) -> Measurement:
+        """Return what replaces a measurement of the case.
+
+        Arguments:
+            change: number of the design change, 0 for none.
+        """
+        exact, shapes = self.solid.modes(self.factors, change, len(known))
+        shapes, relative = _scaled(shapes), known.frequency_std / known.frequencies
+        frequencies = exact
+        if self.rng is not None:
+            frequencies, shapes = self._scattered(exact, shapes, self.rng)
+        weight = known.total_mass
+        own: dict[str, Any] = {
+            "sensors": Sensors(
+                known.sensors.labels,
+                self.solid.moved(self.factors, known.sensors.xyz),
+                known.sensors.directions,
+            ),
+            "frequencies": frequencies,
+            "frequency_std": relative * exact,
+            "shapes": shapes,
+        }
+        if weight is not None:
+            own["total_mass"] = (self.weighed, weight[1] / weight[0] * self.weighed)
+        return replace(known, **own)
+
+    def _scattered(
+        self, exact: FloatArray, shapes: FloatArray, rng: np.random.Generator
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return frequencies and shapes with the scatter of the test that the case describes."""
+        scatter, together, of_shapes = (
+            float(self.solid.arrays[name]) for name in ("scatter", "together", "shape_scatter")
+        )
+        common = np.sqrt(together) * rng.standard_normal()
+        own = np.sqrt(1.0 - together) * rng.standard_normal(len(exact))
+        # What the gain leaves of the stated variance, so that every reading scatters as stated.
+        share = np.sqrt(1.0 - _GAIN_SHARE * np.square(shapes))
+        noise = of_shapes * share * rng.standard_normal(shapes.shape)
+        read = _scaled(shapes * self.gains[:, None] + noise)
+        return exact * (1.0 + scatter * (common + own)), read
+
+
+def _scaled(shapes: FloatArray) -> FloatArray:
+    """Return shapes with the largest component of each at +1, (sensors, modes)."""
+    largest = np.take_along_axis(shapes, np.abs(shapes).argmax(axis=0)[None, :], axis=0)
+    return np.asarray(shapes / largest)

@@ -1,0 +1,336 @@
+"""Twins of stretched structures: their truth against solids in full, and whom they find."""
+
+from __future__ import annotations
+
+import re
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import femubench
+from femubench import read_case
+from femubench.core.case.case import Case
+from femubench.core.cli.main import bench
+from femubench.core.errors import InputError, NotApplicable
+from femubench.core.run.beside import beside
+from femubench.core.run.runner import run_jobs
+from femubench.core.run.starts import Starts
+from femubench.core.score.twin_skill import TwinSkill, twin_skills
+from femubench.core.twin.reduced_solid import ReducedSolid
+from femubench.core.twin.stretched_case import FILE, StretchedStructures, stretched_case
+from femubench.core.twin.twins import FAMILIES, SimilarStructures, TruthFamily, twin_of, twins_of
+from truths.affine import StretchedSolid
+from truths.drawing import case_text
+from truths.elasticity import assemble
+from truths.measurement import modes_csv, record, sensors_csv
+from truths.reduction import basis_of, drawn_factors, rigid_fields, snapshots, stretched
+from truths.seats import rigid_fit
+from truths.sections import bar, channel, rectangular_tube
+from truths.stretch import stretch_of
+from truths.stretch_file import HELD_OUT_SEED, SUITE, distance, file_of, held_out, main, solid_of
+from truths.structure import STEEL, Change, Lump, Member, Spring, Structure
+from truths.suite import structures
+
+sys.path.insert(0, str(Path(__file__).parent / "toys"))
+import harness_toys as toys
+from twin_toys import Ratios
+
+FILES = sorted(SUITE.glob(f"*/{FILE}"))
+NAMES = [file.parent.name for file in FILES]
+LARGEST = 6 * 1024**2  # bytes of all files
+ROW = re.compile(r"^\| \d+ \| (?:used|held out) \| ([\d.]+) \|", re.MULTILINE)
+
+
+def tee() -> Structure:
+    """A free T of two tubes, with a mass at its foot and a change of its design."""
+    return Structure(
+        name="tee",
+        title="A T",
+        classes=(),
+        story="",
+        materials={"steel": STEEL},
+        sections={"s": rectangular_tube(0.04, 0.04, 0.004)},
+        joints={"A": (0, 0, 0), "B": (0.3, 0, 0), "C": (0.7, 0, 0), "D": (0.3, 0, -0.4)},
+        members=(
+            Member("left", ("A", "B"), "s", "steel", 4),
+            Member("right", ("B", "C"), "s", "steel", 4),
+            Member("leg", ("D", "B"), "s", "steel", 4),
+        ),
+        lumps=(Lump("D", 0.3, (0.0, 0.02, 0.0)),),
+        sensors=(("A", "yz"), (("right", 0.5), "yz"), ("C", "yz"), ("D", "xy")),
+        changes=(Change("more", (Lump("A", 0.5),), (Spring(("right", 0.5), "y", 3e5),)),),
+        used=3,
+        held_out=2,
+        size=(0.06, 0.05),
+        guess=180.0,
+        graded=False,
+    )
+
+
+@cache
+def small() -> StretchedSolid:
+    return solid_of(tee())
+
+
+@cache
+def reduced() -> ReducedSolid:
+    """The file of the T, of snapshots at twelve stretches."""
+    solid, structure = small(), tee()
+    taken = [snapshots(structure, solid, f) for f in drawn_factors(solid, 12)]
+    return ReducedSolid(file_of(structure, solid, basis_of(structure, solid, np.hstack(taken), 75)))
+
+
+@cache
+def builtin(name: str) -> Case:
+    return femubench.cases[f"suite/{name}"]
+
+
+def test_matrices_of_a_stretched_solid_are_those_of_an_assembly() -> None:
+    solid = small()
+    factors = drawn_factors(solid, 1, 3)[0]
+    known = assemble(solid.solid, solid.stretch.map(factors)(solid.solid.points))
+    found = solid.matrices(factors)
+    np.testing.assert_allclose(found.nodes, known.nodes, rtol=0, atol=1e-12)
+    for one, other in ((found.stiffness, known.stiffness), (found.mass, known.mass)):
+        assert abs(one - other).max() < 1e-12 * abs(other).max()
+    shapes = np.random.default_rng(0).standard_normal((3 * solid.nodes.shape[1], 4))
+    terms = solid.projected(shapes)
+    for matrix, parts in zip((known.stiffness, known.mass), terms, strict=True):
+        total = sum(np.prod(factors ** np.array(p)) * part for p, part in parts.items())
+        np.testing.assert_allclose(total, shapes.T @ (matrix @ shapes), rtol=1e-9)
+    weight = sum(np.prod(factors ** np.array(p)) * kg for p, kg in solid.masses().items())
+    assert weight == pytest.approx(known.total_mass, rel=1e-12)
+
+
+def test_rigid_motions_of_a_stretched_solid_are_sums_of_the_fields() -> None:
+    structure, solid = tee(), small()
+    factors = drawn_factors(solid, 1, 4)[0]
+    x, y, z = solid.stretch.map(factors)(solid.nodes)
+    zero, fields = np.zeros_like(x), rigid_fields(structure, solid)
+    for turned in ((zero, -z, y), (z, zero, -x), (-y, x, zero)):
+        motion = np.array(turned).T.ravel()
+        share = np.linalg.lstsq(fields, motion, rcond=None)[0]
+        assert np.abs(fields @ share - motion).max() < 1e-12
+
+
+def test_a_file_gives_the_modes_of_solids_in_full() -> None:
+    structure, solid = tee(), small()
+    found = distance(
+        held_out(structure, solid, HELD_OUT_SEED), reduced(), structure.used + structure.held_out
+    )
+    assert found.error < 5e-4
+    assert found.alike > 0.999
+    # With far fewer shapes it is off, so that the figures above say something.
+    one = np.ones((1, len(solid.stretch.names)))
+    taken = np.hstack([snapshots(structure, solid, f) for f in one])
+    rough = ReducedSolid(file_of(structure, solid, basis_of(structure, solid, taken, 4)))
+    assert distance(held_out(structure, solid, HELD_OUT_SEED), rough, 5).error > 0.01
+
+
+def test_a_seat_moves_as_its_nodes_do() -> None:
+    structure, solid = tee(), small()
+    factors = drawn_factors(solid, 1, 5)[0]
+    shapes = np.random.default_rng(1).standard_normal((3 * solid.nodes.shape[1], 3))
+    arrays = file_of(structure, solid, shapes)
+    here, matrices = stretched(structure, solid, factors), solid.matrices(factors)
+    for number, place in enumerate(("A", ("right", 0.5), "C", "D")):
+        known = rigid_fit(here, matrices, place) @ shapes
+        found = ReducedSolid(arrays)._seat(factors, number)
+        np.testing.assert_allclose(found, known, atol=2e-6 * np.abs(known).max())
+
+
+def test_what_cannot_be_stretched_is_said() -> None:
+    structure = tee()
+    with pytest.raises(ValueError, match="only straight solids of bricks"):
+        stretch_of(replace(structure, warp=lambda points: points))
+    # Where a section is given by numbers, it has one factor, walls and all.
+    members = (*structure.members[:2], Member("leg", ("D", "B"), "t", "steel", 4))
+    odd = {"s": channel(0.04, 0.04, 0.004, 0.004), "t": bar(0.02, 0.02)}
+    assert "wall" not in stretch_of(replace(structure, sections=odd, members=members)).names
+
+
+def test_there_are_files_and_they_stay_small() -> None:
+    assert len(FILES) >= 2
+    assert sum(file.stat().st_size for file in FILES) <= LARGEST
+    for file in FILES:
+        assert float(ReducedSolid.read(file).arrays["error"]) <= 5e-4
+        assert float(ReducedSolid.read(file).arrays["alike"]) >= 0.999
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_unstretched_a_file_gives_what_was_published(name: str) -> None:
+    case, solid = builtin(name), ReducedSolid.read(SUITE / name / FILE)
+    one = np.ones(len(solid.names))
+    hertz = [float(v) for v in ROW.findall((SUITE / name / "README.md").read_text("utf-8"))]
+    found = stretched_case(case, solid, one, None)
+    np.testing.assert_allclose(found.measurement.frequencies, hertz, rtol=5e-4, atol=5e-4)
+    structure = structures()[name]
+    noise = 5 * max(structure.scatter, 1e-4)
+    for own, known in zip(
+        (found.measurement, *(m.measurement for m in found.modifications)),
+        (case.measurement, *(m.measurement for m in case.modifications)),
+        strict=True,
+    ):
+        np.testing.assert_allclose(own.frequencies, known.frequencies, rtol=noise)
+        left = (own.shapes * known.shapes).sum(axis=0) ** 2
+        mac = left / ((own.shapes**2).sum(axis=0) * (known.shapes**2).sum(axis=0))
+        assert mac.min() > 1 - 20 * structure.shape_scatter**2 - 1e-3
+    off = abs(found.model.stiffness - case.model.stiffness).max()
+    assert off < 1e-8 * abs(case.model.stiffness).max()
+    assert found.measurement.total_mass is not None
+    assert case.measurement.total_mass is not None
+    value, std = case.measurement.total_mass
+    assert abs(found.measurement.total_mass[0] - value) < 4 * std
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_drawing_is_stretched_as_the_solid(name: str, tmp_path: Path) -> None:
+    """The nominal model equals the one drawn from scratch of a structure with these sizes."""
+    case, solid, structure = (
+        builtin(name),
+        ReducedSolid.read(SUITE / name / FILE),
+        structures()[name],
+    )
+    factors = solid.drawn(np.random.default_rng(8))
+    found = stretched_case(case, solid, factors, None).model
+    move = stretch_of(structure).map(factors)
+    joints = {
+        j: tuple(move(np.array(p)[:, None])[:, 0].tolist()) for j, p in structure.joints.items()
+    }
+    sections = {}
+    for key, section in structure.sections.items():
+        sizes = solid.sizes(factors, key)
+        kind = section.drawn.get("shape")
+        if sizes is None:
+            sections[key] = section
+        elif kind == "rectangular-tube":
+            sections[key] = rectangular_tube(*sizes)
+        elif kind == "solid-rectangle":
+            sections[key] = bar(*sizes[:2])
+        else:
+            s = factors[solid.names.index("section")]
+            power = {"A": 2, "Iy": 4, "Iz": 4, "J": 4, "Jp": 4, "kappa": 0}
+            drawn = {k: float(v) * s ** power[k] for k, v in section.drawn.items()}
+            sections[key] = replace(section, drawn=drawn)
+    hung = [lump.at for lump in structure.lumps] + [spring.at for spring in structure.springs]
+    if any(not isinstance(at, str) for at in hung):
+        pytest.skip("what hangs between joints moves along its member")
+    drawn = replace(structure, joints=joints, sections=sections, changes=())
+    (tmp_path / "case.toml").write_text(case_text(drawn, 1.0))
+    (tmp_path / "sensors.csv").write_text(sensors_csv(drawn))
+    count, sensors = structure.used + structure.held_out, len(case.measurement.sensors)
+    modes = record(drawn, np.arange(1.0, count + 1), np.ones((count, sensors)), np.zeros(count), 1)
+    (tmp_path / "modes.csv").write_text(modes_csv(drawn, modes))
+    known = read_case(tmp_path).model
+    for one, other in ((found.stiffness, known.stiffness), (found.mass, known.mass)):
+        assert abs(one - other).max() < 1e-7 * abs(other).max()
+
+
+def test_twins_have_ratios_of_their_own_and_noise_of_the_stated_size() -> None:
+    name = NAMES[0]
+    case = builtin(name)
+    twins = [twin_of(case, 1, seed) for seed in range(4)]
+    assert all(twin.families == ("stretched", "similar") for twin in twins)
+    ratios = np.array([t.measurement.frequencies / t.measurement.frequencies[0] for t in twins])
+    own = case.measurement.frequencies / case.measurement.frequencies[0]
+    assert np.abs(ratios / own - 1).max(axis=1).min() > 0.02
+    assert np.std(ratios, axis=0)[1:].max() > 0.02
+    again = twin_of(case, 1, 2)
+    assert again.digest == twins[2].digest
+    assert (again.measurement.frequencies == twins[2].measurement.frequencies).all()
+    assert len({twin.digest for twin in twins}) == 4
+
+    solid = ReducedSolid.read(case.folder / FILE)
+    one = np.ones(len(solid.names))
+    exact = stretched_case(case, solid, one, None).measurement
+    drawn = [
+        stretched_case(case, solid, one, np.random.default_rng(seed)).measurement
+        for seed in range(200)
+    ]
+    spread = np.std([m.frequencies / exact.frequencies for m in drawn], axis=0)
+    np.testing.assert_allclose(spread, float(solid.arrays["scatter"]), rtol=0.2)
+    assert np.std([m.shapes for m in drawn]) > 0.0
+    assert all(np.abs(m.shapes).max(axis=0) == pytest.approx(1.0) for m in drawn[:3])
+
+
+def test_the_digest_of_a_twin_follows_from_the_file(tmp_path: Path) -> None:
+    case = builtin(NAMES[0])
+    (tmp_path / FILE).write_bytes((case.folder / FILE).read_bytes())
+    same = twin_of(replace(case, folder=tmp_path), 1, 9)
+    assert same.digest == twin_of(case, 1, 9).digest
+    arrays = dict(ReducedSolid.read(tmp_path / FILE).arrays)
+    np.savez(tmp_path / FILE, **{**arrays, "scatter": 0.0035})
+    assert twin_of(replace(case, folder=tmp_path), 1, 9).digest != same.digest
+    (tmp_path / FILE).unlink()
+    assert twin_of(replace(case, folder=tmp_path), 1, 9).families == ("similar",)
+
+
+@pytest.mark.parametrize("content", [b"", b"no archive", b"PK\x03\x04" + bytes(50)])
+def test_a_damaged_file_is_one_line(content: bytes, tmp_path: Path) -> None:
+    (tmp_path / FILE).write_bytes(content)
+    with pytest.raises(InputError, match=FILE):
+        twin_of(replace(builtin(NAMES[0]), folder=tmp_path), 1, 9)
+    np.savez(tmp_path / FILE, names=np.array(["a"]))
+    with pytest.raises(InputError, match="stretched solid"):
+        twin_of(replace(builtin(NAMES[0]), folder=tmp_path), 1, 9)
+
+
+def test_a_case_without_a_file_has_none_of_them() -> None:
+    with pytest.raises(NotApplicable, match="no stretched solid"):
+        StretchedStructures().variant(toys.tiny_case(), np.random.default_rng(0))
+
+
+def skill(families: tuple[TruthFamily, ...]) -> dict[str, TwinSkill]:
+    """What twins of some families say of who knows ratios by heart, and of who does nothing."""
+    case = builtin("stiffened-strip")
+    twins = list(twins_of([case], 2, 13, families))
+    truth = stretched_case(case, ReducedSolid.read(case.folder / FILE), np.ones(4), None)
+    able = [toys.Unchanged(), Ratios(tuple(truth.measurement.frequencies))]
+    starts = Starts(beside=beside([case], twins, 2, 13))
+    return twin_skills(run_jobs([case], able, jobs=1, starts=starts))
+
+
+def test_who_knows_ratios_by_heart_is_marked_by_stretched_twins_alone() -> None:
+    similar, stretched_too = skill((SimilarStructures(),)), skill(FAMILIES)
+    assert similar["ratios"].original_skill > 0.5
+    assert similar["ratios"].skill == pytest.approx(similar["ratios"].original_skill, abs=1e-3)
+    assert not similar["ratios"].suspicious
+    assert stretched_too["ratios"].known == ("suite/stiffened-strip",)
+    assert not stretched_too["unchanged"].suspicious
+
+
+def test_strategies_that_reckon_are_not_marked() -> None:
+    names = ["local", "offset", "sparse", "eigensensitivity", "baruch"]
+    cases = ["suite/stiffened-strip", "suite/bracket"]
+    run = femubench.rank(cases, names, twins=(2, 21), nominal="textbook", jobs=1)
+    found = twin_skills(run)
+    assert sorted(found) == sorted(names)
+    assert {kind for kinds in run.meta["twins"]["kinds"].values() for kind in kinds} == {
+        *("stretched", "similar")
+    }
+    assert not any(item.suspicious for item in found.values())
+
+
+def test_the_command_tells_the_kinds(tmp_path: Path) -> None:
+    words = ["run", "suite/bracket", "frame-solid", "-s", "unchanged", "--twins", "1:77", "-j", "1"]
+    answer = CliRunner().invoke(bench, [*words, "--store", str(tmp_path / "s")])
+    assert answer.exit_code == 0, answer.output
+    text = " ".join(answer.output.split())
+    assert "2 twins (seed 77; 1 similar; 1 stretched and similar)" in text or (
+        "2 twins (seed 77; 1 stretched and similar; 1 similar)" in text
+    )
+    assert "2 twins (1 stretched) of 2 cases, seed 77" in text
+
+
+def test_the_command_that_writes_files_says_what_it_cannot(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["stretch_file", "arch"])
+    monkeypatch.setattr("truths.stretch_file.write_table", lambda: None)
+    assert main() == 1
+    assert "arch: only straight solids of bricks are stretched" in capsys.readouterr().err
