@@ -18,6 +18,7 @@ from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.fem.frame import GroundSpring, Joint, Material, Member, Place, Support
 from femubench.core.fem.model import Dofs
 from femubench.core.fem.sections import rectangular_tube
+from femubench.core.inference.effort import Effort
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.extended_model import departure, extended, raw_residual
 from femubench.core.inference.fit import Problem, state_at
@@ -203,7 +204,7 @@ class TestCoordinates:
         problem = posed_on(model, hypotheses)
         base = state_at(problem, (), np.zeros(0))
         parts = [projected(problem, hypothesis) for hypothesis in hypotheses]
-        for part, found in zip(parts, screened(problem, base, parts), strict=True):
+        for part, found in zip(parts, screened(problem, base, parts, Effort()), strict=True):
             own, (there,) = enriched(problem, (part,))
             for x, residual in zip(found.grid, found.residuals, strict=True):
                 exact = state_at(own, (there,), x).residual
