@@ -23,13 +23,13 @@ from threadpoolctl import threadpool_limits
 
 from femubench.core.case.case import Case
 from femubench.core.case.reader import read_case
+from femubench.core.change.hypothesis import by_themselves, hypotheses_of
 from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.fem.frame import Frame, Joint, Material, Member, Plane
 from femubench.core.fem.model import Model
 from femubench.core.fem.sections import rectangular_tube
 from femubench.core.fem.sensors import Sensors
-from femubench.core.inference.hypothesis import by_themselves, hypotheses_of
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.plugin.loader import registered_effects

@@ -24,12 +24,12 @@ from scipy.sparse import csc_array, csc_matrix
 from scipy.sparse.linalg import LinearOperator, eigsh
 from threadpoolctl import threadpool_limits
 
+from femubench.core.change.hypothesis import by_themselves, hypotheses_of
 from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.fem.frame import Frame, Place, PointMass
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.structure import Structure
-from femubench.core.inference.hypothesis import by_themselves, hypotheses_of
 from femubench.core.modal.eigen import Modes, solve_modes
 from femubench.core.modal.factorisation import LU, Cholesky, cholmod_obstacle
 from femubench.core.modal.many_changes import Change, modes_of_changes

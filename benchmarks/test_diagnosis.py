@@ -11,13 +11,13 @@ from pytest_benchmark.fixture import BenchmarkFixture
 from femubench.core.case.case import Case
 from femubench.core.challenge.draw import draw_case
 from femubench.core.challenge.truth import Hidden
+from femubench.core.change.hypothesis import Hypothesis, hypotheses_of
 from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.diagnosis.result import Diagnosis
 from femubench.core.errors import FemubenchError
 from femubench.core.fem.model import Model
+from femubench.core.fit.extended_model import raw_residual
 from femubench.core.inference.examine import posed
-from femubench.core.inference.extended_model import raw_residual
-from femubench.core.inference.hypothesis import Hypothesis, hypotheses_of
 from femubench.core.plugin.loader import registered_effects
 
 _MAGNITUDES = (0.3, 1.0, 2.5)  # deviations of the prior

@@ -1,5 +1,17 @@
 """What an author of an effect needs: places, parameters, the change of mass and stiffness."""
 
+from femubench.core.change.terms import (
+    Change,
+    ElementOperator,
+    MatrixOperator,
+    Operator,
+    RowOperator,
+    Term,
+    barycentric,
+    chebyshev_nodes,
+    proportional,
+    sparse_term,
+)
 from femubench.core.effect.attachments import (
     directed_places,
     directed_point,
@@ -13,18 +25,6 @@ from femubench.core.effect.attachments import (
     total_mass,
     translation_rows,
     with_extra,
-)
-from femubench.core.effect.change import (
-    Change,
-    ElementOperator,
-    MatrixOperator,
-    Operator,
-    RowOperator,
-    Term,
-    barycentric,
-    chebyshev_nodes,
-    proportional,
-    sparse_term,
 )
 from femubench.core.effect.flexible_ends import (
     end_arm,

@@ -15,12 +15,12 @@ from femubench import (
 from femubench.core.advise.advice import Group, advise, options_for
 from femubench.core.advise.point_attachments import points_of
 from femubench.core.advise.prediction import Outlook, Points, outlook_of
-from femubench.core.inference.fit import Fit, Problem, fit
-from femubench.core.inference.hypothesis import hypotheses_of
-from femubench.core.inference.modal_basis import nominal_space
-from femubench.core.inference.noise import Noise
-from femubench.core.inference.projection import Projection
-from femubench.core.inference.residuals import Data
+from femubench.core.change.hypothesis import hypotheses_of
+from femubench.core.fit.modal_basis import nominal_space
+from femubench.core.fit.modal_fit import Fit, Problem, fit
+from femubench.core.fit.noise import Noise
+from femubench.core.fit.projection import Projection
+from femubench.core.fit.residuals import Data
 from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import Advice
 

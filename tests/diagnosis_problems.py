@@ -11,14 +11,14 @@ import numpy as np
 
 from femubench import Case, Measurement, Model, Sensors, solve_modes
 from femubench.core.case.modes import NO_SENSORS
+from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.fem.frame import ACTIVE
+from femubench.core.fit.modal_basis import nominal_space
+from femubench.core.fit.modal_fit import Problem
+from femubench.core.fit.noise import Noise
+from femubench.core.fit.projection import Projection
+from femubench.core.fit.residuals import Data
 from femubench.core.inference.examine import posed
-from femubench.core.inference.fit import Problem
-from femubench.core.inference.hypothesis import hypotheses_of
-from femubench.core.inference.modal_basis import nominal_space
-from femubench.core.inference.noise import Noise
-from femubench.core.inference.projection import Projection
-from femubench.core.inference.residuals import Data
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.roles import Effect
 from femubench.effect import total_mass

@@ -13,9 +13,9 @@ from numpy.testing import assert_allclose
 
 from femubench import Model
 from femubench.core.advise.advice import advise
-from femubench.core.inference.fit import fit
-from femubench.core.inference.noise import Noise
-from femubench.core.inference.residuals import Data
+from femubench.core.fit.modal_fit import fit
+from femubench.core.fit.noise import Noise
+from femubench.core.fit.residuals import Data
 from femubench.fem import Frame
 from femubench.plugins.effects.joint_rotation import JointRotation
 from femubench.plugins.effects.material import Density, YoungsModulus

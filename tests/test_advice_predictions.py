@@ -20,7 +20,7 @@ from femubench.core.advise.point_attachments import antiresonances, loaded_frequ
 from femubench.core.advise.prediction import Outlook, Points, Predicted, distance
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.fem.model import Dofs
-from femubench.core.inference.fit import Fit, fit, state_at
+from femubench.core.fit.modal_fit import Fit, fit, state_at
 from femubench.effect import point_in, translation_rows
 from femubench.fem import FloatArray, Frame, Place, PointMass, Support
 from femubench.plugins.effects.added_mass import AddedMass

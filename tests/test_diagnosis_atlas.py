@@ -11,7 +11,7 @@ import pytest
 
 from femubench import Model
 from femubench.core.challenge.structures import structure_named
-from femubench.core.inference.fit import Fit, Problem, fit, state_at
+from femubench.core.fit.modal_fit import Fit, Problem, fit, state_at
 from femubench.core.inference.grid_search import Screened, _in_cells, screen
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from femubench import Measurement, Model, diagnose, solve_modes
-from femubench.core.inference.fit import state_at
+from femubench.core.fit.modal_fit import state_at
 from femubench.fem import Frame, Joint, Material, Member, rectangular_tube
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -13,10 +13,10 @@ import pytest
 from femubench import Measurement, Model, NotApplicable, Sensors, solve_modes
 from femubench.core.fem.frame import Factor, GroundSpring, Place
 from femubench.core.fem.structure import Structure
+from femubench.core.fit.modal_fit import state_at
+from femubench.core.fit.noise import Noise
+from femubench.core.fit.residuals import Data
 from femubench.core.inference.examine import posed
-from femubench.core.inference.fit import state_at
-from femubench.core.inference.noise import Noise
-from femubench.core.inference.residuals import Data
 from femubench.fem import FloatArray, Frame
 
 sys.path.insert(0, str(Path(__file__).parent))

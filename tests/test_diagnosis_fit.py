@@ -15,9 +15,9 @@ from scipy import integrate, optimize
 from femubench import Model
 from femubench.core.challenge.structures import structure_named
 from femubench.core.fem.frame import ACTIVE
-from femubench.core.inference.fit import Fit, Problem, State, bounds_of, fit, log_evidence, state_at
-from femubench.core.inference.modal_basis import solve_pencil
-from femubench.core.inference.projection import Projection
+from femubench.core.fit.modal_basis import solve_pencil
+from femubench.core.fit.modal_fit import Fit, Problem, State, bounds_of, fit, log_evidence, state_at
+from femubench.core.fit.projection import Projection
 from femubench.core.modal.eigen import natural_shift, solve_dense
 from femubench.effect import total_mass
 from femubench.fem import FloatArray, Frame

@@ -12,6 +12,7 @@ import pytest
 from femubench import Case, Diagnosis, Measurement, Model, diagnose
 from femubench.core.case.case import Modification
 from femubench.core.challenge.structures import structure_named
+from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.diagnosis.proof import (
     Unseen,
     gain_of,
@@ -20,10 +21,9 @@ from femubench.core.diagnosis.proof import (
     modified,
     rms_gain_of,
 )
+from femubench.core.fit.mesh_error import refined
+from femubench.core.fit.modal_fit import Fit, state_at
 from femubench.core.inference.examine import examine, posed
-from femubench.core.inference.fit import Fit, state_at
-from femubench.core.inference.hypothesis import hypotheses_of
-from femubench.core.inference.mesh_error import refined
 from femubench.core.schema.diagnosis import Cause, Gain
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block

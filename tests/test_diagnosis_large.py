@@ -14,26 +14,26 @@ from numpy.testing import assert_allclose, assert_array_equal
 from femubench import Measurement, Model, Sensors, solve_modes
 from femubench.core.case.case import Case
 from femubench.core.case.nodes import MatrixGeometry
+from femubench.core.change.hypothesis import Hypothesis, hypotheses_of
 from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.fem.frame import GroundSpring, Joint, Material, Member, Place, Support
 from femubench.core.fem.model import Dofs
 from femubench.core.fem.sections import rectangular_tube
-from femubench.core.inference.effort import Effort
-from femubench.core.inference.examine import Examination, examine
-from femubench.core.inference.extended_model import departure, extended, raw_residual
-from femubench.core.inference.fit import Problem, state_at
-from femubench.core.inference.hypothesis import Hypothesis, hypotheses_of
-from femubench.core.inference.noise import Noise
-from femubench.core.inference.projection import Projection, Projector
-from femubench.core.inference.residuals import Data
-from femubench.core.inference.screening import _pulls, screened, with_shortlist
-from femubench.core.inference.static_response import (
+from femubench.core.fit.extended_model import departure, extended, raw_residual
+from femubench.core.fit.modal_fit import Problem, state_at
+from femubench.core.fit.noise import Noise
+from femubench.core.fit.projection import Projection, Projector
+from femubench.core.fit.residuals import Data
+from femubench.core.fit.static_response import (
     Basis,
     LargeProblem,
     _touched,
     enriched,
     placed,
 )
+from femubench.core.inference.effort import Effort
+from femubench.core.inference.examine import Examination, examine
+from femubench.core.inference.screening import _pulls, screened, with_shortlist
 from femubench.core.modal.eigen import counted_evaluations, modes_of
 from femubench.effect import Effect
 from femubench.fem import Frame

@@ -15,11 +15,11 @@ import pytest
 
 from femubench import Model
 from femubench.core.challenge.structures import structure_named
+from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.fem.frame import Place
+from femubench.core.fit.extended_model import agreed, extended, raw_residual
+from femubench.core.fit.modal_fit import fit, state_at
 from femubench.core.inference.examine import examine
-from femubench.core.inference.extended_model import agreed, extended, raw_residual
-from femubench.core.inference.fit import fit, state_at
-from femubench.core.inference.hypothesis import hypotheses_of
 from femubench.core.inference.posterior import Posterior
 from femubench.core.inference.prior import (
     PRIOR_BEYOND_TEXTBOOK,

@@ -15,6 +15,7 @@ import pytest
 from femubench import Case, Diagnosis, InputError, Measurement, Model, diagnose
 from femubench.core.case.modes import NO_SENSORS
 from femubench.core.challenge.structures import structure_named
+from femubench.core.change.hypothesis import by_themselves
 from femubench.core.diagnosis.scatter import overstatement, scatter_rows
 from femubench.core.diagnosis.verdict import (
     Decision,
@@ -24,9 +25,8 @@ from femubench.core.diagnosis.verdict import (
     most_believed,
     mostly_common,
 )
-from femubench.core.inference.hypothesis import by_themselves
+from femubench.core.fit.residuals import Data
 from femubench.core.inference.posterior import Posterior
-from femubench.core.inference.residuals import Data
 from femubench.core.inference.search import adequacy
 from femubench.effect import Effect
 from femubench.fem import Frame, Joint, Material, Member, Place, Section, Support

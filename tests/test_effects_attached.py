@@ -15,15 +15,15 @@ import scipy.linalg as la
 from femubench import Model, NotApplicable, Sensors, diagnose, solve_modes
 from femubench.core.challenge.structures import structure_named
 from femubench.core.challenge.truth import finer
-from femubench.core.diagnosis.tables import placed_causes
-from femubench.core.effect.places import match
-from femubench.core.inference.examine import examine
-from femubench.core.inference.hypothesis import (
+from femubench.core.change.hypothesis import (
     by_themselves,
     finer as finer_hypotheses,
     hypothesis_at,
 )
-from femubench.core.inference.projection import Projector
+from femubench.core.diagnosis.tables import placed_causes
+from femubench.core.effect.places import match
+from femubench.core.fit.projection import Projector
+from femubench.core.inference.examine import examine
 from femubench.core.modal.eigen import counted_evaluations, solve_dense
 from femubench.effect import (
     FrameEffect,

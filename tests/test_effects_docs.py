@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from femubench import Model, solve_modes
+from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.conformance.checking import findings, subjects
-from femubench.core.inference.hypothesis import hypotheses_of
 from femubench.core.plugin.loader import Plugins, load_plugins
 from femubench.effect import member_length
 from femubench.fem import Frame, Place, PointMass, Support

@@ -14,10 +14,10 @@ import pytest
 
 from femubench import InputError, Model, cases, read_case
 from femubench.core.case.writing import write_case
+from femubench.core.change.hypothesis import hypotheses_of
+from femubench.core.change.terms import Change, RowOperator, Term, proportional
 from femubench.core.effect.attachments import point_motion
-from femubench.core.effect.change import Change, RowOperator, Term, proportional
 from femubench.core.fem.frame import Place
-from femubench.core.inference.hypothesis import hypotheses_of
 from femubench.diagnosis import registered_effects
 from femubench.effect import EffectParameter
 

@@ -16,7 +16,7 @@ from femubench import Measurement, Model, Sensors, diagnose, read_case
 from femubench.core.challenge.draw import draw_case
 from femubench.core.challenge.measuring import Seen, record
 from femubench.core.challenge.structures import structure_named
-from femubench.core.inference.residuals import Data
+from femubench.core.fit.residuals import Data
 from femubench.core.modal.correlation import seen_modes
 from femubench.core.modal.eigen import Modes, counted_evaluations, solve_modes
 from femubench.core.ties import alike, by_probability, in_order, least

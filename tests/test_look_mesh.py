@@ -15,7 +15,7 @@ from femubench.core.fem.frame import Factor, Frame, Place, PointMass, Preload
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Parameter
 from femubench.core.fem.structure import Structure
-from femubench.core.inference.mesh_error import refined
+from femubench.core.fit.mesh_error import refined
 from femubench.core.look.look import mesh_bias
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.typing import FloatArray
@@ -86,5 +86,5 @@ def test_elements_out_of_proportion_are_found(ladder: FrameBuilder) -> None:
 def test_no_mesh_bias_of_a_model_that_is_too_large(
     ladder: FrameBuilder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("femubench.core.inference.mesh_error.SOLVED_LIMIT", 80)
+    monkeypatch.setattr("femubench.core.fit.mesh_error.SOLVED_LIMIT", 80)
     assert mesh_bias(Model.of(ladder()), 5) is None

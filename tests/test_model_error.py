@@ -14,7 +14,9 @@ from scipy.stats import multivariate_normal
 from femubench import Model
 from femubench.core.challenge.structures import structure_named
 from femubench.core.fem.frame import Factor, JointSpring, Place
-from femubench.core.inference.fit import Problem, State, fit, state_at
+from femubench.core.fit.modal_fit import Problem, State, fit, state_at
+from femubench.core.fit.noise import Noise
+from femubench.core.fit.static_response import Basis
 from femubench.core.inference.model_error import (
     WIDTHS,
     ModelError,
@@ -22,8 +24,6 @@ from femubench.core.inference.model_error import (
     error_slopes,
     kind,
 )
-from femubench.core.inference.noise import Noise
-from femubench.core.inference.static_response import Basis
 from femubench.effect import member_length, total_mass
 from femubench.fem import FloatArray, Frame, PointMass
 

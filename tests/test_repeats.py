@@ -15,7 +15,7 @@ from scipy.stats import multivariate_normal
 from femubench import InputError, Measurement, Sensors, read_case
 from femubench.core.case.case import Case
 from femubench.core.case.writing import write_case
-from femubench.core.inference.residuals import Data as DiagnosisData
+from femubench.core.fit.residuals import Data as DiagnosisData
 from femubench.core.update.posterior_sampling import Target
 from femubench.core.update.residuals import Data as UpdateData
 from femubench.modal import shrunk_correlation

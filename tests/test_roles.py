@@ -16,8 +16,8 @@ from mypy import api
 from femubench import Strategy, UpdateResult
 from femubench.core import roles
 from femubench.core.case.reader import read_case
+from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.cli.main import bench
-from femubench.core.inference.hypothesis import hypotheses_of
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.validation import check_effect, check_strategy
 from tests.test_cli import put_case, put_distribution

@@ -14,8 +14,8 @@ import pytest
 
 from femubench import read_case
 from femubench.core.challenge.truth_file import read_truth
+from femubench.core.fit.extended_model import raw_residual
 from femubench.core.inference.examine import posed
-from femubench.core.inference.extended_model import raw_residual
 from femubench.core.plugin.loader import load_plugins
 from truths.opensees_cases import (
     COUNTS,

@@ -36,7 +36,7 @@ from femubench.core.challenge.truth_file import (
     truth_text,
 )
 from femubench.core.errors import InputError
-from femubench.core.inference.residuals import Data
+from femubench.core.fit.residuals import Data
 from femubench.core.modal.eigen import enough_modes, solve_modes
 from truths.posing import FAULTS, SUITE
 

@@ -16,8 +16,8 @@ from femubench.core.advise.point_attachments import (
 )
 from femubench.core.advise.prediction import Outlook, Points, Predicted, distance, outlook_of
 from femubench.core.fem.model import Model
-from femubench.core.inference.fit import Fit, Problem
-from femubench.core.inference.residuals import Data
+from femubench.core.fit.modal_fit import Fit, Problem
+from femubench.core.fit.residuals import Data
 from femubench.core.schema.diagnosis import Advice
 from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray

@@ -14,7 +14,7 @@ from femubench.core.advise.prediction import Outlook, Points, Predicted
 from femubench.core.effect.attachments import free_translations, point_in
 from femubench.core.effect.places import point_places
 from femubench.core.fem.model import Model
-from femubench.core.inference.fit import signed_hz
+from femubench.core.fit.modal_fit import signed_hz
 from femubench.core.typing import FloatArray
 
 _MOST = 48

@@ -10,13 +10,13 @@ import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
+from femubench.core.change.hypothesis import Hypothesis
 from femubench.core.effect.attachments import point_in, translation_rows
 from femubench.core.effect.reading import Reading
 from femubench.core.fem.model import Model
-from femubench.core.inference.fit import Fit, Problem, State, signed_hz, state_at
-from femubench.core.inference.hypothesis import Hypothesis
-from femubench.core.inference.modal_basis import nominal_space
-from femubench.core.inference.static_response import LargeProblem
+from femubench.core.fit.modal_basis import nominal_space
+from femubench.core.fit.modal_fit import Fit, Problem, State, signed_hz, state_at
+from femubench.core.fit.static_response import LargeProblem
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 

@@ -15,7 +15,7 @@ from femubench.core.errors import ModelError
 from femubench.core.fem.kinematics import node_at
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import DIRECTIONS
-from femubench.core.inference.residuals import Data
+from femubench.core.fit.residuals import Data
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.ties import least

@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from femubench.core.change.hypothesis import Hypothesis, hypothesis_at
 from femubench.core.errors import FemubenchError, ModelError
+from femubench.core.fit.extended_model import agreed, extended
+from femubench.core.fit.modal_fit import Fit, Problem, State, bounds_of, fit, state_at
+from femubench.core.fit.projection import Projection, Projector
+from femubench.core.fit.static_response import Basis, enriched, placed
 from femubench.core.inference.examine import Examination, is_innate
-from femubench.core.inference.extended_model import agreed, extended
-from femubench.core.inference.fit import Fit, Problem, State, bounds_of, fit, state_at
-from femubench.core.inference.hypothesis import Hypothesis, hypothesis_at
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.prior import Base, textbook_bases
-from femubench.core.inference.projection import Projection, Projector
-from femubench.core.inference.static_response import Basis, enriched, placed
 from femubench.core.roles import Effect
 from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray

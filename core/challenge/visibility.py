@@ -8,14 +8,14 @@ import numpy as np
 
 from femubench.core.case.case import Case
 from femubench.core.challenge.truth import TrueCause, Truth
+from femubench.core.change.hypothesis import hypotheses_of
 from femubench.core.effect.frame_effect import FrameEffect
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
+from femubench.core.fit.extended_model import agreed
+from femubench.core.fit.modal_fit import Problem, fit
+from femubench.core.fit.projection import Projection
 from femubench.core.inference.examine import posed
-from femubench.core.inference.extended_model import agreed
-from femubench.core.inference.fit import Problem, fit
-from femubench.core.inference.hypothesis import hypotheses_of
-from femubench.core.inference.projection import Projection
 from femubench.core.inference.search import Search
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect

@@ -35,14 +35,14 @@ from femubench.core.diagnosis.tables import (
 from femubench.core.diagnosis.verdict import Decision, decide, elsewhere
 from femubench.core.diagnosis.words import sentence_of
 from femubench.core.fem.model import Model
+from femubench.core.fit.extended_model import departure
+from femubench.core.fit.static_response import LargeProblem
 from femubench.core.inference.effort import Effort, Kind, Number
 from femubench.core.inference.examine import Examination, examine
-from femubench.core.inference.extended_model import departure
 from femubench.core.inference.fault_search import Depth, Inquiry, inquire
 from femubench.core.inference.model_error import WIDTHS
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.search import adequacy
-from femubench.core.inference.static_response import LargeProblem
 from femubench.core.look.localisation import locate
 from femubench.core.look.look import look
 from femubench.core.look.modes import Seen

@@ -13,14 +13,14 @@ from scipy.special import chdtrc, logsumexp
 from femubench.core.case.case import Case, Modification
 from femubench.core.diagnosis.verdict import inseparable
 from femubench.core.fem.model import Model
+from femubench.core.fit.extended_model import extended, raw_residual
+from femubench.core.fit.mesh_error import mesh_bias, mesh_corrections
+from femubench.core.fit.modal_fit import Fit, Problem, bounds_of, state_at
+from femubench.core.fit.noise import Noise
+from femubench.core.fit.residuals import Data
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.examine import Examination, examine
-from femubench.core.inference.extended_model import extended, raw_residual
-from femubench.core.inference.fit import Fit, Problem, bounds_of, state_at
-from femubench.core.inference.mesh_error import mesh_bias, mesh_corrections
-from femubench.core.inference.noise import Noise
 from femubench.core.inference.posterior import Explanation, Key, Posterior
-from femubench.core.inference.residuals import Data
 from femubench.core.modal.eigen import enough_modes, modes_of, once_for
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect

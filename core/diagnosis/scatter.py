@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 from scipy.special import chdtr, chdtrc
 
-from femubench.core.inference.fit import State
+from femubench.core.fit.modal_fit import State
 from femubench.core.schema.diagnosis import Scatter
 
 Kind = Literal["all", "frequencies", "shapes"]

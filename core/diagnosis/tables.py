@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from femubench.core.change.hypothesis import Hypothesis
 from femubench.core.diagnosis.symmetry import mirror_places
 from femubench.core.diagnosis.verdict import angle_between, credible, places_of
+from femubench.core.fit.modal_fit import State
 from femubench.core.inference.examine import Examination
-from femubench.core.inference.fit import State
-from femubench.core.inference.hypothesis import Hypothesis
 from femubench.core.inference.posterior import Explanation, Posterior, fits_better
 from femubench.core.inference.search import Found
 from femubench.core.roles import EffectParameter

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.case.nodes import MatrixGeometry
-from femubench.core.effect.change import RowOperator, Term
+from femubench.core.change.terms import RowOperator, Term
 from femubench.core.effect.places import point_of, split_direction
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import ACTIVE, Frame, Place

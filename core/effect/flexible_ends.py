@@ -20,8 +20,7 @@ from functools import partial
 
 import numpy as np
 
-from femubench.core.effect.attachments import once_for
-from femubench.core.effect.change import (
+from femubench.core.change.terms import (
     Change,
     ElementOperator,
     RowOperator,
@@ -29,6 +28,7 @@ from femubench.core.effect.change import (
     barycentric,
     chebyshev_nodes,
 )
+from femubench.core.effect.attachments import once_for
 from femubench.core.effect.places import member_length
 from femubench.core.fem.beam import mass_matrices, stiffness_matrices
 from femubench.core.fem.frame import Frame, JointSpring

@@ -10,12 +10,15 @@ from math import log
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from femubench.core.change.hypothesis import Hypothesis, by_themselves, hypotheses_of
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.model import Model
+from femubench.core.fit.mesh_error import mesh_bias
+from femubench.core.fit.modal_fit import Fit, Problem, State, fit, log_evidence, state_at
+from femubench.core.fit.noise import Noise
+from femubench.core.fit.residuals import Data
+from femubench.core.fit.static_response import Basis, placed
 from femubench.core.inference.effort import Effort
-from femubench.core.inference.fit import Fit, Problem, State, fit, log_evidence, state_at
-from femubench.core.inference.hypothesis import Hypothesis, by_themselves, hypotheses_of
-from femubench.core.inference.mesh_error import mesh_bias
 from femubench.core.inference.model_error import (
     CHANGE,
     UNSHARED,
@@ -27,12 +30,9 @@ from femubench.core.inference.model_error import (
     rows_of,
     scatter_slopes,
 )
-from femubench.core.inference.noise import Noise
 from femubench.core.inference.posterior import LIKELY_NOTHING, Explanation, Posterior, by_weight
-from femubench.core.inference.residuals import Data
 from femubench.core.inference.screening import with_shortlist
 from femubench.core.inference.search import Found, Search, adequacy
-from femubench.core.inference.static_response import Basis, placed
 from femubench.core.modal.eigen import Modes, zero_tolerance
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect

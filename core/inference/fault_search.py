@@ -28,15 +28,15 @@ from threadpoolctl import threadpool_limits
 
 from femubench.core.errors import FemubenchError
 from femubench.core.fem.model import Model
+from femubench.core.fit.extended_model import raw_residual
+from femubench.core.fit.modal_fit import State, log_evidence, state_at
+from femubench.core.fit.noise import Noise
+from femubench.core.fit.residuals import Data
+from femubench.core.fit.static_response import Basis, placed
 from femubench.core.inference.charge import Charge, Mended, charges_of
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.examine import Examination, before_of, model_error_of, posed
-from femubench.core.inference.extended_model import raw_residual
-from femubench.core.inference.fit import State, log_evidence, state_at
-from femubench.core.inference.noise import Noise
 from femubench.core.inference.posterior import Explanation
-from femubench.core.inference.residuals import Data
-from femubench.core.inference.static_response import Basis, placed
 from femubench.core.modal.eigen import DENSE_LIMIT
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import EffectParameter, Fault

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import log_ndtr
 
-from femubench.core.inference.fit import Problem, State, signed_hz
-from femubench.core.inference.modal_basis import Space
-from femubench.core.inference.noise import marginal
-from femubench.core.inference.projection import Projection
+from femubench.core.fit.modal_basis import Space
+from femubench.core.fit.modal_fit import Problem, State, signed_hz
+from femubench.core.fit.noise import marginal
+from femubench.core.fit.projection import Projection
 from femubench.core.ties import in_order, least
 from femubench.core.typing import FloatArray
 

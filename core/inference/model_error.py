@@ -22,9 +22,9 @@ from scipy.optimize import minimize
 from femubench.core.fem.beam import mass_matrices, stiffness_matrices
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.fem.structure import Structure
-from femubench.core.inference.fit import Problem, State, state_at
-from femubench.core.inference.modal_basis import Space, rigid_first, scatter_terms
-from femubench.core.inference.noise import Noise
+from femubench.core.fit.modal_basis import Space, rigid_first, scatter_terms
+from femubench.core.fit.modal_fit import Problem, State, state_at
+from femubench.core.fit.noise import Noise
 from femubench.core.modal.eigen import Modes
 from femubench.core.typing import BoolArray, FloatArray, IntArray
 

@@ -10,9 +10,9 @@ from math import log
 import numpy as np
 from scipy.special import logsumexp
 
-from femubench.core.inference.fit import Fit, State, state_at
+from femubench.core.fit.modal_fit import Fit, State, state_at
+from femubench.core.fit.projection import Projection
 from femubench.core.inference.prior import PRIOR_BEYOND_TEXTBOOK, PRIOR_OF_COUNT, Base, log_prior
-from femubench.core.inference.projection import Projection
 from femubench.core.ties import by_probability, in_order
 
 # From this probability on the verdict is that nothing is missing.

@@ -9,7 +9,7 @@ from math import factorial, log
 
 import numpy as np
 
-from femubench.core.inference.projection import Projection
+from femubench.core.fit.projection import Projection
 
 # How many causes a model lacks besides textbook physics, before any datum is seen.
 PRIOR_OF_COUNT = (0.5, 0.4, 0.08, 0.015, 0.005)

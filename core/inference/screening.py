@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from femubench.core.change.hypothesis import Hypothesis, magnitudes
+from femubench.core.fit.modal_fit import Fit, Problem, State, fit, state_at
+from femubench.core.fit.noise import marginal
+from femubench.core.fit.projection import Projection, Projector
+from femubench.core.fit.static_response import LargeProblem
 from femubench.core.inference.effort import Effort
-from femubench.core.inference.fit import Fit, Problem, State, fit, state_at
 from femubench.core.inference.grid_search import Screened, residuals_at, screen
-from femubench.core.inference.hypothesis import Hypothesis, magnitudes
-from femubench.core.inference.noise import marginal
-from femubench.core.inference.projection import Projection, Projector
-from femubench.core.inference.static_response import LargeProblem
 from femubench.core.ties import in_order, least
 from femubench.core.typing import FloatArray
 

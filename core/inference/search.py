@@ -9,22 +9,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from femubench.core.errors import ModelError
-from femubench.core.inference.effort import Effort
-from femubench.core.inference.extended_model import agreed, extended
-from femubench.core.inference.fit import Fit, Problem, State, fit, log_evidence, state_at
-from femubench.core.inference.grid_search import Screened, likely, screen
-from femubench.core.inference.hypothesis import (
+from femubench.core.change.hypothesis import (
     Hypothesis,
     by_themselves,
     finer,
     hypotheses_of,
 )
+from femubench.core.errors import ModelError
+from femubench.core.fit.extended_model import agreed, extended
+from femubench.core.fit.modal_fit import Fit, Problem, State, fit, log_evidence, state_at
+from femubench.core.fit.projection import Projection
+from femubench.core.fit.static_response import Basis, LargeProblem, enriched, placed
+from femubench.core.inference.effort import Effort
+from femubench.core.inference.grid_search import Screened, likely, screen
 from femubench.core.inference.posterior import Explanation, by_weight
 from femubench.core.inference.prior import Base, selection_cost, textbook_bases
-from femubench.core.inference.projection import Projection
 from femubench.core.inference.screening import beside, screened, with_shortlist
-from femubench.core.inference.static_response import Basis, LargeProblem, enriched, placed
 from femubench.core.roles import Effect
 from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray

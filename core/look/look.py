@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from femubench.core.fem.model import Model
-from femubench.core.inference.mesh_error import mesh_bias
+from femubench.core.fit.mesh_error import mesh_bias
 from femubench.core.look.freedom import look_at_freedom
 from femubench.core.look.mesh import look_at_mesh
 from femubench.core.look.modes import Seen

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from femubench.core.fem.structure import Structure
-from femubench.core.inference.mesh_error import mesh_bias
+from femubench.core.fit.mesh_error import mesh_bias
 from femubench.core.look.modes import Seen, percent
 from femubench.core.schema.diagnosis import LookWarning
 

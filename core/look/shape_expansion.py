@@ -9,7 +9,7 @@ import scipy.linalg as la
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
-from femubench.core.inference.mesh_error import mesh_bias
+from femubench.core.fit.mesh_error import mesh_bias
 from femubench.core.modal.eigen import Modes
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.modal.measurement import Measurement

@@ -11,7 +11,7 @@ from femubench.core.errors import Diverged, ModelError, NotApplicable, StrategyF
 from femubench.core.fem.model import Model
 from femubench.core.fem.model_parameters import with_values
 from femubench.core.fem.structure import Structure
-from femubench.core.gauss_newton import bounded_step
+from femubench.core.fit.gauss_newton import bounded_step
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import BoolArray, FloatArray
 from femubench.core.update.dual_least_squares import MANY, DualPosterior, dual_step

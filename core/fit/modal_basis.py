@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg as la
 
+from femubench.core.change.hypothesis import Hypothesis
 from femubench.core.errors import ModelError
 from femubench.core.fem.beam import mass_matrices, stiffness_matrices
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
-from femubench.core.inference.hypothesis import Hypothesis
-from femubench.core.inference.projection import Projection, Projector
+from femubench.core.fit.projection import Projection, Projector
 from femubench.core.modal.eigen import Modes
 from femubench.core.typing import BoolArray, FloatArray, IntArray
 

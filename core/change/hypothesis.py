@@ -10,8 +10,8 @@ from itertools import product
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.effect.change import Change
-from femubench.core.effect.tabulated_change import tabulated_change
+from femubench.core.change.tabulated import tabulated_change
+from femubench.core.change.terms import Change
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import enough_modes, modes_of, once_for, zero_tolerance
 from femubench.core.modal.generalised_mass import mass_normalised

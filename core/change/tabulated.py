@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core import roles
-from femubench.core.effect.change import (
+from femubench.core.change.terms import (
     Change,
     Term,
     barycentric,

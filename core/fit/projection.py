@@ -8,10 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
-from femubench.core.effect.change import ElementOperator, RowOperator, Term
+from femubench.core.change.hypothesis import Hypothesis
+from femubench.core.change.terms import ElementOperator, RowOperator, Term
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
-from femubench.core.inference.hypothesis import Hypothesis
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 _MANY = 4  # elements to one kind, from which on these are taken together

@@ -19,15 +19,15 @@ from weakref import WeakValueDictionary
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.effect.change import ElementOperator, RowOperator, Term
+from femubench.core.change.hypothesis import Hypothesis, magnitudes
+from femubench.core.change.terms import ElementOperator, RowOperator, Term
 from femubench.core.fem.model import Model
-from femubench.core.inference.fit import Problem
-from femubench.core.inference.free_memory import give_back
-from femubench.core.inference.hypothesis import Hypothesis, magnitudes
-from femubench.core.inference.modal_basis import Space, nominal_space, rigid_first
-from femubench.core.inference.noise import Noise
-from femubench.core.inference.projection import Projection, Projector
-from femubench.core.inference.residuals import Data
+from femubench.core.fit.free_memory import give_back
+from femubench.core.fit.modal_basis import Space, nominal_space, rigid_first
+from femubench.core.fit.modal_fit import Problem
+from femubench.core.fit.noise import Noise
+from femubench.core.fit.projection import Projection, Projector
+from femubench.core.fit.residuals import Data
 from femubench.core.modal.eigen import DENSE_LIMIT, Modes, modes_of, once_for
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.sparse_eigen import ShiftedModel

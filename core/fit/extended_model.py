@@ -9,8 +9,8 @@ import numpy as np
 
 from femubench.core.errors import FemubenchError, ModelError
 from femubench.core.fem.model import Model
-from femubench.core.inference.fit import Fit, Problem, fit, signed_hz
-from femubench.core.inference.projection import Projection
+from femubench.core.fit.modal_fit import Fit, Problem, fit, signed_hz
+from femubench.core.fit.projection import Projection
 from femubench.core.modal.eigen import enough_modes, modes_of
 from femubench.core.roles import EffectParameter
 from femubench.core.typing import FloatArray

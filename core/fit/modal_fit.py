@@ -13,11 +13,11 @@ from scipy.special import log_ndtr
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
-from femubench.core.gauss_newton import bounded_step
-from femubench.core.inference.modal_basis import Space, solve_pencil
-from femubench.core.inference.noise import Noise
-from femubench.core.inference.projection import Projection
-from femubench.core.inference.residuals import Data
+from femubench.core.fit.gauss_newton import bounded_step
+from femubench.core.fit.modal_basis import Space, solve_pencil
+from femubench.core.fit.noise import Noise
+from femubench.core.fit.projection import Projection
+from femubench.core.fit.residuals import Data
 from femubench.core.typing import BoolArray, FloatArray, IntArray
 
 _STEPS = 12

@@ -1,0 +1,1 @@
+"""How a model may change: places, matrices, parameters; of strategies, groups and effects."""

@@ -1,0 +1,1 @@
+"""Data with their covariance, predictions, bounded Gauss-Newton and what it leaves uncertain."""
