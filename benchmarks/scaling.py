@@ -28,7 +28,7 @@ from femubench.core.change.hypothesis import by_themselves, hypotheses_of
 from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.fem.frame import Frame, Place, PointMass
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import Modes, solve_modes
 from femubench.core.modal.factorisation import LU, Cholesky, cholmod_obstacle
@@ -125,11 +125,11 @@ def _opensees(joints: int) -> Row:
     return {"dofs": dofs, **row, "hz": list(hz[-3:]), "peak_mb": peak()}
 
 
-def _elements(model: Model, count: int) -> list[Parameter]:
+def _elements(model: Model, count: int) -> list[Property]:
     labels = model.frame_structure.labels
     names = labels[: min(count, len(labels))]
-    found = [Parameter(name, "EI", (name,)) for name in names]
-    return found + [Parameter(name, "GJ", (name,)) for name in labels[: count - len(found)]]
+    found = [Property(name, "EI", (name,)) for name in names]
+    return found + [Property(name, "GJ", (name,)) for name in labels[: count - len(found)]]
 
 
 def gradients(count: int) -> Row:
@@ -163,7 +163,7 @@ def _fitted(joints: int, *, slopes: bool) -> Row:
     structure, count = model.frame_structure, 10
     names = [member.name for member in structure.frame.members]
     parameters = [
-        Parameter(name, "EI", tuple(f"{name}/{k}" for k in range(1, 4))) for name in names
+        Property(name, "EI", tuple(f"{name}/{k}" for k in range(1, 4))) for name in names
     ]
     rng = np.random.default_rng(0)
 

@@ -17,7 +17,7 @@ from benchmarks.processor_time import least
 from femubench.core.fem.derivatives import derivatives
 from femubench.core.fem.frame import Place, PointMass
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import Modes, solve_modes
 from femubench.core.modal.many_changes import Change, modes_of_changes
@@ -30,10 +30,10 @@ COUNT = 12
 USED = 5
 
 
-def element_factors(model: Model) -> list[Parameter]:
+def element_factors(model: Model) -> list[Property]:
     """Return factors on E and on the density of every element."""
     labels = list(dict.fromkeys(model.frame_structure.labels))
-    return [Parameter(f"{q} {at}", q, (at,)) for q in ("E", "density") for at in labels]
+    return [Property(f"{q} {at}", q, (at,)) for q in ("E", "density") for at in labels]
 
 
 def gradient_share(model: Model, modes: Modes, solution: float) -> tuple[float, float]:
@@ -70,7 +70,7 @@ def full_solutions(model: Model, changes: list[Change]) -> list[Modes]:
 def exact_measurement(model: Model) -> Measurement:
     """Return modes of the model with other stiffnesses, at three directions of 40 joints."""
     rng, structure = np.random.default_rng(1), model.frame_structure
-    members = [Parameter(name, "E", at) for name, at in structure.member_labels.items()]
+    members = [Property(name, "E", at) for name, at in structure.member_labels.items()]
     truth = Model.of(structure.with_values(members, rng.lognormal(0.0, 0.1, len(members))))
     modes = solve_modes(truth, 6 + USED).elastic
     chosen = rng.choice(len(structure.frame.joints), size=40, replace=False)

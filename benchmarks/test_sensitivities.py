@@ -8,7 +8,7 @@ from pytest_benchmark.fixture import BenchmarkFixture
 
 from femubench.core.case.case import Case
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities, shape_sensitivities
 from femubench.core.typing import FloatArray
@@ -18,18 +18,18 @@ STEP = 1e-4
 
 
 @pytest.fixture(scope="module")
-def parameters(case: Case) -> list[Parameter]:
+def parameters(case: Case) -> list[Property]:
     """Return the bending stiffness of every element, 28 parameters."""
-    return [Parameter(label, "EI", (label,)) for label in case.model.frame_structure.labels]
+    return [Property(label, "EI", (label,)) for label in case.model.frame_structure.labels]
 
 
-def analytical(model: Model, parameters: list[Parameter]) -> FloatArray:
+def analytical(model: Model, parameters: list[Property]) -> FloatArray:
     """Return d lambda / d p of five modes, one eigenvalue solution included."""
     modes = solve_modes(model)
     return eigenvalue_sensitivities(model, modes.take(np.arange(len(modes))[MODES]), parameters)
 
 
-def differences(model: Model, parameters: list[Parameter]) -> FloatArray:
+def differences(model: Model, parameters: list[Property]) -> FloatArray:
     """Return the same by central differences, two eigenvalue solutions a parameter."""
     structure, columns = model.frame_structure, []
     for parameter in parameters:
@@ -42,19 +42,19 @@ def differences(model: Model, parameters: list[Parameter]) -> FloatArray:
 
 
 @pytest.mark.benchmark(group="28 eigenvalue sensitivities")
-def test_analytical(benchmark: BenchmarkFixture, case: Case, parameters: list[Parameter]) -> None:
+def test_analytical(benchmark: BenchmarkFixture, case: Case, parameters: list[Property]) -> None:
     found = benchmark(analytical, case.model, parameters)
     np.testing.assert_allclose(found, differences(case.model, parameters), rtol=1e-4, atol=1.0)
 
 
 @pytest.mark.benchmark(group="28 eigenvalue sensitivities")
-def test_differences(benchmark: BenchmarkFixture, case: Case, parameters: list[Parameter]) -> None:
+def test_differences(benchmark: BenchmarkFixture, case: Case, parameters: list[Property]) -> None:
     found = benchmark.pedantic(differences, (case.model, parameters), rounds=3)
     assert found.shape == (5, 28)
 
 
 @pytest.mark.benchmark(group="28 shape sensitivities of a mode")
-def test_shapes(benchmark: BenchmarkFixture, case: Case, parameters: list[Parameter]) -> None:
+def test_shapes(benchmark: BenchmarkFixture, case: Case, parameters: list[Property]) -> None:
     modes = solve_modes(case.model)
     found = benchmark(shape_sensitivities, case.model, modes, 4, parameters)
     assert found.shape == (case.model.size, 28)

@@ -15,9 +15,9 @@ The example of every function starts from these lines:
 >>> frame, properties = structure.frame, structure.properties
 >>> readings = model.observe(measurement.sensors)
 >>> modes = femubench.solve_modes(model)
->>> stiffness = fem.Parameter("E", "E", update.all_elements(structure))
+>>> stiffness = fem.Property("E", "E", update.all_elements(structure))
 >>> joints = update.joint_groups(frame)
->>> joint = update.joint_stiffness(structure, joints[0])
+>>> joint = update.scale_joint(structure, joints[0])
 >>> nominal, scaled = femubench.strategies["unchanged"], femubench.strategies["global"]
 >>> result = scaled.update(model, measurement, None)
 >>> run = femubench.rank(case, [nominal, scaled], nominal="drawn")

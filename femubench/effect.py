@@ -1,15 +1,14 @@
 """What an author of an effect needs: places, parameters, the change of mass and stiffness."""
 
+from femubench.core.change.change import Change, proportional
+from femubench.core.change.interpolation import barycentric, chebyshev_nodes
+from femubench.core.change.parameter import Parameter as EffectParameter
 from femubench.core.change.terms import (
-    Change,
     ElementOperator,
     MatrixOperator,
     Operator,
     RowOperator,
     Term,
-    barycentric,
-    chebyshev_nodes,
-    proportional,
     sparse_term,
 )
 from femubench.core.effect.attachments import (
@@ -36,7 +35,7 @@ from femubench.core.effect.flexible_ends import (
     softened_ends,
 )
 from femubench.core.effect.flexible_supports import flexible_supports_change, softened_supports
-from femubench.core.effect.frame_effect import EffectParameter, FrameEffect
+from femubench.core.effect.frame_effect import FrameEffect
 from femubench.core.effect.interfaces import (
     facing_nodes,
     interface_directions,

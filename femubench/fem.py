@@ -41,7 +41,7 @@ from femubench.core.fem.group_factors import (
 )
 from femubench.core.fem.mesh import member_axes
 from femubench.core.fem.model import LowRank
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.preload import (
     gravity_stiffness,
     preload_forces,
@@ -87,7 +87,7 @@ __all__ = [
     "Modification",
     "Oscillator",
     "Outline",
-    "Parameter",
+    "Property",
     "Place",
     "PointMass",
     "Preload",

@@ -1,5 +1,8 @@
 """Steps that updating strategies share: unknowns, element families, joints, expansion, promises."""
 
+from femubench.core.change.change import Change, scale_property, set_property
+from femubench.core.change.parameter import Parameter
+from femubench.core.change.parametric_model import ParametricModel
 from femubench.core.errors import SelfCheckFailed
 from femubench.core.fem.joints import (
     JointGroup,
@@ -12,6 +15,19 @@ from femubench.core.fem.joints import (
     spring_estimates,
     with_joint_springs,
     with_rigid_ends,
+)
+from femubench.core.update.change_lists import (
+    OWN,
+    carried_by,
+    check_changes,
+    element_sets,
+    list_changes,
+    parameterise,
+    scale_all_stiffness,
+    scale_groups,
+    scale_groups_within,
+    scale_joint,
+    scale_parts,
 )
 from femubench.core.update.dynamic import expand_measured_shapes
 from femubench.core.update.element_families import (
@@ -28,7 +44,6 @@ from femubench.core.update.element_families import (
 from femubench.core.update.element_strategy import ElementStrategy
 from femubench.core.update.entries import update_entries
 from femubench.core.update.equation_error import update_by_equation_error
-from femubench.core.update.factor_strategy import FactorStrategy
 from femubench.core.update.l_curve import l_curve_corner, tikhonov
 from femubench.core.update.lasso import lasso
 from femubench.core.update.low_rank import (
@@ -40,38 +55,23 @@ from femubench.core.update.modal_space import (
     ModalFit,
     ModalSpace,
     bounded_fit,
-    factor_result,
     modal_space,
+    parametric_result,
 )
-from femubench.core.update.parameter_sets import (
-    OWN,
-    StiffnessParts,
-    checked_set,
-    element_sets,
-    group_factors,
-    groups_within_count,
-    stiffness_factors,
-    stiffness_parts,
-)
+from femubench.core.update.parametric_strategy import ParametricStrategy
 from femubench.core.update.posterior_sampling import Discrepancy, sample_posterior
 from femubench.core.update.promise import check_used_modes, force_scale
 from femubench.core.update.quasi import ITERATIONS, QuasiModes, quasi_measured_modes
-from femubench.core.update.sensitivity_update import sensitivity_update
+from femubench.core.update.sensitivity_strategy import SensitivityStrategy
+from femubench.core.update.sensitivity_update import UpdateOptions, sensitivity_update
 from femubench.core.update.uncertainty import MOST_SAMPLES, Uncertainty
-from femubench.core.update.unknowns import (
-    Unknown,
-    UpdateOptions,
-    carried_by,
-    global_stiffness,
-    joint_stiffness,
-)
 
 __all__ = [
     "Discrepancy",
     "ElementFamily",
     "ElementStrategy",
     "Family",
-    "FactorStrategy",
+    "ParametricStrategy",
     "GroupFamily",
     "ITERATIONS",
     "JointGroup",
@@ -81,31 +81,36 @@ __all__ = [
     "MOST_SAMPLES",
     "QuasiModes",
     "SelfCheckFailed",
-    "StiffnessParts",
+    "ParametricModel",
     "Symmetry",
     "Uncertainty",
-    "Unknown",
+    "Change",
+    "Parameter",
+    "SensitivityStrategy",
+    "list_changes",
+    "scale_property",
+    "set_property",
     "UpdateOptions",
     "all_elements",
     "available_length",
     "bounded_fit",
     "carried_by",
     "check_used_modes",
-    "checked_set",
+    "check_changes",
     "element_sets",
     "expand_measured_shapes",
-    "factor_result",
+    "parametric_result",
     "flexible_ends",
     "force_scale",
     "generic_family",
-    "global_stiffness",
-    "group_factors",
+    "scale_all_stiffness",
+    "scale_groups",
     "group_family",
     "groups_within",
-    "groups_within_count",
+    "scale_groups_within",
     "half_depth",
     "joint_groups",
-    "joint_stiffness",
+    "scale_joint",
     "l_curve_corner",
     "lasso",
     "modal_space",
@@ -115,8 +120,8 @@ __all__ = [
     "sample_posterior",
     "sensitivity_update",
     "spring_estimates",
-    "stiffness_factors",
-    "stiffness_parts",
+    "scale_parts",
+    "parameterise",
     "tikhonov",
     "tied",
     "total_change",

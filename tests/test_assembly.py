@@ -22,7 +22,7 @@ from femubench.core.fem.frame import (
     PointMass,
 )
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import Section, constant_kappa
 from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
@@ -67,7 +67,7 @@ def test_a_large_structure_lets_go_of_its_plan_until_parameters_are_set(
         np.testing.assert_array_equal(one.toarray(), other.toarray())
     assert "plan" in vars(small)
     assert not {"plan", "gather"} & set(vars(large))
-    stiffer = Parameter("stiffer", "E", large.labels[:4])
+    stiffer = Property("stiffer", "E", large.labels[:4])
     changed = large.with_values([stiffer], [1.5])
     for one, other in zip(
         small.with_values([stiffer], [1.5]).matrices(), changed.matrices(), strict=True
@@ -188,7 +188,7 @@ def test_what_a_structure_keeps_is_what_it_would_make_anew(fitted_portal: FrameB
         *(("shear", every, 1.5), ("rotary", every, 2.0), ("GJ", every, 0.7), ("E", first, 0.6)),
         *(("rigid", ("m8@J5",), 0.002), ("rhoA", first, 1.2), ("spring", ("m0@J1:rx",), 5e3)),
     ):
-        parameter = Parameter(quantity, quantity, places)
+        parameter = Property(quantity, quantity, places)
         for start in (changed, base):
             assert Model.of(start).observe(sensors).shape == (2, len(base.kinematics.node))
             found = start.with_values([parameter], [value])

@@ -10,7 +10,7 @@ import pytest
 
 from femubench.core.fem.frame import Frame, Place, PointMass
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.correlation import mac
 from femubench.core.modal.eigen import Modes, solve_modes
@@ -107,7 +107,7 @@ def test_pairing_follows_modes_that_change_places(nominal: Data, truth: Data) ->
     # A torsion constant 1.4 times too large lifts the first mode above the second.
     structure = nominal[2].frame_structure
     everywhere = tuple(dict.fromkeys(label for label in structure.labels if label))
-    stiff = Model.of(structure.with_values([Parameter("GJ", "GJ", everywhere)], [1.4]))
+    stiff = Model.of(structure.with_values([Property("GJ", "GJ", everywhere)], [1.4]))
     modes = solve_modes(stiff).elastic.take(np.arange(COUNT))
     shapes = readings(stiff, modes)
     paired = pair_modes(truth[0].natural_frequencies, truth[1], modes.natural_frequencies, shapes)

@@ -19,7 +19,7 @@ from femubench.core.fem.frame import (
     PointMass,
 )
 from femubench.core.fem.model import LowRank, Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import Section, constant_kappa
 from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
@@ -104,7 +104,7 @@ def test_attach_to_crossing_members_finds_the_right_dofs() -> None:
 
 def test_attach_repeats_parameter_changes(asymmetric_ladder: FrameBuilder) -> None:
     structure = Structure.build(asymmetric_ladder())
-    parameters = [Parameter("E", "EI", ("EF/2",)), Parameter("k", "spring", ("CF@F:ry",))]
+    parameters = [Property("E", "EI", ("EF/2",)), Property("k", "spring", ("CF@F:ry",))]
     updated = Model.of(structure.with_values(parameters, [0.5, 4e3]))
     after = updated.attach([PointMass(Place(member="EF", s=0.4), 0.5)], [])
     changed = after.frame_structure

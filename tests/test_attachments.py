@@ -21,7 +21,7 @@ from femubench.core.fem.frame import (
     Support,
 )
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.typing import FloatArray
@@ -173,7 +173,7 @@ def test_a_member_that_leaves_the_plane_is_refused(ladder: FrameBuilder) -> None
 def test_a_rigid_length_beyond_the_element_is_refused(hframe: FrameBuilder) -> None:
     rigid = (RigidEnd("T1", "horizontal", 0.01),)
     structure = Structure.build(hframe(rigid_ends=rigid))
-    parameter = Parameter("a", "rigid", ("horizontal@T1",))
+    parameter = Property("a", "rigid", ("horizontal@T1",))
     assert structure.with_values([parameter], [-0.05]).properties.rigid_1.min() == -0.05
     with pytest.raises(ModelError, match="longer than its element"):
         structure.with_values([parameter], [0.06])

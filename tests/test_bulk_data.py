@@ -19,7 +19,7 @@ from femubench.core.cli.main import bench
 from femubench.core.run.answers import packed, unpacked
 from femubench.core.run.jobs import JobOutcome
 from femubench.core.typing import FloatArray
-from femubench.fem import Coupling, Eccentricity, GroundSpring, LowRank, Parameter, Place, PointMass
+from femubench.fem import Coupling, Eccentricity, GroundSpring, LowRank, Place, PointMass, Property
 from femubench.plugins.readers.bulk_data import BulkDataReader
 from femubench.plugins.readers.bulk_data.cards import Card
 from femubench.plugins.readers.bulk_data.writing import real
@@ -391,7 +391,7 @@ def changed(model: Model, factors: dict[tuple[str, str], float]) -> Model:
     structure = model.frame_structure
     for (quantity, member), factor in factors.items():
         places = tuple(s for s in structure.labels if member in ("all", s.partition("/")[0]))
-        parameter = Parameter(f"{quantity} {member}", quantity, places)
+        parameter = Property(f"{quantity} {member}", quantity, places)
         structure = structure.with_values([parameter], [factor])
     return Model.of(structure)
 

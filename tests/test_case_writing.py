@@ -39,7 +39,7 @@ from femubench.core.fem.frame import (
     Support,
 )
 from femubench.core.fem.model import LowRank
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import Section, constant_kappa, rectangular_tube, round_tube
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.measurement import Measurement
@@ -399,12 +399,12 @@ def test_names_of_materials(tmp_path: Path, ladder: Case) -> None:
 def test_parameters_become_keys(tmp_path: Path, portal: Case) -> None:
     structure = portal.model.frame_structure
     parameters = [
-        Parameter("all", "E", tuple(label for label in structure.label_index if label)),
-        Parameter("left", "E", tuple(f"left/{k}" for k in (1, 2, 3, 4))),
-        Parameter("one", "density", ("girder/2",)),
-        Parameter("none", "shear", ("right/1", "left/1")),
-        Parameter("spring", "spring", ("right@C:ry",), "N m/rad"),
-        Parameter("end", "rigid", ("girder@B", "left@A"), "m"),
+        Property("all", "E", tuple(label for label in structure.label_index if label)),
+        Property("left", "E", tuple(f"left/{k}" for k in (1, 2, 3, 4))),
+        Property("one", "density", ("girder/2",)),
+        Property("none", "shear", ("right/1", "left/1")),
+        Property("spring", "spring", ("right@C:ry",), "N m/rad"),
+        Property("end", "rigid", ("girder@B", "left@A"), "m"),
     ]
     updated = structure.with_values(parameters, [0.9, 0.8, 1.1, 0.0, 1.5e5, 0.015])
     updated = updated.with_values(parameters[:1], [1.05])
@@ -425,7 +425,7 @@ def test_parameters_become_keys(tmp_path: Path, portal: Case) -> None:
 def test_a_factor_on_all_leaves_the_arms_of_joints_alone(tmp_path: Path, portal: Case) -> None:
     structure = portal.model.frame_structure
     labels = tuple(label for label in structure.label_index if label)
-    updated = Model.of(structure.with_values([Parameter("all", "E", labels)], [0.9]))
+    updated = Model.of(structure.with_values([Property("all", "E", labels)], [0.9]))
     back = round_trip(tmp_path, replace(portal, model=updated))
     assert frame_of(back).factors == (Factor("E", ("all",), 0.9),)
     assert_same_matrix(updated.stiffness, back.model.stiffness)
@@ -443,7 +443,7 @@ def test_parameters_that_no_key_can_say(
     tmp_path: Path, ladder: Case, quantity: str, place: str, value: float
 ) -> None:
     structure = ladder.model.frame_structure
-    changed = structure.with_values([Parameter("odd one", quantity, (place,))], [value])
+    changed = structure.with_values([Property("odd one", quantity, (place,))], [value])
     with pytest.raises(InputError, match="model: cannot be written: odd one = "):
         write_case(
             tmp_path / "new", ladder, replace(ladder.model, structure=changed, **of(changed))
@@ -459,7 +459,7 @@ def of(structure: Any) -> dict[str, Any]:
 def test_a_preload_that_the_new_factors_would_move(tmp_path: Path, ladder: Case) -> None:
     frame = replace(frame_of(ladder), preloads=(Preload("front-left", 2e4),))
     structure = Model.of(frame).frame_structure
-    half = Parameter("half", "E", tuple(f"back-left/{k}" for k in (1, 2, 3, 4)))
+    half = Property("half", "E", tuple(f"back-left/{k}" for k in (1, 2, 3, 4)))
     with pytest.raises(InputError, match="no keys of a frame give the matrices"):
         write_case(tmp_path / "new", ladder, Model.of(structure.with_values([half], [0.5])))
     assert list(tmp_path.iterdir()) == []

@@ -24,7 +24,7 @@ from femubench.core.fem.frame import (
     Support,
 )
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import rectangular_tube
 from femubench.core.fem.sensors import Sensors
 from femubench.core.fem.structure import Structure
@@ -299,7 +299,7 @@ def test_physical_factor_equals_the_parameter_of_the_structure() -> None:
     x[family.names.index("EI rung1/3")] = 0.25
     x[family.names.index("GJ side00/1")] = -0.4
     rebuilt = structure.with_values(
-        [Parameter("a", "EI", ("rung1/3",)), Parameter("b", "GJ", ("side00/1",))], [1.25, 0.6]
+        [Property("a", "EI", ("rung1/3",)), Property("b", "GJ", ("side00/1",))], [1.25, 0.6]
     )
     expected = Model.of(rebuilt).stiffness.toarray()
     found = family.changed(NOMINAL, x).stiffness.toarray()
@@ -384,7 +384,7 @@ def test_a_truth_of_the_family_is_found_from_shapes_at_all_dofs(
 
 def test_perturbed_bending_factors_come_back() -> None:
     truth_structure = NOMINAL.frame_structure.with_values(
-        [Parameter("a", "EI", ("side10/4",)), Parameter("b", "EI", ("rung2/1",))], [0.6, 1.3]
+        [Property("a", "EI", ("side10/4",)), Property("b", "EI", ("rung2/1",))], [0.6, 1.3]
     )
     family = physical_family(NOMINAL.frame_structure)
     modes = exact_modes(Model.of(truth_structure), 3)

@@ -36,7 +36,7 @@ from femubench.core.fem.frame import (
     Support,
 )
 from femubench.core.fem.model import LowRank, Model
-from femubench.core.fem.parameters import QUANTITIES, Parameter
+from femubench.core.fem.parameters import QUANTITIES, Property
 from femubench.core.fem.sections import Section, constant_kappa
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
@@ -112,15 +112,15 @@ class TestFactors:
         for quantity in (name for name, scaled in QUANTITIES.items() if scaled):
             factors = (Factor(quantity, ("m2/1",), 2.0), Factor(quantity, ("m2/1", "m8"), 0.3))
             given = Structure.build(replace(plain, factors=factors))
-            here, there = Parameter("a", quantity, ("m2/1",)), Parameter("b", quantity, ("m8/1",))
-            rest = Parameter("c", quantity, ("m8/2",))
+            here, there = Property("a", quantity, ("m2/1",)), Property("b", quantity, ("m8/1",))
+            rest = Property("c", quantity, ("m8/2",))
             wanted = Structure.build(plain).with_values([here, there, rest], [0.6, 0.3, 0.3])
             for one, two in zip(given.matrices(), wanted.matrices(), strict=True):
                 assert abs(one - two).max() < 1e-13 * abs(two).max()
 
     def test_updating_starts_from_the_factors(self) -> None:
         frame = beam("3d", 4, factors=(Factor("E", ("m/2",), 0.5),))
-        parameter = Parameter("E", "E", ("m/2",))
+        parameter = Property("E", "E", ("m/2",))
         updated = Structure.build(frame).with_values([parameter], [2.0])
         plain = Structure.build(beam("3d", 4))
         assert abs(updated.matrices()[1] - plain.matrices()[1]).max() < 1e-3
@@ -280,7 +280,7 @@ class TestCoupling:
         frame = beam("3d", 3, couplings=(Coupling("m", 0.4),))
         places = ("m/1", "m/2", "m/3")
         structure = Structure.build(frame)
-        stiffer = structure.with_values([Parameter("E", "E", places)], [1.7]).matrices()[1]
+        stiffer = structure.with_values([Property("E", "E", places)], [1.7]).matrices()[1]
         assert abs(stiffer - 1.7 * structure.matrices()[1]).max() < 1e-13 * abs(stiffer).max()
         p = properties(coupling=0.4)
         change = stiffness_matrices(p) - stiffness_matrices(replace(p, coupling=np.zeros(2)))
@@ -302,7 +302,7 @@ class TestCoupling:
         structure = Structure.build(beam("out-of-plane", 5, CLAMP, **extra))
         model = Model.of(structure)
         modes = solve_modes(model, 6)
-        parameter = Parameter("p", quantity, ("m/2", "m/3"))
+        parameter = Property("p", quantity, ("m/2", "m/3"))
         slope = eigenvalue_sensitivities(model, modes, [parameter])[:, 0]
         ends = [
             solve_modes(Model.of(structure.with_values([parameter], [1.0 + s]))).eigenvalues[:6]
@@ -474,7 +474,7 @@ class TestOscillators:
         hung = (Oscillator(Place(member="AB", s=0.4), "z", 0.1, 90.0),)
         frame = replace(ladder(), oscillators=hung, preloads=(Preload("BE", 500.0),))
         more = (PointMass(Place(member="BE", s=0.6), 0.2),)
-        parameter = Parameter("E", "E", ("AB/1", "CF/2"))
+        parameter = Property("E", "E", ("AB/1", "CF/2"))
         model = Model.of(Structure.build(frame).with_values([parameter], [0.8]))
         attached = model.attach(more, ())
         wanted = Structure.build(frame.with_attachments(more, ())).with_values([parameter], [0.8])

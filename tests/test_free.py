@@ -14,8 +14,9 @@ import pytest
 
 from femubench import InputError, Model, cases, read_case
 from femubench.core.case.writing import write_case
+from femubench.core.change.change import Change, proportional
 from femubench.core.change.hypothesis import hypotheses_of
-from femubench.core.change.terms import Change, RowOperator, Term, proportional
+from femubench.core.change.terms import RowOperator, Term
 from femubench.core.effect.attachments import point_motion
 from femubench.core.fem.frame import Place
 from femubench.diagnosis import registered_effects

@@ -24,8 +24,8 @@ from femubench.fem import (
     Material,
     Member,
     MemberSet,
-    Parameter,
     Place,
+    Property,
     Section,
     with_group_factors,
 )
@@ -98,7 +98,7 @@ def measured(truth: Model, count: int) -> Measurement:
 
 def changed(factors: dict[str, float]) -> Model:
     """Return the beam with other groups."""
-    parameters = [Parameter(name, "E", (f"group:{name}",)) for name in factors]
+    parameters = [Property(name, "E", (f"group:{name}",)) for name in factors]
     return with_group_factors(MODEL, parameters, list(factors.values()))
 
 
@@ -134,7 +134,7 @@ def test_groups_and_sets_of_a_frame_go_the_same_way() -> None:
 
 def test_the_whole_stiffness_always_has_a_factor() -> None:
     bare = replace(MODEL, groups={}, mass_groups={})
-    stiffer = measured(with_group_factors(bare, [Parameter("K", "E", ("all",))], [1.21]), 3)
+    stiffer = measured(with_group_factors(bare, [Property("K", "E", ("all",))], [1.21]), 3)
     for strategy in (Global(), Bayesian(stiffness_std=10.0)):
         (parameter,) = strategy.update(bare, stiffer, RNG).parameters
         assert (parameter.name, parameter.after) == ("stiffness all", pytest.approx(1.21, rel=1e-4))
@@ -187,7 +187,7 @@ def test_a_prior_is_a_factor_as_likely_as_not() -> None:
 
 
 def test_masses_of_groups_change_too() -> None:
-    heavier = with_group_factors(MODEL, [Parameter("m", "density", ("group:half",))], [1.2])
+    heavier = with_group_factors(MODEL, [Property("m", "density", ("group:half",))], [1.2])
     result = Bayesian().update(
         replace(MODEL, groups={"none": 1e-12 * MODEL.groups["left"]}), measured(heavier, 4), RNG
     )
@@ -200,8 +200,8 @@ def test_masses_of_groups_change_too() -> None:
 
 
 def test_slopes_are_those_of_differences() -> None:
-    parameters = [Parameter("a", "E", ("group:left", "group:foot"))]
-    parameters += [Parameter("b", "density", ("group:half",)), Parameter("c", "E", ("all",))]
+    parameters = [Property("a", "E", ("group:left", "group:foot"))]
+    parameters += [Property("b", "density", ("group:half",)), Property("c", "E", ("all",))]
     at = with_values(MODEL, parameters, [1.3, 0.8, 1.1])
     modes = solve_modes(at).elastic.take(np.arange(3))
     slopes = eigenvalue_sensitivities(at, modes, parameters)

@@ -21,7 +21,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from femubench.core.fem import frame as frames
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import LowRank, Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import constant_kappa
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.run.answers import AnswerError, head_of, packed, unpacked
@@ -346,7 +346,7 @@ def forged(change: Callable[[dict[str, Any], list[Any]], None]) -> bytes:
     member = structure.frame.members[0]
     spring = frames.JointSpring(member.ends[0], member.name, {"ry": 1e4, "rx": 1e4})
     frame = replace(structure.frame, joint_springs=(spring,))
-    factor = Parameter("E", "E", (f"{member.name}/1",))
+    factor = Property("E", "E", (f"{member.name}/1",))
     data = packed(
         JobOutcome("ok", model=Model.of(structure.rebuilt(frame).with_values([factor], [0.9]))),
         NOMINAL,

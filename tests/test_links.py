@@ -29,7 +29,7 @@ from femubench.core.fem.frame import (
     Support,
 )
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.preload import preload_stiffness, redundant_members
 from femubench.core.fem.sections import Section, solid_rectangle
 from femubench.core.fem.sensors import Sensors
@@ -258,7 +258,7 @@ def test_sensors_at_followers_read_the_motion_of_the_body() -> None:
 def test_sensitivities_are_those_of_differences() -> None:
     frame = tee("3d", masses=(PointMass(Place(joint="D"), 0.5),))
     structure = Structure.build(frame)
-    factors = [Parameter("DE", "E", ("DE/1", "DE/2")), Parameter("AB", "density", ("AB/1",))]
+    factors = [Property("DE", "E", ("DE/1", "DE/2")), Property("AB", "density", ("AB/1",))]
     modes = solve_modes(Model.of(structure), 12)
     found = eigenvalue_sensitivities(Model.of(structure), modes, factors)[6:]
     for k, parameter in enumerate(factors):

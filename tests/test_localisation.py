@@ -12,7 +12,7 @@ import scipy.linalg as la
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.fem.frame import Factor, Frame, JointSpring, Place, PointMass
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.sensors import Sensors
 from femubench.core.look.localisation import locate
 from femubench.core.look.shape_expansion import Comparison, expand
@@ -275,5 +275,5 @@ def test_a_frame_in_space(portal: FrameBuilder) -> None:
     assert ranking(rows, "energy-error", members_of(frame))[0] == "m6"
 
 
-def _softer(labels: tuple[str, ...]) -> Parameter:
-    return Parameter("E", "E", labels)
+def _softer(labels: tuple[str, ...]) -> Property:
+    return Property("E", "E", labels)

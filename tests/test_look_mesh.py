@@ -13,7 +13,7 @@ import pytest
 from femubench.core.effect.attachments import total_mass
 from femubench.core.fem.frame import Factor, Frame, Place, PointMass, Preload
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.structure import Structure
 from femubench.core.fit.mesh_error import refined
 from femubench.core.look.look import mesh_bias
@@ -44,7 +44,7 @@ def test_a_finer_mesh_keeps_factors_springs_ends_and_changes(fitted_portal: Fram
     factors = (Factor("E", ("m2/1",), 0.5), Factor("density", ("m3",), 1.5))
     frame = fitted_portal(3, factors=factors, preloads=(Preload("m2", 1e3),))
     structure = Structure.build(frame).with_values(
-        [Parameter("EI", "EI", ("m4/2",)), Parameter("a", "rigid", ("m8@J5",), "m")], [0.7, 0.025]
+        [Property("EI", "EI", ("m4/2",)), Property("a", "rigid", ("m8@J5",), "m")], [0.7, 0.025]
     )
     finer = structure.rebuilt(refined(structure))
     assert len(finer.properties) > 1.9 * len(structure.properties) - 2

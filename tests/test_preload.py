@@ -29,7 +29,7 @@ from femubench.core.fem.frame import (
     Support,
 )
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.preload import (
     StressState,
     geometric_matrices,
@@ -259,7 +259,7 @@ def test_the_force_is_linear_and_the_mesh_does_not_matter(ladder: Any) -> None:
 def test_changed_parameters_leave_the_stress_alone(asymmetric_ladder: Any) -> None:
     frame = replace(asymmetric_ladder(), preloads=(Preload("BE", 2e3),))
     structure = Structure.build(frame)
-    soft = Parameter("E", "E", ("AB/1", "EF/2"))
+    soft = Property("E", "E", ("AB/1", "EF/2"))
     changed = structure.with_values([soft], [0.5])
     direct = preload_stiffness(changed, "BE", 2e3)
     assert abs(direct - preload_stiffness(structure, "BE", 2e3)).max() == 0.0

@@ -20,7 +20,7 @@ from femubench.core.fem.frame import (
     Support,
 )
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import QUANTITIES, Parameter
+from femubench.core.fem.parameters import QUANTITIES, Property
 from femubench.core.fem.sections import rectangular_tube
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import Modes, solve_modes
@@ -77,23 +77,23 @@ def structure(
     return Structure.build(frames[request.param]())
 
 
-def all_parameters(structure: Structure) -> list[Parameter]:
+def all_parameters(structure: Structure) -> list[Property]:
     """Return one parameter of every quantity, on a part of the frame that breaks its symmetry."""
     labels = [label for label in structure.labels if label]
     some = tuple(dict.fromkeys(labels[: 2 * len(labels) // 3]))
     chosen = [
-        Parameter(f"{quantity} here", quantity, some)
+        Property(f"{quantity} here", quantity, some)
         for quantity in QUANTITIES
         if quantity not in ("rigid", "spring")
     ]
-    chosen.append(Parameter("E everywhere", "E", tuple(dict.fromkeys(labels))))
+    chosen.append(Property("E everywhere", "E", tuple(dict.fromkeys(labels))))
     ends = tuple(structure.element_ends)[:2]
-    chosen.append(Parameter("rigid end", "rigid", ends, "m"))
-    chosen += [Parameter(place, "spring", (place,), "N/m") for place in structure.spring_labels]
+    chosen.append(Property("rigid end", "rigid", ends, "m"))
+    chosen += [Property(place, "spring", (place,), "N/m") for place in structure.spring_labels]
     return chosen
 
 
-def moved(structure: Structure, parameter: Parameter, sign: float) -> tuple[Structure, float]:
+def moved(structure: Structure, parameter: Property, sign: float) -> tuple[Structure, float]:
     """Return the structure with the parameter a little off, and by how much."""
     value = present_value(structure, parameter)
     step = STEP * (0.05 if parameter.quantity == "rigid" else abs(value))
@@ -101,7 +101,7 @@ def moved(structure: Structure, parameter: Parameter, sign: float) -> tuple[Stru
     return structure.with_values([parameter], [value + sign * step]), step
 
 
-def prepared(structure: Structure) -> tuple[Structure, list[Parameter]]:
+def prepared(structure: Structure) -> tuple[Structure, list[Property]]:
     """Return a structure that was updated before, with its rigid lengths alike at the places."""
     parameters = all_parameters(structure)
     rigid = next(p for p in parameters if p.quantity == "rigid")
@@ -184,7 +184,7 @@ def test_a_factor_on_all_stiffness_moves_every_eigenvalue_alike(portal: Any) -> 
     model = Model.of(structure)
     modes = solve_modes(model).elastic.take(np.arange(8))
     labels = tuple(label for label in structure.labels if label)
-    stiffness, density = Parameter("E", "E", labels), Parameter("rho", "density", labels)
+    stiffness, density = Property("E", "E", labels), Property("rho", "density", labels)
     slope = eigenvalue_sensitivities(model, modes, [stiffness, density])
     np.testing.assert_allclose(slope[:, 0], modes.eigenvalues, rtol=1e-9)
     np.testing.assert_allclose(slope[:, 1], -modes.eigenvalues, rtol=1e-9)
@@ -207,7 +207,7 @@ def test_a_repeated_eigenvalue_leaves_out_what_turns_inside_its_space() -> None:
     model = Model.of(structure)
     modes = solve_modes(model)
     np.testing.assert_allclose(modes.eigenvalues[0], modes.eigenvalues[1], rtol=1e-9)
-    parameter = Parameter("EI below", "EI", ("post/1",))
+    parameter = Property("EI below", "EI", ("post/1",))
     summed = shape_sensitivities(model, modes, 0, [parameter])
     bordered = shape_sensitivities(model, modes.take(np.arange(4)), 0, [parameter])
     size = np.abs(modes.shapes[:, 0]).max()

@@ -34,9 +34,9 @@ from femubench.fem import (
     JointSpring,
     Material,
     Member,
-    Parameter,
     Place,
     PointMass,
+    Property,
     Section,
     Structure,
     Support,
@@ -276,8 +276,8 @@ def test_every_step_is_equation_4(hframe_case: Any) -> None:
     result = Local(options).update(model, data, RNG)
     structure = model.frame_structure
     parameters = [
-        Parameter("x", "EI", ("horizontal/1", "horizontal/16")),
-        Parameter("z", "EI", ("lower1/8", "lower2/8", "upper1/1", "upper2/1")),
+        Property("x", "EI", ("horizontal/1", "horizontal/16")),
+        Property("z", "EI", ("lower1/8", "lower2/8", "upper1/1", "upper2/1")),
     ]
     beta = 0.05 * np.sum(data.eigenvalues**2)
     values = np.ones(2)
@@ -342,7 +342,7 @@ def test_a_truth_within_the_class_is_recovered(
         assert found[name] == pytest.approx(value, rel=2e-3)
 
 
-def _neutral(parameter: Parameter, start: UpdateResult) -> float:
+def _neutral(parameter: Property, start: UpdateResult) -> float:
     """Return what takes a parameter back to where the strategy starts from."""
     estimate = next(p for p in start.parameters if p.name == parameter.name)
     return estimate.before / estimate.after if parameter.is_factor else estimate.before
@@ -403,7 +403,7 @@ def test_no_more_parameters_than_frequencies(hframe_case: Any) -> None:
     assert [p.name for p in one.parameters] == ["EI at all"]
 
     def some(name: str) -> Unknown:
-        return Unknown(Parameter(name, "EI", ()))
+        return Unknown(Property(name, "EI", ()))
 
     levels = [[some("a"), some("b")], [], [some("c"), some("d")], [some("e")]]
     counts = {n: [u.parameter.name for u in carried_by(levels, n)] for n in (1, 2, 3, 4, 9)}
@@ -648,7 +648,7 @@ def test_the_jacobian_of_scaled_shapes(ladder: Any) -> None:
     structure = model.frame_structure
     data = Data(measured(model, 3).with_noise(np.random.default_rng(2)), "frequency", True, True)
     labels = tuple(label for label in structure.labels if label)
-    parameters = [Parameter("GJ", "GJ", labels), Parameter("EI", "EI", labels[:3])]
+    parameters = [Property("GJ", "GJ", labels), Property("EI", "EI", labels[:3])]
     slope = predict(data, Model.of(structure)).jacobian(parameters)
     for p, parameter in enumerate(parameters):
         up, down = (

@@ -102,7 +102,7 @@ def test_spread_is_that_of_samples_solved_in_full() -> None:
     model, structure = case.model, case.model.frame_structure
     labels = [label for label in structure.label_index if label][:6]
     rng = np.random.default_rng(3)
-    parameters = [femubench.fem.Parameter(at, "E", (at,)) for at in labels]
+    parameters = [femubench.fem.Property(at, "E", (at,)) for at in labels]
     samples = tuple(
         Model.of(structure.with_values(parameters, np.exp(0.3 * rng.standard_normal(6))))
         for _ in range(8)

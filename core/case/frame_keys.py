@@ -19,7 +19,7 @@ from femubench.core.case.schema import FrameSpec, MaterialSpec, MemberSpec, Sect
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Factor, Frame, Member, Place, Plane, RigidEnd
 from femubench.core.fem.nominal import MAY_VANISH
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import (
     SHAPES,
     Section,
@@ -143,13 +143,13 @@ def described_frame(structure: Structure) -> Frame:
     return replace(frame, factors=(*frame.factors, *_written(structure, factors)))
 
 
-def _refused(parameter: Parameter, value: float) -> Fault:
+def _refused(parameter: Property, value: float) -> Fault:
     what = f"{parameter.name} = {value:g} cannot be written as a key of a frame"
     expected = "values > 0 of factors, >= 0 of springs, on members of the frame"
     return Fault(("model",), what, expected)
 
 
-def _with_springs(frame: Frame, parameter: Parameter, value: float) -> Frame:
+def _with_springs(frame: Frame, parameter: Property, value: float) -> Frame:
     if value < 0.0:
         raise _refused(parameter, value)
     springs = list(frame.joint_springs)
@@ -162,7 +162,7 @@ def _with_springs(frame: Frame, parameter: Parameter, value: float) -> Frame:
     return replace(frame, joint_springs=tuple(springs))
 
 
-def _with_rigid_ends(frame: Frame, parameter: Parameter, value: float) -> Frame:
+def _with_rigid_ends(frame: Frame, parameter: Property, value: float) -> Frame:
     ends = {f"{end.member}@{end.joint}": end for end in frame.rigid_ends}
     for place in parameter.places:
         member, _, joint = place.rpartition("@")

@@ -28,7 +28,8 @@ from femubench.core.challenge.truth import (
     with_causes,
 )
 from femubench.core.challenge.visibility import unexplained
-from femubench.core.effect.frame_effect import EffectParameter, FrameEffect
+from femubench.core.change.parameter import Parameter as EffectParameter
+from femubench.core.effect.frame_effect import FrameEffect
 from femubench.core.effect.sizes import Site, Size
 from femubench.core.errors import FemubenchError, InputError, ModelError
 from femubench.core.fem.frame import Frame

@@ -10,8 +10,8 @@ from itertools import product
 import numpy as np
 import scipy.linalg as la
 
-from femubench.core.change.tabulated import tabulated_change
-from femubench.core.change.terms import Change
+from femubench.core.change.change import Change
+from femubench.core.change.tabulated import change_of, placed_change
 from femubench.core.fem.model import Model
 from femubench.core.modal.eigen import enough_modes, modes_of, once_for, zero_tolerance
 from femubench.core.modal.generalised_mass import mass_normalised
@@ -19,7 +19,6 @@ from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.roles import Effect, EffectParameter
 from femubench.core.typing import FloatArray
 
-_SLOPE_STEP = 1e-5
 _SINGLE = (0.12, 0.5, 1.3, 2.6, 4.6)
 _DOUBLE = (0.03, 0.2, 0.7, 1.8)
 _OSCILLATOR = (0.4, 1.2, 2.2)
@@ -36,17 +35,23 @@ class Hypothesis:
 
     Arguments:
         effect: the effect itself.
-        place: where it sits.
-        parameters: what it takes there.
-        change: what it does to the matrices.
+        change: what it does there, and its parameters.
         places: number of places that the effect could sit at.
     """
 
     effect: Effect
-    place: str
-    parameters: tuple[EffectParameter, ...]
     change: Change
     places: int
+
+    @property
+    def place(self) -> str:
+        """Return where it sits."""
+        return self.change.places[0]
+
+    @property
+    def parameters(self) -> tuple[EffectParameter, ...]:
+        """Return what it takes there."""
+        return self.change.parameters
 
     @property
     def name(self) -> str:
@@ -67,11 +72,10 @@ class Hypothesis:
         pairs = zip(self.parameters, values, strict=True)
         return np.array([p.coordinate(v) for p, v in pairs if v is not None])
 
-    @cached_property
+    @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Return the lowest and the highest coordinates, (k,) each."""
-        low, high = np.array([p.range for p in self.parameters]).T
-        return low, high
+        return self.change.bounds
 
     @cached_property
     def one_sided(self) -> FloatArray:
@@ -121,20 +125,15 @@ class Hypothesis:
 
     def values(self, x: FloatArray) -> FloatArray:
         """Return parameter values of coordinates, (g, k) both."""
-        columns = [p.value(x[:, i]) for i, p in enumerate(self.parameters)]
-        return np.column_stack(columns)
+        return self.change.values(x)
 
     def factors(self, x: FloatArray) -> FloatArray:
         """Return the factors of the terms, (g, n_terms), of coordinates, (g, k)."""
-        return np.asarray(self.change.coefficients(self.values(x)))
+        return self.change.factors(x)
 
     def slopes(self, x: FloatArray) -> FloatArray:
         """Return d factors / d x at one point, (k, n_terms); one-sided where a bound is near."""
-        low, high = self.bounds
-        step = _SLOPE_STEP * np.eye(len(x))
-        up, down = np.minimum(x + step, high), np.maximum(x - step, low)
-        width = (up - down).diagonal()
-        return np.asarray((self.factors(up) - self.factors(down)) / width[:, None])
+        return self.change.slopes(x)
 
 
 def magnitudes(hypothesis: Hypothesis, sizes: tuple[float, ...] = _SIZES) -> FloatArray:
@@ -226,7 +225,10 @@ def _hypotheses(model: Model, effects: Iterable[Effect]) -> tuple[Hypothesis, ..
         each = {p: tuple(effect.parameters(model, p)) for p in dict.fromkeys(effect.places(model))}
         # A rod has no bending stiffness by which a rotational spring could be measured.
         places = {p: own for p, own in each.items() if all(one.scale > 0.0 for one in own)}
-        own = [_made(model, effect, p, own, len(places)) for p, own in places.items()]
+        own = [
+            Hypothesis(effect, placed_change(effect, model, p, own), len(places))
+            for p, own in places.items()
+        ]
         if model.free:
             own = [one for one in own if not _holds(model, one)]
             own = [replace(one, places=len(own)) for one in own]
@@ -257,16 +259,4 @@ def _rigid_motions(model: Model) -> tuple[FloatArray, float]:
 
 def hypothesis_at(model: Model, effect: Effect, place: str, places: int) -> Hypothesis:
     """Return an effect at one of so many places."""
-    return _made(model, effect, place, tuple(effect.parameters(model, place)), places)
-
-
-def _made(
-    model: Model, effect: Effect, place: str, parameters: tuple[EffectParameter, ...], places: int
-) -> Hypothesis:
-    change = getattr(effect, "change", None)
-    made = (
-        change(model, place)
-        if callable(change)
-        else tabulated_change(effect, model, place, parameters)
-    )
-    return Hypothesis(effect, place, parameters, made, places)
+    return Hypothesis(effect, change_of(effect, model, place), places)

@@ -1,22 +1,18 @@
-"""What an effect does to the matrices, read off the models that it gives at a few values."""
+"""An effect at a place as a change: its own, or read off the models that it gives."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import scipy.sparse as sp
 
 from femubench.core import roles
-from femubench.core.change.terms import (
-    Change,
-    Term,
-    barycentric,
-    chebyshev_nodes,
-    proportional,
-    sparse_term,
-)
+from femubench.core.change.change import Change, proportional
+from femubench.core.change.interpolation import barycentric, chebyshev_nodes
+from femubench.core.change.terms import Term, sparse_term
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model, common_dofs
 from femubench.core.modal.factorisation import LU
@@ -26,6 +22,26 @@ from femubench.core.typing import FloatArray, IntArray, SparseArray
 _NODES = {1: 9, 2: 4}
 _WIDEST = 3.0  # deviations to either side that a table covers
 _AFFINE = 1e-9
+
+
+def change_of(effect: Effect, model: Model, place: str) -> Change:
+    """Return what an effect does at a place, with its parameters.
+
+    Raises:
+        ModelError: as `tabulated_change`.
+    """
+    return placed_change(effect, model, place, tuple(effect.parameters(model, place)))
+
+
+def placed_change(
+    effect: Effect, model: Model, place: str, parameters: tuple[EffectParameter, ...]
+) -> Change:
+    """Return the same with parameters that are known."""
+    own = getattr(effect, "change", None)
+    made: Change = (
+        own(model, place) if callable(own) else tabulated_change(effect, model, place, parameters)
+    )
+    return replace(made, name=effect.name, places=(place,), parameters=parameters)
 
 
 def tabulated_change(

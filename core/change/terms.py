@@ -1,24 +1,16 @@
-"""What an effect does to mass and stiffness, as a sum of fixed matrices with varying factors.
-
-    K(values) = K + sum_i a_i(values) A_i ,   M(values) = M + sum_i b_i(values) B_i
-
-The matrices are never global: each knows the few dofs or elements that it touches, so that a
-modal basis is projected on them once and every further value costs a small sum.
-"""
+"""Fixed matrices of a change: each knows the few dofs or elements that it touches."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
 import scipy.sparse as sp
 
+from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.typing import FloatArray, IntArray, SparseArray
-
-Coefficients = Callable[[FloatArray], FloatArray]
 
 
 class Operator(Protocol):
@@ -70,13 +62,14 @@ class ElementOperator:
         return total
 
     @property
-    def _rows(self) -> SparseArray:
+    def local_rows(self) -> SparseArray:
+        """Return the displacements of its elements from dofs, sparse (12 k, n)."""
         rows = (12 * self.elements[:, None] + np.arange(12)).ravel()
         return self.structure.gather[rows]
 
     def apply(self, vectors: FloatArray) -> FloatArray:
         """Return the product with vectors, (n + extra, m)."""
-        rows = self._rows
+        rows = self.local_rows
         n, m = rows.shape[1], vectors.shape[1]
         local = (rows @ vectors[:n]).reshape(-1, 12, m)
         product = np.zeros(vectors.shape)
@@ -85,7 +78,7 @@ class ElementOperator:
 
     def project(self, vectors: FloatArray) -> FloatArray:
         """Return vectors' A vectors, (m, m)."""
-        rows = self._rows
+        rows = self.local_rows
         local = np.asarray(rows @ vectors[: rows.shape[1]])
         force = (self.matrices @ local.reshape(-1, 12, local.shape[1])).reshape(local.shape)
         return np.asarray(local.T @ force)
@@ -144,67 +137,6 @@ class Term:
     weight: float | None = None
 
 
-@dataclass(frozen=True)
-class Change:
-    """What an effect does to a model at one place.
-
-    Arguments:
-        terms: fixed matrices.
-        coefficients: from values (g, n_parameters) to the factors of the terms (g, n_terms).
-        extra: dofs that the effect adds behind those of the model; they have neither mass nor
-            stiffness but what the terms give them.
-    """
-
-    terms: tuple[Term, ...]
-    coefficients: Coefficients
-    extra: int = 0
-
-
-def proportional(*terms: Term, neutral: float = 0.0) -> Change:
-    """Return a change that grows with the distance of one value from its neutral one.
-
-    Examples:
-        >>> mass = effect.proportional(effect.mass_term(model, [fem.Place(joint="J1")]))
-        >>> print(mass.coefficients(np.array([[0.5]])))
-        [[0.5]]
-    """
-    count = len(terms)
-    return Change(terms, lambda values: np.repeat(values[:, :1] - neutral, count, axis=1))
-
-
-def chebyshev_nodes(low: float, high: float, count: int) -> FloatArray:
-    """Return the Chebyshev points of the second kind between two bounds, ascending, (count,).
-
-    Examples:
-        >>> print(effect.chebyshev_nodes(0.0, 2.0, 3))
-        [0. 1. 2.]
-    """
-    return 0.5 * (low + high) - 0.5 * (high - low) * np.cos(np.pi * np.arange(count) / (count - 1))
-
-
-def barycentric(nodes: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the Lagrange basis at points, (n_points, n_nodes) (Berrut & Trefethen 2004, (5.4)).
-
-    Arguments:
-        nodes: Chebyshev points of the second kind, (n_nodes,).
-        points: where to evaluate, (n_points,).
-
-    Examples:
-        >>> nodes = effect.chebyshev_nodes(0.0, 2.0, 4)
-        >>> np.allclose(effect.barycentric(nodes, np.array([0.7])) @ nodes**3, 0.7**3)
-        True
-    """
-    weight = (-1.0) ** np.arange(len(nodes))
-    weight[[0, -1]] *= 0.5
-    gap = points[:, None] - nodes[None, :]
-    hit = np.abs(gap) < 1e-14 * max(float(np.ptp(nodes)), 1e-300)
-    share = weight / np.where(hit, 1.0, gap)
-    share = share / share.sum(axis=1, keepdims=True)
-    on_node = hit.any(axis=1)
-    share[on_node] = hit[on_node]
-    return np.asarray(share)
-
-
 def sparse_term(matrix: Literal["mass", "stiffness"], change: SparseArray) -> Term:
     """Return a term of a sparse matrix.
 
@@ -213,3 +145,55 @@ def sparse_term(matrix: Literal["mass", "stiffness"], change: SparseArray) -> Te
         'stiffness'
     """
     return Term(matrix, MatrixOperator(sp.csr_array(change)))
+
+
+def sparse_matrix(operator: Operator, size: int) -> SparseArray:
+    """Return an operator on the dofs of a model as a sparse matrix, (n, n).
+
+    Arguments:
+        operator: without added dofs.
+        size: number of dofs n.
+    """
+    if isinstance(operator, MatrixOperator):
+        return sp.csr_array(operator.matrix)
+    if isinstance(operator, RowOperator):
+        return sp.csr_array(operator.rows.T @ sp.csr_array(operator.core) @ operator.rows)
+    if isinstance(operator, ElementOperator):
+        rows = operator.local_rows
+        return sp.csr_array(rows.T @ sp.block_diag(operator.matrices, format="csr") @ rows)
+    return sp.csr_array(operator.apply(np.eye(size)))
+
+
+def translation_axis(structure: Structure) -> int:
+    """Return the axis along which a frame is moved to weigh it."""
+    return 0 if structure.frame.plane == "in-plane" else 2
+
+
+def translation(structure: Structure) -> FloatArray:
+    """Return the local displacements of all elements in a unit translation, (n_elements, 12)."""
+    axis = structure.mesh.axes[:, :, translation_axis(structure)]
+    motion = np.zeros((len(axis), 12))
+    motion[:, 0:3] = motion[:, 6:9] = axis
+    return motion
+
+
+def heaviest_translation(model: Model) -> FloatArray:
+    """Return the motion of all dofs in the unit translation that weighs a model, (n,)."""
+    shift = model.dofs.motions[:, :3]
+    if model.structure is not None:
+        return np.asarray(shift[:, translation_axis(model.structure)])
+    carried = np.einsum("nd,nd->d", shift, model.mass_times(shift))
+    return np.asarray(shift[:, int(carried.argmax())])
+
+
+def weigh_term(model: Model, term: Term) -> float:
+    """Return by how much a term makes a structure heavier in kg for every unit of its factor."""
+    if term.matrix == "stiffness":
+        return 0.0
+    if term.weight is not None:
+        return term.weight
+    operator = term.operator
+    if isinstance(operator, ElementOperator):
+        own = translation(operator.structure)[operator.elements]
+        return float(np.einsum("ei,eij,ej->", own, operator.matrices, own))
+    return float(operator.project(heaviest_translation(model)[:, None])[0, 0])

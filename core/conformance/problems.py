@@ -24,7 +24,7 @@ from femubench.core.fem.frame import (
     Support,
 )
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import rectangular_tube
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import solve_modes
@@ -172,7 +172,7 @@ def _as_matrices(problem: Problem) -> Problem:
 def _as_groups(problem: Problem) -> Problem:
     """Return a problem with matrices of which one member and the others are groups."""
     structure, nominal = problem.model.frame_structure, problem.model.stiffness
-    own = Parameter("E", "E", tuple(m for m in structure.label_index if m.startswith("AB/")))
+    own = Property("E", "E", tuple(m for m in structure.label_index if m.startswith("AB/")))
     one = structure.with_values([own], [2.0]).matrices()[1] - nominal
     grouped = _as_matrices(problem)
     groups = {"one": one, "others": nominal - one}

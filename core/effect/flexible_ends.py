@@ -20,14 +20,9 @@ from functools import partial
 
 import numpy as np
 
-from femubench.core.change.terms import (
-    Change,
-    ElementOperator,
-    RowOperator,
-    Term,
-    barycentric,
-    chebyshev_nodes,
-)
+from femubench.core.change.change import Change
+from femubench.core.change.interpolation import barycentric, chebyshev_nodes
+from femubench.core.change.terms import ElementOperator, RowOperator, Term
 from femubench.core.effect.attachments import once_for
 from femubench.core.effect.places import member_length
 from femubench.core.fem.beam import mass_matrices, stiffness_matrices

@@ -21,7 +21,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from femubench.core.change.terms import Change, RowOperator, Term
+from femubench.core.change.change import Change
+from femubench.core.change.terms import RowOperator, Term
 from femubench.core.effect.attachments import once_for, point_motion
 from femubench.core.effect.places import point_of, supports_of
 from femubench.core.fem.frame import Frame, GroundSpring

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from femubench.core.errors import ModelError
 from femubench.core.fem.beam import BeamProperties, mass_matrices, stiffness_matrices
 from femubench.core.fem.meshed_frame import MeshedFrame
-from femubench.core.fem.parameters import QUANTITIES, Parameter
+from femubench.core.fem.parameters import QUANTITIES, Property
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 # Young's modulus is in GA too, which the elements know by its inverse.
@@ -64,7 +64,7 @@ class Touched:
         return tuple((name, -1.0 if name in divided else 1.0) for name in names)
 
 
-def touched(structure: MeshedFrame, parameters: Sequence[Parameter]) -> tuple[Touched, ...]:
+def touched(structure: MeshedFrame, parameters: Sequence[Property]) -> tuple[Touched, ...]:
     """Return what parameters touch, kind by kind; those of the last call are kept.
 
     Raises:
@@ -78,7 +78,7 @@ def touched(structure: MeshedFrame, parameters: Sequence[Parameter]) -> tuple[To
     return found
 
 
-def _resolved(structure: MeshedFrame, parameters: Sequence[Parameter]) -> tuple[Touched, ...]:
+def _resolved(structure: MeshedFrame, parameters: Sequence[Property]) -> tuple[Touched, ...]:
     kinds: dict[str, list[int]] = {}
     for p, parameter in enumerate(parameters):
         kinds.setdefault(parameter.quantity, []).append(p)
@@ -104,13 +104,13 @@ def _resolved(structure: MeshedFrame, parameters: Sequence[Parameter]) -> tuple[
     return tuple(found)
 
 
-def _places(parameter: Parameter) -> Collection[str]:
+def _places(parameter: Property) -> Collection[str]:
     places = parameter.places
     return places if len(places) < 2 else dict.fromkeys(places)
 
 
 def _rigid_ends(
-    structure: MeshedFrame, parameters: Sequence[Parameter], numbers: Sequence[int]
+    structure: MeshedFrame, parameters: Sequence[Property], numbers: Sequence[int]
 ) -> list[Touched]:
     ends = structure.element_ends
     found: tuple[list[tuple[int, int]], list[tuple[int, int]]] = ([], [])
@@ -124,7 +124,7 @@ def _rigid_ends(
     return [Touched(f"{_RIGID}_{k + 1}", *table.T) for k, table in enumerate(tables) if len(table)]
 
 
-def present_value(structure: MeshedFrame, parameter: Parameter) -> float:
+def present_value(structure: MeshedFrame, parameter: Property) -> float:
     """Return a parameter's value: 1 for a factor, else the mean rigid length or stiffness."""
     if parameter.is_factor:
         return 1.0
@@ -138,7 +138,7 @@ def present_value(structure: MeshedFrame, parameter: Parameter) -> float:
 
 
 def apply_values(
-    structure: MeshedFrame, parameters: Sequence[Parameter], values: Sequence[float] | FloatArray
+    structure: MeshedFrame, parameters: Sequence[Property], values: Sequence[float] | FloatArray
 ) -> tuple[BeamProperties, FloatArray]:
     """Return element properties and joint springs with the parameters set to the values."""
     given = np.asarray(values, dtype=float)
@@ -290,7 +290,7 @@ def _slopes(
     return k, m
 
 
-def derivatives(structure: MeshedFrame, parameters: Sequence[Parameter]) -> Derivatives:
+def derivatives(structure: MeshedFrame, parameters: Sequence[Property]) -> Derivatives:
     """Return the derivatives of stiffness and mass with respect to parameters.
 
     Factors are differentiated with respect to the factor at its present value 1, rigid lengths and
@@ -311,7 +311,7 @@ def derivatives(structure: MeshedFrame, parameters: Sequence[Parameter]) -> Deri
     return Derivatives(tuple(parts), structure.gather, structure.spring_rows, springs)
 
 
-def element_masses(structure: MeshedFrame, parameters: Sequence[Parameter]) -> FloatArray:
+def element_masses(structure: MeshedFrame, parameters: Sequence[Property]) -> FloatArray:
     """Return d mass / d factor about the present value in kg, (n_parameters,)."""
     p = structure.properties
     mass = p.rhoA * (p.length - p.rigid_mass_1 - p.rigid_mass_2)

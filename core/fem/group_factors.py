@@ -10,7 +10,7 @@ import numpy as np
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.typing import FloatArray, SparseArray
 
 GROUP = "group:"
@@ -52,7 +52,7 @@ def group_matrix(model: Model, matrix: Matrix, place: str) -> SparseArray:
 
 
 def with_group_factors(
-    model: Model, parameters: Sequence[Parameter], values: Sequence[float] | FloatArray
+    model: Model, parameters: Sequence[Property], values: Sequence[float] | FloatArray
 ) -> Model:
     """Return a model from matrices with factors on its groups, which stay its groups.
 
@@ -65,7 +65,7 @@ def with_group_factors(
         ModelError: when there is no such group, or for a parameter that matrices do not have.
 
     Examples:
-        >>> factor = fem.Parameter("stiffness all", "E", ("all",))
+        >>> factor = fem.Property("stiffness all", "E", ("all",))
         >>> twice = fem.with_group_factors(model, [factor], [2.0])
         >>> float(abs(twice.stiffness - 2.0 * model.stiffness).max())
         0.0
@@ -93,7 +93,7 @@ def _scaled(model: Model, matrix: Matrix, places: Sequence[str], factor: float) 
     return replace(model, stiffness=stiffness, stiffness_change=change, groups=groups)
 
 
-def _matrix(parameter: Parameter) -> Matrix:
+def _matrix(parameter: Property) -> Matrix:
     if parameter.quantity not in _MATRIX:
         raise ModelError(f"{parameter.name}: matrices have no {parameter.quantity}")
     return _MATRIX[parameter.quantity]
@@ -152,7 +152,7 @@ class GroupDerivatives:
         return np.asarray(self.quadratic(shift[:, None], shift[:, None])[1][0])
 
 
-def group_derivatives(model: Model, parameters: Sequence[Parameter]) -> GroupDerivatives:
+def group_derivatives(model: Model, parameters: Sequence[Property]) -> GroupDerivatives:
     """Return the derivatives of stiffness and mass with respect to factors on groups.
 
     Raises:

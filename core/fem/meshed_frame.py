@@ -18,7 +18,7 @@ from femubench.core.fem.frame import Frame, GroundSpring, PointMass
 from femubench.core.fem.kinematics import Kinematics, point_rows, spring_rows
 from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.mesh import Mesh
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
@@ -62,7 +62,7 @@ class MeshedFrame:
     kinematics: Kinematics
     properties: BeamProperties
     springs: FloatArray
-    changes: tuple[tuple[Parameter, float], ...] = ()
+    changes: tuple[tuple[Property, float], ...] = ()
 
     def __post_init__(self) -> None:
         p = self.properties

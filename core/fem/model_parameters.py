@@ -10,7 +10,7 @@ import numpy as np
 from femubench.core.fem.derivatives import derivatives, element_masses
 from femubench.core.fem.group_factors import group_derivatives, with_group_factors
 from femubench.core.fem.model import Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.typing import FloatArray
 
 
@@ -40,7 +40,7 @@ class MatrixSlopes(Protocol):
 
 
 def with_values(
-    model: Model, parameters: Sequence[Parameter], values: Sequence[float] | FloatArray
+    model: Model, parameters: Sequence[Property], values: Sequence[float] | FloatArray
 ) -> Model:
     """Return a model with parameters set; factors multiply the present properties.
 
@@ -57,7 +57,7 @@ def with_values(
     return Model.of(model.structure.with_values(parameters, values))
 
 
-def matrix_slopes(model: Model, parameters: Sequence[Parameter]) -> MatrixSlopes:
+def matrix_slopes(model: Model, parameters: Sequence[Property]) -> MatrixSlopes:
     """Return the derivatives of a model's matrices; factors are taken about 1.
 
     Raises:
@@ -73,7 +73,7 @@ def updated_mass(model: Model) -> float:
     return model.total_mass if model.structure is None else model.structure.total_mass
 
 
-def mass_slopes(model: Model, parameters: Sequence[Parameter]) -> FloatArray:
+def mass_slopes(model: Model, parameters: Sequence[Property]) -> FloatArray:
     """Return d total mass / d factor about the present value in kg, (n_parameters,)."""
     if model.structure is not None:
         return element_masses(model.structure, parameters)

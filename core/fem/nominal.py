@@ -16,7 +16,7 @@ from femubench.core.fem.frame import Coupling, Eccentricity, Factor, Frame, Memb
 from femubench.core.fem.kinematics import build_kinematics
 from femubench.core.fem.mesh import Mesh, build_mesh
 from femubench.core.fem.meshed_frame import MeshedFrame
-from femubench.core.fem.parameters import QUANTITIES, Parameter
+from femubench.core.fem.parameters import QUANTITIES, Property
 from femubench.core.typing import FloatArray
 
 # Without shear or rotary inertia a beam is still one; without stiffness or mass it is none.
@@ -112,7 +112,7 @@ def factored_properties(structure: MeshedFrame) -> BeamProperties:
     return apply_values(structure, parameters, [item.factor for item in factors])[0]
 
 
-def _parameter(structure: MeshedFrame, item: Factor) -> Parameter:
+def _parameter(structure: MeshedFrame, item: Factor) -> Property:
     name = f"factor on {item.quantity}"
     if item.quantity not in QUANTITIES or not QUANTITIES[item.quantity]:
         known = ", ".join(quantity for quantity, scaled in QUANTITIES.items() if scaled)
@@ -127,4 +127,4 @@ def _parameter(structure: MeshedFrame, item: Factor) -> Parameter:
             places += structure.member_labels[place]
         else:
             places.append(place)
-    return Parameter(name, item.quantity, tuple(places))
+    return Property(name, item.quantity, tuple(places))

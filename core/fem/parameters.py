@@ -1,4 +1,4 @@
-"""Named parameters of a frame model: what they scale or set, and where."""
+"""Properties of a model that updating may scale or set, and where."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ _SET = ("rigid", "spring")
 
 
 @dataclass(frozen=True)
-class Parameter:
-    """One number that updating may change.
+class Property:
+    """One property that updating may scale or set.
 
     Arguments:
         name: for tables.

@@ -14,7 +14,7 @@ from femubench.core.fem.elastic_stiffness import elastic_stiffness
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.meshed_frame import MeshedFrame
 from femubench.core.fem.nominal import meshed
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.preload import gravity_stiffness, preload_stiffness
 from femubench.core.fem.sensing import sensor_rows
 from femubench.core.fem.sensors import Sensors
@@ -41,7 +41,7 @@ class Structure(MeshedFrame):
         return cls(found.frame, found.mesh, found.kinematics, found.properties, found.springs)
 
     def with_values(
-        self, parameters: Sequence[Parameter], values: Sequence[float] | FloatArray
+        self, parameters: Sequence[Property], values: Sequence[float] | FloatArray
     ) -> Structure:
         """Return the structure with parameters set; factors multiply the present properties."""
         properties, springs = apply_values(self, parameters, values)

@@ -9,9 +9,14 @@ from functools import cached_property
 import numpy as np
 
 from femubench.core.change.hypothesis import Hypothesis
-from femubench.core.change.terms import ElementOperator, RowOperator, Term
+from femubench.core.change.terms import (
+    ElementOperator,
+    RowOperator,
+    Term,
+    heaviest_translation,
+    translation,
+)
 from femubench.core.fem.model import Model
-from femubench.core.fem.structure import Structure
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 _MANY = 4  # elements to one kind, from which on these are taken together
@@ -95,15 +100,11 @@ class Projector:
         self.vectors, self.structure = vectors, model.structure
         self.wider: dict[int, FloatArray] = {0: vectors}
         self._near: tuple[FloatArray, FloatArray] | None = None
-        shift = model.dofs.motions[:, :3]
-        if self.structure is None:
-            carried = np.einsum("nd,nd->d", shift, model.mass_times(shift))
-            self.unit = shift[:, int(carried.argmax())]
-        else:
+        self.unit = heaviest_translation(model)
+        if self.structure is not None:
             # What cannot move in the plane of the frame has no part in any product.
             self.active = np.flatnonzero(self.structure.active_local)
-            self.shift = _translation(self.structure)[:, self.active]
-            self.unit = shift[:, _direction(self.structure)]
+            self.shift = translation(self.structure)[:, self.active]
 
     @cached_property
     def local(self) -> FloatArray:
@@ -416,16 +417,3 @@ def _by_kinds(
             if factor:
                 own += factor * one
     return list(total)
-
-
-def _direction(structure: Structure) -> int:
-    """Return the axis along which the structure is moved to weigh it."""
-    return 0 if structure.frame.plane == "in-plane" else 2
-
-
-def _translation(structure: Structure) -> FloatArray:
-    """Return the local displacements of all elements in a unit translation, (n_elements, 12)."""
-    axis = structure.mesh.axes[:, :, _direction(structure)]
-    motion = np.zeros((len(axis), 12))
-    motion[:, 0:3] = motion[:, 6:9] = axis
-    return motion

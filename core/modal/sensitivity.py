@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
 from femubench.core.fem.model_parameters import MatrixSlopes, matrix_slopes
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.modal.eigen import Modes
 from femubench.core.modal.factorisation import LU
 from femubench.core.typing import FloatArray, IntArray
@@ -19,15 +19,15 @@ _REPEATED = 1e-8
 
 
 def eigenvalue_sensitivities(
-    model: Model, modes: Modes, parameters: Sequence[Parameter], change: MatrixSlopes | None = None
+    model: Model, modes: Modes, parameters: Sequence[Property] | MatrixSlopes
 ) -> FloatArray:
     """Return d lambda_j / d p in rad^2/s^2 a unit of the parameter, (m, n_parameters).
 
     Arguments:
         model: a frame, or matrices with groups.
         modes: some of its modes, mass-normalised.
-        parameters: factors are taken about 1, everything else about its present value.
-        change: the derivatives of the matrices, where they are at hand.
+        parameters: factors are taken about 1, everything else about its present value; or the
+            slopes of the matrices, where they are at hand.
 
     Source: Fox & Kapoor (1968); Horton et al. (1999), equation (2).
 
@@ -36,7 +36,7 @@ def eigenvalue_sensitivities(
         >>> np.allclose(slopes[:, 0], modes.eigenvalues[[3, 4]])
         True
     """
-    change = matrix_slopes(model, parameters) if change is None else change
+    change = matrix_slopes(model, parameters) if isinstance(parameters, Sequence) else parameters
     stiffness, mass = change.quadratic(modes.shapes, modes.shapes)
     return np.asarray(stiffness - modes.eigenvalues[:, None] * mass)
 
@@ -45,8 +45,7 @@ def shape_sensitivities(
     model: Model,
     modes: Modes,
     index: int,
-    parameters: Sequence[Parameter],
-    change: MatrixSlopes | None = None,
+    parameters: Sequence[Property] | MatrixSlopes,
 ) -> FloatArray:
     """Return d phi / d p of one mode, (n, n_parameters).
 
@@ -60,7 +59,6 @@ def shape_sensitivities(
         modes: its modes, mass-normalised; modes that share the eigenvalue must be among them.
         index: which of them.
         parameters: as in `eigenvalue_sensitivities`.
-        change: the derivatives of the matrices, where they are at hand.
 
     Raises:
         ModelError: when the bordered system is singular.
@@ -71,7 +69,7 @@ def shape_sensitivities(
         >>> modal.shape_sensitivities(model, modes, 3, [stiffness]).shape
         (81, 1)
     """
-    change = matrix_slopes(model, parameters) if change is None else change
+    change = matrix_slopes(model, parameters) if isinstance(parameters, Sequence) else parameters
     if len(modes) == model.size:
         return _modal_sum(modes, index, change)
     return _nelson(model, modes, index, change)
@@ -125,7 +123,7 @@ def _nelson(model: Model, modes: Modes, index: int, change: MatrixSlopes) -> Flo
 
 
 def frequency_sensitivities(
-    model: Model, modes: Modes, parameters: Sequence[Parameter]
+    model: Model, modes: Modes, parameters: Sequence[Property]
 ) -> FloatArray:
     """Return d f_j / d p in Hz a unit of the parameter, elastic modes only, (m, n_parameters).
 

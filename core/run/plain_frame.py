@@ -16,7 +16,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame, Material, Member, Vector
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import Section, TabulatedKappa
 from femubench.core.run.plain_arrays import BytesError
 
@@ -98,9 +98,9 @@ def frame_from_plain(data: object, nominal: Frame, most_elements: int) -> Frame:
     return found
 
 
-def parameters_from_plain(data: object) -> tuple[Parameter, ...]:
+def parameters_from_plain(data: object) -> tuple[Property, ...]:
     """Return parameters of a frame, each checked; raises BytesError."""
-    found: tuple[Parameter, ...] = read_plain(tuple[Parameter, ...], data, "parameters")
+    found: tuple[Property, ...] = read_plain(tuple[Property, ...], data, "parameters")
     return found
 
 

@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from femubench.core.errors import StrategyFailure
 from femubench.core.fem.beam import BeamProperties
 from femubench.core.fem.model import LowRank, Model, common_dofs, dofs_of
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.structure import Structure
 from femubench.core.run.model_checks import check_change, check_entries, check_indices
 from femubench.core.run.plain_arrays import BytesError, Shelf
@@ -180,7 +180,7 @@ def _plain(structure: Structure, nominal: Model, shelf: Shelf) -> dict[str, Any]
     if nominal.structure is None:
         raise StrategyFailure("the updated model holds a frame, and the nominal model has none")
     properties = [shelf.put(getattr(structure.properties, f.name)) for f in fields(BeamProperties)]
-    numbers: dict[Parameter, int] = {}
+    numbers: dict[Property, int] = {}
     each = [numbers.setdefault(parameter, len(numbers)) for parameter, _ in structure.changes]
     found: dict[str, Any] = {
         "properties": properties,
@@ -246,7 +246,7 @@ def _meshed(
 
 def _changes(
     data: Mapping[str, Any], arrays: Sequence[AnyArray]
-) -> list[tuple[int, Parameter, float]]:
+) -> list[tuple[int, Property, float]]:
     """Return every parameter that was set, with its number and value, in turn."""
     parameters = parameters_from_plain(data.get("parameters"))
     match data.get("changes"):
@@ -261,7 +261,7 @@ def _changes(
     return [(number, parameters[number], value) for number, value in pairs]
 
 
-def _with_changes(plain: Structure, changes: Sequence[tuple[int, Parameter, float]]) -> Structure:
+def _with_changes(plain: Structure, changes: Sequence[tuple[int, Property, float]]) -> Structure:
     found = replace(plain)
     # What is kept of a nominal structure is for its own parameters alone.
     found.__dict__.update({name: value for name, value in vars(plain).items() if name != "kept"})
@@ -271,10 +271,10 @@ def _with_changes(plain: Structure, changes: Sequence[tuple[int, Parameter, floa
 
 
 def _turns(
-    changes: Sequence[tuple[int, Parameter, float]],
-) -> Iterator[list[tuple[int, Parameter, float]]]:
+    changes: Sequence[tuple[int, Property, float]],
+) -> Iterator[list[tuple[int, Property, float]]]:
     """Yield the changes in turn, no parameter twice at a time."""
-    turn: list[tuple[int, Parameter, float]] = []
+    turn: list[tuple[int, Property, float]] = []
     seen: set[int] = set()
     for change in changes:
         if change[0] in seen:

@@ -15,9 +15,11 @@ from femubench.core.errors import ModelError, NotApplicable
 from femubench.core.fem.beam import BeamProperties, stiffness_matrices
 from femubench.core.fem.frame import Plane
 from femubench.core.fem.model import Model
+from femubench.core.fem.model_parameters import matrix_slopes, with_values
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.structure import Structure
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
-from femubench.core.update.parameter_sets import StiffnessParts, stiffness_parts
+from femubench.core.update.change_lists import parameterise
 
 Symmetry = Literal["none", "half-turn", "mirror", "full"]
 _MIRROR_AXIS = 0  # the mid-plane is normal to the element
@@ -257,20 +259,22 @@ class GroupFamily(Family):
     """Factors on the groups of a model from matrices.
 
     Arguments:
-        parts: the groups and their factors.
+        model: with the groups.
+        factors: on them.
     """
 
-    parts: StiffnessParts
+    model: Model
+    factors: tuple[Property, ...]
 
     @property
     def places(self) -> tuple[tuple[str, ...], ...]:
         """Return the groups."""
-        return tuple(parameter.places for parameter in self.parts.parameters)
+        return tuple(factor.places for factor in self.factors)
 
     @property
     def length(self) -> float:
         """Return the length at which rotations are as stiff as translations, 1 without either."""
-        model = self.parts.model
+        model = self.model
         turning = np.array([direction.startswith("r") for direction in model.dofs.direction])
         size = model.stiffness.diagonal()
         sizes = [size[chosen & (size > 0.0)] for chosen in (turning, ~turning)]
@@ -281,11 +285,12 @@ class GroupFamily(Family):
 
     def changed(self, model: Model, x: FloatArray) -> Model:
         """Return the model with factors 1 + x on its groups."""
-        return self.parts.at(1.0 + x)
+        return with_values(self.model, self.factors, 1.0 + x)
 
     def forces(self, shapes: FloatArray) -> list[SparseArray]:
         """Return, for each shape, what a unit of every unknown adds, sparse (n, n_unknowns)."""
-        return [sp.csr_array(self.parts.slopes.products(shape, 0.0)) for shape in shapes.T]
+        slopes = matrix_slopes(self.model, self.factors)
+        return [sp.csr_array(slopes.products(shape, 0.0)) for shape in shapes.T]
 
 
 def group_family(model: Model) -> GroupFamily:
@@ -300,7 +305,7 @@ def group_family(model: Model) -> GroupFamily:
         >>> update.group_family(deck).names
         ('stiffness group:deck',)
     """
-    parts = stiffness_parts(model, "groups")
+    parts = parameterise(model, "groups")
     one = np.ones(len(parts))
     return GroupFamily(
         columns=np.arange(len(parts))[:, None],
@@ -309,7 +314,8 @@ def group_family(model: Model) -> GroupFamily:
         scale=one,
         units=("",) * len(parts),
         cores=np.ones((len(parts), 1, 1, 1)),
-        parts=parts,
+        model=model,
+        factors=parts.properties,
     )
 
 

@@ -12,9 +12,9 @@ from femubench.core.errors import InputError, NotApplicable
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.measurement import Measurement
+from femubench.core.update.change_lists import OWN, check_changes, element_sets
 from femubench.core.update.element_families import ElementFamily, Family, tied
 from femubench.core.update.equation_error import update_by_equation_error
-from femubench.core.update.parameter_sets import OWN, checked_set, element_sets
 from femubench.core.update.quasi import Expansion, Frequencies
 from femubench.core.update.strategy import Strategy, UpdateResult
 
@@ -30,7 +30,7 @@ class ElementStrategy(Strategy):
             and (17), or `force`, its equation (15) with the nominal model.
         frequencies: that the equations ask for: the `measured` ones, or `nominal`, the nominal
             model's own, which leaves the measured shapes as the only data.
-        parameters: `own` for the unknowns of the family; else those of the elements of every one
+        changes: `own` for the unknowns of the family; else those of the elements of every one
             of the `members`, `sections`, `materials` or `sets` of the case are tied to each other.
     """
 
@@ -46,10 +46,10 @@ class ElementStrategy(Strategy):
     orthogonality: bool = True
     expansion: Expansion = "rotation"
     frequencies: Frequencies = "measured"
-    parameters: str = OWN
+    changes: str = OWN
 
     def __post_init__(self) -> None:
-        checked_set(self.parameters, own=True)
+        check_changes(self.changes, parts_alone=True)
         if self.expansion not in get_args(Expansion):
             raise InputError(f"the expansion is rotation or force, not {self.expansion!r}")
         if self.frequencies not in get_args(Frequencies):
@@ -60,18 +60,18 @@ class ElementStrategy(Strategy):
         """Return where the updated element matrices are looked for."""
 
     def family_of(self, model: Model) -> Family:
-        """Return the family of a model, unknowns of one part tied where told.
+        """Return the family of a model, unknowns of one part tied where asked.
 
         Raises:
             NotApplicable: when the model has no such parts.
         """
-        if self.parameters == "groups":
-            raise NotApplicable("groups of matrices have no elements: parameters=sets of a frame")
+        if self.changes == "groups":
+            raise NotApplicable("groups of matrices have no elements: changes=sets of a frame")
         structure = model.frame_structure
         family = self.family(structure)
-        if self.parameters == OWN:
+        if self.changes == OWN:
             return family
-        return tied(family, element_sets(structure, self.parameters))
+        return tied(family, element_sets(structure, self.changes))
 
     def update(
         self, model: Model, measurement: Measurement, rng: np.random.Generator

@@ -1,4 +1,4 @@
-"""Modal data and their derivatives by stiffness factors, in a space of shapes of the model."""
+"""Modal data and their derivatives by the changes of a model, in a space of its shapes."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 import scipy.linalg as la
 from scipy.optimize import least_squares
 
+from femubench.core.change.parametric_model import ParametricModel
 from femubench.core.errors import StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.modal.correlation import seen_modes
@@ -20,12 +21,13 @@ from femubench.core.modal.eigen import (
     enough_modes,
     solve_modes,
 )
+from femubench.core.modal.group_prior import STRUCTURE_STD
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import WINDOW_WITHOUT_SHAPE, pair_modes
 from femubench.core.modal.sparse_eigen import ShiftedModel
 from femubench.core.typing import BoolArray, FloatArray, IntArray
-from femubench.core.update.parameter_sets import StiffnessParts
-from femubench.core.update.strategy import ParameterEstimate, UpdateResult
+from femubench.core.update.sensitivity_update import estimate_parameters
+from femubench.core.update.strategy import UpdateResult
 
 _SPARE = 10  # modes above the measured ones that may become their partners
 _LOST = 1.0 - 1.0 / WINDOW_WITHOUT_SHAPE  # what a mode without a partner counts as, relative
@@ -46,7 +48,7 @@ class ModalFit:
     Arguments:
         residual: relative errors of the frequencies, then the weighted misfit of shapes of unit
             length, (m + m n_sensors,) or (m,).
-        slope: d residual / d ln theta, (n_rows, p).
+        slope: d residual / dx, (n_rows, p).
         paired: how many measured modes have a partner.
     """
 
@@ -62,53 +64,95 @@ class ModalFit:
 
 @dataclass(frozen=True)
 class ModalSpace:
-    """The problem K phi = lambda M phi in a space of shapes, as a function of the factors.
+    """The problem K phi = lambda M phi in a space of shapes, as a function of the coordinates x.
 
-    Rigid-body motions are no part of it: no factor gives them stiffness.
+    x is ln theta of a factor on stiffness, and the coordinate of an effect. Rigid-body motions are
+    part of it where an effect may give them stiffness or mass.
 
     Arguments:
         measurement: the used modes.
-        stiffness: V' K_0 V, (r, r), V being orthonormal with the mass.
-        parts: V' K_j V, (p, r, r).
+        parametric: the model with its changes.
+        stiffness, mass: V' K_0 V and V' M_0 V, (r, r), V being orthonormal with the mass where it
+            was taken.
+        parts: V' K_j V of the factors on stiffness, (p_factors, r, r).
+        terms: V' A_t V of the terms of effects, (n_terms, r, r).
         readings: of the shapes at the sensors, (n_sensors, r).
         shape_weight: of a shape error of 1 (MAC of 0) beside a frequency error of 1 (100 %); 0 to
             leave shapes out.
-        spread: of every ln theta beforehand, relative to each other, (p,).
     """
 
     measurement: Measurement
+    parametric: ParametricModel
     stiffness: FloatArray
+    mass: FloatArray
     parts: FloatArray
+    terms: FloatArray
     readings: FloatArray
     shape_weight: float
-    spread: FloatArray
 
-    def eigenpairs(self, log: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return eigenvalues (r,) and vectors (r, r) at ln theta, (p,)."""
+    @cached_property
+    def spread(self) -> FloatArray:
+        """Return the prior deviations of the coordinates, in that of a structure's ln E, (p,)."""
+        std = np.array([p.std for p in self.parametric.parameters])
+        return np.where(np.isfinite(std), std / STRUCTURE_STD, 1.0)
+
+    @cached_property
+    def _is_mass(self) -> BoolArray:
+        return np.array([term.matrix == "mass" for term in self.parametric.terms], dtype=bool)
+
+    def bounds(self, factor: float | FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the lowest and highest coordinates, (p,) each.
+
+        Arguments:
+            factor: logarithm of the largest factor; the least is its inverse.
+        """
+        model = self.parametric
+        low = np.where(model.is_property, -factor, model.lower)
+        return low, np.where(model.is_property, factor, model.upper)
+
+    def eigenpairs(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return eigenvalues (r,) and vectors (r, r) at coordinates, (p,)."""
         count_evaluation()
-        change = np.tensordot(np.expm1(log), self.parts, axes=1)
-        values, vectors = la.eigh(self.stiffness + change, check_finite=False, driver="evd")
+        change = np.tensordot(np.expm1(x[self.parametric.is_property]), self.parts, axes=1)
+        stiffness, mass = self.stiffness + change, None
+        if len(self.terms):
+            own, factors = self._is_mass, self.parametric.factors(x)
+            stiffness += np.tensordot(factors[~own], self.terms[~own], axes=1)
+            if own.any():
+                mass = self.mass + np.tensordot(factors[own], self.terms[own], axes=1)
+        driver = "evd" if mass is None else "gvd"
+        values, vectors = la.eigh(stiffness, mass, check_finite=False, driver=driver)
         return np.asarray(values), np.asarray(vectors)
+
+    def forces(self, x: FloatArray, vector: FloatArray, value: float) -> FloatArray:
+        """Return (dK/dx - value dM/dx) @ vector, (p, r)."""
+        factors = self.parametric.is_property
+        found = np.zeros((len(x), len(vector)))
+        found[factors] = (self.parts @ vector) * np.exp(x[factors])[:, None]
+        if len(self.terms):
+            weight = np.where(self._is_mass, -value, 1.0)
+            found += self.parametric.factor_slopes(x) @ (weight[:, None] * (self.terms @ vector))
+        return found
 
     def partners(self, eigenvalues: FloatArray, readings: FloatArray) -> IntArray:
         """Return the partner of every measured mode, -1 where there is none, (m,)."""
         measured = self.measurement
-        count = 3 * len(measured) + _SPARE
+        count = 3 * len(measured) + _SPARE + (6 if len(self.terms) else 0)
         own = np.sqrt(np.abs(eigenvalues[:count])) / (2.0 * np.pi)
         return pair_modes(measured.frequencies, measured.shapes, own, readings[:, :count]).index
 
-    def fit(self, log: FloatArray, *, slopes: bool = True) -> ModalFit:
-        """Return residual and slope at ln theta, (p,).
+    def fit(self, x: FloatArray, *, slopes: bool = True) -> ModalFit:
+        """Return residual and slope at coordinates, (p,).
 
         The residual of a shape is that of both shapes at unit length, the measured less its share
         along the model's: the sum of its squares is 1 - MAC, whose own slope vanishes at its best.
         """
-        eigenvalues, vectors = self.eigenpairs(log)
+        eigenvalues, vectors = self.eigenpairs(x)
         readings = self.readings @ vectors
         partner = self.partners(eigenvalues, readings)
         m, shapes = len(self.measurement), self._unit_shapes
         rows, shape_rows = np.full(m, _LOST), np.zeros((m, len(readings) if shapes.any() else 0))
-        size = len(log) if slopes else 0
+        size = len(x) if slopes else 0
         slope, shape_slope = np.zeros((m, size)), np.zeros((*shape_rows.shape, size))
         there = np.flatnonzero(partner >= 0)
         own = np.sqrt(np.maximum(eigenvalues[partner[there]], 0.0)) / (2.0 * np.pi)
@@ -116,7 +160,7 @@ class ModalSpace:
         for i in there:
             j = partner[i]
             if slopes:
-                gain = ((self.parts @ vectors[:, j]) * np.exp(log)[:, None]) @ vectors  # p, r
+                gain = self.forces(x, vectors[:, j], float(eigenvalues[j])) @ vectors  # p, r
                 slope[i] = -(1.0 - rows[i]) * gain[:, j] / (2.0 * eigenvalues[j])
             if not shapes[i].any():
                 continue
@@ -152,7 +196,7 @@ class ModalSpace:
 
     def advance(
         self,
-        log: FloatArray,
+        x: FloatArray,
         fit: ModalFit,
         wanted: FloatArray,
         *,
@@ -162,27 +206,27 @@ class ModalSpace:
         """Return the next point: shortened, and halved until cost and penalty do not grow.
 
         Arguments:
-            log: ln theta, (p,).
+            x: coordinates, (p,).
             fit: the fit there.
             wanted: where a linear problem has its optimum, (p,).
-            squares, sizes: what the sums of squares and of absolute values of ln theta / spread
+            squares, sizes: what the sums of squares and of absolute values of x / spread
                 weigh in the penalty, beside the sum of squares of the residual.
         """
 
-        def penalty(x: FloatArray) -> float:
-            z = x / self.spread
+        def penalty(point: FloatArray) -> float:
+            z = point / self.spread
             return squares * float(z @ z) + sizes * float(np.abs(z).sum())
 
-        limit = _LARGEST_LOG * np.clip(self.spread, 1.0, _WIDER)
-        step = wanted - log
+        low, high = self.bounds(_LARGEST_LOG * np.clip(self.spread, 1.0, _WIDER))
+        step = wanted - x
         step *= min(1.0, _LONGEST / max(float(np.abs(step).max()), _LONGEST))
-        before = fit.cost + penalty(log)
+        before = fit.cost + penalty(x)
         for halving in range(_HALVINGS):
-            trial = np.clip(log + step / 2**halving, -limit, limit)
+            trial = np.clip(x + step / 2**halving, low, high)
             found = self.fit(trial)
             if found.cost + penalty(trial) <= before:
                 return trial, found
-        return log, fit
+        return x, fit
 
 
 def _shape_misfit(shape: FloatArray, own: FloatArray) -> tuple[float, FloatArray]:
@@ -213,7 +257,7 @@ def _square(shape: FloatArray) -> float:
 
 
 def modal_space(
-    parts: StiffnessParts,
+    parametric: ParametricModel,
     measurement: Measurement,
     *,
     shape_weight: float,
@@ -222,14 +266,14 @@ def modal_space(
 ) -> ModalSpace:
     """Return the problem in all elastic modes of a model, or in a few shapes.
 
-    The few are the lowest modes, and the static answers to a change of every factor in the
-    measured ones, those that matter most: they keep frequencies true where factors move far.
+    The few are the lowest modes, and the static answers to a change of every parameter in the
+    measured ones, those that matter most: they keep frequencies true where parameters move far.
 
     Arguments:
-        parts: the model and its factors.
+        parametric: the model and its changes, factors on stiffness and effects.
         measurement: the used modes.
         shape_weight: as of `ModalSpace`.
-        at: ln theta where the shapes are taken, (p,); None for the nominal model.
+        at: coordinates where the shapes are taken, (p,); None for the nominal model.
         size: number of shapes at most; None for all, of a large model a hundred.
 
     Raises:
@@ -239,37 +283,49 @@ def modal_space(
     reduced basis of shapes and their derivatives.
 
     Examples:
-        >>> parts = update.stiffness_parts(model, "members")
-        >>> space = update.modal_space(parts, measurement, shape_weight=0.1)
+        >>> members = update.parameterise(model, "members")
+        >>> space = update.modal_space(members, measurement, shape_weight=0.1)
         >>> space.fit(np.zeros(7)).paired
         3
     """
-    log = np.zeros(len(parts)) if at is None else at
-    model = parts.model if not log.any() else parts.at(np.exp(log))
+    count = len(parametric)
+    x = np.zeros(count) if at is None else at
+    model = parametric.model if not x.any() else parametric.at(x)
     modes = solve_modes(model, enough_modes(model, len(measurement)))
     observer = model.observe(measurement.sensors)
-    basis = modes.elastic.shapes
+    terms = parametric.terms
+    basis = modes.shapes if terms else modes.elastic.shapes
     limit = size or (basis.shape[1] if model.size <= DENSE_LIMIT else 100)
     if limit < basis.shape[1] or model.size > DENSE_LIMIT:
-        basis = _few_shapes(parts, measurement, model, modes, limit)
-    change = np.expm1(log)
-    inner = parts.energies(basis, basis)
-    nominal = basis.T @ model.stiffness_times(basis) - np.tensordot(change, inner, axes=1)
-    space = ModalSpace(measurement, nominal, inner, observer @ basis, shape_weight, parts.spread)
-    if space.fit(log, slopes=False).paired == 0:
+        basis = _few_shapes(parametric, measurement, model, modes, limit)
+        if terms:
+            basis = np.hstack([modes.shapes[:, modes.rigid], basis])
+    factors = parametric.is_property
+    inner = parametric.energies(basis, basis)[factors]
+    nominal = basis.T @ model.stiffness_times(basis)
+    nominal -= np.tensordot(np.expm1(x[factors]), inner, axes=1)
+    mass = np.eye(len(nominal))
+    projected = np.array([term.operator.project(basis) for term in terms])
+    # At the nominal model the terms are not in it yet.
+    for own, term, factor in zip(projected, terms, parametric.factors(x), strict=True):
+        if x.any():
+            {"stiffness": nominal, "mass": mass}[term.matrix][:] -= factor * own
+    given = nominal, mass, inner, projected, observer @ basis, shape_weight
+    space = ModalSpace(measurement, parametric, *given)
+    if space.fit(x, slopes=False).paired == 0:
         raise StrategyFailure("no mode of the model looks like any measured mode")
     return space
 
 
 def _few_shapes(
-    parts: StiffnessParts, measurement: Measurement, model: Model, modes: Modes, limit: int
+    parts: ParametricModel, measurement: Measurement, model: Model, modes: Modes, limit: int
 ) -> FloatArray:
     """Return at most so many shapes, orthonormal with the mass and to the rigid ones, (n, r)."""
     low = modes.elastic.shapes[:, : len(measurement) + _SPARE]
     first = float(modes.elastic.eigenvalues[0])
     shifted, moved = ShiftedModel(model, -first), low[:, : len(measurement) + 2].T
     if moved.size * len(parts) <= _MOST_FORCES:
-        pulled = np.hstack([parts.slopes.products(shape, 0.0) for shape in moved])
+        pulled = np.hstack([parts.start_slopes.products(shape, 0.0) for shape in moved])
         answers = shifted.solve(pulled)
     else:
         answers = _largest_answers(parts, shifted, moved, limit)
@@ -288,12 +344,12 @@ def _few_shapes(
 
 
 def _largest_answers(
-    parts: StiffnessParts, shifted: ShiftedModel, moved: FloatArray, limit: int
+    parts: ParametricModel, shifted: ShiftedModel, moved: FloatArray, limit: int
 ) -> FloatArray:
     """Return the largest of too many static answers, (n, limit): subspace iteration.
 
     Arguments:
-        moved: the shapes, (m, n), that every factor changes the forces of.
+        moved: the shapes, (m, n), that every parameter changes the forces of.
 
     Source: Halko, Martinsson & Tropp (2011), randomised range finder.
     """
@@ -301,47 +357,48 @@ def _largest_answers(
     for last in (False, False, True):
         forces = np.zeros((moved.shape[1], limit))
         for shape, own in zip(moved, weights, strict=True):
-            forces += parts.slopes.combined(shape, own)
+            forces += parts.start_slopes.combined(shape, own)
         answers = shifted.solve(forces)
         if not last:
             answers = la.qr(answers, mode="economic")[0]
-            products = [parts.slopes.inner(shape[:, None], answers)[:, 0] for shape in moved]
+            products = [parts.start_slopes.inner(shape[:, None], answers)[:, 0] for shape in moved]
             weights = np.array(products)
     return np.asarray(answers)
 
 
 def bounded_fit(space: ModalSpace, start: FloatArray, largest: float) -> tuple[FloatArray, float]:
-    """Return the local optimum of ln theta between its bounds, and the cost there.
+    """Return the local optimum of the coordinates between their bounds, and the cost there.
 
     Arguments:
         space: the problem.
-        start: ln theta, (p,).
+        start: coordinates, (p,).
         largest: bound of a factor; the least is its inverse.
 
     Source: Branch, Coleman & Li (1999), trust-region reflective least squares.
 
     Examples:
-        >>> parts = update.stiffness_parts(model, "sections")
-        >>> space = update.modal_space(parts, measurement, shape_weight=0.0)
-        >>> log, cost = update.bounded_fit(space, np.zeros(1), 3.0)
+        >>> sections = update.parameterise(model, "sections")
+        >>> space = update.modal_space(sections, measurement, shape_weight=0.0)
+        >>> x, cost = update.bounded_fit(space, np.zeros(1), 3.0)
         >>> cost < space.fit(np.zeros(1)).cost
         True
     """
-    limit, kept = float(np.log(largest)), {}
+    low, high = space.bounds(float(np.log(largest)))
+    middle, half, kept = 0.5 * (low + high), 0.5 * (high - low), {}
 
-    def residual(log: FloatArray) -> FloatArray:
-        kept[0] = (log.copy(), space.fit(log))
+    def residual(x: FloatArray) -> FloatArray:
+        kept[0] = (x.copy(), space.fit(x))
         return kept[0][1].residual
 
-    def slope(log: FloatArray) -> FloatArray:
+    def slope(x: FloatArray) -> FloatArray:
         at, fit = kept[0]
-        return (fit if np.array_equal(at, log) else space.fit(log)).slope
+        return (fit if np.array_equal(at, x) else space.fit(x)).slope
 
     found = least_squares(
         residual,
-        np.clip(start, -_INSIDE * limit, _INSIDE * limit),
+        np.clip(start, middle - _INSIDE * half, middle + _INSIDE * half),
         slope,
-        bounds=(-limit, limit),
+        bounds=(low, high),
         max_nfev=_EVALUATIONS,
         xtol=_TOLERANCE,
         ftol=_TOLERANCE,
@@ -349,28 +406,24 @@ def bounded_fit(space: ModalSpace, start: FloatArray, largest: float) -> tuple[F
     return np.asarray(found.x), 2.0 * float(found.cost)
 
 
-def factor_result(
-    parts: StiffnessParts,
-    log: FloatArray,
+def parametric_result(
+    parametric: ParametricModel,
+    x: FloatArray,
     history: Sequence[dict[str, float]] = (),
     **figures: float,
 ) -> UpdateResult:
-    """Return the updated model with its factors.
+    """Return the updated model with its parameters.
 
     Arguments:
-        parts: the nominal model and its factors.
-        log: ln theta, (p,).
+        parametric: the nominal model and its changes.
+        x: coordinates, (p,).
         history: one mapping an iteration.
         figures: diagnostics.
 
     Examples:
-        >>> parts = update.stiffness_parts(model, "sections")
-        >>> update.factor_result(parts, np.zeros(len(parts))).parameters[0].after
+        >>> sections = update.parameterise(model, "sections")
+        >>> update.parametric_result(sections, np.zeros(1)).parameters[0].after
         1.0
     """
-    factors = np.exp(log)
-    estimates = tuple(
-        ParameterEstimate(parameter.name, 1.0, float(value), places=parameter.places)
-        for parameter, value in zip(parts.parameters, factors, strict=True)
-    )
-    return UpdateResult(parts.at(factors), len(parts), estimates, tuple(history), figures)
+    estimates = estimate_parameters(parametric, x, None)
+    return UpdateResult(parametric.at(x), len(parametric), estimates, tuple(history), figures)

@@ -17,6 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from femubench.core.change.change import Change
+from femubench.core.change.parametric_model import ParametricModel
 from femubench.core.errors import ModelError, NotApplicable, StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
@@ -26,10 +28,14 @@ from femubench.core.typing import BoolArray, FloatArray
 from femubench.core.update.dual_least_squares import MANY
 from femubench.core.update.quadratic_fit import QuadraticFit, coefficients_of
 from femubench.core.update.residuals import Data
-from femubench.core.update.sensitivity_update import Iteration, Point
-from femubench.core.update.strategy import ParameterEstimate, UpdateResult
+from femubench.core.update.sensitivity_update import (
+    Iteration,
+    Point,
+    UpdateOptions,
+    estimate_parameters,
+)
+from femubench.core.update.strategy import UpdateResult
 from femubench.core.update.uncertainty import Uncertainty
-from femubench.core.update.unknowns import Unknown, UpdateOptions
 
 _MORE = 8  # modes above the highest one that was measured, which samples may mix with it
 _POINTS = 1.5  # solutions for every coefficient of the polynomials
@@ -137,14 +143,14 @@ class Target:
         """Return a function from (n, p + 1) to ln of the density, (n,)."""
         log, std, own = self.data
         known = np.square(std) + np.square(fit.error)
-        scaling = self.iteration.scaling
+        parametric = self.iteration.parametric
 
         def density(at: FloatArray) -> FloatArray:
             q, v = at[:, :-1], at[:, -1]
             variance = known + np.square(self.discrepancy.std(v))[:, None] * own
             misfit = self._misfit(log - fit(q), variance)
-            prior = np.square(q) @ scaling.precision + np.square(v)
-            inside = ((q > scaling.lower) & (q < scaling.upper)).all(axis=1)
+            prior = np.square(q) @ parametric.precision + np.square(v)
+            inside = ((q > parametric.lower) & (q < parametric.upper)).all(axis=1)
             return np.where(inside, -0.5 * (misfit + prior), -np.inf)
 
         return density
@@ -188,7 +194,7 @@ class StretchMove:
 
 def sample_posterior(
     source: Model | Structure,
-    unknowns: Sequence[Unknown],
+    changes: Sequence[Change],
     measurement: Measurement,
     rng: np.random.Generator,
     *,
@@ -208,7 +214,7 @@ def sample_posterior(
 
     Arguments:
         source: the nominal model, matrices with groups or a frame, or the latter's structure.
-        unknowns: positive parameters, each with a prior.
+        changes: each parameter with a prior.
         measurement: the used modes, each with a standard deviation.
         rng: decides on every draw.
         discrepancy: its prior.
@@ -223,7 +229,7 @@ def sample_posterior(
     Foreman-Mackey, Hogg, Lang & Goodman (2013), PASP 125, 306-312.
 
     Examples:
-        >>> factor = update.global_stiffness(structure, prior_std=0.1)
+        >>> factor = update.scale_all_stiffness(structure, prior_std=0.1)
         >>> own = update.Discrepancy(median=0.02, spread=0.7)
         >>> options = update.UpdateOptions(weighting="statistical")
         >>> rng = np.random.default_rng(0)
@@ -233,7 +239,7 @@ def sample_posterior(
         >>> len(found.uncertainty.samples)
         40
     """
-    target, covariance = most_probable(source, unknowns, measurement, discrepancy, options)
+    target, covariance = most_probable(source, changes, measurement, discrepancy, options)
     sampler, off, rough = _fitted(target, np.asarray(np.linalg.cholesky(covariance)), rng)
     if sampler is None:
         return _normal_result(target, covariance, off)
@@ -276,7 +282,7 @@ def _fitted(target: Target, root: FloatArray, rng: np.random.Generator) -> tuple
 
 def most_probable(
     source: Model | Structure,
-    unknowns: Sequence[Unknown],
+    changes: Sequence[Change],
     measurement: Measurement,
     discrepancy: Discrepancy,
     options: UpdateOptions,
@@ -284,20 +290,20 @@ def most_probable(
     """Return the posterior about its mode at the median discrepancy, and the covariance of q there.
 
     Arguments:
-        source, unknowns, measurement, discrepancy, options: as for `sample_posterior`.
+        source, changes, measurement, discrepancy, options: as for `sample_posterior`.
 
     Raises:
         NotApplicable: when a frequency has no standard deviation, or parameters are too many.
         StrategyFailure: when no measured mode has a partner.
     """
-    if len(unknowns) > MANY:
-        count = f"{len(unknowns)} parameters"
-        raise NotApplicable(f"{count}, and their covariance fills a dense matrix beyond {MANY}")
     whole = measurement.widened(discrepancy.median * measurement.frequencies)
     model = Model.of(source) if isinstance(source, Structure) else source
-    iteration = Iteration(
-        model, unknowns, Data(whole, options.residual, True, options.shapes, True), options
-    )
+    parametric = ParametricModel(model, tuple(changes))
+    if len(parametric) > MANY:
+        count = f"{len(parametric)} parameters"
+        raise NotApplicable(f"{count}, and their covariance fills a dense matrix beyond {MANY}")
+    data = Data(whole, options.residual, True, options.shapes, True)
+    iteration = Iteration(parametric, data, options)
     point = iteration.run()
     covariance = iteration.covariance(point)
     assert covariance is not None
@@ -318,7 +324,7 @@ def _started(target: Target, fit: QuadraticFit, root: FloatArray, rng: np.random
     walkers = max(_WALKERS * size, _FEWEST_WALKERS)
     near = rng.standard_normal((walkers, size))
     near[:, :-1] = target.point.q + near[:, :-1] @ root.T
-    low, high = target.iteration.scaling.lower, target.iteration.scaling.upper
+    low, high = target.iteration.parametric.lower, target.iteration.parametric.upper
     near[:, :-1] = np.clip(near[:, :-1], 0.99 * low, 0.99 * high)
     density = target.log_density(fit)
     sampler = emcee.EnsembleSampler(walkers, size, density, vectorize=True, moves=StretchMove())
@@ -367,7 +373,9 @@ def _normal_result(
     return UpdateResult(
         model=point.prediction.model,
         parameter_count=len(point.q),
-        parameters=iteration.estimates(point, np.sqrt(np.diagonal(covariance))),
+        parameters=estimate_parameters(
+            iteration.parametric, point.q, np.sqrt(np.diagonal(covariance))
+        ),
         diagnostics={
             "discrepancy_std": own,
             "steps": steps,
@@ -385,13 +393,7 @@ def _result(
     iteration = target.iteration
     q, std = chain[:, :-1].mean(axis=0), chain[:, :-1].std(axis=0)
     own = target.discrepancy.std(chain[:, -1])
-    parameters = tuple(
-        ParameterEstimate(
-            *(u.parameter.name, u.start, float(value), u.parameter.unit, float(value * s)),
-            places=u.parameter.places,
-        )
-        for u, value, s in zip(iteration.unknowns, iteration.scaling.values(q), std, strict=True)
-    )
+    parameters = estimate_parameters(iteration.parametric, q, std)
     rms = float(np.sqrt(np.mean(np.square(own))))
     return UpdateResult(
         model=iteration.model_at(q),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -11,13 +11,7 @@ import numpy as np
 
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.model import Model
-from femubench.core.fem.model_parameters import (
-    MatrixSlopes,
-    mass_slopes,
-    matrix_slopes,
-    updated_mass,
-)
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.model_parameters import MatrixSlopes
 from femubench.core.modal.correlated_errors import undone
 from femubench.core.modal.correlation import modal_scale_factor, seen_modes
 from femubench.core.modal.eigen import Modes, enough_modes, solve_modes
@@ -119,6 +113,7 @@ class Prediction:
         modes: its modes.
         partner: which of them belongs to every measured mode; -1 where none does, (m,).
         observer: sensor readings from dofs, sparse (n_sensors, n).
+        mass: in kg.
     """
 
     data: Data
@@ -126,6 +121,7 @@ class Prediction:
     modes: Modes
     partner: IntArray
     observer: SparseArray
+    mass: float
 
     @cached_property
     def residual(self) -> FloatArray:
@@ -139,7 +135,7 @@ class Prediction:
             parts.append(np.where(lost, np.nan, misfit).T.ravel())
         if data.weigh and data.measurement.total_mass is not None:
             mass, std = data.measurement.total_mass
-            parts.append(np.array([(mass - updated_mass(self.model)) / std]))
+            parts.append(np.array([(mass - self.mass) / std]))
         return np.concatenate(parts)
 
     @cached_property
@@ -155,41 +151,46 @@ class Prediction:
     def _scaled(self) -> FloatArray:
         return np.asarray(self._at_sensors * self._factor)
 
-    def jacobian(self, parameters: Sequence[Parameter]) -> FloatArray:
-        """Return d (weighted prediction) / d parameter, 0 without partner, (n_rows, p)."""
+    def jacobian(self, slopes: MatrixSlopes, masses: Callable[[], FloatArray]) -> FloatArray:
+        """Return d (weighted prediction) / d parameter, 0 without partner, (n_rows, p).
+
+        Arguments:
+            slopes: of the matrices by the parameters.
+            masses: gives d mass / d parameter in kg, (p,), where the mass is a datum.
+        """
         data = self.data
-        change = matrix_slopes(self.model, parameters)
         paired = self.modes.take(self.partner)
-        slope = eigenvalue_sensitivities(self.model, paired, parameters, change)
+        slope = eigenvalue_sensitivities(self.model, paired, slopes)
         scale = data.weight * data.slope(paired.eigenvalues) * (self.partner >= 0)
         rows = np.where(scale[:, None] > 0.0, slope * scale[:, None], 0.0)
         parts = [data.independent(rows, self.partner >= 0)]
         if data.shapes:
-            parts.append(self._shape_rows(parameters, change))
+            parts.append(self._shape_rows(slopes))
         if data.weigh and data.measurement.total_mass is not None:
-            grow = mass_slopes(self.model, parameters)
-            parts.append(grow[None, :] / data.measurement.total_mass[1])
+            parts.append(masses()[None, :] / data.measurement.total_mass[1])
         return np.vstack(parts)
 
-    def _shape_rows(self, parameters: Sequence[Parameter], change: MatrixSlopes) -> FloatArray:
+    def _shape_rows(self, slopes: MatrixSlopes) -> FloatArray:
         """Return the sensitivities of s phi with the modal scale factor's own, (n_s m, p)."""
         data = self.data
         observe = self.observer
-        rows = np.zeros((len(self.partner), observe.shape[0], len(parameters)))
+        rows = np.zeros((len(self.partner), observe.shape[0], slopes.count))
         for j, index in enumerate(self.partner):
             weight, seen = data.shape_weight[:, j], self._at_sensors[:, j]
             if index < 0 or not weight.any():
                 continue
-            turn = observe @ shape_sensitivities(self.model, self.modes, index, parameters, change)
+            turn = observe @ shape_sensitivities(self.model, self.modes, index, slopes)
             square = np.square(weight)
             rest = np.nan_to_num(data.measurement.shapes[:, j]) - 2.0 * self._factor[j] * seen
             factor_slope = (square * rest) @ turn / (square @ np.square(seen))
             slope = self._factor[j] * turn + np.outer(seen, factor_slope)
             rows[j] = weight[:, None] * slope
-        return rows.reshape(-1, len(parameters))
+        return rows.reshape(-1, slopes.count)
 
 
-def predict(data: Data, model: Model, previous: Prediction | None = None) -> Prediction:
+def predict(
+    data: Data, model: Model, mass: float, previous: Prediction | None = None
+) -> Prediction:
     """Return the prediction of a model, its modes paired with the measured ones.
 
     Pairs are formed by shape and frequency; a measured mode that finds no partner that way keeps
@@ -198,6 +199,7 @@ def predict(data: Data, model: Model, previous: Prediction | None = None) -> Pre
     Arguments:
         data: what is measured.
         model: with its present values.
+        mass: of it in kg.
         previous: the prediction at the iteration before, on the same dofs.
 
     Raises:
@@ -212,7 +214,7 @@ def predict(data: Data, model: Model, previous: Prediction | None = None) -> Pre
     partner = pair_measured(data.measurement, modes, observer @ modes.shapes).index
     if previous is not None:
         partner = _followed(partner, model, modes, previous)
-    return Prediction(data, model, modes, partner, observer)
+    return Prediction(data, model, modes, partner, observer, mass)
 
 
 def _observed_anew(model: Model) -> bool:

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
+from femubench.core.change.change import Change
+from femubench.core.change.parametric_model import ParametricModel
 from femubench.core.errors import Diverged, ModelError, NotApplicable, StrategyFailure
 from femubench.core.fem.model import Model
-from femubench.core.fem.model_parameters import with_values
 from femubench.core.fem.structure import Structure
 from femubench.core.fit.gauss_newton import bounded_step
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import BoolArray, FloatArray
 from femubench.core.update.dual_least_squares import MANY, DualPosterior, dual_step
-from femubench.core.update.residuals import Data, Prediction, common_rows, predict
+from femubench.core.update.residuals import Data, Prediction, Residual, common_rows, predict
 from femubench.core.update.strategy import ParameterEstimate, UpdateResult
 from femubench.core.update.uncertainty import Uncertainty, standard_normal
-from femubench.core.update.unknowns import Scaling, Unknown, UpdateOptions
 
 _SMALLEST_STEP = 1e-9
 _ROUNDING = 1e-10  # relative, of a modal quantity: some ten times what linear algebra leaves
@@ -29,8 +30,44 @@ Solve = Callable[[BoolArray], FloatArray]
 
 
 @dataclass(frozen=True)
+class UpdateOptions:
+    """How the iteration goes.
+
+    Arguments:
+        residual: the modal quantity that is fitted: ``eigenvalue``, ``relative-eigenvalue`` or
+            ``frequency``.
+        weighting: ``unit`` for W_ee = I, ``statistical`` for the inverse covariance of the data.
+        shapes: take mode shapes as data too (statistical weighting).
+        damping: beta, which stands for alpha / pct^2 of the paper, as a share of z_m'W z_m: of
+            what s's is for a factor on the whole stiffness.
+        max_iterations: steps at most.
+        tolerance: the iteration ends when no scaled parameter moves by more,
+        cost_tolerance: or when three steps in a row lower the cost by no more than this share:
+            parameters that hardly matter drift on for ever.
+        max_step: longest step of a scaled parameter in one iteration.
+        halvings: how often a step that makes the cost grow is halved.
+    """
+
+    residual: Residual = "eigenvalue"
+    weighting: str = "unit"
+    shapes: bool = False
+    damping: float = 1e-5
+    max_iterations: int = 100
+    tolerance: float = 1e-6
+    cost_tolerance: float = 1e-4
+    max_step: float = 0.5
+    halvings: int = 8
+
+    def __post_init__(self) -> None:
+        if self.weighting not in ("unit", "statistical"):
+            raise ValueError(f"weighting {self.weighting!r} is neither 'unit' nor 'statistical'")
+        if self.shapes and self.weighting != "statistical":
+            raise ValueError("mode shapes as data need statistical weighting")
+
+
+@dataclass(frozen=True)
 class Point:
-    """Scaled parameters q, (p,), and what the model predicts there."""
+    """Coordinates q, (p,), and what the model predicts there."""
 
     q: FloatArray
     prediction: Prediction
@@ -44,44 +81,41 @@ class Point:
 class Iteration:
     """State of one update."""
 
-    def __init__(
-        self, model: Model, unknowns: Sequence[Unknown], data: Data, options: UpdateOptions
-    ) -> None:
-        self.model, self.unknowns, self.data, self.options = model, unknowns, data, options
-        self.scaling = Scaling(unknowns)
-        self.parameters = [u.parameter for u in unknowns]
+    def __init__(self, parametric: ParametricModel, data: Data, options: UpdateOptions) -> None:
+        self.parametric, self.data, self.options = parametric, data, options
         self.history: list[Mapping[str, float]] = []
         self.beta = 0.0
         self.converged = False
 
     def model_at(self, q: FloatArray) -> Model:
-        """Return the model at scaled parameters, (p,), taken within their limits."""
-        values = self.scaling.values(np.clip(q, self.scaling.lower, self.scaling.upper))
-        return with_values(self.model, self.parameters, values)
+        """Return the model at coordinates, (p,), taken within their limits."""
+        return self.parametric.at(np.clip(q, self.parametric.lower, self.parametric.upper))
 
     def at(self, q: FloatArray, previous: Prediction | None = None) -> Point:
-        """Return the prediction at scaled parameters, its pairs continued from a previous one."""
-        values = self.scaling.values(q)
-        model = with_values(self.model, self.parameters, values)
-        return Point(q, predict(self.data, model, previous))
+        """Return the prediction at coordinates, its pairs continued from a previous one."""
+        model = self.parametric.at(q)
+        mass = self.parametric.mass(q, model)
+        return Point(q, predict(self.data, model, mass, previous))
 
     def system(self, point: Point) -> tuple[FloatArray, FloatArray]:
-        """Return scaled sensitivities s and residual of the data that have a partner."""
-        scale = self.scaling.slope(point.q)
-        known = np.isfinite(point.prediction.residual)
-        sensitivities = point.prediction.jacobian(self.parameters) * scale
-        return sensitivities[known], point.prediction.residual[known]
+        """Return sensitivities s by the coordinates and residual of the data with a partner."""
+        parametric, prediction = self.parametric, point.prediction
+        known = np.isfinite(prediction.residual)
+        slopes = parametric.slopes(point.q, prediction.model)
+        masses = partial(parametric.mass_slopes, point.q, prediction.model)
+        sensitivities = prediction.jacobian(slopes, masses) * parametric.steps(point.q)
+        return sensitivities[known], prediction.residual[known]
 
     def step(self, point: Point) -> FloatArray:
         """Return dtheta / |theta| = (s's + beta I + P)^-1 (s'r - P q), limits respected."""
         s, residual = self.system(point)
         solve = self.dual if len(point.q) > MANY else self.primal
-        low, high = self.scaling.lower, self.scaling.upper
+        low, high = self.parametric.lower, self.parametric.upper
         return bounded_step(solve(s, residual, point.q), point.q, low, high, self.options.max_step)
 
     def primal(self, s: FloatArray, residual: FloatArray, q: FloatArray) -> Solve:
         """Return what solves for the step in the space of the parameters."""
-        size, weight = len(q), np.sqrt(self.scaling.precision)
+        size, weight = len(q), np.sqrt(self.parametric.precision)
         rows = np.vstack([s, np.sqrt(self.beta) * np.eye(size), np.diag(weight)])
         right = np.concatenate([residual, np.zeros(size), -weight * q])
 
@@ -92,12 +126,12 @@ class Iteration:
 
     def dual(self, s: FloatArray, residual: FloatArray, q: FloatArray) -> Solve:
         """Return what solves for the step in the space of the data."""
-        weight = self.beta + self.scaling.precision
+        weight = self.beta + self.parametric.precision
         if not (weight > 0.0).all():
             raise NotApplicable(
                 f"{len(q)} parameters without damping or a prior, expected one of them"
             )
-        rest = -self.scaling.precision * q / weight
+        rest = -self.parametric.precision * q / weight
 
         def solve(free: BoolArray) -> FloatArray:
             return dual_step(s[:, free], residual, weight[free], rest[free])
@@ -106,7 +140,10 @@ class Iteration:
 
     def gain(self, before: Point, after: Point) -> float:
         """Return the share of the cost that a step took away."""
-        rows, precision = common_rows(before.prediction, after.prediction), self.scaling.precision
+        rows, precision = (
+            common_rows(before.prediction, after.prediction),
+            self.parametric.precision,
+        )
         cost = before.cost(rows, precision)
         return 1.0 - after.cost(rows, precision) / cost if cost > 0.0 else 0.0
 
@@ -114,8 +151,8 @@ class Iteration:
         """Return the share of the cost that a step would take away were the model linear."""
         s, residual = self.system(point)
         after = residual - s @ step
-        rest = self.scaling.precision @ np.square(point.q + step)
-        cost = point.cost(np.isfinite(point.prediction.residual), self.scaling.precision)
+        rest = self.parametric.precision @ np.square(point.q + step)
+        cost = point.cost(np.isfinite(point.prediction.residual), self.parametric.precision)
         return float(1.0 - (after @ after + rest) / cost) if cost > 0.0 else 0.0
 
     def rounding(self, cost: float) -> float:
@@ -129,9 +166,9 @@ class Iteration:
         Costs that differ by no more than rounding are equal, so that the last steps towards an
         optimum, too short for the cost to show, are taken on every processor.
         """
-        precision = self.scaling.precision
+        precision = self.parametric.precision
         for halving in range(self.options.halvings + 1):
-            q = np.clip(point.q + step / 2**halving, self.scaling.lower, self.scaling.upper)
+            q = np.clip(point.q + step / 2**halving, self.parametric.lower, self.parametric.upper)
             if np.abs(q - point.q).max() < _SMALLEST_STEP:
                 return None
             try:
@@ -146,7 +183,7 @@ class Iteration:
 
     def run(self) -> Point:
         """Return the optimum; raises StrategyFailure or Diverged where there is none."""
-        point = self.at(np.zeros(len(self.unknowns)))
+        point = self.at(np.zeros(len(self.parametric)))
         if not (point.prediction.partner >= 0).any():
             raise StrategyFailure("no mode of the model looks like any measured mode")
         data = self.data
@@ -174,22 +211,22 @@ class Iteration:
         rows = np.isfinite(point.prediction.residual)
         entry = {
             "iteration": float(iteration),
-            "cost": point.cost(rows, self.scaling.precision),
+            "cost": point.cost(rows, self.parametric.precision),
             "step": step,
         }
-        if len(self.unknowns) <= MANY:  # nobody follows more, and they are too much to keep
-            values = self.scaling.values(point.q)
-            names = (u.parameter.name for u in self.unknowns)
-            entry.update((name, float(v)) for name, v in zip(names, values, strict=True))
+        if len(self.parametric) <= MANY:  # nobody follows more, and they are too much to keep
+            values = self.parametric.values(point.q)
+            pairs = zip(self.parametric.names, values, strict=True)
+            entry.update((name, float(value)) for name, value in pairs)
         self.history.append(entry)
 
     def check(self, point: Point) -> None:
         """Raise Diverged where a parameter ended at the limit of its sense."""
-        at_limit = (point.q <= self.scaling.lower) | (point.q >= self.scaling.upper)
-        for unknown, out in zip(self.unknowns, at_limit, strict=True):
-            if unknown.fatal and out:
+        at_limit = (point.q <= self.parametric.lower) | (point.q >= self.parametric.upper)
+        for p, out in zip(self.parametric.parameters, at_limit, strict=True):
+            if p.fatal and out:
                 raise Diverged(
-                    f"{unknown.parameter.name} left its range {unknown.lower:g}..{unknown.upper:g}"
+                    f"{p.name} left its range {p.lower:g}..{p.upper:g}"
                     f" at iteration {len(self.history) - 1}"
                 )
 
@@ -199,25 +236,9 @@ class Iteration:
             return None
         s, _ = self.system(point)
         try:
-            return np.asarray(np.linalg.inv(s.T @ s + np.diag(self.scaling.precision)))
+            return np.asarray(np.linalg.inv(s.T @ s + np.diag(self.parametric.precision)))
         except np.linalg.LinAlgError:
             return np.full((s.shape[1], s.shape[1]), np.inf)
-
-    def estimates(self, point: Point, std: FloatArray | None) -> tuple[ParameterEstimate, ...]:
-        """Return the parameters before and after, with deviations of q, (p,), where known."""
-        values = self.scaling.values(point.q)
-        grow = np.where(self.scaling.signed, np.abs(self.scaling.start), values)
-        return tuple(
-            ParameterEstimate(
-                name=unknown.parameter.name,
-                before=float(unknown.start),
-                after=float(value),
-                unit=unknown.parameter.unit,
-                std=None if std is None else float(std[i] * grow[i]),
-                places=unknown.parameter.places,
-            )
-            for i, (unknown, value) in enumerate(zip(self.unknowns, values, strict=True))
-        )
 
     def known(self, point: Point) -> tuple[FloatArray | None, Uncertainty | None]:
         """Return the deviations of q, (p,), and models of the posterior, where there are any."""
@@ -237,7 +258,7 @@ class Iteration:
 
     def known_of_many(self, point: Point) -> tuple[FloatArray | None, Uncertainty | None]:
         """Return the same without a matrix of the size of the parameters."""
-        precision = self.scaling.precision
+        precision = self.parametric.precision
         if not self.data.statistical or not (precision > 0.0).all():
             return None, None
         posterior = DualPosterior.of(self.system(point)[0], precision)
@@ -245,9 +266,36 @@ class Iteration:
         return posterior.std, Uncertainty.of_draws(self.model_at, point.q + draws)
 
 
+def estimate_parameters(
+    parametric: ParametricModel, q: FloatArray, std: FloatArray | None
+) -> tuple[ParameterEstimate, ...]:
+    """Return the parameters before and after.
+
+    Arguments:
+        parametric: the model and its changes.
+        q: coordinates after, (p,).
+        std: their standard deviations, (p,); None where unknown.
+    """
+    values = parametric.values(q)
+    deviations = [None] * len(q) if std is None else [*map(float, std * parametric.growth(q))]
+    names, owners, parameters = parametric.names, parametric.owners, parametric.parameters
+    return tuple(
+        ParameterEstimate(
+            name, float(p.neutral), float(value), p.unit, _size(deviation), owner.places
+        )
+        for name, owner, p, value, deviation in zip(
+            names, owners, parameters, values, deviations, strict=True
+        )
+    )
+
+
+def _size(deviation: float | None) -> float | None:
+    return None if deviation is None else abs(deviation)
+
+
 def sensitivity_update(
     source: Model | Structure,
-    unknowns: Sequence[Unknown],
+    changes: Sequence[Change],
     measurement: Measurement,
     options: UpdateOptions | None = None,
 ) -> UpdateResult:
@@ -259,7 +307,7 @@ def sensitivity_update(
     Arguments:
         source: the nominal model, matrices with groups or a frame, or the latter's structure;
             factors multiply its present properties.
-        unknowns: the parameters, with ranges and priors.
+        changes: what may change, with ranges and priors.
         measurement: the used modes.
         options: residual, weighting, damping, ends.
 
@@ -271,23 +319,23 @@ def sensitivity_update(
     Source: Horton, Gurgenci, Veidt & Friswell (1999), equations (1), (2), (3) and (4).
 
     Examples:
-        >>> factor = update.global_stiffness(structure)
+        >>> factor = update.scale_all_stiffness(structure)
         >>> update.sensitivity_update(structure, [factor], measurement).parameter_count
         1
     """
-    if not unknowns:
+    if not changes:
         raise NotApplicable("there is no parameter to update")
     options = UpdateOptions() if options is None else options
     statistical = options.weighting == "statistical"
     data = Data(measurement, options.residual, statistical, options.shapes, statistical)
     model = Model.of(source) if isinstance(source, Structure) else source
-    iteration = Iteration(model, unknowns, data, options)
+    iteration = Iteration(ParametricModel(model, tuple(changes)), data, options)
     point = iteration.run()
     std, uncertainty = iteration.known(point)
     return UpdateResult(
         model=point.prediction.model,
-        parameter_count=len(unknowns),
-        parameters=iteration.estimates(point, std),
+        parameter_count=len(iteration.parametric),
+        parameters=estimate_parameters(iteration.parametric, point.q, std),
         history=tuple(iteration.history),
         diagnostics={
             "iterations": float(len(iteration.history) - 1),

@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femubench import Case, Measurement, Model, solve_modes
-from femubench.fem import FloatArray, Parameter
+from femubench.fem import FloatArray
 from femubench.modal import pair_measured
 from femubench.update import (
-    Unknown,
     UpdateOptions,
     all_elements,
+    scale_property,
     sensitivity_update,
+    set_property,
     with_joint_springs,
 )
 
@@ -48,12 +49,12 @@ def physical_model(case: Case) -> Physical:
         structure.rebuilt(frame), {end: {"ry": _START} for end in _ENDS}, arm=ARM, arm_factor=None
     )
     places = tuple(f"{end}:ry" for end in _ENDS)
-    unknowns = [
-        Unknown(Parameter("k_theta", "spring", places, "N m/rad"), _START, 1e2, 1e9),
-        Unknown(Parameter("E", "E", all_elements(sprung))),
+    changes = [
+        set_property("k_theta", "spring", places, _START, 1e2, 1e9, unit="N m/rad"),
+        scale_property("E", "E", all_elements(sprung)),
     ]
     options = UpdateOptions(residual="relative-eigenvalue")
-    result = sensitivity_update(sprung, unknowns, case.used_measurement(0), options)
+    result = sensitivity_update(sprung, changes, case.used_measurement(0), options)
     spring, young = (parameter.after for parameter in result.parameters)
     return Physical(result.model, spring, young)
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from femubench import Case, Model, UpdateResult
-from femubench.fem import Parameter
+from femubench.fem import Property
 from femubench.papers.hframe.meshes import RECOVERED
 from femubench.papers.printed import printed
 from femubench.reproduction import Ground, Workbench
@@ -212,7 +212,7 @@ def at_printed(bench: Workbench, row: Row) -> Model:
     structure = run(bench, row.updated.start).model.frame_structure
     known = {parameter.name: parameter for parameter, _ in structure.changes}
     theirs = printed("hframe")["table4"][row.key]["parameters"]
-    chosen: list[Parameter] = []
+    chosen: list[Property] = []
     values: list[float] = []
     for symbol, name in row.names.items():
         if name in known:

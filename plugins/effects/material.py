@@ -32,7 +32,7 @@ from femubench.fem import (
     FloatArray,
     Frame,
     Member,
-    Parameter,
+    Property,
     group_matrix,
     group_places,
     mass_matrices,
@@ -86,7 +86,7 @@ class MaterialEffect(FrameEffect):
         if model.structure is not None:
             return super().extend(model, place, values)
         quantity = "E" if self.constant == "E" else "density"
-        return with_group_factors(model, [Parameter(place, quantity, (place,))], [1.0 + values[0]])
+        return with_group_factors(model, [Property(place, quantity, (place,))], [1.0 + values[0]])
 
     def change(self, model: Model, place: str) -> Change:
         """Return the matrices of the elements, exactly proportional to the change."""

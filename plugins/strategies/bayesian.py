@@ -5,29 +5,26 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
-from femubench import Measurement, Model, Strategy, UpdateResult
-from femubench.fem import Parameter
+from femubench import Measurement, Model
 from femubench.update import (
     OWN,
-    Unknown,
+    Change,
+    SensitivityStrategy,
     UpdateOptions,
     all_elements,
-    checked_set,
-    global_stiffness,
-    group_factors,
     joint_groups,
-    joint_stiffness,
-    sensitivity_update,
-    stiffness_factors,
+    list_changes,
+    scale_all_stiffness,
+    scale_groups,
+    scale_joint,
+    scale_property,
 )
 
 _OPTIONS = UpdateOptions(residual="frequency", weighting="statistical", damping=0.0)
 
 
 @dataclass(frozen=True)
-class Bayesian(Strategy):
+class Bayesian(SensitivityStrategy):
     """Weigh measured modes against prior knowledge by their covariances.
 
     Parameters are the stiffness of all members; out of plane and in 3-D their torsional rigidity;
@@ -45,9 +42,9 @@ class Bayesian(Strategy):
         joint_std: of the logarithm of a joint factor.
         density_std: of ln(density).
         options: of the iteration; `shapes` takes the shapes at the sensors as data too.
-        parameters: `own` for the parameters above; else one factor on E of each of the `elements`,
-            `members`, `sections`, `materials` or `sets` of the case, with the prior of the
-            stiffness, in place of stiffness, torsion and joints; or on the `groups` of matrices.
+        changes: `own` for the parameters above; else what takes the place of stiffness, torsion and
+            joints, as of `SensitivityStrategy`: factors with the prior of the stiffness, groups
+            and effects with their own.
 
     Source: Horton et al. (1999), equation (4) with W_ee and W_theta the inverse covariances;
     Friswell & Mottershead (1995), Finite Element Model Updating in Structural Dynamics, ch. 8.
@@ -70,40 +67,36 @@ class Bayesian(Strategy):
     joint_std: float = 0.5
     density_std: float = 0.1
     options: UpdateOptions = _OPTIONS
-    parameters: str = OWN
 
-    def __post_init__(self) -> None:
-        checked_set(self.parameters, own=True)
-
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
-        """Return the most probable model, parameters with standard deviations."""
-        unknowns = self.unknowns(model, weighed=measurement.total_mass is not None)
-        return sensitivity_update(model, unknowns, measurement, self.options)
-
-    def unknowns(self, model: Model, *, weighed: bool) -> list[Unknown]:
-        """Return the parameters with their priors.
-
-        Arguments:
-            model: the nominal one.
-            weighed: whether the total mass was measured.
-        """
-        structure = model.structure
-        everywhere = ("all",) if structure is None else all_elements(structure)
-        mass = group_factors(model, "mass", own_prior=True)
-        if weighed and not mass:
-            density = Parameter("density all members", "density", everywhere)
-            mass = [Unknown(density, prior_std=self.density_std)]
-        word = "groups" if self.parameters == OWN and model.groups else self.parameters
-        if word != OWN:
-            return stiffness_factors(model, word, prior_std=self.stiffness_std) + mass
-        unknowns = [global_stiffness(model, prior_std=self.stiffness_std)]
+    def own_changes(self, model: Model, measurement: Measurement) -> tuple[Model, list[Change]]:
+        """Return the parameters above with their priors, or those of the groups."""
+        if model.groups:
+            return model, self.listed_changes(model, measurement)
+        stiffness = scale_all_stiffness(model, prior_std=self.stiffness_std)
+        structure, mass = model.structure, self._mass(model, measurement)
         if structure is None:
-            return unknowns + mass
+            return model, [stiffness, *mass]
+        torsion = []
         if structure.frame.plane != "in-plane":
-            torsion = Parameter("GJ all members", "GJ", everywhere)
-            unknowns.append(Unknown(torsion, prior_std=self.torsion_std))
-        unknowns += mass
-        groups = joint_groups(structure.frame)
-        return unknowns + [joint_stiffness(structure, g, prior_std=self.joint_std) for g in groups]
+            every = all_elements(structure)
+            torsion = [scale_property("GJ all members", "GJ", every, prior_std=self.torsion_std)]
+        joints = [
+            scale_joint(structure, group, prior_std=self.joint_std)
+            for group in joint_groups(structure.frame)
+        ]
+        return model, [stiffness, *torsion, *mass, *joints]
+
+    def listed_changes(self, model: Model, measurement: Measurement) -> list[Change]:
+        """Return the changes that `changes` names and the mass, each with its prior."""
+        words = "groups" if self.changes == OWN else self.changes
+        listed = list_changes(model, words, prior_std=self.stiffness_std)
+        return listed + self._mass(model, measurement)
+
+    def _mass(self, model: Model, measurement: Measurement) -> list[Change]:
+        """Return factors on groups of the mass, or the density where the structure was weighed."""
+        mass = scale_groups(model, "mass", own_prior=True)
+        if mass or measurement.total_mass is None:
+            return mass
+        every = ("all",) if model.structure is None else all_elements(model.structure)
+        name = "density all members"
+        return [scale_property(name, "density", every, prior_std=self.density_std)]

@@ -13,7 +13,7 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 
 from femubench import Measurement, Model, UpdateResult
-from femubench.update import FactorStrategy, factor_result, modal_space, stiffness_parts
+from femubench.update import ParametricStrategy, modal_space, parameterise, parametric_result
 
 
 class _Hidden(MetaPathFinder):
@@ -46,7 +46,7 @@ def _cma() -> Any:  # noqa: ANN401 - a module without types
 
 
 @dataclass(frozen=True)
-class CmaEs(FactorStrategy):
+class CmaEs(ParametricStrategy):
     """Search all factors within bounds for the least misfit of frequencies and MAC.
 
     Unknowns are the logarithms of the factors, the cost the sum of squares of relative frequency
@@ -54,9 +54,7 @@ class CmaEs(FactorStrategy):
     reduced basis of the nominal model.
 
     Arguments:
-        parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
-            `materials`, `sets` of the case, or `groups` of matrices; `own` for the members of a
-            frame and the groups of matrices.
+        changes: as of `ParametricStrategy`.
         evaluations: at most.
         largest: bound of a factor; the least is its inverse.
         spread: standard deviation of the first generation in ln(factor).
@@ -88,11 +86,11 @@ class CmaEs(FactorStrategy):
             StrategyFailure: when no mode of the model looks like any measured mode.
         """
         cma = _cma()
-        parts = stiffness_parts(model, self.parameters)
+        parts = parameterise(model, self.changes)
         space = modal_space(parts, measurement, shape_weight=self.shape_weight, size=self.basis)
-        limit = float(np.log(self.largest))
+        low, high = space.bounds(float(np.log(self.largest)))
         options = {
-            "bounds": [-limit, limit],
+            "bounds": [low, high],
             "maxfevals": self.evaluations,
             # Its own seed would be that of the whole process.
             "seed": np.nan,
@@ -101,7 +99,7 @@ class CmaEs(FactorStrategy):
             "verbose": -9,
             "verb_log": 0,
         }
-        search = cma.CMAEvolutionStrategy(np.zeros(len(parts)), self.spread, options)
+        search = cma.CMAEvolutionStrategy(np.clip(0.0, low, high), self.spread, options)
         history = []
         while not search.stop():
             points = search.ask()
@@ -109,7 +107,7 @@ class CmaEs(FactorStrategy):
             search.tell(points, costs)
             history.append({"cost": float(min(costs)), "spread": float(search.sigma)})
         log = np.asarray(search.result.xbest)
-        return factor_result(
+        return parametric_result(
             parts,
             log,
             history,

@@ -12,12 +12,12 @@ from femubench import InputError, Measurement, Model, Modes, UpdateResult, solve
 from femubench.fem import FloatArray
 from femubench.modal import mass_normalised
 from femubench.update import (
-    FactorStrategy,
-    StiffnessParts,
+    ParametricModel,
+    ParametricStrategy,
     expand_measured_shapes,
-    factor_result,
+    parameterise,
+    parametric_result,
     quasi_measured_modes,
-    stiffness_parts,
 )
 
 _RIDGE = 1e-3  # decides factors that no equation sees
@@ -25,7 +25,7 @@ _LEAST, _LARGEST = 0.2, 5.0
 
 
 @dataclass(frozen=True)
-class CrossModel(FactorStrategy):
+class CrossModel(ParametricStrategy):
     """Solve for all factors at once from products of model modes and measured modes.
 
     For model mode i and measured mode j, phi_i' K* phi*_j = lambda*_j phi_i' M phi*_j with
@@ -33,9 +33,7 @@ class CrossModel(FactorStrategy):
     phi*_j, linear in a_n, of which least squares over all pairs decide.
 
     Arguments:
-        parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
-            `materials`, `sets` of the case, or `groups` of matrices; `own` for the members of a
-            frame and the groups of matrices.
+        changes: as of `ParametricStrategy`.
         modes: model modes taken for every measured one, the lowest.
         expansion: of measured shapes to all dofs: `rotation` of the model's own, or `force`, the
             least force residual with the readings met, which is exact for complete shapes.
@@ -69,7 +67,7 @@ class CrossModel(FactorStrategy):
             NotApplicable: when the model has no such parameters.
             StrategyFailure: when a measured mode has no partner in the model.
         """
-        parts = stiffness_parts(model, self.parameters)
+        parts = parameterise(model, self.changes)
         own = solve_modes(model).elastic
         own = own.take(np.arange(min(len(own), self.modes * len(measurement))))
         if self.expansion == "force":
@@ -77,18 +75,22 @@ class CrossModel(FactorStrategy):
         else:
             shapes = quasi_measured_modes(model, measurement).shapes
         matrix, right = cross_equations(parts, own, shapes, measurement.eigenvalues)
-        count = len(parts)
+        count, factor = len(parts), parts.is_property
         found = lsq_linear(
             np.vstack([matrix, _RIDGE * np.eye(count)]),
             np.append(right, np.zeros(count)),
-            bounds=(_LEAST - 1.0, _LARGEST - 1.0),
+            bounds=(
+                np.where(factor, _LEAST - 1.0, parts.lower),
+                np.where(factor, _LARGEST - 1.0, parts.upper),
+            ),
         )
         rest = float(np.linalg.norm(matrix @ found.x - right) / np.linalg.norm(right))
-        return factor_result(parts, np.log1p(found.x), equations=float(len(right)), residual=rest)
+        x = np.where(factor, np.log1p(np.where(factor, found.x, 0.0)), found.x)
+        return parametric_result(parts, x, equations=float(len(right)), residual=rest)
 
 
 def cross_equations(
-    parts: StiffnessParts, own: Modes, shapes: FloatArray, eigenvalues: FloatArray
+    parts: ParametricModel, own: Modes, shapes: FloatArray, eigenvalues: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return the equations of all pairs of modes, (n_i m, p) and (n_i m,).
 
@@ -99,6 +101,9 @@ def cross_equations(
         eigenvalues: measured, in rad^2/s^2, (m,).
     """
     energies = parts.energies(own.shapes, shapes)
+    inertias = parts.inertias(own.shapes, shapes)
+    if inertias is not None:
+        energies = energies - eigenvalues * inertias
     momentum = own.shapes.T @ parts.model.mass_times(shapes)
     right = (eigenvalues[None, :] - own.eigenvalues[:, None]) * momentum
     scale = 1.0 / np.sqrt(np.outer(own.eigenvalues, eigenvalues))

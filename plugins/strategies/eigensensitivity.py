@@ -9,11 +9,11 @@ import numpy as np
 
 from femubench import Measurement, Model, UpdateResult
 from femubench.update import (
-    FactorStrategy,
-    factor_result,
+    ParametricStrategy,
     l_curve_corner,
     modal_space,
-    stiffness_parts,
+    parameterise,
+    parametric_result,
     tikhonov,
 )
 
@@ -22,7 +22,7 @@ _SMALL = 1e-3
 
 
 @dataclass(frozen=True)
-class Eigensensitivity(FactorStrategy):
+class Eigensensitivity(ParametricStrategy):
     """Fit frequencies and MAC by factors that Tikhonov's term keeps near 1.
 
     Every iteration linearises relative frequencies and unit shapes in the logarithms x of the
@@ -32,9 +32,7 @@ class Eigensensitivity(FactorStrategy):
     may change more than the structure.
 
     Arguments:
-        parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
-            `materials`, `sets` of the case, or `groups` of matrices; `own` for the members of a
-            frame and the groups of matrices.
+        changes: as of `ParametricStrategy`.
         shape_weight: of a MAC of 0 beside a frequency that is 100 % off; 0 for frequencies alone.
 
     The authors' are the sensitivities (Fox & Kapoor), the damped least squares of Natke and
@@ -63,7 +61,7 @@ class Eigensensitivity(FactorStrategy):
             NotApplicable: when the model has no such parameters.
             StrategyFailure: when no mode of the model looks like any measured mode.
         """
-        parts = stiffness_parts(model, self.parameters)
+        parts = parameterise(model, self.changes)
         space = modal_space(parts, measurement, shape_weight=self.shape_weight)
         log = np.zeros(len(parts))
         fit, history, weight = space.fit(log), [], 0.0
@@ -80,4 +78,4 @@ class Eigensensitivity(FactorStrategy):
             history.append({"cost": fit.cost, "step": moved, "weight": weight})
             if moved < _SMALL:
                 break
-        return factor_result(parts, log, history, weight=weight, paired_modes=float(fit.paired))
+        return parametric_result(parts, log, history, weight=weight, paired_modes=float(fit.paired))

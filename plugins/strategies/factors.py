@@ -2,55 +2,24 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from dataclasses import dataclass, field
 from functools import partial
 from typing import ClassVar
 
-import numpy as np
-
-from femubench import Measurement, Model, Strategy, UpdateResult
+from femubench import Measurement, Model
 from femubench.update import (
-    OWN,
-    Unknown,
+    Change,
+    SensitivityStrategy,
     UpdateOptions,
-    checked_set,
-    global_stiffness,
     groups_within,
-    groups_within_count,
-    joint_stiffness,
-    sensitivity_update,
-    stiffness_factors,
+    scale_all_stiffness,
+    scale_groups_within,
+    scale_joint,
 )
 
 
 @dataclass(frozen=True)
-class _Factors(Strategy):
-    """Base class of updates of stiffness factors by the sensitivity method."""
-
-    options: UpdateOptions = field(default_factory=UpdateOptions)
-    parameters: str = OWN
-
-    def __post_init__(self) -> None:
-        checked_set(self.parameters, own=True)
-
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
-        """Return the model with the factors that fit the used frequencies."""
-        if self.parameters == OWN:
-            unknowns = self.unknowns(model, len(measurement))
-        else:
-            unknowns = stiffness_factors(model, self.parameters)
-        return sensitivity_update(model, unknowns, measurement, self.options)
-
-    @abstractmethod
-    def unknowns(self, model: Model, count: int) -> list[Unknown]:
-        """Return the factors, where so many frequencies were measured."""
-
-
-@dataclass(frozen=True)
-class Global(_Factors):
+class Global(SensitivityStrategy):
     """Scale the stiffness of all members by one factor.
 
     In plane the factor is on EI, as in the paper. Out of plane and in 3-D it is on E, that is on
@@ -62,8 +31,7 @@ class Global(_Factors):
         options: of the iteration; the residual is that of frequencies, in which one factor has to
             compromise between all modes, while the paper's absolute eigenvalues
             (``residual=eigenvalue``) leave the choice to the highest.
-        parameters: `own` for the factor above; else one on E of each of the `elements`, `members`,
-            `sections`, `materials` or `sets` of the case, or on the `groups` of matrices.
+        changes: `own` for the above; else as of `SensitivityStrategy`.
 
     Source: Horton et al. (1999), table 4(a).
     """
@@ -81,13 +49,13 @@ class Global(_Factors):
 
     options: UpdateOptions = field(default_factory=partial(UpdateOptions, residual="frequency"))
 
-    def unknowns(self, model: Model, count: int) -> list[Unknown]:
+    def own_changes(self, model: Model, measurement: Measurement) -> tuple[Model, list[Change]]:
         """Return one factor on all members, or on the whole matrix."""
-        return [global_stiffness(model)]
+        return model, [scale_all_stiffness(model)]
 
 
 @dataclass(frozen=True)
-class Local(_Factors):
+class Local(SensitivityStrategy):
     """Scale the bending stiffness of the elements that touch joints.
 
     One factor for every joint type and role: at joints that a member passes, one for the elements
@@ -100,8 +68,7 @@ class Local(_Factors):
 
     Arguments:
         options: of the iteration.
-        parameters: `own` for the factors above; else one on E of each of the `elements`, `members`,
-            `sections`, `materials` or `sets` of the case, or on the `groups` of matrices.
+        changes: `own` for the above; else as of `SensitivityStrategy`.
 
     Source: Horton et al. (1999), table 4(b).
     """
@@ -118,9 +85,10 @@ class Local(_Factors):
         "damping=1e-3",
     )
 
-    def unknowns(self, model: Model, count: int) -> list[Unknown]:
+    def own_changes(self, model: Model, measurement: Measurement) -> tuple[Model, list[Change]]:
         """Return the factors on the elements at joints, or on groups."""
-        if model.structure is None:
-            return groups_within_count(model, count)
-        structure = model.structure
-        return [joint_stiffness(structure, g) for g in groups_within(structure.frame, count)]
+        structure, count = model.structure, len(measurement)
+        if structure is None:
+            return model, scale_groups_within(model, count)
+        groups = groups_within(structure.frame, count)
+        return model, [scale_joint(structure, group) for group in groups]

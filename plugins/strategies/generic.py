@@ -42,7 +42,7 @@ class GenericLS(ElementStrategy):
     def family(self, structure: Structure) -> ElementFamily:
         """Return a core for every element, or one for all elements of a kind."""
         # Elements that share a core are turned end for end where their second end is at the joint.
-        tied = self.tied or self.parameters != OWN
+        tied = self.tied or self.changes != OWN
         return generic_family(structure, plain=self.plain, joint=self.joint, tied=tied)
 
 

@@ -9,16 +9,16 @@ import numpy as np
 
 from femubench import Measurement, Model, UpdateResult
 from femubench.update import (
-    FactorStrategy,
+    ParametricStrategy,
     bounded_fit,
-    factor_result,
     modal_space,
-    stiffness_parts,
+    parameterise,
+    parametric_result,
 )
 
 
 @dataclass(frozen=True)
-class MultiStart(FactorStrategy):
+class MultiStart(ParametricStrategy):
     """Fit frequencies and MAC by bounded least squares from the nominal and other starts.
 
     Unknowns are the logarithms of the factors. Every start is followed to a local optimum with
@@ -26,9 +26,7 @@ class MultiStart(FactorStrategy):
     reduced basis; the last fit starts from its best point, in a basis made there.
 
     Arguments:
-        parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
-            `materials`, `sets` of the case, or `groups` of matrices; `own` for the members of a
-            frame and the groups of matrices.
+        changes: as of `ParametricStrategy`.
         starts: number of starts from a Latin hypercube, beside the nominal model.
         largest: bound of a factor; the least is its inverse.
         shape_weight: of a MAC of 0 beside a frequency that is 100 % off; 0 for frequencies alone.
@@ -62,11 +60,15 @@ class MultiStart(FactorStrategy):
         # Here, since no other strategy has to wait for it; workers have it from the start.
         from scipy.stats.qmc import LatinHypercube
 
-        parts = stiffness_parts(model, self.parameters)
-        weight, limit = self.shape_weight, float(np.log(self.largest))
+        parts = parameterise(model, self.changes)
+        weight = self.shape_weight
         space = modal_space(parts, measurement, shape_weight=weight, size=self.basis)
+        low, high = space.bounds(float(np.log(self.largest)))
         cube = LatinHypercube(len(parts), rng=rng).random(self.starts)
-        starts = [np.zeros(len(parts)), *(limit * (2.0 * cube - 1.0))]
+        starts = [
+            np.zeros(len(parts)),
+            *(0.5 * (low + high) + 0.5 * (high - low) * (2.0 * cube - 1.0)),
+        ]
         found = [bounded_fit(space, start, self.largest) for start in starts]
         best = min(found, key=lambda item: item[1])[0]
         there = modal_space(parts, measurement, shape_weight=weight, at=best, size=self.basis)
@@ -74,4 +76,4 @@ class MultiStart(FactorStrategy):
         costs = np.array([item[1] for item in found])
         history = tuple({"cost": float(value)} for value in costs)
         near = float(np.mean(costs <= 1.1 * costs.min()))
-        return factor_result(parts, log, history, cost=cost, share_of_starts_at_best=near)
+        return parametric_result(parts, log, history, cost=cost, share_of_starts_at_best=near)

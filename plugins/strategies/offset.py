@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from femubench import Measurement, Model, Strategy, UpdateResult
-from femubench.fem import Parameter, Structure
+from femubench import Measurement, Model
+from femubench.fem import Structure
 from femubench.update import (
+    Change,
     JointGroup,
-    Unknown,
-    UpdateOptions,
+    SensitivityStrategy,
     available_length,
     carried_by,
-    global_stiffness,
     groups_within,
     half_depth,
-    sensitivity_update,
+    scale_all_stiffness,
+    set_property,
     with_rigid_ends,
 )
 
@@ -28,7 +28,7 @@ _LONGEST_EXTENSION = 3.0  # negative lengths, in those available
 
 
 @dataclass(frozen=True)
-class Offset(Strategy):
+class Offset(SensitivityStrategy):
     """Make the elements at joints partly rigid and update the rigid lengths with EI.
 
     Every joint type has one length for its branches, initially half the depth of the member that
@@ -59,30 +59,24 @@ class Offset(Strategy):
     )
 
     length: float | None = None
-    options: UpdateOptions = field(default_factory=UpdateOptions)
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
-        """Return the model with partly rigid elements at its joints."""
+    def own_changes(self, model: Model, measurement: Measurement) -> tuple[Structure, list[Change]]:
+        """Return the frame with partly rigid elements at its joints, and what moves them."""
         structure = model.frame_structure
         count = len(measurement)
         groups = groups_within(structure.frame, count, passing=False)
         lengths: dict[str, tuple[float, float]] = {}
-        unknowns: dict[str, list[Unknown]] = {"branch": [], "end": [], "through": []}
+        own: dict[str, list[Change]] = {"branch": [], "end": [], "through": []}
         for group in groups:
             start, in_mass = self._initial(structure, group)
             lengths.update(dict.fromkeys(group.ends, (start, in_mass)))
-            unknowns[group.role].append(_length(structure, group, start))
+            own[group.role].append(_length(structure, group, start))
         levels = [
-            unknowns["branch"] + unknowns["end"],
-            [global_stiffness(structure)],
-            unknowns["through"],
+            own["branch"] + own["end"],
+            [scale_all_stiffness(structure)],
+            own["through"],
         ]
-        free = carried_by(levels, count)
-        return sensitivity_update(
-            with_rigid_ends(structure, lengths), free, measurement, self.options
-        )
+        return with_rigid_ends(structure, lengths), carried_by(levels, count)
 
     def _initial(self, structure: Structure, group: JointGroup) -> tuple[float, float]:
         """Return the rigid lengths in the stiffness and in the mass matrix in m."""
@@ -96,7 +90,8 @@ class Offset(Strategy):
         return start, start if group.role == "branch" else 0.0
 
 
-def _length(structure: Structure, group: JointGroup, start: float) -> Unknown:
+def _length(structure: Structure, group: JointGroup, start: float) -> Change:
     room = min(available_length(structure, end) for end in group.ends)
-    parameter = Parameter(f"a {group.name}", "rigid", group.ends, "m")
-    return Unknown(parameter, start, -_LONGEST_EXTENSION * room, room, signed=True)
+    limits = -_LONGEST_EXTENSION * room, room
+    name = f"a {group.name}"
+    return set_property(name, "rigid", group.ends, start, *limits, unit="m", signed=True)

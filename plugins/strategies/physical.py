@@ -41,6 +41,6 @@ class Physical(ElementStrategy):
 
     def family_of(self, model: Model) -> Family:
         """Return factors on the groups of matrices, else on the rigidities."""
-        if self.parameters == "groups" or (model.structure is None and self.parameters == OWN):
+        if self.changes == "groups" or (model.structure is None and self.changes == OWN):
             return group_family(model)
         return super().family_of(model)

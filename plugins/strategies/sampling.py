@@ -55,10 +55,8 @@ class BayesianSampling(Bayesian):
             raise InputError(
                 "the likelihood is of frequencies alone", key="shapes", expected="false"
             )
-        unknowns = self.unknowns(model, weighed=measurement.total_mass is not None)
         return sample_posterior(
-            model,
-            unknowns,
+            *self.pose(model, measurement),
             measurement,
             rng,
             discrepancy=Discrepancy(self.discrepancy_median, self.discrepancy_spread),

@@ -9,7 +9,7 @@ import numpy as np
 
 from femubench import Measurement, Model, UpdateResult
 from femubench.fem import FloatArray
-from femubench.update import FactorStrategy, factor_result, lasso, modal_space, stiffness_parts
+from femubench.update import ParametricStrategy, lasso, modal_space, parameterise, parametric_result
 
 _ITERATIONS = 20
 _SMALL = 1e-3
@@ -18,7 +18,7 @@ _ZERO = 1e-3  # a smaller ln(factor) is no change
 
 
 @dataclass(frozen=True)
-class Sparse(FactorStrategy):
+class Sparse(ParametricStrategy):
     """Fit the frequencies by few factors, all others left as they are.
 
     Every iteration linearises relative frequencies in the logarithms x of the factors and takes
@@ -27,9 +27,7 @@ class Sparse(FactorStrategy):
     of matrices each x_j is divided by the spread of its prior.
 
     Arguments:
-        parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
-            `materials`, `sets` of the case, or `groups` of matrices; `own` for the members of a
-            frame and the groups of matrices.
+        changes: as of `ParametricStrategy`.
 
     The authors' are the l1 penalty on the changes and the frequencies' sensitivities; the
     criterion for its weight (Tibshirani's cross-validation), logarithms, and a new
@@ -52,7 +50,7 @@ class Sparse(FactorStrategy):
             NotApplicable: when the model has no such parameters.
             StrategyFailure: when no mode of the model looks like any measured mode.
         """
-        parts = stiffness_parts(model, self.parameters)
+        parts = parameterise(model, self.changes)
         space = modal_space(parts, measurement, shape_weight=0.0)
         log = np.zeros(len(parts))
         fit, history, weight = space.fit(log), [], 0.0
@@ -69,7 +67,7 @@ class Sparse(FactorStrategy):
             if moved < _SMALL:
                 break
         changed = float((np.abs(log) > _ZERO).sum())
-        return factor_result(parts, log, history, weight=weight, changed=changed)
+        return parametric_result(parts, log, history, weight=weight, changed=changed)
 
 
 def cross_validated_weight(slope: FloatArray, right: FloatArray) -> float:

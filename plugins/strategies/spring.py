@@ -6,20 +6,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
-import numpy as np
-
-from femubench import Measurement, Model, NotApplicable, Strategy, UpdateResult
-from femubench.fem import Parameter, Structure
+from femubench import Measurement, Model, NotApplicable
+from femubench.fem import Structure
 from femubench.update import (
+    Change,
     JointGroup,
-    Unknown,
-    UpdateOptions,
+    SensitivityStrategy,
     all_elements,
     carried_by,
     flexible_ends,
-    global_stiffness,
     joint_groups,
-    sensitivity_update,
+    scale_all_stiffness,
+    scale_property,
+    set_property,
     spring_estimates,
     with_joint_springs,
 )
@@ -29,7 +28,7 @@ _SOFTEST, _STIFFEST = 1e-4, 1e3  # of the initial stiffness: a hinge, and rigid
 
 
 @dataclass(frozen=True)
-class Spring(Strategy):
+class Spring(SensitivityStrategy):
     """Connect members at joints by springs and update them with one global factor.
 
     A spring of every direction ties a member's end to the joint, behind a stiff massless arm as
@@ -71,22 +70,18 @@ class Spring(Strategy):
     arm: float | None = None
     arm_factor: float | None = 5.0
     stiffness: Mapping[str, float] = field(default_factory=dict)
-    options: UpdateOptions = field(default_factory=UpdateOptions)
 
-    def update(
-        self, model: Model, measurement: Measurement, rng: np.random.Generator
-    ) -> UpdateResult:
-        """Return the model with springs at its joints, on the mesh that has them."""
+    def own_changes(self, model: Model, measurement: Measurement) -> tuple[Structure, list[Change]]:
+        """Return the frame with springs at its joints, on the mesh that has them, and these."""
         structure = model.frame_structure
         groups = self._groups(structure, len(measurement))
         values = {name: self._initial(structure, ends) for name, ends in groups.items()}
         placed = {end: values[name] for name, ends in groups.items() for end in ends}
         sprung = with_joint_springs(structure, placed, arm=self.arm, arm_factor=self.arm_factor)
         if self.variant == "global":
-            unknowns = [global_stiffness(sprung), _global_mass(sprung)]
-        else:
-            unknowns = self._unknowns(sprung, groups, values, len(measurement))
-        return sensitivity_update(sprung, unknowns, measurement, self.options)
+            mass = scale_property("rhoA all members", "rhoA", all_elements(sprung), fatal=True)
+            return sprung, [scale_all_stiffness(sprung), mass]
+        return sprung, self._springs(sprung, groups, values, len(measurement))
 
     def _groups(self, structure: Structure, count: int) -> dict[str, tuple[str, ...]]:
         """Return flexible ends by group; one group where bending alone outnumbers the data."""
@@ -100,14 +95,14 @@ class Spring(Strategy):
         estimates = spring_estimates(structure.frame, ends)
         return {name: self.stiffness.get(name, value) for name, value in estimates.items()}
 
-    def _unknowns(
+    def _springs(
         self,
         structure: Structure,
         groups: Mapping[str, tuple[str, ...]],
         values: Mapping[str, Mapping[str, float]],
         count: int,
-    ) -> list[Unknown]:
-        def level(directions: tuple[str, ...]) -> list[Unknown]:
+    ) -> list[Change]:
+        def level(directions: tuple[str, ...]) -> list[Change]:
             return [
                 _spring(group, ends, name, values[group][name])
                 for name in directions
@@ -115,7 +110,7 @@ class Spring(Strategy):
                 if name in values[group]
             ]
 
-        stiffness = [global_stiffness(structure)] if self.free_stiffness else []
+        stiffness = [scale_all_stiffness(structure)] if self.free_stiffness else []
         levels = [level(_BENDING), stiffness, level(_TORSION), level(_TRANSLATION)]
         return carried_by(levels, count)
 
@@ -128,12 +123,8 @@ def _flexible(structure: Structure, groups: tuple[JointGroup, ...]) -> dict[str,
     return flexible
 
 
-def _spring(group: str, ends: tuple[str, ...], direction: str, start: float) -> Unknown:
+def _spring(group: str, ends: tuple[str, ...], direction: str, start: float) -> Change:
     places = tuple(f"{end}:{direction}" for end in ends)
     unit = "N m/rad" if direction.startswith("r") else "N/m"
-    parameter = Parameter(f"k_{direction} {group}", "spring", places, unit)
-    return Unknown(parameter, start, _SOFTEST * start, _STIFFEST * start)
-
-
-def _global_mass(structure: Structure) -> Unknown:
-    return Unknown(Parameter("rhoA all members", "rhoA", all_elements(structure)), fatal=True)
+    limits = _SOFTEST * start, _STIFFEST * start
+    return set_property(f"k_{direction} {group}", "spring", places, start, *limits, unit=unit)

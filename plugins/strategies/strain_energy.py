@@ -11,13 +11,13 @@ from femubench import Measurement, Model, UpdateResult
 from femubench.fem import FloatArray
 from femubench.modal import mass_normalised, rigid_modes_of
 from femubench.update import (
-    FactorStrategy,
+    ParametricStrategy,
     bounded_fit,
     expand_measured_shapes,
-    factor_result,
     modal_space,
+    parameterise,
+    parametric_result,
     quasi_measured_modes,
-    stiffness_parts,
 )
 
 _BARE = 1e-6  # of a mode's strain energy: where there is less, its change says nothing
@@ -25,7 +25,7 @@ _LARGEST = 5.0
 
 
 @dataclass(frozen=True)
-class StrainEnergy(FactorStrategy):
+class StrainEnergy(ParametricStrategy):
     """Name the members whose modal strain energy differs most, and fit their factors alone.
 
     With the nominal matrix K_j of a member in both, its change ratio in mode i is
@@ -34,9 +34,7 @@ class StrainEnergy(FactorStrategy):
     deviation above the mean index are fitted to frequencies and MAC.
 
     Arguments:
-        parameters: one factor on the stiffness of each of the `elements`, `members`, `sections`,
-            `materials`, `sets` of the case, or `groups` of matrices; `own` for the members of a
-            frame and the groups of matrices.
+        changes: as of `ParametricStrategy`.
         above: standard deviations above the mean index from which a member is named; one is named
             in any case, and no more than there are frequencies.
         shape_weight: of a MAC of 0 beside a frequency that is 100 % off, in the fit.
@@ -65,12 +63,13 @@ class StrainEnergy(FactorStrategy):
             NotApplicable: when the model has no such parameters.
             StrategyFailure: when a measured mode has no partner in the model.
         """
-        parts = stiffness_parts(model, self.parameters)
+        parts = parameterise(model, self.changes)
         paired = quasi_measured_modes(model, measurement)
         own = paired.modes.shapes[:, paired.partners]
         shapes = expand_measured_shapes(model, measurement, rigid_modes_of(model))
         shapes = mass_normalised(model, shapes)
-        energies = (np.einsum("pjj->pj", parts.energies(s, s)) for s in (own, shapes))
+        # What softens takes energy: its size counts.
+        energies = (np.abs(np.einsum("pjj->pj", parts.energies(s, s))) for s in (own, shapes))
         index = energy_change_index(*energies)
         named = np.flatnonzero(index >= index.mean() + self.above * index.std())
         order = np.argsort(-index, kind="stable")
@@ -78,7 +77,7 @@ class StrainEnergy(FactorStrategy):
         chosen = parts.of([int(j) for j in order[:count]])
         space = modal_space(chosen, measurement, shape_weight=self.shape_weight)
         log, cost = bounded_fit(space, np.zeros(len(chosen)), _LARGEST)
-        return factor_result(chosen, log, cost=cost, named=float(count))
+        return parametric_result(chosen, log, cost=cost, named=float(count))
 
 
 def energy_change_index(before: FloatArray, after: FloatArray) -> FloatArray:

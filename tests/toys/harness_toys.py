@@ -23,7 +23,7 @@ from femubench.core.case.case import Case, Modification
 from femubench.core.errors import Diverged, NotApplicable, SelfCheckFailed
 from femubench.core.fem.frame import Frame, GroundSpring, Joint, Material, Member, Place, PointMass
 from femubench.core.fem.model import LowRank, Model
-from femubench.core.fem.parameters import Parameter
+from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import Section
 from femubench.core.fem.sensors import Sensors
 from femubench.core.modal.eigen import solve_modes
@@ -118,7 +118,7 @@ class Softer(Strategy):
         first = solve_modes(model).elastic.eigenvalues[0]
         factor = float(measurement.eigenvalues[0] / first)
         places = tuple(label for label in structure.labels if label)
-        changed = structure.with_values([Parameter("E", "E", places)], [factor])
+        changed = structure.with_values([Property("E", "E", places)], [factor])
         estimate = ParameterEstimate("E", 1.0, factor, std=0.01)
         return UpdateResult(
             Model.of(changed), 1, (estimate,), ({"step": 1.0},), {"rng": rng.random()}

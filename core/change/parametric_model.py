@@ -1,0 +1,308 @@
+"""A model as a function of the coordinates of its changes, with the slopes of its matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from femubench.core.change.change import Change, parameter_of
+from femubench.core.change.parameter import Parameter
+from femubench.core.change.terms import Term, sparse_matrix, weigh_term
+from femubench.core.errors import NotApplicable
+from femubench.core.fem.model import Model
+from femubench.core.fem.model_parameters import (
+    MatrixSlopes,
+    mass_slopes,
+    matrix_slopes,
+    updated_mass,
+    with_values,
+)
+from femubench.core.fem.parameters import Property
+from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
+
+
+@dataclass(frozen=True)
+class TermSlopes:
+    """dK/dx and dM/dx of changes that are sums of terms.
+
+    Arguments:
+        terms: on the dofs of the model.
+        factors: d factor / dx of every term, (n_parameters, n_terms).
+    """
+
+    terms: tuple[Term, ...]
+    factors: FloatArray
+
+    @property
+    def count(self) -> int:
+        """Return the number of parameters."""
+        return len(self.factors)
+
+    def quadratic(self, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return left_j' dK/dx right_j and the same for dM, two arrays (m, n_parameters)."""
+        found = {name: np.zeros((left.shape[1], self.count)) for name in ("stiffness", "mass")}
+        for term, own in zip(self.terms, self.factors.T, strict=True):
+            energy = np.einsum("nm,nm->m", left, term.operator.apply(right))
+            found[term.matrix] += np.outer(energy, own)
+        return found["stiffness"], found["mass"]
+
+    def inner(self, left: FloatArray, right: FloatArray, matrix: str = "stiffness") -> FloatArray:
+        """Return left' dK/dx right, or that of the mass, (n_parameters, m_left, m_right)."""
+        found = np.zeros((self.count, left.shape[1], right.shape[1]))
+        for term, own in zip(self.terms, self.factors.T, strict=True):
+            if term.matrix == matrix:
+                found += own[:, None, None] * (left.T @ term.operator.apply(right))
+        return found
+
+    def combined(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return the sum of weights[p] dK/dx @ vector, (n, k), of weights (n_parameters, k)."""
+        return self.products(vector, 0.0) @ weights
+
+    def products(self, vector: FloatArray, eigenvalue: float) -> FloatArray:
+        """Return (dK/dx - eigenvalue dM/dx) @ vector for every parameter, (n, n_parameters)."""
+        result = np.zeros((len(vector), self.count))
+        for term, own in zip(self.terms, self.factors.T, strict=True):
+            force = term.operator.apply(vector[:, None])[:, 0]
+            result += np.outer(force if term.matrix == "stiffness" else -eigenvalue * force, own)
+        return result
+
+
+@dataclass(frozen=True)
+class JoinedSlopes:
+    """Slopes by properties and by terms, in the order of the parameters.
+
+    Arguments:
+        parts: each with the numbers of its parameters.
+        count: of all parameters.
+    """
+
+    parts: tuple[tuple[MatrixSlopes, IntArray], ...]
+    count: int
+
+    def quadratic(self, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return left_j' dK/dx right_j and the same for dM, two arrays (m, n_parameters)."""
+        found = np.zeros((2, left.shape[1], self.count))
+        for part, own in self.parts:
+            found[:, :, own] = part.quadratic(left, right)
+        return found[0], found[1]
+
+    def inner(self, left: FloatArray, right: FloatArray) -> FloatArray:
+        """Return left' dK/dx right of every parameter, (n_parameters, m_left, m_right)."""
+        found = np.zeros((self.count, left.shape[1], right.shape[1]))
+        for part, own in self.parts:
+            found[own] = part.inner(left, right)
+        return found
+
+    def combined(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
+        """Return the sum of weights[p] dK/dx @ vector, (n, k), of weights (n_parameters, k)."""
+        products = [part.combined(vector, weights[own]) for part, own in self.parts]
+        return sum(products[1:], start=products[0])
+
+    def products(self, vector: FloatArray, eigenvalue: float) -> FloatArray:
+        """Return (dK/dx - eigenvalue dM/dx) @ vector for every parameter, (n, n_parameters)."""
+        result = np.zeros((len(vector), self.count))
+        for part, own in self.parts:
+            result[:, own] = part.products(vector, eigenvalue)
+        return result
+
+
+@dataclass(frozen=True)
+class ParametricModel:
+    """A model as a function of the coordinates x of its changes, 0 for the model as it is.
+
+    Changes of properties are made in the frame or the groups; what terms add is summed on top of
+    them, on the dofs of the model.
+
+    Arguments:
+        model: a frame, or matrices.
+        changes: what may change; none adds degrees of freedom.
+
+    Raises:
+        NotApplicable: for a change that does.
+    """
+
+    model: Model
+    changes: tuple[Change, ...]
+
+    def __post_init__(self) -> None:
+        for change in self.changes:
+            if change.extra:
+                raise NotApplicable(
+                    f"{change.name} adds degrees of freedom, which this method keeps as they are"
+                )
+
+    def __len__(self) -> int:
+        return len(self.parameters)
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Return the parameters of all changes, in their order."""
+        return tuple(parameter_of(p) for change in self.changes for p in change.parameters)
+
+    @cached_property
+    def owners(self) -> tuple[Change, ...]:
+        """Return the change of every parameter."""
+        return tuple(change for change in self.changes for _ in change.parameters)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Return a name for every parameter."""
+        pairs = zip(self.owners, self.parameters, strict=True)
+        return tuple(c.name if len(c.parameters) == 1 else f"{c.name}: {p.name}" for c, p in pairs)
+
+    @cached_property
+    def is_property(self) -> BoolArray:
+        """Tell which parameters are properties, (p,)."""
+        return np.array([bool(change.quantity) for change in self.owners], dtype=bool)
+
+    @cached_property
+    def properties(self) -> tuple[Property, ...]:
+        """Return what these scale or set."""
+        return tuple(change.property for change in self.owners if change.quantity)
+
+    @cached_property
+    def _ranges(self) -> FloatArray:
+        return np.array([p.range for p in self.parameters]).reshape(-1, 2).T
+
+    @property
+    def lower(self) -> FloatArray:
+        """Return the lowest coordinates, (p,)."""
+        return np.asarray(self._ranges[0])
+
+    @property
+    def upper(self) -> FloatArray:
+        """Return the highest coordinates, (p,)."""
+        return np.asarray(self._ranges[1])
+
+    @cached_property
+    def precision(self) -> FloatArray:
+        """Return the inverse variances of the coordinates beforehand, 0 where unknown, (p,)."""
+        return 1.0 / np.square([p.std for p in self.parameters])
+
+    def values(self, x: FloatArray) -> FloatArray:
+        """Return parameter values of coordinates, (p,) both."""
+        return np.array([float(p.value(own)) for p, own in zip(self.parameters, x, strict=True)])
+
+    def growth(self, x: FloatArray) -> FloatArray:
+        """Return d value / dx, (p,)."""
+        return np.array([p.slope(float(own)) for p, own in zip(self.parameters, x, strict=True)])
+
+    @cached_property
+    def _terms(self) -> tuple[tuple[Change, slice], ...]:
+        """Return the changes that are sums of terms, with their coordinates."""
+        last, found = 0, []
+        for change in self.changes:
+            first, last = last, last + len(change.parameters)
+            if not change.quantity:
+                found.append((change, slice(first, last)))
+        return tuple(found)
+
+    @cached_property
+    def terms(self) -> tuple[Term, ...]:
+        """Return the terms of all changes."""
+        return tuple(term for change, _ in self._terms for term in change.terms)
+
+    @cached_property
+    def _matrices(self) -> tuple[SparseArray, ...]:
+        return tuple(sparse_matrix(term.operator, self.model.size) for term in self.terms)
+
+    @cached_property
+    def _weights(self) -> FloatArray:
+        return np.array([weigh_term(self.model, term) for term in self.terms])
+
+    def factors(self, x: FloatArray) -> FloatArray:
+        """Return the factors of the terms, (n_terms,)."""
+        own = [change.factors(x[None, columns])[0] for change, columns in self._terms]
+        return np.concatenate([*own, np.zeros(0)])
+
+    def factor_slopes(self, x: FloatArray) -> FloatArray:
+        """Return d factor / dx of the terms, (p, n_terms)."""
+        found, last = np.zeros((len(self), len(self.terms))), 0
+        for change, columns in self._terms:
+            first, last = last, last + len(change.terms)
+            found[columns, first:last] = change.slopes(x[columns])
+        return found
+
+    def at(self, x: FloatArray) -> Model:
+        """Return the model at coordinates, (p,).
+
+        Raises:
+            ModelError: when there is no such place.
+        """
+        model = self.model
+        if self.properties:
+            model = with_values(model, self.properties, self.values(x)[self.is_property])
+        if not self.terms:
+            return model
+        sums = {"stiffness": model.stiffness, "mass": model.mass}
+        for factor, term, matrix in zip(self.factors(x), self.terms, self._matrices, strict=True):
+            if factor != 0.0:
+                sums[term.matrix] = sums[term.matrix] + factor * matrix
+        return replace(model, stiffness=sums["stiffness"], mass=sums["mass"])
+
+    def mass(self, x: FloatArray, model: Model) -> float:
+        """Return the total mass in kg.
+
+        Arguments:
+            x: coordinates, (p,).
+            model: the model there.
+        """
+        added = float(self.factors(x) @ self._weights) if self.terms else 0.0
+        known = model if model.structure is not None or not self.terms else self.model
+        return updated_mass(known) + added
+
+    def mass_slopes(self, x: FloatArray, model: Model) -> FloatArray:
+        """Return d mass / dx in kg, that of a factor about its present value, (p,)."""
+        if not self.terms:
+            return mass_slopes(model, self.properties)
+        found = self.factor_slopes(x) @ self._weights
+        if self.properties:
+            found[self.is_property] = mass_slopes(model, self.properties)
+        return np.asarray(found)
+
+    def slopes(self, x: FloatArray, model: Model) -> MatrixSlopes:
+        """Return the slopes of the matrices by x; factors are taken about their present values.
+
+        Arguments:
+            x: coordinates, (p,).
+            model: the model there.
+        """
+        if not self.terms:
+            return matrix_slopes(model, self.properties)
+        own = np.flatnonzero(~self.is_property)
+        terms = TermSlopes(self.terms, self.factor_slopes(x)[own]), own
+        if not self.properties:
+            return terms[0]
+        known = matrix_slopes(model, self.properties), np.flatnonzero(self.is_property)
+        return JoinedSlopes((known, terms), len(self))
+
+    def steps(self, x: FloatArray) -> FloatArray:
+        """Return what the units of `slopes` are in x: that of a set value, 1 of all else, (p,)."""
+        set_alone = [
+            bool(change.quantity) and not change.property.is_factor for change in self.owners
+        ]
+        return np.where(set_alone, self.growth(x), 1.0)
+
+    @cached_property
+    def start_slopes(self) -> MatrixSlopes:
+        """Return the slopes of the matrices by x at the model as it is."""
+        return self.slopes(np.zeros(len(self)), self.model)
+
+    def energies(self, left: FloatArray, right: FloatArray) -> FloatArray:
+        """Return left_i' dK/dx right_k at the model as it is, (p, m_left, m_right)."""
+        return self.start_slopes.inner(left, right)
+
+    def inertias(self, left: FloatArray, right: FloatArray) -> FloatArray | None:
+        """Return left_i' dM/dx right_k of the terms there, (p, m_left, m_right); None for none."""
+        if not any(term.matrix == "mass" for term in self.terms):
+            return None
+        slopes = TermSlopes(self.terms, self.factor_slopes(np.zeros(len(self))))
+        return slopes.inner(left, right, "mass")
+
+    def of(self, chosen: Sequence[int]) -> ParametricModel:
+        """Return the same model with the changes of some of the parameters only."""
+        wanted = {id(self.owners[j]): self.owners[j] for j in chosen}
+        return ParametricModel(self.model, tuple(wanted.values()))
