@@ -168,7 +168,7 @@ class ModalSpace:
             scale, shape_rows[i] = _shape_misfit(shapes[i], read)
             if slopes:
                 gap = eigenvalues[j] - eigenvalues
-                gap[np.abs(gap) < _DEPENDENT * eigenvalues[j]] = np.inf
+                gap[np.abs(gap) <= _DEPENDENT * np.abs(eigenvalues[j])] = np.inf
                 turn = np.where(self._known[i][:, None], readings @ (gain / gap).T, 0.0)
                 shape_slope[i] = _shape_slope(shapes[i], read, turn, scale)
         weight = self.shape_weight
@@ -295,7 +295,9 @@ def modal_space(
     observer = model.observe(measurement.sensors)
     terms = parametric.terms
     basis = modes.shapes if terms else modes.elastic.shapes
-    limit = size or (basis.shape[1] if model.size <= DENSE_LIMIT else 100)
+    # A spring's softness runs over decades, for which few shapes are too few.
+    whole = model.size <= DENSE_LIMIT and (bool(terms) or size is None)
+    limit = basis.shape[1] if whole else size or 100
     if limit < basis.shape[1] or model.size > DENSE_LIMIT:
         basis = _few_shapes(parametric, measurement, model, modes, limit)
         if terms:
@@ -324,8 +326,11 @@ def _few_shapes(
     low = modes.elastic.shapes[:, : len(measurement) + _SPARE]
     first = float(modes.elastic.eigenvalues[0])
     shifted, moved = ShiftedModel(model, -first), low[:, : len(measurement) + 2].T
-    if moved.size * len(parts) <= _MOST_FORCES:
+    if parts.terms or moved.size * len(parts) <= _MOST_FORCES:
         pulled = np.hstack([parts.start_slopes.products(shape, 0.0) for shape in moved])
+        # How the terms of an effect share its force depends on its size: each by itself.
+        alone = [term.operator.apply(moved.T) for term in parts.terms if term.matrix == "stiffness"]
+        pulled = np.hstack([pulled, *alone])
         answers = shifted.solve(pulled)
     else:
         answers = _largest_answers(parts, shifted, moved, limit)
