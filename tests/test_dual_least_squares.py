@@ -8,7 +8,7 @@ import pytest
 import femubench
 from femubench.core.update import sensitivity_update as iteration
 from femubench.core.update.dual_least_squares import DualPosterior, dual_step
-from femubench.update import UpdateOptions, sensitivity_update, stiffness_factors
+from femubench.update import UpdateOptions, scale_parts, sensitivity_update
 
 RNG = np.random.default_rng(5)
 S, RESIDUAL = RNG.standard_normal((4, 30)), RNG.standard_normal(4)
@@ -36,7 +36,7 @@ def test_an_update_of_many_parameters_is_that_of_few(
 ) -> None:
     case = femubench.cases["frame"]
     std = 0.1 if statistical else None
-    unknowns = stiffness_factors(case.model, "elements", prior_std=std)
+    unknowns = scale_parts(case.model, "elements", prior_std=std)
     options = UpdateOptions(weighting="statistical" if statistical else "unit")
     used = case.used_measurement()
     dense = sensitivity_update(case.model, unknowns, used, options)
@@ -56,7 +56,7 @@ def test_many_parameters_without_a_prior_and_damping_are_refused(
 ) -> None:
     case = femubench.cases["frame"]
     monkeypatch.setattr(iteration, "MANY", 3)
-    unknowns = stiffness_factors(case.model, "elements")
+    unknowns = scale_parts(case.model, "elements")
     with pytest.raises(femubench.NotApplicable, match="without damping or a prior"):
         sensitivity_update(
             case.model, unknowns, case.used_measurement(), UpdateOptions(damping=0.0)

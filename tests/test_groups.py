@@ -40,7 +40,7 @@ from femubench.plugins.strategies.physical import Physical
 from femubench.plugins.strategies.sampling import BayesianSampling
 from femubench.scenarios.matlab_footbridge import TEST, VARIABLE
 from femubench.scenarios.nodes_from_stiffness import labelled_rows
-from femubench.update import group_factors, stiffness_parts
+from femubench.update import parameterise, scale_groups, scale_groups_within
 
 STEEL = Material(2.1e11, 0.3, 7850.0)
 BAR = Section(4e-4, 1.2e-8, 1.2e-8, 2e-8, 2.4e-8)
@@ -68,7 +68,7 @@ def grouped(frame: Frame) -> Model:
     model = Model.of(frame)
     structure = model.frame_structure
     names = [found.name for found in frame.sets]
-    factors = stiffness_parts(model, "sets").parameters
+    factors = parameterise(model, "sets").properties
     twice = [structure.with_values([factor], [2.0]).matrices()[1] for factor in factors]
     parts = {n: m - structure.matrices()[1] for n, m in zip(names, twice, strict=True)}
     for name, springs in (("foot", frame.springs[:2]), ("head", frame.springs[2:])):
@@ -107,7 +107,7 @@ DATA = measured(changed(TRUTH), 5)
 
 @pytest.mark.parametrize(
     "strategy",
-    [Local(), Global(parameters="groups"), Bayesian(), Physical()],
+    [Local(), Global(changes="groups"), Bayesian(), Physical()],
     ids=lambda strategy: type(strategy).__name__,
 )
 def test_strategies_find_the_factors_of_groups(strategy: femubench.Strategy) -> None:
@@ -125,7 +125,7 @@ def test_groups_and_sets_of_a_frame_go_the_same_way() -> None:
     bare = replace(MODEL, groups=groups, mass_groups={})
     for strategy in (Global, Bayesian, Eigensensitivity):
         pair = (
-            strategy(parameters=word).update(model, data, RNG)
+            strategy(changes=word).update(model, data, RNG)
             for word, model in (("sets", Model.of(beam())), ("groups", bare))
         )
         one, other = ([p.after for p in result.parameters[:2]] for result in pair)
@@ -154,8 +154,8 @@ def test_reasons_say_what_would_make_a_strategy_applicable() -> None:
 def test_few_frequencies_merge_groups_into_levels() -> None:
     counts = {}
     for count in (1, 2, 3, 4):
-        unknowns = Local().unknowns(MODEL, count)
-        counts[count] = [u.parameter.name.removeprefix("stiffness ") for u in unknowns]
+        changes = scale_groups_within(MODEL, count)
+        counts[count] = [change.name.removeprefix("stiffness ") for change in changes]
     assert counts[4] == [f"group:{name}" for name in TRUTH]
     assert counts[3] == ["group:foot", "group:head", "structure"]
     assert (counts[2], counts[1]) == (["supports", "structure"], ["all groups"])
@@ -176,7 +176,8 @@ def test_a_prior_is_a_factor_as_likely_as_not() -> None:
     draws = np.exp(group_prior_std(stated, "left") * RNG.standard_normal(200_000))
     assert np.mean((draws > 0.5) & (draws < 2.0)) == pytest.approx(0.5, abs=0.005)
     stds = {
-        u.parameter.name: u.prior_std for u in group_factors(stated, "stiffness", own_prior=True)
+        change.name: change.parameters[0].std
+        for change in scale_groups(stated, "stiffness", own_prior=True)
     }
     assert stds["stiffness group:right"] == 0.1
     assert stds["stiffness group:foot"] == pytest.approx(np.log(5.0) / 0.67449, rel=1e-4)

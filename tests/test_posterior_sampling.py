@@ -52,17 +52,17 @@ def test_the_posterior_is_that_of_exact_solutions() -> None:
     """Weighed draws of a wider distribution, every one solved, give the same mean and spread."""
     measurement, discrepancy = CASE.used_measurement(), Discrepancy(0.02, 0.01)
     strategy = BayesianSampling(discrepancy_median=0.02, discrepancy_spread=0.01)
-    unknowns = strategy.unknowns(CASE.model, weighed=False)
+    _, changes = strategy.pose(CASE.model, measurement)
     target, covariance = posterior_sampling.most_probable(
-        CASE.model, unknowns, measurement, discrepancy, strategy.options
+        CASE.model, changes, measurement, discrepancy, strategy.options
     )
     rng = np.random.default_rng(0)
-    z = 1.8 * rng.standard_normal((700, len(unknowns)))
+    z = 1.8 * rng.standard_normal((700, len(changes)))
     points, values = target.predicted(target.point.q + z @ np.linalg.cholesky(covariance).T)
     assert len(points) == len(z)
     log, _, _ = target.data
     misfit = np.square((log - values) / target.std(np.zeros(1))).sum(axis=1)
-    posterior = -0.5 * (misfit + np.square(points) @ target.iteration.scaling.precision)
+    posterior = -0.5 * (misfit + np.square(points) @ target.iteration.parametric.precision)
     weight = np.exp(posterior + 0.5 * np.square(z / 1.8).sum(axis=1))
     weight /= weight.sum()
     assert 1.0 / np.square(weight).sum() > 100.0

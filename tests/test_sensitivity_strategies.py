@@ -23,6 +23,7 @@ from femubench import (
     solve_modes,
 )
 from femubench.core.fem.frame import ACTIVE
+from femubench.core.fem.model_parameters import matrix_slopes
 from femubench.core.fem.sections import constant_kappa
 from femubench.core.modal.eigen import counted_evaluations
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
@@ -47,13 +48,14 @@ from femubench.plugins.strategies.factors import Global, Local
 from femubench.plugins.strategies.offset import Offset
 from femubench.plugins.strategies.spring import Spring
 from femubench.update import (
-    Unknown,
+    Change,
     UpdateOptions,
+    all_elements,
     carried_by,
-    global_stiffness,
     groups_within,
     half_depth,
     joint_groups,
+    scale_property,
     sensitivity_update,
     spring_estimates,
     with_joint_springs,
@@ -386,10 +388,12 @@ def test_frequencies_alone_will_do(hframe_case: Any) -> None:
 
 def test_an_optimum_out_of_range_is_a_divergence(hframe_case: Any) -> None:
     model, data = hframe_case
-    narrow = replace(global_stiffness(model.frame_structure), lower=0.95, upper=1.05)
+    every = all_elements(model.frame_structure)
+    limits = {"lower": 0.95, "upper": 1.05}
+    narrow = scale_property("EI all members", "EI", every, fatal=True, **limits)
     with pytest.raises(Diverged, match=r"EI all members left its range 0\.95\.\.1\.05"):
         sensitivity_update(model.frame_structure, [narrow], data)
-    soft = replace(narrow, fatal=False)
+    soft = scale_property("EI all members", "EI", every, **limits)
     result = sensitivity_update(model.frame_structure, [soft], data)
     assert result.parameters[0].after == pytest.approx(0.95)
 
@@ -402,11 +406,11 @@ def test_no_more_parameters_than_frequencies(hframe_case: Any) -> None:
     one = Local(short).update(model, data.select([1]), RNG)
     assert [p.name for p in one.parameters] == ["EI at all"]
 
-    def some(name: str) -> Unknown:
-        return Unknown(Property(name, "EI", ()))
+    def some(name: str) -> Change:
+        return scale_property(name, "EI", ())
 
     levels = [[some("a"), some("b")], [], [some("c"), some("d")], [some("e")]]
-    counts = {n: [u.parameter.name for u in carried_by(levels, n)] for n in (1, 2, 3, 4, 9)}
+    counts = {n: [change.name for change in carried_by(levels, n)] for n in (1, 2, 3, 4, 9)}
     assert counts == {1: ["a"], 2: ["a", "b"], 3: ["a", "b"], 4: list("abcd"), 9: list("abcde")}
 
 
@@ -564,12 +568,12 @@ def test_the_linear_gaussian_limit_has_the_closed_form(ladder: Any) -> None:
     data = exact.with_noise(rng)
     strategy = Bayesian(stiffness_std=1e-5, torsion_std=2e-5, joint_std=5e-5)
     result = strategy.update(model, data, RNG)
-    unknowns = strategy.unknowns(model, weighed=False)
+    _, changes = strategy.pose(model, data)
     modes = solve_modes(model).elastic.take(np.arange(6))
-    slope = eigenvalue_sensitivities(model, modes, [u.parameter for u in unknowns])
+    slope = eigenvalue_sensitivities(model, modes, [change.property for change in changes])
     deviation = 8.0 * np.pi**2 * data.frequencies * data.frequency_std
     s = slope / deviation[:, None]
-    prior = np.diag([1.0 / (u.prior_std or 0.0) ** 2 for u in unknowns])
+    prior = np.diag([1.0 / change.parameters[0].std ** 2 for change in changes])
     covariance = np.linalg.inv(s.T @ s + prior)
     expected = covariance @ s.T @ ((data.eigenvalues - modes.eigenvalues) / deviation)
     found = np.array([p.after - 1.0 for p in result.parameters])
@@ -585,9 +589,9 @@ def test_the_stated_deviations_are_right(ladder: Any) -> None:
     model = Model.of(ladder(elements=2))
     structure = model.frame_structure
     strategy = Bayesian(joint_std=0.3)
-    unknowns = strategy.unknowns(model, weighed=False)
-    std = np.array([u.prior_std for u in unknowns])
-    parameters = [u.parameter for u in unknowns]
+    _, changes = strategy.pose(model, measured(model, 6))
+    std = np.array([change.parameters[0].std for change in changes])
+    parameters = [change.property for change in changes]
     scores = []
     for _ in range(60):
         truth = std * rng.standard_normal(len(std))
@@ -628,8 +632,7 @@ def test_shapes_as_data_sharpen_the_parameters(ladder: Any) -> None:
     model = Model.of(ladder(elements=2))
     options = replace(Bayesian().options, shapes=True)
     structure = model.frame_structure
-    unknowns = Bayesian().unknowns(model, weighed=False)
-    parameters = [u.parameter for u in unknowns]
+    parameters = [change.property for change in Bayesian().pose(model, measured(model, 4))[1]]
     values = [0.97, 0.8, 0.7, 1.1, 0.8]
     truth = Model.of(structure.with_values(parameters, values))
     rng = np.random.default_rng(5)
@@ -649,7 +652,8 @@ def test_the_jacobian_of_scaled_shapes(ladder: Any) -> None:
     data = Data(measured(model, 3).with_noise(np.random.default_rng(2)), "frequency", True, True)
     labels = tuple(label for label in structure.labels if label)
     parameters = [Property("GJ", "GJ", labels), Property("EI", "EI", labels[:3])]
-    slope = predict(data, Model.of(structure)).jacobian(parameters)
+    slopes = matrix_slopes(model, parameters)
+    slope = predict(data, model).jacobian(slopes, lambda: np.zeros(2))
     for p, parameter in enumerate(parameters):
         up, down = (
             predict(data, Model.of(structure.with_values([parameter], [1.0 + h]))).residual

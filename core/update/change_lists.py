@@ -50,11 +50,12 @@ def check_changes(words: str, *, parts_alone: bool = False) -> None:
         if parts_alone:
             raise InputError(f"the changes are {OWN}, {', '.join(known)}, not {word!r}")
         effect = word.partition("@")[0]
-        if not any(found.name == effect for found in registered_effects()):
+        # The code of others is imported where a strategy runs, not where its options are read.
+        if "/" not in effect and all(found.name != effect for found in registered_effects()):
             raise InputError(
                 f"changes: there is no {word!r}",
-                expected=f"{OWN}, {', '.join(known)} or effects that `bench plugins list` shows, "
-                "joined by +",
+                expected=f"{OWN}, {', '.join(known)} or effects that `bench plugins list` shows "
+                "(those of others as PLUGIN/EFFECT), joined by +",
             )
 
 
@@ -279,7 +280,7 @@ def list_changes(model: Model, words: str, *, prior_std: float | None = None) ->
 
     A set of parts gives each part a factor on its stiffness. An effect sits at its coarsest places:
     the whole model, or joint types, sections and the like, or every joint or member, or what is
-    smaller; ``effect@place`` at one place that is named.
+    smaller; ``effect@place`` at one place that is named. ``plugin/effect`` is one of somebody else.
 
     Arguments:
         model: the nominal one.
@@ -300,7 +301,9 @@ def list_changes(model: Model, words: str, *, prior_std: float | None = None) ->
             found += scale_parts(model, word, prior_std=prior_std)
             continue
         name, _, place = word.partition("@")
-        effect = next((e for e in registered_effects() if e.name == name), None)
+        plugin, _, name = name.rpartition("/")
+        known = registered_effects(*([plugin] if plugin else []))
+        effect = next((found for found in known if found.name == name), None)
         if effect is None:
             raise NotApplicable(f"changes: there is no effect {name!r}")
         placed = [change_of(effect, model, where) for where in _places(effect, model, place)]

@@ -11,7 +11,7 @@ import numpy as np
 
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.model import Model
-from femubench.core.fem.model_parameters import MatrixSlopes
+from femubench.core.fem.model_parameters import MatrixSlopes, updated_mass
 from femubench.core.modal.correlated_errors import undone
 from femubench.core.modal.correlation import modal_scale_factor, seen_modes
 from femubench.core.modal.eigen import Modes, enough_modes, solve_modes
@@ -189,7 +189,7 @@ class Prediction:
 
 
 def predict(
-    data: Data, model: Model, mass: float, previous: Prediction | None = None
+    data: Data, model: Model, previous: Prediction | None = None, *, mass: float | None = None
 ) -> Prediction:
     """Return the prediction of a model, its modes paired with the measured ones.
 
@@ -199,8 +199,8 @@ def predict(
     Arguments:
         data: what is measured.
         model: with its present values.
-        mass: of it in kg.
         previous: the prediction at the iteration before, on the same dofs.
+        mass: of the model in kg; None for that of its members.
 
     Raises:
         ModelError: when the eigenvalue problem has no solution.
@@ -214,6 +214,7 @@ def predict(
     partner = pair_measured(data.measurement, modes, observer @ modes.shapes).index
     if previous is not None:
         partner = _followed(partner, model, modes, previous)
+    mass = updated_mass(model) if mass is None else mass
     return Prediction(data, model, modes, partner, observer, mass)
 
 

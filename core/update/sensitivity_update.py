@@ -95,7 +95,7 @@ class Iteration:
         """Return the prediction at coordinates, its pairs continued from a previous one."""
         model = self.parametric.at(q)
         mass = self.parametric.mass(q, model)
-        return Point(q, predict(self.data, model, mass, previous))
+        return Point(q, predict(self.data, model, previous, mass=mass))
 
     def system(self, point: Point) -> tuple[FloatArray, FloatArray]:
         """Return sensitivities s by the coordinates and residual of the data with a partner."""
