@@ -607,7 +607,13 @@ class TestPluginsAndScenarios:
     def test_builtins_are_plugins_and_none_is_broken(self, invoke: Invoke) -> None:
         result = invoke("plugins", "list")
         assert result.stderr == ""
-        for kind in ("strategies: unchanged", "reporters: terminal", "scenarios: frame"):
+        offered = (
+            "strategies: unchanged",
+            "reporters: terminal",
+            "scenarios: frame",
+            "papers: frame",
+        )
+        for kind in offered:
             assert kind in " ".join(result.stdout.split())
 
     def test_scenarios_list_and_show(self, invoke: Invoke) -> None:

@@ -8,11 +8,20 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 from femubench.core.cli.registry import wrapped
-from femubench.core.plugin.foreign import doc_of
+from femubench.core.plugin.foreign import Foreign, doc_of
 from femubench.core.plugin.loader import LoadedPlugin, Plugins, shown
 from femubench.core.plugin.options import ToldOptions, options_of
 from femubench.core.plugin.validation import CHECKS, KINDS
-from femubench.core.roles import Effect, Fault, Reader, Reporter, Scenario, Strategy, declared
+from femubench.core.roles import (
+    Effect,
+    Fault,
+    Paper,
+    Reader,
+    Reporter,
+    Scenario,
+    Strategy,
+    declared,
+)
 
 Row = tuple[str, str]
 
@@ -134,6 +143,12 @@ def _reporter(reporter: Reporter) -> Iterator[Row]:
     yield "run", f"bench report --format {reporter.name}"
 
 
+def _paper(paper: Paper | Foreign) -> Iterator[Row]:
+    if isinstance(paper, Paper):
+        yield "cases", ", ".join(paper.cases)
+    yield "run", f"bench reproduce {paper.name}"
+
+
 _ROWS: dict[str, Callable[..., Iterator[Row]]] = {
     "strategies": _strategy,
     "scenarios": _scenario,
@@ -141,4 +156,5 @@ _ROWS: dict[str, Callable[..., Iterator[Row]]] = {
     "faults": _fault,
     "readers": _reader,
     "reporters": _reporter,
+    "papers": _paper,
 }

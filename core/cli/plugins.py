@@ -71,7 +71,8 @@ def list_(ctx: click.Context, traceback: bool) -> None:
 def show(ctx: click.Context, name: str) -> None:
     """Show what NAME is, where it comes from, what it needs, and its options.
 
-    NAME is a strategy, scenario, effect, reader or reporter, or a plugin of `bench plugins list`.
+    NAME is a strategy, scenario, effect, reader, reporter or paper, or a plugin of `bench plugins
+    list`.
     """
     from femubench.core.cli.plugin_pages import pages_of
 

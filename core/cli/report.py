@@ -14,6 +14,7 @@ from femubench.core.cli import options
 from femubench.core.cli.registry import plugins_for
 from femubench.core.errors import InputError
 from femubench.core.files import check_writable, make_folder, write_atomically
+from femubench.core.library.cases import way_of
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.validation import chosen
 
@@ -117,10 +118,8 @@ def _words(formats: Iterable[str]) -> list[str]:
 
 def _tell(run: Run, writers: Sequence[Reporter]) -> None:
     """Tell on stderr what was left out, where a report has no room for it."""
-    from femubench.reports.summary import notes_of
-
     if any(writer.name not in _TELLING for writer in writers):
-        for note in notes_of(run):
+        for note in way_of("terminal", "notes")(run):
             click.echo(f"bench: {note}", err=True)
 
 

@@ -31,6 +31,20 @@ def usable_plugins() -> Plugins:
     return plugins
 
 
+def way_of(style: str, way: str) -> Callable[..., Any]:
+    """Return the method by which a report format of femubench shows something else than a run.
+
+    Raises:
+        InputError: when there is no such format, or it does not show that.
+    """
+    formats = load_plugins(strangers=False).reporters
+    found = getattr(formats.get(style), way, None)
+    if callable(found):
+        return found  # type: ignore[no-any-return]
+    having = ", ".join(name for name in formats if callable(getattr(formats[name], way, None)))
+    raise InputError(f"there is no style {style!r}", expected=f"one of {having}")
+
+
 class InstalledReaders(Sequence[Reader]):
     """The readers of all plugins; nothing is loaded before a file asks for one."""
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from femubench.core.display import counted
 from femubench.core.errors import InputError
 from femubench.core.files import check_writable
-from femubench.core.library.cases import listed, usable_plugins
+from femubench.core.library.cases import listed, usable_plugins, way_of
 from femubench.core.library.compare import compare
 from femubench.core.library.plugins import check
 from femubench.core.library.publish import refusal_of
@@ -145,16 +145,14 @@ def _named(cases: Sequence[str]) -> str:
 
 def summary_of(found: Submission) -> str:
     """Return what came out in Markdown: the verdict, the ranking, the comparison."""
-    from femubench.reports.markdown import escape
-
     markdown = reporter(usable_plugins(), "markdown")
     verdict = "not accepted" if found.faults else "accepted"
-    lines = [f"# Submission: {verdict}", *(f"- {escape(line)}" for line in found.faults)]
+    lines = list(found.faults)
     if found.unverified:
-        lines.append(f"- a leaderboard takes it as unverified alone: {escape(found.unverified)}")
+        lines.append(f"a leaderboard takes it as unverified alone: {found.unverified}")
     if found.comparison is None:
-        lines.append("- no baseline: commit the result file to have the next run compared with it")
-    parts = ["\n".join(lines)]
+        lines.append("no baseline: commit the result file to have the next run compared with it")
+    parts = [way_of("markdown", "render_list")(f"Submission: {verdict}", lines)]
     if found.comparison is not None:
         parts.append(str(rendering(found.comparison, "markdown")))
     parts.append(str(rendered(markdown, found.run)))
