@@ -23,7 +23,7 @@ REPEATED = {
         "Bar Bench Card Change Choice Data EffectParameter Evidence Exhibits Factor Fault "
         "Grid Ground Group Job Judgement Known Measurement ModalFit Model ModelError Physical "
         "Point Problem Record Run Section Seen Site Strategy Submission Task TrueCause Truth "
-        "Verdict _Item _Known _Mode _Pair _Part _Table _Verbs"
+        "Verdict _Item _Known _Mode _Pair _Part _Table"
     ),
     3: "Comparison Reading Table",
     4: "Finding Row",

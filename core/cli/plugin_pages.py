@@ -9,7 +9,7 @@ from pathlib import Path
 
 from femubench.core.cli.registry import wrapped
 from femubench.core.plugin.foreign import Foreign, doc_of
-from femubench.core.plugin.loader import LoadedPlugin, Plugins, shown
+from femubench.core.plugin.loader import Plugins, shown
 from femubench.core.plugin.options import ToldOptions, options_of
 from femubench.core.plugin.validation import CHECKS, KINDS
 from femubench.core.roles import (
@@ -43,7 +43,8 @@ def pages_of(name: str, plugins: Plugins) -> Iterator[str]:
         offers = getattr(plugins, kind)
         if name in offers:
             found, offered = True, shown(offers, name)
-            source = _source(kind, name, plugins.loaded)
+            origin = next(one for one in plugins.loaded if name in one.offers.get(kind, ()))
+            source = "from", f"{origin.distribution}, plugin {origin.plugin}"
             yield _page(f"{name}: {_ROLES[kind]}", _about(offered), [source, *_ROWS[kind](offered)])
     for plugin in plugins.loaded:
         if plugin.plugin == name and not found:
@@ -61,11 +62,6 @@ def _page(heading: str, paragraphs: Iterable[str], rows: Iterable[Row]) -> str:
         first = f"{key + ':':{width}}" if key else " " * width
         lines.append(wrapped(value, indent=2, lead=first, hanging=width + 2))
     return "\n".join(lines)
-
-
-def _source(kind: str, name: str, loaded: Iterable[LoadedPlugin]) -> Row:
-    found = next(plugin for plugin in loaded if name in plugin.offers.get(kind, ()))
-    return "from", f"{found.distribution}, plugin {found.plugin}"
 
 
 def _about(offered: object) -> Iterator[str]:

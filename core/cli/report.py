@@ -63,7 +63,8 @@ def report(
     out and reported.
     """
     plugins = plugins_for(ctx)
-    words = list(dict.fromkeys([*_words(formats), *([_PAGE] if opened else [])])) or ["terminal"]
+    parts = [part.strip() for word in formats for part in word.split(",")] + [_PAGE] * opened
+    words = list(dict.fromkeys(_SHORT.get(p, p) for p in parts if p)) or ["terminal"]
     file = Path(run) if run is not None and os.path.isfile(run) else None
     if file is None:  # names are known to be right before what reads runs is loaded
         chosen("report format", words, plugins.reporters)
@@ -79,7 +80,10 @@ def report(
         writers = [plugins.reporters[w] for w in chosen("report format", words, plugins.reporters)]
         kept = store_in(store)
         found = read_run(run, kept)
-        _tell(found, writers)
+        # What was left out is told on stderr where a report has no room for it.
+        silent = any(writer.name not in _TELLING for writer in writers)
+        for note in way_of("terminal", "notes")(found) if silent else ():
+            click.echo(f"bench: {note}", err=True)
         exhibits = kept.exhibits if file is None else None
         above = kept.folder if file is None else file.parent
         written = _write(found, exhibits, writers, above, output)
@@ -108,19 +112,6 @@ def _write_diagnosis(
         write_atomically(files[name], text)
         click.echo(f"{name}: {files[name]}")
     return files
-
-
-def _words(formats: Iterable[str]) -> list[str]:
-    """Return the formats that the words of the user stand for."""
-    parts = [part.strip() for word in formats for part in word.split(",")]
-    return [_SHORT.get(part, part) for part in parts if part]
-
-
-def _tell(run: Run, writers: Sequence[Reporter]) -> None:
-    """Tell on stderr what was left out, where a report has no room for it."""
-    if any(writer.name not in _TELLING for writer in writers):
-        for note in way_of("terminal", "notes")(run):
-            click.echo(f"bench: {note}", err=True)
 
 
 def _write(

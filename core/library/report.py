@@ -72,38 +72,25 @@ def report(
         kept = store_in(store)
         found = read_run(what, kept)
     if isinstance(found, Run):
-        content = _run_report(found, path, style, kept)
+        plugins, name = usable_plugins(), SHORT.get(style or "", style or "terminal")
+        if style is None and path is not None:
+            writer = reporter_for(plugins, path)
+        else:
+            writer = plugins.reporters[chosen("report format", [name], plugins.reporters)[0]]
+        content = rendered(writer, found, None if kept is None else kept.exhibits)
     else:
-        content = rendering(found, style or ("terminal" if path is None else _style_of(path)))
+        ending = ".txt" if path is None else path.suffix.lower()
+        by_suffix = {suffix: name for name, suffix in SUFFIXES.items()}
+        if style is None and ending not in by_suffix:
+            known = " or ".join(by_suffix)
+            raise InputError("does not say its format", file=path, expected=f"a name with {known}")
+        content = rendering(found, style or by_suffix[ending])
     if path is not None:
         write_atomically(path, content)
         return path
     if isinstance(content, bytes):
         raise InputError(f"style {style} is no text", expected="a file")
     return content
-
-
-def _run_report(run: Run, path: Path | None, style: str | None, store: Store | None) -> str | bytes:
-    plugins = usable_plugins()
-    if style is None and path is not None:
-        found = reporter_for(plugins, path)
-    else:
-        name = SHORT.get(style or "", style or "terminal")
-        found = plugins.reporters[chosen("report format", [name], plugins.reporters)[0]]
-    return rendered(found, run, None if store is None else store.exhibits)
-
-
-def _style_of(path: Path) -> str:
-    """Return the style that a suffix stands for.
-
-    Raises:
-        InputError: when it stands for none.
-    """
-    for style, suffix in SUFFIXES.items():
-        if path.suffix.lower() == suffix:
-            return style
-    known = " or ".join(SUFFIXES.values())
-    raise InputError("does not say its format", file=path, expected=f"a name with {known}")
 
 
 def diagnosis_in(path: Path) -> dict[str, Any] | None:

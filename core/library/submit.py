@@ -78,7 +78,10 @@ def submit(
     names = [str(name) for name in listed(strategies)]
     file = Path(output)
     check_writable(file)
-    before = None if baseline is None else _baseline(Path(baseline))
+    if baseline is not None and not Path(baseline).is_file():
+        what = "there is no such file"
+        raise InputError(what, file=Path(baseline), expected="a result file")
+    before = None if baseline is None else read_run(baseline)
     faults = list(_broken_rules(names, tell))
     tell(f"run {', '.join(names)}")
     limits = dict(timeouts or {})
@@ -99,12 +102,6 @@ def submit(
         faults += _losses(found)
     tell(f"check {file} as a leaderboard does")
     return Submission(run, tuple(faults), refusal_of(file), found)
-
-
-def _baseline(file: Path) -> Run:
-    if not file.is_file():
-        raise InputError("there is no such file", file=file, expected="a result file")
-    return read_run(file)
 
 
 def _broken_rules(names: Sequence[str], tell: Callable[[str], None]) -> Iterator[str]:
