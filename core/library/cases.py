@@ -152,12 +152,10 @@ def _case(plugins: Plugins, name: str) -> Case:
     return read_case(folder, name, readers, installed=True)
 
 
-def _strategy(plugins: Plugins, name: str) -> Variant:
-    return Variant(plugins.strategies[name], name)
-
-
 cases: Catalogue[Case] = Catalogue("case", lambda p: scenarios_of(p.scenarios), _case)
-strategies: Catalogue[Variant] = Catalogue("strategy", lambda p: p.strategies, _strategy)
+strategies: Catalogue[Variant] = Catalogue(
+    "strategy", lambda p: p.strategies, lambda p, name: Variant(p.strategies[name], name)
+)
 effects: Catalogue[Effect] = Catalogue(
     "effect", lambda p: p.effects, lambda p, name: p.effects[name]
 )
@@ -193,7 +191,14 @@ def read_cases(given: CaseLike | Iterable[CaseLike], plugins: Plugins) -> list[C
         else item
         for item in wanted
     ]
-    _check_names(found)
+    # Results of two folders under one name could not be told apart.
+    seen: dict[str, Path] = {}
+    for case in found:
+        if case.name in seen:
+            what = f"the name {case.name!r} is also that of {seen[case.name]}"
+            file, expected = case.folder / "case.toml", "a name of its own"
+            raise InputError(what, file=file, key="case.name", expected=expected)
+        seen[case.name] = case.folder
     return found
 
 
@@ -267,17 +272,3 @@ def _folders(word: str, scenarios: Mapping[str, Scenario]) -> Iterable[tuple[str
     if "/" in word and word.partition("/")[0] not in {*scenarios, *groups}:
         raise InputError("folder does not exist", file=path, expected="a folder with a case.toml")
     raise unknown("case", word, case_names(scenarios))
-
-
-def _check_names(cases: Iterable[Case]) -> None:
-    """Refuse two folders under one name: their results could not be told apart."""
-    seen: dict[str, Path] = {}
-    for case in cases:
-        if case.name in seen:
-            raise InputError(
-                f"the name {case.name!r} is also that of {seen[case.name]}",
-                file=case.folder / "case.toml",
-                key="case.name",
-                expected="a name of its own",
-            )
-        seen[case.name] = case.folder

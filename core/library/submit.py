@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -82,7 +82,11 @@ def submit(
         what = "there is no such file"
         raise InputError(what, file=Path(baseline), expected="a result file")
     before = None if baseline is None else read_run(baseline)
-    faults = list(_broken_rules(names, tell))
+    faults = []
+    for name in names:
+        tell(f"check {name}")
+        rules = [item for item in check(name) if item.verdict.status == "fail"]
+        faults += [f"{name} breaks the rule {r.check.name}: {r.verdict.message}" for r in rules]
     tell(f"run {', '.join(names)}")
     limits = dict(timeouts or {})
     plan = plan_of(
@@ -104,15 +108,6 @@ def submit(
     return Submission(run, tuple(faults), refusal_of(file), found)
 
 
-def _broken_rules(names: Sequence[str], tell: Callable[[str], None]) -> Iterator[str]:
-    """Yield the rules for plugins that a strategy breaks."""
-    for name in names:
-        tell(f"check {name}")
-        failed = [found for found in check(name) if found.verdict.status == "fail"]
-        for found in failed:
-            yield f"{name} breaks the rule {found.check.name}: {found.verdict.message}"
-
-
 def _unanswered(run: Run, names: Iterable[str]) -> Iterator[str]:
     """Yield strategies with jobs that ended their process or had to be ended."""
     for name in names:
@@ -121,7 +116,9 @@ def _unanswered(run: Run, names: Iterable[str]) -> Iterator[str]:
             cases = list(dict.fromkeys(item.case for item in own if item.status == status))
             if cases:
                 what = "crashed" if status == "crashed" else "ran out of time"
-                yield f"{name} {what} on {_named(cases)}"
+                left = len(cases) - _MOST_NAMED
+                more = f" and {counted(left, 'more case')}" if left > 0 else ""
+                yield f"{name} {what} on {', '.join(cases[:_MOST_NAMED])}{more}"
 
 
 def _losses(found: Comparison) -> Iterator[str]:
@@ -132,12 +129,6 @@ def _losses(found: Comparison) -> Iterator[str]:
         was = "lost results" if item.metric == "failures" else f"{item.metric}, as a ratio"
         told = f"{was}: {item.value:.3g}, allowed {item.most:g}"
         yield f"{item.strategy} is worse than the baseline{where}: {told}"
-
-
-def _named(cases: Sequence[str]) -> str:
-    first = ", ".join(cases[:_MOST_NAMED])
-    left = len(cases) - _MOST_NAMED
-    return f"{first} and {counted(left, 'more case')}" if left > 0 else first
 
 
 def summary_of(found: Submission) -> str:
