@@ -37,6 +37,7 @@ run: $(VENV)/.installed
 test: $(VENV)/.installed-test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/python benchmarks/line_budget.py
 	$(BIN)/mypy -p femubench
 	$(BIN)/mypy truths
 	$(BIN)/pyright --pythonpath $(BIN)/python

@@ -286,6 +286,12 @@ class Reporter(Protocol):
       data to draw or None.
     - ``render_bytes(run) -> bytes``: used instead of `render`, for a format that is no text.
 
+    Those that come with femubench also show other things, each where it can: a diagnosis
+    (``render_diagnosis(data)``, ``diagnosis_lines(data)``), a comparison
+    (``render_comparison(data)``), papers (``render_studies(studies, drawings)``), identified modes
+    (``render_modes(found, source)``), a list (``render_list(title, lines)``), a leaderboard
+    (``render_site(index)``), and what has to be known of a run besides (``notes(run)``).
+
     Attributes:
         name: the word after ``bench report --format``.
         suffix: of the file that is written, with the dot.
@@ -296,6 +302,33 @@ class Reporter(Protocol):
 
     def render(self, run: Any) -> str:  # noqa: ANN401 - see the module
         """Return the report; must not run anything."""
+        ...
+
+
+@runtime_checkable
+class Paper(Protocol):
+    """A paper whose printed tables are recomputed.
+
+    A paper may offer more than is asked here: ``done``, hundredths of a second after which a re-run
+    had done each of its different updates, and all else, from which the time that is left is told.
+
+    Attributes:
+        name: the word after ``bench reproduce``.
+        cases: names of those that the re-run works with.
+    """
+
+    @property
+    def name(self) -> str:
+        """Return a slug; a plain attribute will do."""
+        ...
+
+    @property
+    def cases(self) -> Sequence[str]:
+        """Return the names of cases; a plain attribute will do."""
+        ...
+
+    def study(self, bench: Any) -> Any:  # noqa: ANN401 - see the module
+        """Return the `reproduction.Study`, worked out on a `reproduction.Workbench`."""
         ...
 
 

@@ -12,10 +12,12 @@ from femubench.core.reproduction.printed_table import (
     as_printed,
     places_of,
 )
-from femubench.core.reproduction.study import Extra, Study, verdict_counts
+from femubench.core.reproduction.study import FIGURES, Extra, Study, verdict_counts
 from femubench.core.reproduction.workbench import Workbench
+from femubench.core.roles import Paper
 
 __all__ = [
+    "FIGURES",
     "VERDICTS",
     "Bars",
     "Cell",
@@ -31,6 +33,7 @@ __all__ = [
     "Ground",
     "MatrixImage",
     "Page",
+    "Paper",
     "PrintedTable",
     "StructureMap",
     "Study",

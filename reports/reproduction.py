@@ -19,6 +19,7 @@ from femubench.reports.digits import Digits, off
 from femubench.reports.markdown import escape, to_markdown
 from femubench.reports.terminal import WIDTH, to_terminal
 from femubench.reproduction import (
+    FIGURES,
     VERDICTS,
     Cell,
     Extra,
@@ -30,7 +31,6 @@ from femubench.reproduction import (
 
 Words = Mapping[Verdict, str]
 
-FIGURES = "figures"
 # A mark that tells it apart without colour; a short word for the screen and a whole one; what a
 # sentence says of a number of cells; what it means.
 _VERDICTS: dict[Verdict, tuple[str, str, str, str, str]] = {

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from femubench.reports import study
 from femubench.reports.blocks import Block, Cell, Column, Items, Section, Table
-from femubench.reports.cells import NOTHING, first_of, hertz, interval, plain, whole
-from femubench.reports.markdown import to_markdown
+from femubench.reports.cells import NOTHING, hertz, interval, plain, whole
+from femubench.reports.markdown import escape, to_markdown
 from femubench.reports.page.papers import papers_of, started_as_drawn
 from femubench.reports.summary import (
-    Trouble,
     cases_of,
+    failures,
     finding,
     first_seed,
     header,
@@ -30,6 +31,7 @@ from femubench.results import (
     JobResult,
     PairedMode,
     Run,
+    StudyAxes,
     interval_kind,
     leaderboard,
     modes_frame,
@@ -37,6 +39,10 @@ from femubench.results import (
     tell_apart,
     twin_skills,
 )
+
+if TYPE_CHECKING:
+    from femubench import Identification
+    from femubench.reproduction import Study
 
 _Row = Mapping[Any, Any]
 _Printed = Mapping[str, Mapping[int, float | None]]
@@ -90,9 +96,45 @@ class TerminalReporter:
 
     def render(self, run: Run) -> str:
         """Return the ranking, the failures and what the columns mean."""
+        if StudyAxes.asked(run) is not None:
+            return study.study_text(run)
         failed = failures(troubles(run.results))
         told = [*failed, *_notes(run)]
         return to_terminal([*_board(run), *(Section("", [block]) for block in told)])
+
+    def notes(self, run: Run) -> list[str]:
+        """Return what a reader has to know of a run, where a format has no room for it."""
+        return notes_of(run)
+
+    def render_diagnosis(self, data: Mapping[str, Any]) -> str:
+        """Return a diagnosis in 80 columns."""
+        from femubench.reports.diagnosis import diagnosis_text
+
+        return diagnosis_text(data)
+
+    def diagnosis_lines(self, data: Mapping[str, Any]) -> list[str]:
+        """Return the verdict of a diagnosis and its causes, a line each."""
+        from femubench.reports.diagnosis import summary_lines
+
+        return summary_lines(data)
+
+    def render_comparison(self, data: Mapping[str, Any]) -> str:
+        """Return a comparison in 80 columns."""
+        from femubench.reports.compare_page import comparison_text
+
+        return comparison_text(data)
+
+    def render_studies(self, studies: Sequence[Study], drawings: Mapping[str, str]) -> str:
+        """Return papers worked through, in 80 columns."""
+        from femubench.reports.reproduction import reproduction_text
+
+        return reproduction_text(studies)
+
+    def render_modes(self, found: Identification, source: str = "") -> str:
+        """Return identified modes in 80 columns."""
+        from femubench.reports.identification import identification_text
+
+        return identification_text(found)
 
 
 class MarkdownReporter:
@@ -103,21 +145,37 @@ class MarkdownReporter:
 
     def render(self, run: Run) -> str:
         """Return the report."""
+        if StudyAxes.asked(run) is not None:
+            return study.study_markdown(run)
         title = f"Updating strategies compared: run {run.meta.get('run', '')}".rstrip()
         return to_markdown(_document(run), title)
+
+    def render_diagnosis(self, data: Mapping[str, Any]) -> str:
+        """Return a diagnosis in Markdown."""
+        from femubench.reports.diagnosis import diagnosis_markdown
+
+        return diagnosis_markdown(data)
+
+    def render_comparison(self, data: Mapping[str, Any]) -> str:
+        """Return a comparison in Markdown."""
+        from femubench.reports.compare_page import comparison_markdown
+
+        return comparison_markdown(data)
+
+    def render_studies(self, studies: Sequence[Study], drawings: Mapping[str, str]) -> str:
+        """Return papers worked through; where there are drawings, with links to their files."""
+        from femubench.reports.reproduction import reproduction_markdown
+
+        return reproduction_markdown(studies, figures=bool(drawings))
+
+    def render_list(self, title: str, lines: Iterable[str]) -> str:
+        """Return lines as a list with a title above."""
+        return "\n".join([f"# {escape(title)}", *(f"- {escape(line)}" for line in lines)])
 
 
 def board_text(run: Run) -> str:
     """Return the ranking, what its columns mean, and which strategies differ from the best."""
     return to_terminal(_board(run))
-
-
-def failures(items: Sequence[Trouble]) -> list[Block]:
-    """Return a table of jobs without a model, with their reasons; nothing where there is none."""
-    widths = {"case": 20, "strategy": 16, "seeds": 9, "status": 14, "reason": 0}
-    rows = [[t.case, t.strategy, first_of(t.seeds, 5), t.status, t.reason] for t in items]
-    heads = [Column(name, width, left=True, wrap=True) for name, width in widths.items()]
-    return [Table(heads, rows, most=20)] if rows else []
 
 
 def floors_said(run: Run) -> tuple[str, str]:

@@ -10,8 +10,7 @@ from femubench import InputError
 from femubench.reports.blocks import Block, Column, Drawing, Items, Section, Table
 from femubench.reports.cells import NOTHING, fixed, interval, plain
 from femubench.reports.markdown import to_markdown
-from femubench.reports.runs import failures
-from femubench.reports.summary import header, lead, notes_of, troubles
+from femubench.reports.summary import failures, header, lead, notes_of, troubles
 from femubench.reports.terminal import to_terminal
 from femubench.results import Run, StudyAxes, skill_by
 

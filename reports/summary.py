@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from femubench.reports.blocks import Block, Column, Table
 from femubench.reports.cells import first_of, interval, joined, plain
 from femubench.results import (
     JobResult,
@@ -55,6 +56,14 @@ def troubles(results: Iterable[JobResult], *, fine: bool = False) -> list[Troubl
         Trouble(*key, tuple(job.seed for job in jobs), plain(jobs[0].reason))
         for key, jobs in groups.items()
     ]
+
+
+def failures(items: Sequence[Trouble]) -> list[Block]:
+    """Return a table of jobs without a model, with their reasons; nothing where there is none."""
+    widths = {"case": 20, "strategy": 16, "seeds": 9, "status": 14, "reason": 0}
+    rows = [[t.case, t.strategy, first_of(t.seeds, 5), t.status, t.reason] for t in items]
+    heads = [Column(name, width, left=True, wrap=True) for name, width in widths.items()]
+    return [Table(heads, rows, most=20)] if rows else []
 
 
 def spared(results: Iterable[JobResult]) -> dict[str, list[str]]:

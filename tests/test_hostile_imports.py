@@ -442,7 +442,7 @@ def test_an_effect_and_a_reader_are_imported_by_who_uses_them(fine: Path) -> Non
     assert MODULE in sys.modules
 
 
-HOOKED = ("strategies", "scenarios", "effects", "faults", "readers", "reporters")
+HOOKED = ("strategies", "scenarios", "effects", "faults", "readers", "reporters", "papers")
 FORGED: Mapping[str, tuple[object, str]] = {
     "no object": ([1], "what it told is no JSON object"),
     "no offers": ({"broken": [], "loaded": True}, "its description is none: 'offers'"),

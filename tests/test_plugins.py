@@ -318,6 +318,7 @@ def test_objects_with_methods_are_plugins_too(tmp_path: Path) -> None:
         "faults": (),
         "readers": ("unit",),
         "reporters": ("unit",),
+        "papers": (),
     }
 
 

@@ -19,6 +19,7 @@ from femubench.core.plugin.importing import HOOKS
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.roles import CAPABILITIES
 from femubench.effect import Effect, Fault, FrameEffect, Suspect
+from femubench.reproduction import Paper
 from femubench.results import Reporter
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -30,6 +31,7 @@ SECTIONS = {
     "femubench_faults": "Faults",
     "femubench_readers": "Readers",
     "femubench_reporters": "Reporters",
+    "femubench_papers": "Papers",
 }
 ROLES = {
     "Strategies": (Strategy, ("update",), tuple(Strategy.__annotations__)),
@@ -37,6 +39,7 @@ ROLES = {
     "Faults": (Fault, ("suspects",), ("name", "side")),
     "Readers": (Reader, ("read_matrix", "read_modes"), ("name", "suffixes")),
     "Reporters": (Reporter, ("render",), ("name", "suffix")),
+    "Papers": (Paper, ("study",), ("name", "cases")),
 }
 
 

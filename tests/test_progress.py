@@ -199,7 +199,8 @@ class TestEffort:
 def test_updates_of_the_papers_are_as_long_as_they_were(clock: Clock, speed: float) -> None:
     """Every update at a speed that is not known, with what comes between them."""
     papers, said = tuple(PAPERS), list[Advance]()
-    updates, begin = _Updates(papers, said.append, clock), clock.now
+    updates = _Updates([DONE[paper] for paper in papers], said.append, clock)
+    begin = clock.now
     starts = {"frame": 0.0, "hframe": DONE["frame"][-1]}
     whole = sum(row[-1] for row in DONE.values())
     for paper in papers:

@@ -71,13 +71,16 @@ def telling(
         if run is None or isinstance(fault, click.ClickException | click.exceptions.Exit):
             raise
         done = _shown(store, run, screen)
-        for line in _reason(fault):
-            click.echo(line, err=True)
+        stopped = isinstance(fault, KeyboardInterrupt)
+        if not stopped and not isinstance(fault, FemubenchError | OSError):
+            # A fault of ours, which somebody will want to report.
+            click.echo("".join(traceback.format_exception(fault)).rstrip(), err=True)
+        said = " ".join(str(fault).split()) or type(fault).__name__
+        click.echo(f"bench: {'interrupted' if stopped else said}", err=True)
         command = resuming(click.get_current_context().meta.get(_WORDS, ()), added, dropped)
         known = "what was done is kept" if done is None else f"{done} of {jobs} jobs are done"
         click.echo(f"bench: {known}; to go on: {harmless(command)}", err=True)
-        code = INTERRUPTED if isinstance(fault, KeyboardInterrupt) else UNFINISHED
-        raise click.exceptions.Exit(code) from fault
+        raise click.exceptions.Exit(INTERRUPTED if stopped else UNFINISHED) from fault
 
 
 def _shown(store: Store, run: str, screen: Reporter | None) -> int | None:
@@ -91,13 +94,3 @@ def _shown(store: Store, run: str, screen: Reporter | None) -> int | None:
             click.echo("\n" + text_of(screen, rendered(screen, found)))
         return len(found.results) + len(found.beside)
     return None
-
-
-def _reason(fault: BaseException) -> Iterator[str]:
-    if isinstance(fault, KeyboardInterrupt):
-        yield "bench: interrupted"
-        return
-    if not isinstance(fault, FemubenchError | OSError):
-        # A fault of ours, which somebody will want to report.
-        yield "".join(traceback.format_exception(fault)).rstrip()
-    yield f"bench: {' '.join(str(fault).split()) or type(fault).__name__}"

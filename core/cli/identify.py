@@ -10,6 +10,7 @@ from femubench.core.cli import options
 from femubench.core.cli.progress import waiting
 from femubench.core.cli.registry import plugins_for
 from femubench.core.files import check_new
+from femubench.core.library.cases import way_of
 
 
 def _band(
@@ -66,12 +67,11 @@ def identify(
     if output is not None:
         check_new(output)
     from femubench.core.library.identify import identification_of, write_identification
-    from femubench.reports.identification import identification_text
 
     with waiting(f"looking for modes in {file.name}", quiet=quiet):
         found = identification_of(file, plugins_for(ctx), band, order, sensors)
     if not quiet:
-        click.echo(identification_text(found))
+        click.echo(way_of("terminal", "render_modes")(found))
     if output is not None:
         write_identification(found, output, source=file.name)
         if not quiet:

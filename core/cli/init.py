@@ -88,7 +88,7 @@ def init(
 def _tell(case: Case) -> None:
     """Print how well model and test go together, and which modes are held out."""
     from femubench.core.case.starting import sizes_of
-    from femubench.core.library.new_case import nominal_pairs
+    from femubench.core.score.scoring import predict_block
 
     click.echo(wrapped(f"The model {sizes_of(case.model)}.", hanging=2))
     for note in case.notes:
@@ -98,7 +98,7 @@ def _tell(case: Case) -> None:
         text = f"{len(case.matches)} sensors matched; furthest from its place is {far.sensor}, "
         click.echo(wrapped(f"{text}{far.distance:.3g} m from {far.place}.", hanging=2))
     try:
-        pairs = nominal_pairs(case)
+        pairs = predict_block(case.model, case.measurement, None)
     except ModelError as error:
         click.echo(wrapped(f"Note: the model cannot be solved: {error}", hanging=2))
         return

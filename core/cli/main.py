@@ -23,48 +23,24 @@ from femubench.core.version import __version__
 
 DONE, FAILED, WRONG_INPUT = 0, 1, 2
 
-# verb: the module that holds a click command of the same name, and its help in one line. The line
-# stands here so that `bench --help` imports none of them.
+# A verb, which is a click command of that name in a module of that name, and its help in one line,
+# which stands here so that `bench --help` imports none of them.
 VERBS = {
-    "run": ("femubench.core.cli.run", "Run strategies on cases and rank them."),
-    "study": (
-        "femubench.core.cli.study",
-        "Run strategies under conditions that vary: noise, sensors, options.",
-    ),
-    "report": ("femubench.core.cli.report", "Write a report on a stored run."),
-    "compare": (
-        "femubench.core.cli.compare",
-        "Compare run B with run A; exit with 1 if B is worse.",
-    ),
-    "store": ("femubench.core.cli.store", "Check, repair or export stored runs."),
-    "submit": (
-        "femubench.core.cli.submit",
-        "Check, run and compare a strategy for a leaderboard.",
-    ),
-    "publish": ("femubench.core.cli.publish", "Merge result files into a static site in DIR."),
-    "update": (
-        "femubench.core.cli.update",
-        "Write the updated model of CASE in the format that it came in.",
-    ),
-    "diagnose": ("femubench.core.cli.diagnose", "Find what a model lacks, and extend it."),
-    "identify": (
-        "femubench.core.cli.identify",
-        "Find modes in measured responses, without a click.",
-    ),
-    "reproduce": (
-        "femubench.core.cli.reproduce",
-        "Recompute the tables of the papers, cell by cell.",
-    ),
-    "init": (
-        "femubench.core.cli.init",
-        "Write a case folder into FOLDER, which must be new or empty.",
-    ),
-    "challenge": (
-        "femubench.core.cli.challenge",
-        "Write blind cases with a hidden fault, and score answers.",
-    ),
-    "scenarios": ("femubench.core.cli.scenarios", "List the built-in scenarios, or show one."),
-    "plugins": ("femubench.core.cli.plugins", "List, show and check plugins, or write a new one."),
+    "run": "Run strategies on cases and rank them.",
+    "study": "Run strategies under conditions that vary: noise, sensors, options.",
+    "report": "Write a report on a stored run.",
+    "compare": "Compare run B with run A; exit with 1 if B is worse.",
+    "store": "Check, repair or export stored runs.",
+    "submit": "Check, run and compare a strategy for a leaderboard.",
+    "publish": "Merge result files into a static site in DIR.",
+    "update": "Write the updated model of CASE in the format that it came in.",
+    "diagnose": "Find what a model lacks, and extend it.",
+    "identify": "Find modes in measured responses, without a click.",
+    "reproduce": "Recompute the tables of the papers, cell by cell.",
+    "init": "Write a case folder into FOLDER, which must be new or empty.",
+    "challenge": "Write blind cases with a hidden fault, and score answers.",
+    "scenarios": "List the built-in scenarios, or show one.",
+    "plugins": "List, show and check plugins, or write a new one.",
 }
 
 
@@ -84,7 +60,7 @@ class Bench(click.Group):
         """Import one verb."""
         if cmd_name not in VERBS:
             return None
-        command = getattr(import_module(VERBS[cmd_name][0]), cmd_name)
+        command = getattr(import_module(f"{__package__}.{cmd_name}"), cmd_name)
         assert isinstance(command, click.Command)
         return command
 
@@ -102,7 +78,7 @@ class Bench(click.Group):
         """Complete a verb without importing any."""
         verbs = [
             CompletionItem(verb, help=line)
-            for verb, (_, line) in VERBS.items()
+            for verb, line in VERBS.items()
             if verb.startswith(incomplete)
         ]
         return verbs + click.Command.shell_complete(self, ctx, incomplete)
@@ -110,7 +86,7 @@ class Bench(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of verbs without importing them."""
         with formatter.section("Commands"):
-            formatter.write_dl([(verb, line) for verb, (_, line) in VERBS.items()])
+            formatter.write_dl(list(VERBS.items()))
 
     def invoke(self, ctx: click.Context) -> Any:  # noqa: ANN401 - as click has it
         """Run a verb; print one line for an error that the user can act upon."""

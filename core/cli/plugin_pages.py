@@ -8,11 +8,20 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 
 from femubench.core.cli.registry import wrapped
-from femubench.core.plugin.foreign import doc_of
-from femubench.core.plugin.loader import LoadedPlugin, Plugins, shown
+from femubench.core.plugin.foreign import Foreign, doc_of
+from femubench.core.plugin.loader import Plugins, shown
 from femubench.core.plugin.options import ToldOptions, options_of
 from femubench.core.plugin.validation import CHECKS, KINDS
-from femubench.core.roles import Effect, Fault, Reader, Reporter, Scenario, Strategy, declared
+from femubench.core.roles import (
+    Effect,
+    Fault,
+    Paper,
+    Reader,
+    Reporter,
+    Scenario,
+    Strategy,
+    declared,
+)
 
 Row = tuple[str, str]
 
@@ -34,7 +43,8 @@ def pages_of(name: str, plugins: Plugins) -> Iterator[str]:
         offers = getattr(plugins, kind)
         if name in offers:
             found, offered = True, shown(offers, name)
-            source = _source(kind, name, plugins.loaded)
+            origin = next(one for one in plugins.loaded if name in one.offers.get(kind, ()))
+            source = "from", f"{origin.distribution}, plugin {origin.plugin}"
             yield _page(f"{name}: {_ROLES[kind]}", _about(offered), [source, *_ROWS[kind](offered)])
     for plugin in plugins.loaded:
         if plugin.plugin == name and not found:
@@ -52,11 +62,6 @@ def _page(heading: str, paragraphs: Iterable[str], rows: Iterable[Row]) -> str:
         first = f"{key + ':':{width}}" if key else " " * width
         lines.append(wrapped(value, indent=2, lead=first, hanging=width + 2))
     return "\n".join(lines)
-
-
-def _source(kind: str, name: str, loaded: Iterable[LoadedPlugin]) -> Row:
-    found = next(plugin for plugin in loaded if name in plugin.offers.get(kind, ()))
-    return "from", f"{found.distribution}, plugin {found.plugin}"
 
 
 def _about(offered: object) -> Iterator[str]:
@@ -134,6 +139,12 @@ def _reporter(reporter: Reporter) -> Iterator[Row]:
     yield "run", f"bench report --format {reporter.name}"
 
 
+def _paper(paper: Paper | Foreign) -> Iterator[Row]:
+    if isinstance(paper, Paper):
+        yield "cases", ", ".join(paper.cases)
+    yield "run", f"bench reproduce {paper.name}"
+
+
 _ROWS: dict[str, Callable[..., Iterator[Row]]] = {
     "strategies": _strategy,
     "scenarios": _scenario,
@@ -141,4 +152,5 @@ _ROWS: dict[str, Callable[..., Iterator[Row]]] = {
     "faults": _fault,
     "readers": _reader,
     "reporters": _reporter,
+    "papers": _paper,
 }

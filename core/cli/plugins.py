@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from femubench.core.cli import options
-from femubench.core.cli.registry import plugins_for, warn, wrapped
+from femubench.core.cli.registry import Verbs, plugins_for, warn, wrapped
 from femubench.core.conformance import SECONDS
 from femubench.core.display import counted
 from femubench.core.errors import InputError
 from femubench.core.files import write_atomically
 from femubench.core.library.cases import read_cases
-from femubench.core.plugin.loader import Plugins, load_plugins
+from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.validation import CHECKS, chosen, did_you_mean
 
 if TYPE_CHECKING:
@@ -32,15 +32,7 @@ _NEXT = {
 }
 
 
-class _Verbs(click.Group):
-    """A group with an order of its own."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the verbs in the order in which one needs them."""
-        return ["list", "show", "new", "check"]
-
-
-@click.group("plugins", cls=_Verbs)
+@click.group("plugins", cls=Verbs)
 def plugins() -> None:
     """List, show and check plugins, or write a new one."""
 
@@ -71,14 +63,19 @@ def list_(ctx: click.Context, traceback: bool) -> None:
 def show(ctx: click.Context, name: str) -> None:
     """Show what NAME is, where it comes from, what it needs, and its options.
 
-    NAME is a strategy, scenario, effect, reader or reporter, or a plugin of `bench plugins list`.
+    NAME is a strategy, scenario, effect, reader, reporter or paper, or a plugin of `bench plugins
+    list`.
     """
     from femubench.core.cli.plugin_pages import pages_of
 
     found = plugins_for(ctx)
     pages = list(pages_of(name, found))
     if not pages:
-        hint = did_you_mean(name, _names(found)) or "; bench plugins list names all there are"
+        known = [word for kind in CHECKS for word in getattr(found, kind)]
+        known += [plugin.plugin for plugin in found.loaded]
+        hint = (
+            did_you_mean(name, dict.fromkeys(known)) or "; bench plugins list names all there are"
+        )
         raise InputError(f"no plugin offers {name!r}{hint}")
     click.echo("\n\n".join(pages))
 
@@ -106,12 +103,6 @@ def new(ctx: click.Context, name: str, kind: str, output: Path) -> None:
     click.echo(
         f"then run:   {_NEXT[kind].format(name=name, folder=folder, trial=trial_of(name, found))}"
     )
-
-
-def _names(found: Plugins) -> list[str]:
-    """Return every name that `show` takes."""
-    offered = [name for kind in CHECKS for name in getattr(found, kind)]
-    return list(dict.fromkeys([*offered, *(plugin.plugin for plugin in found.loaded)]))
 
 
 @plugins.command("check")

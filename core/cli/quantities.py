@@ -30,7 +30,11 @@ def timeouts_of(
         if name in found:
             whom = f" for {name!r}" if name else ""
             raise click.BadParameter(f"{value!r}: given twice{whom}")
-        found[name] = _seconds(text, value)
+        match = _DURATION.fullmatch(text.strip())
+        seconds = float(match[1]) * _UNITS[match[2]] if match else 0.0
+        if not 0.0 < seconds < float("inf"):
+            raise click.BadParameter(f"{value!r} is no duration > 0 such as 90, 90s, 10m or 1h")
+        found[name] = seconds
     return found
 
 
@@ -63,14 +67,6 @@ def twins_of(
     if match is None:
         raise click.BadParameter(f"{value!r} is no number of twins such as 2, or 2:SEED")
     return int(match[1]), None if match[2] is None else int(match[2])
-
-
-def _seconds(text: str, value: str) -> float:
-    match = _DURATION.fullmatch(text.strip())
-    seconds = float(match[1]) * _UNITS[match[2]] if match else 0.0
-    if not 0.0 < seconds < float("inf"):
-        raise click.BadParameter(f"{value!r} is no duration > 0 such as 90, 90s, 10m or 1h")
-    return seconds
 
 
 def spoken(seconds: float) -> str:

@@ -11,6 +11,14 @@ from femubench.core.plugin.importing import BrokenPlugin
 from femubench.core.plugin.loader import Plugins, load_plugins
 
 
+class Verbs(click.Group):
+    """A group that lists its verbs in the order in which they are written."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the verbs."""
+        return list(self.commands)
+
+
 def plugins_for(ctx: click.Context) -> Plugins:
     """Load all plugins; tell on stderr of those that are broken."""
     plugins = load_plugins()

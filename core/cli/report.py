@@ -14,6 +14,7 @@ from femubench.core.cli import options
 from femubench.core.cli.registry import plugins_for
 from femubench.core.errors import InputError
 from femubench.core.files import check_writable, make_folder, write_atomically
+from femubench.core.library.cases import way_of
 from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.validation import chosen
 
@@ -62,7 +63,8 @@ def report(
     out and reported.
     """
     plugins = plugins_for(ctx)
-    words = list(dict.fromkeys([*_words(formats), *([_PAGE] if opened else [])])) or ["terminal"]
+    parts = [part.strip() for word in formats for part in word.split(",")] + [_PAGE] * opened
+    words = list(dict.fromkeys(_SHORT.get(p, p) for p in parts if p)) or ["terminal"]
     file = Path(run) if run is not None and os.path.isfile(run) else None
     if file is None:  # names are known to be right before what reads runs is loaded
         chosen("report format", words, plugins.reporters)
@@ -78,7 +80,10 @@ def report(
         writers = [plugins.reporters[w] for w in chosen("report format", words, plugins.reporters)]
         kept = store_in(store)
         found = read_run(run, kept)
-        _tell(found, writers)
+        # What was left out is told on stderr where a report has no room for it.
+        silent = any(writer.name not in _TELLING for writer in writers)
+        for note in way_of("terminal", "notes")(found) if silent else ():
+            click.echo(f"bench: {note}", err=True)
         exhibits = kept.exhibits if file is None else None
         above = kept.folder if file is None else file.parent
         written = _write(found, exhibits, writers, above, output)
@@ -107,21 +112,6 @@ def _write_diagnosis(
         write_atomically(files[name], text)
         click.echo(f"{name}: {files[name]}")
     return files
-
-
-def _words(formats: Iterable[str]) -> list[str]:
-    """Return the formats that the words of the user stand for."""
-    parts = [part.strip() for word in formats for part in word.split(",")]
-    return [_SHORT.get(part, part) for part in parts if part]
-
-
-def _tell(run: Run, writers: Sequence[Reporter]) -> None:
-    """Tell on stderr what was left out, where a report has no room for it."""
-    from femubench.reports.summary import notes_of
-
-    if any(writer.name not in _TELLING for writer in writers):
-        for note in notes_of(run):
-            click.echo(f"bench: {note}", err=True)
 
 
 def _write(

@@ -11,11 +11,20 @@ from femubench.core.cli.progress import progress
 from femubench.core.cli.registry import plugins_for, wrapped
 from femubench.core.display import counted
 from femubench.core.files import check_can_make, write_atomically
+from femubench.core.plugin.loader import load_plugins
 from femubench.core.plugin.validation import chosen
 
 
+class _PaperName(click.Argument):
+    """The argument of the papers; its help names those that come with femubench."""
+
+    def make_metavar(self, *_: click.Context) -> str:  # none before click 8.2
+        """Return what may stand there."""
+        return f"[{'|'.join(load_plugins(strangers=False).papers)}]"
+
+
 @click.command("reproduce")
-@click.argument("paper", required=False, metavar="[frame|hframe]")
+@click.argument("paper", required=False, cls=_PaperName)
 @options.json_file("Write the cells as JSON; - prints them.", options.OUTPUT_OR_SCREEN)
 @options.output_folder(
     "Write reproduce.md, .html, .json and the figures there; needs femubench[plot]."
@@ -37,16 +46,16 @@ def reproduce(
     under a convention, after a search or after a fit; it is input, a misprint or cannot be checked;
     or it does not follow from the text. Without a paper, both.
     """
-    from femubench.papers import PAPERS
-
-    papers = chosen("paper", PAPERS if paper is None else [paper], PAPERS)
+    plugins = plugins_for(ctx)
+    if paper is not None:
+        chosen("paper", [paper], plugins.papers)
     if output is not None:
         check_can_make(output)
     from femubench.core.library.report import rendering
-    from femubench.core.library.reproduce import studies_of, write_studies
+    from femubench.core.library.reproduce import papers_of, studies_of, write_studies
 
     with progress(quiet=quiet) as told:
-        studies = studies_of(papers, plugins_for(ctx), told)
+        studies = studies_of(papers_of(plugins, paper), plugins, told)
     if json_file is not None and json_file != options.SCREEN:
         write_atomically(json_file, rendering(studies, "json"))
     files, figures = ([], 0) if output is None else write_studies(studies, output)

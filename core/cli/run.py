@@ -30,6 +30,13 @@ if TYPE_CHECKING:
     from femubench.core.schema.results import Run
 
 
+# Words that would make a run another one.
+_FIXED = (
+    *("cases", "strategies", "seeds", "seed", "nominal", "twins"),
+    *("timeouts", "memory", "resume", "overwrite"),
+)
+
+
 @click.command("run")
 @click.argument("cases", metavar="[CASE]...", nargs=-1)
 @click.option(
@@ -127,8 +134,9 @@ def _checked(ctx: click.Context, cases: Iterable[str], strategies: Iterable[str]
         raise PluginError(f"{counted(len(plugins.broken), 'fault')} in plugins, see above")
     chosen("strategy", (word.partition(":")[0] for word in strategies), plugins.strategies)
     case_folders(cases, plugins.scenarios)
-    if ctx.params["locked"] is not None:
-        _check_locked(ctx)
+    for name in _FIXED if ctx.params["locked"] is not None else ():
+        if ctx.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT:
+            raise InputError(f"--locked repeats a run as it was; {name} cannot be given beside it")
     return plugins
 
 
@@ -169,22 +177,6 @@ def _plan(ctx: click.Context, plugins: Plugins, store: Store) -> Plan:
         resumed=store if words["resume"] else None,
         twins=words["twins"],
     )
-
-
-def _check_locked(ctx: click.Context) -> None:
-    """Refuse words that would make it another run.
-
-    Raises:
-        InputError: naming the first of them.
-    """
-    default = click.core.ParameterSource.DEFAULT
-    words = (
-        *("cases", "strategies", "seeds", "seed", "nominal", "twins"),
-        *("timeouts", "memory", "resume", "overwrite"),
-    )
-    for name in words:
-        if ctx.get_parameter_source(name) is not default:
-            raise InputError(f"--locked repeats a run as it was; {name} cannot be given beside it")
 
 
 def _compare(old: Run, new: Run) -> int:

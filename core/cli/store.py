@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from femubench.core.cli import options
-from femubench.core.cli.registry import plugins_for
+from femubench.core.cli.registry import Verbs, plugins_for
 from femubench.core.display import counted
 from femubench.core.errors import InputError
 from femubench.core.files import make_folder, write_atomically
@@ -19,15 +19,7 @@ if TYPE_CHECKING:
 _LINES, _FRAMES = "jsonl", ("csv", "parquet")
 
 
-class _Verbs(click.Group):
-    """A group with an order of its own."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the verbs in the order in which one needs them."""
-        return ["check", "repair", "export"]
-
-
-@click.group("store", cls=_Verbs)
+@click.group("store", cls=Verbs)
 def store() -> None:
     """Check, repair or export stored runs."""
 

@@ -31,6 +31,20 @@ def usable_plugins() -> Plugins:
     return plugins
 
 
+def way_of(style: str, way: str) -> Callable[..., Any]:
+    """Return the method by which a report format of femubench shows something else than a run.
+
+    Raises:
+        InputError: when there is no such format, or it does not show that.
+    """
+    formats = load_plugins(strangers=False).reporters
+    found = getattr(formats.get(style), way, None)
+    if callable(found):
+        return found  # type: ignore[no-any-return]
+    having = ", ".join(name for name in formats if callable(getattr(formats[name], way, None)))
+    raise InputError(f"there is no style {style!r}", expected=f"one of {having}")
+
+
 class InstalledReaders(Sequence[Reader]):
     """The readers of all plugins; nothing is loaded before a file asks for one."""
 
@@ -138,12 +152,10 @@ def _case(plugins: Plugins, name: str) -> Case:
     return read_case(folder, name, readers, installed=True)
 
 
-def _strategy(plugins: Plugins, name: str) -> Variant:
-    return Variant(plugins.strategies[name], name)
-
-
 cases: Catalogue[Case] = Catalogue("case", lambda p: scenarios_of(p.scenarios), _case)
-strategies: Catalogue[Variant] = Catalogue("strategy", lambda p: p.strategies, _strategy)
+strategies: Catalogue[Variant] = Catalogue(
+    "strategy", lambda p: p.strategies, lambda p, name: Variant(p.strategies[name], name)
+)
 effects: Catalogue[Effect] = Catalogue(
     "effect", lambda p: p.effects, lambda p, name: p.effects[name]
 )
@@ -179,7 +191,14 @@ def read_cases(given: CaseLike | Iterable[CaseLike], plugins: Plugins) -> list[C
         else item
         for item in wanted
     ]
-    _check_names(found)
+    # Results of two folders under one name could not be told apart.
+    seen: dict[str, Path] = {}
+    for case in found:
+        if case.name in seen:
+            what = f"the name {case.name!r} is also that of {seen[case.name]}"
+            file, expected = case.folder / "case.toml", "a name of its own"
+            raise InputError(what, file=file, key="case.name", expected=expected)
+        seen[case.name] = case.folder
     return found
 
 
@@ -253,17 +272,3 @@ def _folders(word: str, scenarios: Mapping[str, Scenario]) -> Iterable[tuple[str
     if "/" in word and word.partition("/")[0] not in {*scenarios, *groups}:
         raise InputError("folder does not exist", file=path, expected="a folder with a case.toml")
     raise unknown("case", word, case_names(scenarios))
-
-
-def _check_names(cases: Iterable[Case]) -> None:
-    """Refuse two folders under one name: their results could not be told apart."""
-    seen: dict[str, Path] = {}
-    for case in cases:
-        if case.name in seen:
-            raise InputError(
-                f"the name {case.name!r} is also that of {seen[case.name]}",
-                file=case.folder / "case.toml",
-                key="case.name",
-                expected="a name of its own",
-            )
-        seen[case.name] = case.folder

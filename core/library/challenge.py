@@ -141,23 +141,16 @@ def _given(case: Path, path: Path, seed: int, truths: Path, reference: bool) -> 
     told = read_truth(room)
     near = (folder / "structures" / told.structure for folder in (room.parent, truths))
     structure = next((folder for folder in near if folder.is_dir()), None)
-    structure = structure or _structure(told.structure, room)
+    if structure is None:
+        owners = scenarios_of(usable_plugins().scenarios)
+        named = [name for name in owners if name.rpartition("/")[2] == told.structure]
+        if not named:
+            what = f"no structure {told.structure!r}"
+            expected = "a folder in `structures`, or a built-in case"
+            raise InputError(what, file=room / TRUTH_FILE, key="structure", expected=expected)
+        structure = owners[named[0]].folder(named[0])
     hidden = GivenTruth(told, seed, reference, digest="")
     return _sealed(case, path, lambda: pose(room, structure, case, reference), hidden)
-
-
-def _structure(name: str, room: Path) -> Path:
-    """Return the folder of a built-in case by the last word of its name.
-
-    Raises:
-        InputError: when there is none.
-    """
-    owners = scenarios_of(usable_plugins().scenarios)
-    for case, scenario in owners.items():
-        if case.rpartition("/")[2] == name:
-            return scenario.folder(case)
-    what, expected = f"no structure {name!r}", "a folder in `structures`, or a built-in case"
-    raise InputError(what, file=room / TRUTH_FILE, key="structure", expected=expected)
 
 
 def _free(folder: str | PathLike[str], truth: str | PathLike[str] | None) -> tuple[Path, Path]:

@@ -62,13 +62,8 @@ def compare(
     wanted = chosen("strategy", map(str, listed(strategies)), (*known[0], *known[1]))
     limits = tuple(threshold_of(item) if isinstance(item, str) else item for item in listed(fail))
     pair = None if against is None else Against(*against)
-    return compare_runs(
-        one,
-        other,
-        thresholds=limits or DEFAULT_THRESHOLDS,
-        strategies=wanted,
-        against=pair,
-    )
+    limits = limits or DEFAULT_THRESHOLDS
+    return compare_runs(one, other, thresholds=limits, strategies=wanted, against=pair)
 
 
 def threshold_of(text: str) -> Threshold:

@@ -17,7 +17,7 @@ from femubench.core.diagnosis.serial import diagnosis_to_json
 from femubench.core.errors import InputError, NotApplicable
 from femubench.core.files import check_new, make_folder
 from femubench.core.inference.effort import Effort
-from femubench.core.library.cases import CaseLike, listed, one_case, usable_plugins
+from femubench.core.library.cases import CaseLike, listed, one_case, usable_plugins, way_of
 from femubench.core.pace import Told
 from femubench.core.plugin.loader import Plugins, registered_faults
 from femubench.core.plugin.validation import check_effect, chosen
@@ -139,12 +139,10 @@ def write_extended(found: Diagnosis, folder: Path) -> None:
     Raises:
         FemubenchError: when it cannot be written as a case.
     """
-    from femubench.reports.diagnosis import summary_lines
-
     case = found.subject
     assert isinstance(case, Case)
     make_folder(folder.parent)
-    comment = summary_lines(diagnosis_to_json(found))
+    comment = way_of("terminal", "diagnosis_lines")(diagnosis_to_json(found))
     # A name of its own, so that both cases can be run together.
     name = f"{case.name[:_LONGEST]}-extended"
     write_case(folder, case, found.extended, comment=comment, name=name)

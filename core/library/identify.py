@@ -16,7 +16,7 @@ from femubench.core.files import check_new, check_regular
 from femubench.core.identify.identification import Identification
 from femubench.core.identify.output_only import MOST_ORDER, identify_signals
 from femubench.core.identify.responses import MOST_POLES, identify_responses
-from femubench.core.library.cases import usable_plugins
+from femubench.core.library.cases import usable_plugins, way_of
 from femubench.core.modal.signals import TimeSignals
 from femubench.core.plugin.loader import Plugins
 
@@ -104,12 +104,10 @@ def write_identification(found: Identification, folder: Path, *, source: str = "
     Raises:
         InputError: when nothing can be written there.
     """
-    from femubench.reports.identification import identification_html
-
     measurement = found.measurement
     with new_folder(folder) as fresh:
         share = common_share([measurement], None)
         (fresh / "modes.csv").write_bytes(modes_csv(measurement, share))
         (fresh / "sensors.csv").write_bytes(sensors_csv(measurement.sensors))
-        page = identification_html(found, source)
+        page = way_of("html", "render_modes")(found, source)
         (fresh / PAGE).write_text(page, encoding="utf-8")

@@ -7,8 +7,6 @@ from pathlib import Path
 from femubench.core.case.case import Case
 from femubench.core.case.starting import Beginning, start_case
 from femubench.core.plugin.loader import Plugins
-from femubench.core.schema.paired_modes import PairedMode
-from femubench.core.score.scoring import predict_block
 
 
 def begin_case(folder: Path, given: Beginning, plugins: Plugins) -> Case:
@@ -31,12 +29,3 @@ def _draw(case: Case, file: Path) -> None:
     from femubench.core.plot.style import figure_of
 
     figure_of(matching(case)).savefig(str(file), dpi=150)
-
-
-def nominal_pairs(case: Case) -> tuple[PairedMode, ...]:
-    """Return what the model predicts of all measured modes, paired by shape and frequency.
-
-    Raises:
-        ModelError: when the model has no modes.
-    """
-    return predict_block(case.model, case.measurement, None)

@@ -71,7 +71,12 @@ def write_package(name: str, kind: str, output: Path, plugins: Plugins) -> tuple
     """
     check_name(name, kind, plugins)
     folder = output / name
-    _check_free(folder)
+    if not output.is_dir():
+        raise InputError("folder does not exist", file=folder.parent, expected="an existing folder")
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise InputError("is in the way", file=folder, expected="no such file, or an empty folder")
+    if folder.is_dir() and any(folder.iterdir()):
+        raise InputError("is not empty", file=folder, expected="a new or an empty folder")
     # Made beside its place, so that one rename puts it there.
     part = output / f".{name}.{secrets.token_hex(6)}"
     try:
@@ -142,15 +147,6 @@ def _fault_of(name: str, kind: str, plugins: Plugins) -> str:
     found = find_spec(module)
     # A folder without __init__.py in the working directory counts as a module without origin.
     return f"a module {module} is installed" if found is not None and found.origin else ""
-
-
-def _check_free(folder: Path) -> None:
-    if not folder.parent.is_dir():
-        raise InputError("folder does not exist", file=folder.parent, expected="an existing folder")
-    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-        raise InputError("is in the way", file=folder, expected="no such file, or an empty folder")
-    if folder.is_dir() and any(folder.iterdir()):
-        raise InputError("is not empty", file=folder, expected="a new or an empty folder")
 
 
 def _files(name: str, kind: str, trial: str) -> Iterator[tuple[str, str]]:

@@ -12,7 +12,7 @@ from typing import Any
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
 from femubench.core.files import check_can_make, resolved
-from femubench.core.library.cases import listed, read_cases, scenarios_of, usable_plugins
+from femubench.core.library.cases import listed, read_cases, scenarios_of, usable_plugins, way_of
 from femubench.core.library.rank import classes_of, drawn_twins, textbook_of
 from femubench.core.plugin.loader import Plugins
 from femubench.core.publish.publishing import Published, publish as merge
@@ -49,8 +49,6 @@ def publish(
         >>> len(femubench.publish("site", run, unverified=True).added)
         1
     """
-    from femubench.reports.publish_page import pages_of
-
     check_can_make(resolved(Path(folder)).parent)
     with TemporaryDirectory() as scratch:
         files = []
@@ -60,7 +58,9 @@ def publish(
                 file.write_text(json.dumps(run_to_json(run), allow_nan=False), encoding="utf-8")
             files.append(file)
         return merge(
-            Path(folder), files, pages_of, _check(), unverified=unverified, address=address
+            *(Path(folder), files, way_of("html", "render_site"), _check()),
+            unverified=unverified,
+            address=address,
         )
 
 

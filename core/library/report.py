@@ -6,7 +6,7 @@ import base64
 import json
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from femubench.core.diagnosis.serial import diagnosis_from_json, diagnosis_to_js
 from femubench.core.drawing.files import Exhibits
 from femubench.core.errors import FemubenchError, InputError, PluginError
 from femubench.core.files import check_writable, read_bytes, write_atomically
-from femubench.core.library.cases import usable_plugins
+from femubench.core.library.cases import usable_plugins, way_of
 from femubench.core.library.rank import Run as Tables, read_run, store_in
 from femubench.core.plugin.apart import Origin
 from femubench.core.plugin.importing import offered_by
@@ -28,7 +28,6 @@ from femubench.core.run.store import Store
 from femubench.core.schema.records import finite, parse_json, run_from_json
 from femubench.core.schema.results import Run
 from femubench.core.score.comparison import Comparison
-from femubench.core.study.axes import StudyAxes
 
 Reportable = Run | Diagnosis | Comparison | Study | Sequence[Study]
 SUFFIXES = {"terminal": ".txt", "markdown": ".md", "html": ".html", "json": ".json"}
@@ -73,38 +72,25 @@ def report(
         kept = store_in(store)
         found = read_run(what, kept)
     if isinstance(found, Run):
-        content = _run_report(found, path, style, kept)
+        plugins, name = usable_plugins(), SHORT.get(style or "", style or "terminal")
+        if style is None and path is not None:
+            writer = reporter_for(plugins, path)
+        else:
+            writer = plugins.reporters[chosen("report format", [name], plugins.reporters)[0]]
+        content = rendered(writer, found, None if kept is None else kept.exhibits)
     else:
-        content = rendering(found, style or ("terminal" if path is None else _style_of(path)))
+        ending = ".txt" if path is None else path.suffix.lower()
+        by_suffix = {suffix: name for name, suffix in SUFFIXES.items()}
+        if style is None and ending not in by_suffix:
+            known = " or ".join(by_suffix)
+            raise InputError("does not say its format", file=path, expected=f"a name with {known}")
+        content = rendering(found, style or by_suffix[ending])
     if path is not None:
         write_atomically(path, content)
         return path
     if isinstance(content, bytes):
         raise InputError(f"style {style} is no text", expected="a file")
     return content
-
-
-def _run_report(run: Run, path: Path | None, style: str | None, store: Store | None) -> str | bytes:
-    plugins = usable_plugins()
-    if style is None and path is not None:
-        found = reporter_for(plugins, path)
-    else:
-        name = SHORT.get(style or "", style or "terminal")
-        found = plugins.reporters[chosen("report format", [name], plugins.reporters)[0]]
-    return rendered(found, run, None if store is None else store.exhibits)
-
-
-def _style_of(path: Path) -> str:
-    """Return the style that a suffix stands for.
-
-    Raises:
-        InputError: when it stands for none.
-    """
-    for style, suffix in SUFFIXES.items():
-        if path.suffix.lower() == suffix:
-            return style
-    known = " or ".join(SUFFIXES.values())
-    raise InputError("does not say its format", file=path, expected=f"a name with {known}")
 
 
 def diagnosis_in(path: Path) -> dict[str, Any] | None:
@@ -127,50 +113,22 @@ def rendering(what: object, style: str) -> str:
         InputError: for a style that it does not have.
     """
     data: Any = what
+    further: list[Any] = []
     if isinstance(data, Diagnosis):
         data = diagnosis_to_json(data, case=data.subject)
     if isinstance(data, Mapping):
-        writers = _diagnosis_writers()
+        way = "render_diagnosis"
     elif isinstance(data, Comparison):
-        data, writers = finite(data.to_json()), _comparison_writers()
+        way, data = "render_comparison", finite(data.to_json())
     else:
-        data, writers = [data] if isinstance(data, Study) else data, _study_writers()
-    by_style = dict(zip(SUFFIXES, writers, strict=True))
-    if style not in by_style:
-        raise InputError(f"there is no style {style!r}", expected=f"one of {', '.join(by_style)}")
-    return by_style[style](data)
-
-
-def _plain_json(data: object) -> str:
-    return json.dumps(data, indent=1, allow_nan=False)
-
-
-Writers = tuple[Callable[[Any], str], ...]
-
-
-def _diagnosis_writers() -> Writers:
-    from femubench.reports.diagnosis import diagnosis_html, diagnosis_markdown, diagnosis_text
-
-    return diagnosis_text, diagnosis_markdown, diagnosis_html, _plain_json
-
-
-def _comparison_writers() -> Writers:
-    from femubench.reports import compare_page as page
-
-    return page.comparison_text, page.comparison_markdown, page.comparison_html, _plain_json
-
-
-def _study_writers() -> Writers:
-    from femubench.reports import reproduction as page
-    from femubench.reports.reproduction_page import reproduction_html
-
-    def html(studies: Sequence[Study]) -> str:
-        return reproduction_html(studies, dict(drawings(studies)))
-
-    def data(studies: Sequence[Study]) -> str:
-        return json.dumps(cells_to_json(studies), indent=1, ensure_ascii=False, allow_nan=False)
-
-    return page.reproduction_text, page.reproduction_markdown, html, data
+        way, data = "render_studies", [data] if isinstance(data, Study) else data
+        further = [dict(drawings(data)) if style == "html" else {}]
+    if style not in SUFFIXES:
+        raise InputError(f"there is no style {style!r}", expected=f"one of {', '.join(SUFFIXES)}")
+    if style != "json":
+        return str(way_of(style, way)(data, *further))
+    plain, ascii_only = (cells_to_json(data), False) if further else (data, True)
+    return json.dumps(plain, indent=1, ensure_ascii=ascii_only, allow_nan=False)
 
 
 def drawings(studies: Sequence[Study]) -> Iterator[tuple[str, str]]:
@@ -202,8 +160,6 @@ def rendered(found: Reporter, run: Run, exhibits: object = None) -> str | bytes:
     Raises:
         PluginError: naming the reporter, whatever it raised.
     """
-    if found.name in ("terminal", "markdown", "html") and StudyAxes.asked(run) is not None:
-        return _study_report(found.name, run)
     as_bytes, with_exhibits = (
         getattr(found, name, None) for name in ("render_bytes", "render_with")
     )
@@ -241,14 +197,6 @@ def written_apart(origin: Origin, question: Mapping[str, Any]) -> dict[str, Any]
     if isinstance(content, bytes):
         return {"bytes": base64.b64encode(content).decode()}
     return {"text": content if isinstance(content, str) else None, "type": type(content).__name__}
-
-
-def _study_report(style: str, run: Run) -> str:
-    """Return a study in a format whose reporter would rank what the study varies."""
-    from femubench.reports.study import study_html, study_markdown, study_text
-
-    writers = {"terminal": study_text, "markdown": study_markdown, "html": study_html}
-    return writers[style](run)
 
 
 def text_of(found: Reporter, content: str | bytes) -> str:

@@ -11,12 +11,13 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from femubench.core.files import check_can_make, make_folder, write_atomically
-from femubench.core.library.cases import listed, read_cases, usable_plugins
+from femubench.core.library.cases import listed, read_cases, usable_plugins, way_of
 from femubench.core.library.report import drawings, rendering
 from femubench.core.pace import Advance, Told
-from femubench.core.plugin.loader import Plugins
+from femubench.core.plugin.foreign import is_foreign
+from femubench.core.plugin.loader import Plugins, shown
 from femubench.core.plugin.validation import chosen
-from femubench.core.reproduction.study import Study
+from femubench.core.reproduction.study import FIGURES, Study
 from femubench.core.reproduction.workbench import Workbench
 
 _STEM = "reproduce"
@@ -40,21 +41,21 @@ def reproduce(
     """
     if output is not None:
         check_can_make(Path(output))
-    found = studies_of(known_papers(papers), usable_plugins())
+    plugins = usable_plugins()
+    found = studies_of(papers_of(plugins, papers), plugins)
     if output is not None:
         write_studies(found, Path(output))
     return found
 
 
-def known_papers(papers: str | Sequence[str] | None = None) -> tuple[str, ...]:
-    """Return the names of papers, all where None is given.
+def papers_of(plugins: Plugins, papers: str | Sequence[str] | None = None) -> tuple[str, ...]:
+    """Return the names of papers, all that come with femubench where None is given.
 
     Raises:
         InputError: for an unknown one.
     """
-    from femubench.papers import PAPERS
-
-    return chosen("paper", PAPERS if papers is None else listed(papers), PAPERS)
+    own = [name for name in plugins.papers if not is_foreign(shown(plugins.papers, name))]
+    return chosen("paper", own if papers is None else listed(papers), plugins.papers)
 
 
 def studies_of(
@@ -69,15 +70,14 @@ def studies_of(
         told: called after each update with how many are computed, of how many.
         clock: seconds from any time on.
     """
-    from femubench.papers import PAPERS, study
-
     found = []
-    watched = _Updates(papers, told, clock)
-    for paper in papers:
-        cases = {case.name: case for case in read_cases(PAPERS[paper], plugins)}
+    wanted = [plugins.papers[name] for name in papers]
+    watched = _Updates([getattr(paper, "done", (1,)) for paper in wanted], told, clock)
+    for paper in wanted:
+        cases = {case.name: case for case in read_cases(paper.cases, plugins)}
         # Many small matrices: threads would only wait for each other.
         with threadpool_limits(1):
-            found.append(study(paper, Workbench(plugins.strategies, cases, watched.step)))
+            found.append(paper.study(Workbench(plugins.strategies, cases, watched.step)))
     return tuple(found)
 
 
@@ -85,11 +85,8 @@ class _Updates:
     """Updates that are computed, and the time that the rest takes, as such re-runs have it."""
 
     def __init__(
-        self, papers: Sequence[str], told: Told | None, clock: Callable[[], float]
+        self, rows: Sequence[Sequence[int]], told: Told | None, clock: Callable[[], float]
     ) -> None:
-        from femubench.papers import DONE
-
-        rows = [DONE[paper] for paper in papers]
         before = accumulate((row[-1] for row in rows), initial=0)
         self._after = [
             first + x for first, row in zip(before, rows, strict=False) for x in row[:-1]
@@ -114,16 +111,13 @@ class _Updates:
 
 def write_studies(studies: Sequence[Study], folder: Path) -> tuple[list[str], int]:
     """Write the reports and the figures; return the names of the reports, and how many figures."""
-    from femubench.reports.reproduction import FIGURES, reproduction_markdown
-    from femubench.reports.reproduction_page import reproduction_html
-
     make_folder(folder / FIGURES)
     drawn = dict(drawings(studies))
     for name, svg in drawn.items():
         write_atomically(folder / FIGURES / f"{name}.svg", svg)
     texts = {
-        ".md": reproduction_markdown(studies, figures=True),
-        ".html": reproduction_html(studies, drawn),
+        ".md": way_of("markdown", "render_studies")(studies, drawn),
+        ".html": way_of("html", "render_studies")(studies, drawn),
         ".json": rendering(studies, "json"),
     }
     for suffix, text in texts.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from femubench.core.display import counted
 from femubench.core.errors import InputError
 from femubench.core.files import check_writable
-from femubench.core.library.cases import listed, usable_plugins
+from femubench.core.library.cases import listed, usable_plugins, way_of
 from femubench.core.library.compare import compare
 from femubench.core.library.plugins import check
 from femubench.core.library.publish import refusal_of
@@ -78,8 +78,15 @@ def submit(
     names = [str(name) for name in listed(strategies)]
     file = Path(output)
     check_writable(file)
-    before = None if baseline is None else _baseline(Path(baseline))
-    faults = list(_broken_rules(names, tell))
+    if baseline is not None and not Path(baseline).is_file():
+        what = "there is no such file"
+        raise InputError(what, file=Path(baseline), expected="a result file")
+    before = None if baseline is None else read_run(baseline)
+    faults = []
+    for name in names:
+        tell(f"check {name}")
+        rules = [item for item in check(name) if item.verdict.status == "fail"]
+        faults += [f"{name} breaks the rule {r.check.name}: {r.verdict.message}" for r in rules]
     tell(f"run {', '.join(names)}")
     limits = dict(timeouts or {})
     plan = plan_of(
@@ -101,21 +108,6 @@ def submit(
     return Submission(run, tuple(faults), refusal_of(file), found)
 
 
-def _baseline(file: Path) -> Run:
-    if not file.is_file():
-        raise InputError("there is no such file", file=file, expected="a result file")
-    return read_run(file)
-
-
-def _broken_rules(names: Sequence[str], tell: Callable[[str], None]) -> Iterator[str]:
-    """Yield the rules for plugins that a strategy breaks."""
-    for name in names:
-        tell(f"check {name}")
-        failed = [found for found in check(name) if found.verdict.status == "fail"]
-        for found in failed:
-            yield f"{name} breaks the rule {found.check.name}: {found.verdict.message}"
-
-
 def _unanswered(run: Run, names: Iterable[str]) -> Iterator[str]:
     """Yield strategies with jobs that ended their process or had to be ended."""
     for name in names:
@@ -124,7 +116,9 @@ def _unanswered(run: Run, names: Iterable[str]) -> Iterator[str]:
             cases = list(dict.fromkeys(item.case for item in own if item.status == status))
             if cases:
                 what = "crashed" if status == "crashed" else "ran out of time"
-                yield f"{name} {what} on {_named(cases)}"
+                left = len(cases) - _MOST_NAMED
+                more = f" and {counted(left, 'more case')}" if left > 0 else ""
+                yield f"{name} {what} on {', '.join(cases[:_MOST_NAMED])}{more}"
 
 
 def _losses(found: Comparison) -> Iterator[str]:
@@ -137,24 +131,16 @@ def _losses(found: Comparison) -> Iterator[str]:
         yield f"{item.strategy} is worse than the baseline{where}: {told}"
 
 
-def _named(cases: Sequence[str]) -> str:
-    first = ", ".join(cases[:_MOST_NAMED])
-    left = len(cases) - _MOST_NAMED
-    return f"{first} and {counted(left, 'more case')}" if left > 0 else first
-
-
 def summary_of(found: Submission) -> str:
     """Return what came out in Markdown: the verdict, the ranking, the comparison."""
-    from femubench.reports.markdown import escape
-
     markdown = reporter(usable_plugins(), "markdown")
     verdict = "not accepted" if found.faults else "accepted"
-    lines = [f"# Submission: {verdict}", *(f"- {escape(line)}" for line in found.faults)]
+    lines = list(found.faults)
     if found.unverified:
-        lines.append(f"- a leaderboard takes it as unverified alone: {escape(found.unverified)}")
+        lines.append(f"a leaderboard takes it as unverified alone: {found.unverified}")
     if found.comparison is None:
-        lines.append("- no baseline: commit the result file to have the next run compared with it")
-    parts = ["\n".join(lines)]
+        lines.append("no baseline: commit the result file to have the next run compared with it")
+    parts = [way_of("markdown", "render_list")(f"Submission: {verdict}", lines)]
     if found.comparison is not None:
         parts.append(str(rendering(found.comparison, "markdown")))
     parts.append(str(rendered(markdown, found.run)))

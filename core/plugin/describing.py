@@ -157,4 +157,5 @@ _DESCRIBE: Mapping[str, Callable[[Any], dict[str, Any]]] = {
     "faults": _fault,
     "readers": _reader,
     "reporters": _reporter,
+    "papers": _common,
 }

@@ -1,8 +1,8 @@
 """What plugins of strangers offer, known from a description and never imported to be listed.
 
 A `ForeignStrategy` is imported where its `update` is called, which is in a worker; folders of cases
-are made and reports are written in processes of their own. An effect, a fault and a reader work on
-models and are imported by whoever uses one by its name.
+are made and reports are written in processes of their own. An effect, a fault, a paper and a reader
+work on models and are imported by whoever uses one by its name.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Handle:
 
 @dataclass(frozen=True)
 class Foreign(Later):
-    """What is known of an effect or a fault without its code.
+    """What is known of an effect, a fault or a paper without its code.
 
     Arguments:
         handle: by which it is imported.
@@ -82,7 +82,7 @@ class Foreign(Later):
         return self.handle.name
 
     def load(self) -> Any:  # noqa: ANN401 - as the kind has it
-        """Import the plugin in this process and return the effect or the fault."""
+        """Import the plugin in this process and return the thing."""
         return self.handle.load()
 
 
@@ -419,6 +419,10 @@ def _fault(handle: Handle, told: Mapping[str, Any]) -> Foreign:
     return Foreign(handle, _doc(told), side=side)
 
 
+def _paper(handle: Handle, told: Mapping[str, Any]) -> Foreign:
+    return Foreign(handle, _doc(told))
+
+
 _MADE: Mapping[str, Callable[[Handle, Mapping[str, Any]], Any]] = {
     "strategies": strategy_of,
     "scenarios": _scenario,
@@ -426,6 +430,7 @@ _MADE: Mapping[str, Callable[[Handle, Mapping[str, Any]], Any]] = {
     "faults": _fault,
     "readers": _reader,
     "reporters": _reporter,
+    "papers": _paper,
 }
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from femubench.core.plugin.markers import hookspec
 
 if TYPE_CHECKING:
-    from femubench.core.roles import Effect, Fault, Reader, Reporter, Scenario, Strategy
+    from femubench.core.roles import Effect, Fault, Paper, Reader, Reporter, Scenario, Strategy
 
 # Hook specifications have no body: pluggy reads their signature alone.
 # mypy: disable-error-code="empty-body"
@@ -42,3 +42,8 @@ def femubench_readers() -> Iterable[Reader | type[Reader]]:
 @hookspec
 def femubench_reporters() -> Iterable[Reporter | type[Reporter]]:
     """Return report formats for ``bench report --format``."""
+
+
+@hookspec
+def femubench_papers() -> Iterable[Paper | type[Paper]]:
+    """Return papers whose tables ``bench reproduce`` recomputes."""

@@ -68,9 +68,9 @@ class Later(ABC):
 class Offers(UserDict[str, Any]):
     """What plugins offer of one kind, by name, in the order of the plugins.
 
-    Asking for an entry that was offered by reference loads it, and so does asking for an effect or
-    a fault of a stranger, which imports the stranger's plugin here. Both raise PluginError where
-    that fails or where the entry does not fill its role.
+    Asking for an entry that was offered by reference loads it, and so does asking for an effect, a
+    fault or a paper of a stranger, which imports the stranger's plugin here. Both raise PluginError
+    where that fails or where the entry does not fill its role.
     """
 
     def __getitem__(self, name: str) -> Any:  # noqa: ANN401 - as the kind has it

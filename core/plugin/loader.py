@@ -30,7 +30,7 @@ from femubench.core.plugin.importing import (
 from femubench.core.plugin.markers import PROJECT
 from femubench.core.plugin.source_files import stamps
 from femubench.core.plugin.validation import CHECKS, chosen, of_type
-from femubench.core.roles import Effect, Fault, Reader, Reporter, Scenario, Strategy
+from femubench.core.roles import Effect, Fault, Paper, Reader, Reporter, Scenario, Strategy
 from femubench.core.version import __version__
 
 DESCRIBE = "femubench.core.plugin.describing:described"
@@ -71,6 +71,7 @@ class Plugins:
     faults: Mapping[str, Fault] = field(default_factory=dict)
     readers: Mapping[str, Reader] = field(default_factory=dict)
     reporters: Mapping[str, Reporter] = field(default_factory=dict)
+    papers: Mapping[str, Paper] = field(default_factory=dict)
     loaded: tuple[LoadedPlugin, ...] = ()
     broken: tuple[BrokenPlugin, ...] = ()
 

@@ -14,6 +14,7 @@ from femubench.core.roles import (
     CAPABILITIES,
     Effect,
     Fault,
+    Paper,
     Reader,
     Reporter,
     Scenario,
@@ -130,6 +131,19 @@ def check_fault(offered: object) -> Fault:
     return fault
 
 
+def check_paper(offered: object) -> Paper:
+    """Return a paper.
+
+    Raises:
+        PluginError: when it lacks its method, a name or its cases.
+    """
+    paper: Paper = _filled(offered, "Paper", "study")
+    cases = getattr(paper, "cases", None)
+    if not isinstance(cases, (tuple, list)) or not all(map(_is_text, cases)):
+        raise PluginError(f"{_label(offered)}: cases is {cases!r}, not a tuple of names")
+    return paper
+
+
 CHECKS: Mapping[str, Callable[[object], Any]] = {
     "strategies": check_strategy,
     "scenarios": check_scenario,
@@ -137,6 +151,7 @@ CHECKS: Mapping[str, Callable[[object], Any]] = {
     "faults": check_fault,
     "readers": check_reader,
     "reporters": check_reporter,
+    "papers": check_paper,
 }
 
 
@@ -148,6 +163,7 @@ KINDS = {
     "reader": "readers",
     "scenario": "scenarios",
     "reporter": "reporters",
+    "paper": "papers",
 }
 
 

@@ -14,6 +14,7 @@ from femubench.core.reproduction.equation import Equation
 from femubench.core.reproduction.ground import VERDICTS, Verdict
 from femubench.core.reproduction.printed_table import PrintedTable
 
+FIGURES = "figures"  # folder of the drawings beneath that of a report
 _TOLD = (
     *("paper", "table", "row", "column"),
     *("printed", "ours", "deviation_percent", "verdict", "note", "tried"),

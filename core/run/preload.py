@@ -13,9 +13,7 @@ import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import suppress
-from importlib import import_module
 from multiprocessing import popen_forkserver  # noqa: F401 - every worker imports it
-from pkgutil import iter_modules
 
 import scipy.linalg
 import scipy.optimize
@@ -27,21 +25,23 @@ import femubench.core.drawing.prediction
 import femubench.core.plugin.variants
 import femubench.core.run.judging
 import femubench.core.run.worker  # noqa: F401 - loaded for its time
+from femubench.core.plugin.loader import load_plugins
 
 _PR_SET_CHILD_SUBREAPER = 36
 _OWN = ("strategies", "effects", "faults")
 
 
 def own_plugins() -> Iterator[str]:
-    """Yield the modules of plugins that come with femubench."""
+    """Load the plugins that come with femubench and yield the modules of what they offer."""
+    found = load_plugins(strangers=False)
     for kind in _OWN:
-        package = import_module(f"femubench.plugins.{kind}")
-        yield from (found.name for found in iter_modules(package.__path__, f"{package.__name__}."))
+        offers = getattr(found, kind)
+        for name in offers:
+            with suppress(Exception):  # a job that needs it says what is wrong with it
+                yield type(offers[name]).__module__
 
 
-for module in own_plugins():
-    with suppress(Exception):  # a job that needs it says what is wrong with it
-        import_module(module)
+LOADED = frozenset(own_plugins())
 # What a job leaves behind becomes a child of this process, whose other children are known.
 if sys.platform == "linux":
     ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
