@@ -81,16 +81,21 @@ def named_tables(
     """
     found = [_known_name(content, own.get(member), tables) for member, content in contents]
     bases = [own.get(member, plain) for member, _ in contents]
-    pairs = {(base, _frozen(c)) for base, (_, c) in zip(bases, contents, strict=True)}
+    pairs = {(base, tuple(c.items())) for base, (_, c) in zip(bases, contents, strict=True)}
     taken = {name for name in found if name is not None}
     new: dict[tuple[object, ...], str] = {}
     names, result = [], {}
     for name, base, (member, content) in zip(found, bases, contents, strict=True):
-        key = _frozen(content)
+        key = tuple(content.items())
         chosen = name or new.get(key)
         if chosen is None:
             alone = sum(base == other for other, _ in pairs) == 1
-            chosen = new[key] = _free_name(base if alone else f"{base}-{member}", taken)
+            free = base if alone else f"{base}-{member}"
+            chosen, count = free[:_LONGEST].rstrip(), 1
+            while chosen in taken:
+                count += 1
+                chosen = f"{free[: _LONGEST - 8].rstrip()}-{count}"
+            new[key] = chosen
         names.append(chosen)
         result[chosen] = content
         taken.add(chosen)
@@ -101,18 +106,6 @@ def _known_name(content: Keys, own: str | None, tables: Mapping[str, Keys]) -> s
     if own is not None and tables.get(own) == content:
         return own
     return next((name for name, table in tables.items() if table == content), None)
-
-
-def _frozen(content: Keys) -> tuple[object, ...]:
-    return tuple(content.items())
-
-
-def _free_name(name: str, taken: set[str]) -> str:
-    chosen, count = name[:_LONGEST].rstrip(), 1
-    while chosen in taken:
-        count += 1
-        chosen = f"{name[: _LONGEST - 8].rstrip()}-{count}"
-    return chosen
 
 
 _Factors = dict[tuple[str, str], float]

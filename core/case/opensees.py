@@ -82,27 +82,23 @@ def _labels(
     nodes, directions, places = [""] * size, [""] * size, np.full((size, 3), np.nan)
     led = {int(tag) for tag in ops.getConstrainedNodes() or ()}
     for tag in tags:
-        for direction, row in _rows(ops, tag, tag in led):
-            nodes[row], directions[row] = str(tag), direction
-            coordinates = ops.nodeCoord(tag)
-            places[row] = [*coordinates, *[0.0] * (3 - len(coordinates))]
+        space, count = int(ops.getNDM(tag)[0]), int(ops.getNDF(tag)[0])
+        motions = _MOTIONS.get((space, count))
+        if motions is None:
+            what = f"node {tag} has {count} degrees of freedom in {space} dimensions"
+            raise ModelError(f"{what}; known are displacements and rotations")
+        follow = {int(dof) for dof in ops.getConstrainedDOFs(tag)} if tag in led else set()
+        own = [name for i, name in enumerate(motions, 1) if i not in follow]
+        # Behind those of its own stand the equations of the node that it follows.
+        equations = [int(row) for row in ops.nodeDOFs(tag)[: len(own)]]
+        coordinates = ops.nodeCoord(tag)
+        for direction, row in zip(own, equations, strict=True):
+            if row >= 0:
+                nodes[row], directions[row] = str(tag), direction
+                places[row] = [*coordinates, *[0.0] * (3 - len(coordinates))]
     if "" in directions:
         raise ModelError("OpenSees has equations that belong to no node")
     return nodes, directions, places
-
-
-def _rows(ops: Any, tag: int, led: bool) -> list[tuple[str, int]]:  # noqa: ANN401 - a module
-    """Return the directions in which a node moves by itself, with their equations."""
-    space, count = int(ops.getNDM(tag)[0]), int(ops.getNDF(tag)[0])
-    motions = _MOTIONS.get((space, count))
-    if motions is None:
-        what = f"node {tag} has {count} degrees of freedom in {space} dimensions"
-        raise ModelError(f"{what}; known are displacements and rotations")
-    follow = {int(dof) for dof in ops.getConstrainedDOFs(tag)} if led else set()
-    own = [name for i, name in enumerate(motions, 1) if i not in follow]
-    # Behind those of its own stand the equations of the node that it follows.
-    equations = [int(row) for row in ops.nodeDOFs(tag)[: len(own)]]
-    return [(name, row) for name, row in zip(own, equations, strict=True) if row >= 0]
 
 
 def _matrices(ops: Any) -> tuple[FloatArray, FloatArray]:  # noqa: ANN401 - a module
