@@ -223,19 +223,6 @@ def _document(run: Run) -> Iterator[Section]:
     yield Section("", [about, *([Items(notes)] if notes else [])])
     yield from _board(run, "Leaderboard")
     yield Section("", [Items([("skill", _SKILL), floors_said(run)])])
-    yield from _coverage(run)
-    drawn, papers, ranked = started_as_drawn(run), papers_of(run), Run(run.meta, run.ranked)
-    for case in cases_of(run):
-        start, printed = drawn.get(case, {}), papers.get(case, {})
-        others = (("from the model as drawn", start), ("as the paper prints it", printed))
-        yield Section(f"Case {case}", list(_case(ranked, case, others)))
-    yield from _changes(ranked)
-    if cited := run.meta.get("citations"):
-        yield Section("Strategies", [Items(list(cited.items()))])
-
-
-def _coverage(run: Run) -> Iterator[Section]:
-    """Yield how many jobs each strategy finished, then the failures and what did not apply."""
     rows: list[list[Cell]] = []
     for name in strategies_of(run):
         found = [result.status for result in run.results if result.strategy == name]
@@ -248,6 +235,14 @@ def _coverage(run: Run) -> Iterator[Section]:
     for title, fine in (("Failures", False), ("Not applicable", True)):
         ended = failures(troubles(run.results, fine=fine))
         yield Section(title, ended or ["None."], level=3)
+    drawn, papers, ranked = started_as_drawn(run), papers_of(run), Run(run.meta, run.ranked)
+    for case in cases_of(run):
+        start, printed = drawn.get(case, {}), papers.get(case, {})
+        others = (("from the model as drawn", start), ("as the paper prints it", printed))
+        yield Section(f"Case {case}", list(_case(ranked, case, others)))
+    yield from _changes(ranked)
+    if cited := run.meta.get("citations"):
+        yield Section("Strategies", [Items(list(cited.items()))])
 
 
 def _case(run: Run, case: str, others: Iterable[tuple[str, _Printed]]) -> Iterator[Block]:

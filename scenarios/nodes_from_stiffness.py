@@ -40,7 +40,13 @@ def labelled_rows(
         across: rows that go along y.
         upright: rows that go along z; the first are at nodes that do not move lengthwise.
     """
-    shifts, rolls = _free_motions(stiffness, turns)
+    scale = 1.0 / np.sqrt(stiffness.diagonal())
+    values, vectors = la.eigh(scale[:, None] * stiffness * scale)
+    motions = scale[:, None] * vectors[:, np.abs(values) < _FREE]
+    _, size, mix = la.svd(motions[turns])
+    size = np.append(size, np.zeros(len(mix) - len(size)))
+    straight = size < _FREE * size.max(initial=1e-300)
+    shifts, rolls = motions @ mix[straight].T, motions @ mix[~straight].T
     if shifts.shape[1] != 2 or rolls.shape[1] != 2:
         return None
     kind = _shifted(shifts, turns, across[0], upright[0])
@@ -64,17 +70,6 @@ def labelled_rows(
         xyz = (float(along), float(rolls[at["z"], 0]), float(up))
         found += [Row(number, str(kind[row]), xyz) for row in rows]
     return found
-
-
-def _free_motions(stiffness: FloatArray, turns: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Return motions without force, (n, k) each: those in which no row turns, and the others."""
-    scale = 1.0 / np.sqrt(stiffness.diagonal())
-    values, vectors = la.eigh(scale[:, None] * stiffness * scale)
-    motions = scale[:, None] * vectors[:, np.abs(values) < _FREE]
-    _, size, mix = la.svd(motions[turns])
-    size = np.append(size, np.zeros(len(mix) - len(size)))
-    straight = size < _FREE * size.max(initial=1e-300)
-    return motions @ mix[straight].T, motions @ mix[~straight].T
 
 
 def _axes(rolls: FloatArray) -> FloatArray | None:

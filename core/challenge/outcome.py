@@ -90,19 +90,6 @@ def _half(truth: Truth, parts: Parts, same: Same) -> bool:
     return any(is_finding(parts[0], cause, same) for cause in truth.causes)
 
 
-def said_sets(truth: Truth, record: Record) -> list[Parts]:
-    """Return what a record takes for possible, without what it takes at the textbook value.
-
-    What handbooks give a drawn model lacks whether the structure has a defect or not.
-    """
-    wanted = {effect for cause in truth.causes for effect, _ in cause.findings}
-    textbook = set(record.get("textbook", ())) - wanted
-    return [
-        tuple(part for part in parts if part[0] not in textbook)
-        for parts in candidates(Answer.model_validate(record["answer"]))
-    ]
-
-
 def outcome(truth: Truth, record: Record, same: Same) -> str:
     """Return which of `OUTCOMES` a record is.
 
@@ -110,11 +97,20 @@ def outcome(truth: Truth, record: Record, same: Same) -> str:
     one of its members is right by itself.
     """
     verdict = str(record["verdict"]).replace("-", " ")
-    if truth.kind.endswith("-fault") and (found := faults_said(record)):
-        return fault_outcome(truth, found, same)
+    faulty = truth.kind.endswith("-fault") and "answer" in record
+    if faulty and (found := faults_in(Answer.model_validate(record["answer"]))):
+        if _holds(truth, found, same):
+            return "right" if _only(truth, found, same) else "with others"
+        return "other place" if _holds(truth, found, anywhere) else "wrong"
     if verdict not in ("named", "ambiguous"):
         return verdict
-    sets = said_sets(truth, record)
+    # What handbooks give a drawn model lacks whether the structure has a defect or not.
+    wanted = {effect for cause in truth.causes for effect, _ in cause.findings}
+    textbook = set(record.get("textbook", ())) - wanted
+    sets = [
+        tuple(part for part in parts if part[0] not in textbook)
+        for parts in candidates(Answer.model_validate(record["answer"]))
+    ]
     if not any(sets):
         return "none"
     if not truth.causes:
@@ -129,18 +125,6 @@ def outcome(truth: Truth, record: Record, same: Same) -> str:
     if any(_holds(truth, parts, same) for parts in sets):
         return "with others"
     return "one of two" if any(_half(truth, parts, same) for parts in sets) else "wrong"
-
-
-def faults_said(record: Record) -> Parts:
-    """Return the faults of data and input that a record names."""
-    return faults_in(Answer.model_validate(record["answer"])) if "answer" in record else ()
-
-
-def fault_outcome(truth: Truth, found: Parts, same: Same) -> str:
-    """Return which of `OUTCOMES` the faults are that were named, whatever else was."""
-    if _holds(truth, found, same):
-        return "right" if _only(truth, found, same) else "with others"
-    return "other place" if _holds(truth, found, anywhere) else "wrong"
 
 
 def beside(record: Record) -> str:

@@ -94,11 +94,11 @@ def compare_spaces(model: Model) -> Spaces:
         beam_and_rod=ranks.split(assembled)[0],
         outside=int(added.sum()),
         within=ranks.split(assembled @ inside)[0],
-        same_as_generic=_angle(kept, (assembled @ inside)[present]),
+        same_as_generic=float(la.subspace_angles(kept, (assembled @ inside)[present]).max()),
         nobari=ranks.split(nobari)[0],
         nobari_kept=free.shape[1],
         physical=ranks.split(physical)[0],
-        same_as_physical=_angle(nobari @ free, physical),
+        same_as_physical=float(la.subspace_angles(nobari @ free, physical).max()),
         gap=ranks.gap,
     )
 
@@ -172,8 +172,3 @@ def _forces(
     off = rows != columns
     np.add.at(forces, columns[off], rigid[rows[off]][:, :, None] * entries[off][:, None, :])
     return forces.reshape(-1, entries.shape[1])
-
-
-def _angle(one: FloatArray, other: FloatArray) -> float:
-    """Return the largest principal angle between two column spaces in rad."""
-    return float(la.subspace_angles(one, other).max())
