@@ -107,7 +107,22 @@ def _sections(data: Mapping[str, Any], *, screen: bool = False) -> Iterator[Sect
     proof = Table(_PROOF, [*map(_proof, evidence)])
     yield Section("Is it more than chance?", [*told, proof, _EVIDENCE])
     legend = f"{_LEGEND} {_TELLING}" if screen else _LEGEND
-    yield Section("Ratios", [_ratios(data["rows"], screen), legend])
+    cells = []
+    for row in data["rows"]:
+        name, scenario, values = plain(row["strategy"]), row["scenario"], row["values"]
+        same = not any(_arrow(key, values[key]) for key in _RATIOS[:-1])
+        if screen and scenario is not None and same and not values["failures"]:
+            continue
+        if scenario is not None:
+            name = 2 * _BLANK + plain(scenario) if screen else f"{name}, {plain(scenario)}"
+        cells.append([name, row["jobs"], *map(values.get, _RATIOS), values["failures"]])
+    says = (None if screen else partial(_told, key) for key in _RATIOS)
+    figures = [
+        Column(key, max(len(key), 6), digits=2 if key == "seconds" else 3, say=say)
+        for key, say in zip(_RATIOS, says, strict=True)
+    ]
+    columns = [Column("strategy", 22, left=True), Column("jobs", 4), *figures, Column("lost", 4)]
+    yield Section("Ratios", [Table(columns, cells), legend])
     yield from _listed("Only in A", _jobs(data["only_before"]), screen)
     yield from _listed("Only in B", _jobs(data["only_after"]), screen)
     yield from _listed("Not compared: other case files", _jobs(data["other_cases"]), screen)
@@ -136,29 +151,6 @@ def _drawn(evidence: Sequence[Mapping[str, Any]]) -> list[Block]:
         Chart("interval", "B over A", *axes, tuple(series), (Mark("x", 1.0, "no change"),)), _FOREST
     )
     return [Drawing("B over A", _FOREST, shown)] if shown else []
-
-
-def _ratios(rows: Iterable[Mapping[str, Any]], screen: bool) -> Table:
-    """Return the ratios, those that got worse or better with an arrow where there is room for it.
-
-    The screen leaves out the scenarios where only times differ.
-    """
-    cells = []
-    for row in rows:
-        name, scenario, values = plain(row["strategy"]), row["scenario"], row["values"]
-        same = not any(_arrow(key, values[key]) for key in _RATIOS[:-1])
-        if screen and scenario is not None and same and not values["failures"]:
-            continue
-        if scenario is not None:
-            name = 2 * _BLANK + plain(scenario) if screen else f"{name}, {plain(scenario)}"
-        cells.append([name, row["jobs"], *map(values.get, _RATIOS), values["failures"]])
-    says = (None if screen else partial(_told, key) for key in _RATIOS)
-    figures = [
-        Column(key, max(len(key), 6), digits=2 if key == "seconds" else 3, say=say)
-        for key, say in zip(_RATIOS, says, strict=True)
-    ]
-    columns = [Column("strategy", 22, left=True), Column("jobs", 4), *figures, Column("lost", 4)]
-    return Table(columns, cells)
 
 
 def _told(name: str, ratio: float | None) -> str:

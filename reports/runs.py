@@ -129,15 +129,18 @@ def floors_said(run: Run) -> tuple[str, str]:
     return label, f"the same but for {named}." if moved else "the same."
 
 
-def _leaderboard(
-    run: Run,
-    rows: Sequence[_Row],
-    tiers: Mapping[str, int],
-    letters: Mapping[str, str],
-    *,
-    screen: bool,
-) -> Table:
-    """Return the ranking; columns that nothing is known of are left out."""
+def _marks(row: _Row) -> str:
+    """Return what must not be overlooked: lost physics, and jobs that the errors leave out."""
+    incomplete = row["ok"] + row["not_applicable"] < row["total"]
+    return ("!" if row["unphysical"] else "") + ("*" if incomplete else "")
+
+
+def _board(run: Run, title: str = "") -> Iterator[Section]:
+    """Yield the leaderboard, what its columns mean, and what the run shows."""
+    rows = leaderboard(run).to_dict("records")
+    tested = tell_apart(run, [row["strategy"] for row in rows])
+    tiers = tested.tier_of()
+    letters = tested.letters()
     heads = (
         *(Column("#", 6), Column("strategy", 16, left=True), *_FIGURES.values()),
         *(Column(f"95 % interval\nover {interval_kind(run)}", 16), *_MORE_FIGURES.values()),
@@ -155,30 +158,18 @@ def _leaderboard(
         ]
         for row in rows
     ]
+    # Columns that nothing is known of are left out.
     known = [
         k
         for k, head in enumerate(heads)
         if k < _ALWAYS or {head.text(line[k]) for line in cells} - {NOTHING, ""}
     ]
-    if screen and not {heads[k].title for k in known[_ALWAYS:]} - _BESIDE:
+    if not title and not {heads[k].title for k in known[_ALWAYS:]} - _BESIDE:
         known = known[:_ALWAYS]
-    return Table([heads[k] for k in known], [[line[k] for k in known] for line in cells], names=1)
-
-
-def _marks(row: _Row) -> str:
-    """Return what must not be overlooked: lost physics, and jobs that the errors leave out."""
-    incomplete = row["ok"] + row["not_applicable"] < row["total"]
-    return ("!" if row["unphysical"] else "") + ("*" if incomplete else "")
-
-
-def _board(run: Run, title: str = "") -> Iterator[Section]:
-    """Yield the leaderboard, what its columns mean, and what the run shows."""
-    rows = leaderboard(run).to_dict("records")
-    tested = tell_apart(run, [row["strategy"] for row in rows])
-    table = _leaderboard(run, rows, tested.tier_of(), tested.letters(), screen=not title)
+    table = Table([heads[k] for k in known], [[line[k] for k in known] for line in cells], names=1)
     yield Section(title, [table])
-    known = " ".join([*(c.title.replace("\n", " ") for c in table.columns), *map(_marks, rows)])
-    legend = [entry for entry in _LEGEND.items() if entry[0].partition(",")[0] in known]
+    titles = " ".join([*(c.title.replace("\n", " ") for c in table.columns), *map(_marks, rows)])
+    legend = [entry for entry in _LEGEND.items() if entry[0].partition(",")[0] in titles]
     if title or not tested.tiers:
         legend.append(("tier, group" if tested.tiers else "#", tested.note))
     yield Section("", [lead(run), Items(legend)])

@@ -204,8 +204,27 @@ def frame_keys(frame: Frame, known: Known) -> Keys:
     # A beam without length is no arm, and the reader takes none.
     springs = (replace(s, arm_factor=s.arm_factor if s.arm else None) for s in frame.joint_springs)
     plain = keys_of(replace(frame, joint_springs=tuple(springs)), without=("members", "families"))
-    sections, section_tables = _sections(frame, known)
-    materials, material_tables = _materials(frame, known)
+    own = known.names("section")
+    contents, seen = [], dict[tuple[int, float, str], Keys]()
+    for member in frame.members:
+        name = own.get(member.name, "")
+        key = id(member.section), member.material.nu, name
+        if key not in seen:
+            seen[key] = _section_keys(member, frame.plane, known.sections.get(name))
+        contents.append((member.name, seen[key]))
+    tables = {}
+    for name, spec in known.sections.items():
+        try:
+            section = section_of(spec, frame.plane, "euler-bernoulli")
+        except Fault:
+            continue
+        tables[name] = section_keys(section, _ANY_NU, frame.plane, spec)
+    sections, section_tables = named_tables(contents, own, tables, "section")
+    contents = [
+        (member.name, keys_of(member.material, without=("name",))) for member in frame.members
+    ]
+    tables = {name: spec.model_dump() for name, spec in known.materials.items()}
+    materials, material_tables = named_tables(contents, known.names("material"), tables, "material")
     members = [
         {
             **keys_of(member, without=("section", "material")),
@@ -250,33 +269,6 @@ def _plain(value: object) -> Any:  # noqa: ANN401 - what TOML can hold
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     return float(value) if isinstance(value, (int, float, np.number)) else keys_of(value)
-
-
-def _materials(frame: Frame, known: Known) -> tuple[list[str], dict[str, Keys]]:
-    contents = [
-        (member.name, keys_of(member.material, without=("name",))) for member in frame.members
-    ]
-    tables = {name: spec.model_dump() for name, spec in known.materials.items()}
-    return named_tables(contents, known.names("material"), tables, "material")
-
-
-def _sections(frame: Frame, known: Known) -> tuple[list[str], dict[str, Keys]]:
-    own = known.names("section")
-    contents, seen = [], dict[tuple[int, float, str], Keys]()
-    for member in frame.members:
-        name = own.get(member.name, "")
-        key = id(member.section), member.material.nu, name
-        if key not in seen:
-            seen[key] = _section_keys(member, frame.plane, known.sections.get(name))
-        contents.append((member.name, seen[key]))
-    tables = {}
-    for name, spec in known.sections.items():
-        try:
-            section = section_of(spec, frame.plane, "euler-bernoulli")
-        except Fault:
-            continue
-        tables[name] = section_keys(section, _ANY_NU, frame.plane, spec)
-    return named_tables(contents, own, tables, "section")
 
 
 def _section_keys(member: Member, plane: Plane, hint: SectionSpec | None) -> Keys:

@@ -51,7 +51,14 @@ def from_opensees() -> Model:
     if sum(int(ops.getNDF(tag)[0]) for tag in tags) > _MOST:
         what = f"the model of {len(tags)} nodes in OpenSees is too large"
         raise ModelError(f"{what}: its matrices are printed whole, at most {_MOST} rows")
-    if not _free(ops, tags):  # to solve for nothing ends the whole process
+    held = {int(tag): set(ops.getFixedDOFs(int(tag))) for tag in ops.getFixedNodes() or ()}
+    led = {
+        int(tag): set(ops.getConstrainedDOFs(int(tag))) for tag in ops.getConstrainedNodes() or ()
+    }
+    none: set[int] = set()
+    if not any(
+        len(held.get(tag, none) | led.get(tag, none)) < int(ops.getNDF(tag)[0]) for tag in tags
+    ):  # to solve for nothing ends the whole process
         raise ModelError("nothing can move in the model of OpenSees")
     ops.wipeAnalysis()
     try:
@@ -59,18 +66,6 @@ def from_opensees() -> Model:
         return matrix_model(mass, stiffness, *_labels(ops, tags, len(mass)))
     finally:
         ops.wipeAnalysis()
-
-
-def _free(ops: Any, tags: Sequence[int]) -> bool:  # noqa: ANN401 - a module
-    """Tell whether a node moves by itself in any direction."""
-    held = {int(tag): set(ops.getFixedDOFs(int(tag))) for tag in ops.getFixedNodes() or ()}
-    led = {
-        int(tag): set(ops.getConstrainedDOFs(int(tag))) for tag in ops.getConstrainedNodes() or ()
-    }
-    none: set[int] = set()
-    return any(
-        len(held.get(tag, none) | led.get(tag, none)) < int(ops.getNDF(tag)[0]) for tag in tags
-    )
 
 
 def _labels(

@@ -92,12 +92,6 @@ def judge_answer(truth: Truth, answer: Answer, delta_chi2: Sequence[float]) -> J
         reason = "nothing is hidden" if right else f"nothing is hidden, but it says {_said(answer)}"
         alarm = answer.verdict != "none"
         return Judgement(right, None, None, group, 0, False, alarm, (), reason)
-    return _judge_causes(truth, answer, delta_chi2, group)
-
-
-def _judge_causes(
-    truth: Truth, answer: Answer, delta_chi2: Sequence[float], group: int
-) -> Judgement:
     frame = structure_named(truth.structure).frame
     pairs = list(zip(truth.causes, delta_chi2, strict=True))
     visible = frozenset(cause.effect for cause, delta in pairs if delta >= TOO_SMALL)

@@ -64,7 +64,29 @@ _THE_SAME = Ground(
 def count_cells(bench: Workbench) -> tuple[Cell, ...]:
     """Return the cells of what the text counts or claims in figures."""
     rigid = rigid_modes(bench, "nobari")
-    ours = _of_structure(bench) | {
+    case = bench.cases[CASE]
+    structure, types = case.model.frame_structure, Counter(_types(case.model.frame_structure))
+    at_joints = {
+        structure.element_ends[e][0] for ends in structure.joint_ends.values() for e in ends
+    }
+    family = generic_family(structure)
+    free = (family.columns >= 0).sum(axis=1)
+    touches = np.isin(family.elements, list(at_joints))
+    element = physical_family(structure).patterns[0].sum(axis=0)
+    ours = {
+        "joints_L": types["L"],
+        "joints_T": types["T"],
+        "measured_points": len(case.measurement.sensors),
+        "elements": len(family.elements),
+        "joint_elements": int(touches.sum()),
+        "symmetric_elements": int((~touches).sum()),
+        "element_order": int(structure.active_local.sum()),
+        "element_rank": int(np.linalg.matrix_rank(element, hermitian=True)),
+        "joint_element_parameters": _only(free[touches]),
+        "symmetric_element_parameters": _only(free[~touches]),
+        "nonzeros": int(sp.triu(case.model.stiffness).nnz),
+        "rigid_body_modes": int(modes_of(bench, "unchanged").rigid.sum()),
+    } | {
         "equations": int(bench.update(CASE, "generic-ls").diagnostics["equations"]),
         "nobari_parameters": bench.update(CASE, "nobari").parameter_count,
         "generic_parameters": bench.update(CASE, "generic-ls").parameter_count,
@@ -86,32 +108,6 @@ def count_cells(bench: Workbench) -> tuple[Cell, ...]:
     off = 100.0 * float(np.abs(one / other - 1.0).max())
     key = "nobari_rigid_difference"
     return (*cells, page.cell(_NAMES[key], "difference", float(printed(PAPER)["text"][key]), off))
-
-
-def _of_structure(bench: Workbench) -> dict[str, int]:
-    case = bench.cases[CASE]
-    structure, types = case.model.frame_structure, Counter(_types(case.model.frame_structure))
-    at_joints = {
-        structure.element_ends[e][0] for ends in structure.joint_ends.values() for e in ends
-    }
-    family = generic_family(structure)
-    free = (family.columns >= 0).sum(axis=1)
-    touches = np.isin(family.elements, list(at_joints))
-    element = physical_family(structure).patterns[0].sum(axis=0)
-    return {
-        "joints_L": types["L"],
-        "joints_T": types["T"],
-        "measured_points": len(case.measurement.sensors),
-        "elements": len(family.elements),
-        "joint_elements": int(touches.sum()),
-        "symmetric_elements": int((~touches).sum()),
-        "element_order": int(structure.active_local.sum()),
-        "element_rank": int(np.linalg.matrix_rank(element, hermitian=True)),
-        "joint_element_parameters": _only(free[touches]),
-        "symmetric_element_parameters": _only(free[~touches]),
-        "nonzeros": int(sp.triu(case.model.stiffness).nnz),
-        "rigid_body_modes": int(modes_of(bench, "unchanged").rigid.sum()),
-    }
 
 
 def _types(structure: Structure) -> list[str]:

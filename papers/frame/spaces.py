@@ -126,10 +126,6 @@ def spaces_extra(bench: Workbench) -> tuple[Extra, tuple[str, ...], Spaces]:
         f"Ranks by singular values; the closest call has a gap of {s.gap:.0e} between those that "
         "count and those that do not.",
     )
-    return extra, _findings(s), s
-
-
-def _findings(s: Spaces) -> tuple[str, ...]:
     generic = (
         f"Of {s.entries} non-zero entries, {s.kept_by_rigid} are free once the rigid-body modes "
         f"are kept: {s.beam_and_rod // 4} x 4 - {s.outside}, four parameters an element less "
@@ -143,7 +139,7 @@ def _findings(s: Spaces) -> tuple[str, ...]:
         f"that set is the physical one (dimension {s.physical}, largest principal angle "
         f"{s.same_as_physical:.0e} rad), as equation (21) says."
     )
-    return generic, nobari
+    return extra, (generic, nobari), s
 
 
 def _upper(matrix: FloatArray, size: FloatArray) -> FloatArray:
