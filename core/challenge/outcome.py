@@ -83,13 +83,6 @@ def _only(truth: Truth, parts: Parts, same: Same) -> bool:
     return all(any(is_finding(part, cause, same) for cause in truth.causes) for part in parts)
 
 
-def _half(truth: Truth, parts: Parts, same: Same) -> bool:
-    """Tell whether parts are just one of two causes."""
-    if len(truth.causes) != 2 or len(parts) != 1:
-        return False
-    return any(is_finding(parts[0], cause, same) for cause in truth.causes)
-
-
 def outcome(truth: Truth, record: Record, same: Same) -> str:
     """Return which of `OUTCOMES` a record is.
 
@@ -124,7 +117,9 @@ def outcome(truth: Truth, record: Record, same: Same) -> str:
         return "other place"
     if any(_holds(truth, parts, same) for parts in sets):
         return "with others"
-    return "one of two" if any(_half(truth, parts, same) for parts in sets) else "wrong"
+    single = [parts[0] for parts in sets if len(parts) == 1 and len(truth.causes) == 2]
+    half = any(is_finding(part, cause, same) for part in single for cause in truth.causes)
+    return "one of two" if half else "wrong"
 
 
 def beside(record: Record) -> str:
