@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -21,7 +22,6 @@ from femubench.reports.summary import (
     spared,
     strategies_of,
     troubles,
-    unconverged,
 )
 from femubench.reports.terminal import to_terminal
 from femubench.reports.twins import MEANING, drawn_from, suspicions
@@ -203,7 +203,12 @@ def _notes(run: Run) -> Iterator[str]:
 
 
 def _moving(run: Run) -> Iterator[str]:
-    if moving := unconverged(run.results):
+    moving = Counter(
+        result.strategy
+        for result in run.results
+        if result.status == "ok" and result.diagnostics.get("converged") == 0.0
+    )
+    if moving:
         named = ", ".join(f"{plain(name)} ({count})" for name, count in moving.items())
         yield f"Still moving at their last iteration (jobs): {named}."
 

@@ -40,16 +40,12 @@ def bare(case: Case, mesh: Sequence[int]) -> Model:
     return Model.of(replace(frame, members=members, masses=()))
 
 
-def mesh_frequencies(case: Case) -> dict[str, FloatArray]:
-    """Return frequencies in Hz, (8,) for every row of table 2."""
-    meshes = printed("hframe")["test_article"]["mesh"]
-    found = {name: frequencies(bare(case, mesh)) for name, mesh in meshes.items()}
-    return {**found, "C_a": frequencies(case.model)}
-
-
 def mesh_cells(case: Case) -> tuple[Cell, ...]:
     """Return table 2, normalised with mesh A; what agrees rounds to the printed digit."""
-    tables, found = printed("hframe"), mesh_frequencies(case)
+    tables = printed("hframe")
+    meshes = tables["test_article"]["mesh"]
+    found = {name: frequencies(bare(case, mesh)) for name, mesh in meshes.items()}
+    found["C_a"] = frequencies(case.model)
     cells = []
     for row, values in tables["table2"].items():
         for k, (theirs, hertz, base) in enumerate(zip(values, found[row], found["A"], strict=True)):
