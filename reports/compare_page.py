@@ -82,18 +82,6 @@ def headline(data: Mapping[str, Any]) -> str:
     return f"B is worse than A: {', '.join(names[:3])}{more} ({asked}; {jobs})"
 
 
-def forest(evidence: Sequence[Mapping[str, Any]]) -> Chart:
-    """Return ratio and interval of every strategy, by what is shown of it."""
-    listed = [item for item in evidence if item["ratio"] is not None]
-    series = []
-    for verdict in dict.fromkeys(item["verdict"] for item in listed):
-        own = [item for item in listed if item["verdict"] == verdict]
-        ratio, low, high = ([item[key] for item in own] for key in ("ratio", "low", "high"))
-        series.append(Series(verdict, ratio, [plain(o["strategy"]) for o in own], low, high))
-    axes = Axis("mean ratio of the errors, B / A", log=True), Axis("strategy")
-    return Chart("interval", "B over A", *axes, tuple(series), (Mark("x", 1.0, "no change"),))
-
-
 def _sides(data: Mapping[str, Any]) -> tuple[str, str]:
     """Return the names of A and B, with the strategies of two names that are compared."""
     before, after = (
@@ -119,7 +107,22 @@ def _sections(data: Mapping[str, Any], *, screen: bool = False) -> Iterator[Sect
     proof = Table(_PROOF, [*map(_proof, evidence)])
     yield Section("Is it more than chance?", [*told, proof, _EVIDENCE])
     legend = f"{_LEGEND} {_TELLING}" if screen else _LEGEND
-    yield Section("Ratios", [_ratios(data["rows"], screen), legend])
+    cells = []
+    for row in data["rows"]:
+        name, scenario, values = plain(row["strategy"]), row["scenario"], row["values"]
+        same = not any(_arrow(key, values[key]) for key in _RATIOS[:-1])
+        if screen and scenario is not None and same and not values["failures"]:
+            continue
+        if scenario is not None:
+            name = 2 * _BLANK + plain(scenario) if screen else f"{name}, {plain(scenario)}"
+        cells.append([name, row["jobs"], *map(values.get, _RATIOS), values["failures"]])
+    says = (None if screen else partial(_told, key) for key in _RATIOS)
+    figures = [
+        Column(key, max(len(key), 6), digits=2 if key == "seconds" else 3, say=say)
+        for key, say in zip(_RATIOS, says, strict=True)
+    ]
+    columns = [Column("strategy", 22, left=True), Column("jobs", 4), *figures, Column("lost", 4)]
+    yield Section("Ratios", [Table(columns, cells), legend])
     yield from _listed("Only in A", _jobs(data["only_before"]), screen)
     yield from _listed("Only in B", _jobs(data["only_after"]), screen)
     yield from _listed("Not compared: other case files", _jobs(data["other_cases"]), screen)
@@ -137,39 +140,21 @@ def _listed(title: str, lines: Iterable[str], screen: bool) -> Iterator[Section]
 
 
 def _drawn(evidence: Sequence[Mapping[str, Any]]) -> list[Block]:
-    shown = drawing(forest(evidence), _FOREST)
+    listed = [item for item in evidence if item["ratio"] is not None]
+    series = []
+    for verdict in dict.fromkeys(item["verdict"] for item in listed):
+        own = [item for item in listed if item["verdict"] == verdict]
+        ratio, low, high = ([item[key] for item in own] for key in ("ratio", "low", "high"))
+        series.append(Series(verdict, ratio, [plain(o["strategy"]) for o in own], low, high))
+    axes = Axis("mean ratio of the errors, B / A", log=True), Axis("strategy")
+    shown = drawing(
+        Chart("interval", "B over A", *axes, tuple(series), (Mark("x", 1.0, "no change"),)), _FOREST
+    )
     return [Drawing("B over A", _FOREST, shown)] if shown else []
 
 
-def _ratios(rows: Iterable[Mapping[str, Any]], screen: bool) -> Table:
-    """Return the ratios, those that got worse or better with an arrow where there is room for it.
-
-    The screen leaves out the scenarios where only times differ.
-    """
-    cells = []
-    for row in rows:
-        name, scenario, values = plain(row["strategy"]), row["scenario"], row["values"]
-        same = not any(_arrow(key, values[key]) for key in _RATIOS[:-1])
-        if screen and scenario is not None and same and not values["failures"]:
-            continue
-        if scenario is not None:
-            name = 2 * _BLANK + plain(scenario) if screen else f"{name}, {plain(scenario)}"
-        cells.append([name, row["jobs"], *map(values.get, _RATIOS), values["failures"]])
-    says = (None if screen else partial(_told, key) for key in _RATIOS)
-    figures = [
-        Column(key, max(len(key), 6), digits=_digits(key), say=say)
-        for key, say in zip(_RATIOS, says, strict=True)
-    ]
-    columns = [Column("strategy", 22, left=True), Column("jobs", 4), *figures, Column("lost", 4)]
-    return Table(columns, cells)
-
-
-def _digits(name: str) -> int:
-    return 2 if name == "seconds" else 3
-
-
 def _told(name: str, ratio: float | None) -> str:
-    return fixed(ratio, _digits(name), 6) + _arrow(name, ratio)
+    return fixed(ratio, 2 if name == "seconds" else 3, 6) + _arrow(name, ratio)
 
 
 def _arrow(name: str, ratio: float | None) -> str:

@@ -43,10 +43,10 @@ def _parts(section: Section) -> Iterator[str]:
 
 def _shown(block: Block) -> Iterator[str]:
     if isinstance(block, str):
-        yield _line(block)
+        yield _STARTERS.sub(r"\1\\\2", escape(block))
     elif isinstance(block, Table):
         if block.caption:
-            yield _line(block.caption)
+            yield _STARTERS.sub(r"\1\\\2", escape(block.caption))
         heads = [escape(column.title) for column in block.columns]
         rows = (
             (escape(c.text(cell)) for c, cell in zip(block.columns, row, strict=True))
@@ -64,9 +64,6 @@ def _shown(block: Block) -> Iterator[str]:
 
 def _labelled(label: str, *texts: str) -> str:
     text = ", ".join(texts)
-    return f"**{escape(label)}**: {escape(text)}" if label else _line(text)
-
-
-def _line(text: str) -> str:
-    """Return text that stays a paragraph wherever it starts."""
-    return _STARTERS.sub(r"\1\\\2", escape(text))
+    return (
+        f"**{escape(label)}**: {escape(text)}" if label else _STARTERS.sub(r"\1\\\2", escape(text))
+    )

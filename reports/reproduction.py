@@ -120,7 +120,10 @@ def _chapters(studies: Iterable[Study], words: Words, folder: str) -> Iterator[S
     for study in studies:
         yield Section(study.title, [study.citation, f"{sentence_of_counts(study.cells)}."])
         yield from _remarks("What was taken from where", study.premises)
-        for table, cells in _grouped(study.cells).items():
+        tables: dict[str, list[Cell]] = {}
+        for cell in study.cells:
+            tables.setdefault(cell.table, []).append(cell)
+        for table, cells in tables.items():
             title = heading(table)
             yield Section(title, list(cells_in_words(cells, words)), level=3)
         yield from parts_of(study, partial(_drawing, folder=folder))
@@ -137,14 +140,6 @@ def parts_of(study: Study, drawn: Callable[[Figure], Drawing]) -> Iterator[Secti
         yield Section(extra.title, list(_extra_blocks(extra)), level=3)
     if study.figures:
         yield Section("Figures", [drawn(figure) for figure in study.figures], level=3)
-
-
-def _grouped(cells: Iterable[Cell]) -> dict[str, list[Cell]]:
-    """Return the cells by table, in the order in which the tables come up."""
-    tables: dict[str, list[Cell]] = {}
-    for cell in cells:
-        tables.setdefault(cell.table, []).append(cell)
-    return tables
 
 
 def _remarks(title: str, sentences: Sequence[str]) -> Iterator[Section]:

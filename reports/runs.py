@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -22,7 +23,6 @@ from femubench.reports.summary import (
     spared,
     strategies_of,
     troubles,
-    unconverged,
 )
 from femubench.reports.terminal import to_terminal
 from femubench.reports.twins import MEANING, drawn_from, suspicions
@@ -187,15 +187,18 @@ def floors_said(run: Run) -> tuple[str, str]:
     return label, f"the same but for {named}." if moved else "the same."
 
 
-def _leaderboard(
-    run: Run,
-    rows: Sequence[_Row],
-    tiers: Mapping[str, int],
-    letters: Mapping[str, str],
-    *,
-    screen: bool,
-) -> Table:
-    """Return the ranking; columns that nothing is known of are left out."""
+def _marks(row: _Row) -> str:
+    """Return what must not be overlooked: lost physics, and jobs that the errors leave out."""
+    incomplete = row["ok"] + row["not_applicable"] < row["total"]
+    return ("!" if row["unphysical"] else "") + ("*" if incomplete else "")
+
+
+def _board(run: Run, title: str = "") -> Iterator[Section]:
+    """Yield the leaderboard, what its columns mean, and what the run shows."""
+    rows = leaderboard(run).to_dict("records")
+    tested = tell_apart(run, [row["strategy"] for row in rows])
+    tiers = tested.tier_of()
+    letters = tested.letters()
     heads = (
         *(Column("#", 6), Column("strategy", 16, left=True), *_FIGURES.values()),
         *(Column(f"95 % interval\nover {interval_kind(run)}", 16), *_MORE_FIGURES.values()),
@@ -213,30 +216,18 @@ def _leaderboard(
         ]
         for row in rows
     ]
+    # Columns that nothing is known of are left out.
     known = [
         k
         for k, head in enumerate(heads)
         if k < _ALWAYS or {head.text(line[k]) for line in cells} - {NOTHING, ""}
     ]
-    if screen and not {heads[k].title for k in known[_ALWAYS:]} - _BESIDE:
+    if not title and not {heads[k].title for k in known[_ALWAYS:]} - _BESIDE:
         known = known[:_ALWAYS]
-    return Table([heads[k] for k in known], [[line[k] for k in known] for line in cells], names=1)
-
-
-def _marks(row: _Row) -> str:
-    """Return what must not be overlooked: lost physics, and jobs that the errors leave out."""
-    incomplete = row["ok"] + row["not_applicable"] < row["total"]
-    return ("!" if row["unphysical"] else "") + ("*" if incomplete else "")
-
-
-def _board(run: Run, title: str = "") -> Iterator[Section]:
-    """Yield the leaderboard, what its columns mean, and what the run shows."""
-    rows = leaderboard(run).to_dict("records")
-    tested = tell_apart(run, [row["strategy"] for row in rows])
-    table = _leaderboard(run, rows, tested.tier_of(), tested.letters(), screen=not title)
+    table = Table([heads[k] for k in known], [[line[k] for k in known] for line in cells], names=1)
     yield Section(title, [table])
-    known = " ".join([*(c.title.replace("\n", " ") for c in table.columns), *map(_marks, rows)])
-    legend = [entry for entry in _LEGEND.items() if entry[0].partition(",")[0] in known]
+    titles = " ".join([*(c.title.replace("\n", " ") for c in table.columns), *map(_marks, rows)])
+    legend = [entry for entry in _LEGEND.items() if entry[0].partition(",")[0] in titles]
     if title or not tested.tiers:
         legend.append(("tier, group" if tested.tiers else "#", tested.note))
     yield Section("", [lead(run), Items(legend)])
@@ -270,7 +261,12 @@ def _notes(run: Run) -> Iterator[str]:
 
 
 def _moving(run: Run) -> Iterator[str]:
-    if moving := unconverged(run.results):
+    moving = Counter(
+        result.strategy
+        for result in run.results
+        if result.status == "ok" and result.diagnostics.get("converged") == 0.0
+    )
+    if moving:
         named = ", ".join(f"{plain(name)} ({count})" for name, count in moving.items())
         yield f"Still moving at their last iteration (jobs): {named}."
 
@@ -281,19 +277,6 @@ def _document(run: Run) -> Iterator[Section]:
     yield Section("", [about, *([Items(notes)] if notes else [])])
     yield from _board(run, "Leaderboard")
     yield Section("", [Items([("skill", _SKILL), floors_said(run)])])
-    yield from _coverage(run)
-    drawn, papers, ranked = started_as_drawn(run), papers_of(run), Run(run.meta, run.ranked)
-    for case in cases_of(run):
-        start, printed = drawn.get(case, {}), papers.get(case, {})
-        others = (("from the model as drawn", start), ("as the paper prints it", printed))
-        yield Section(f"Case {case}", list(_case(ranked, case, others)))
-    yield from _changes(ranked)
-    if cited := run.meta.get("citations"):
-        yield Section("Strategies", [Items(list(cited.items()))])
-
-
-def _coverage(run: Run) -> Iterator[Section]:
-    """Yield how many jobs each strategy finished, then the failures and what did not apply."""
     rows: list[list[Cell]] = []
     for name in strategies_of(run):
         found = [result.status for result in run.results if result.strategy == name]
@@ -306,6 +289,14 @@ def _coverage(run: Run) -> Iterator[Section]:
     for title, fine in (("Failures", False), ("Not applicable", True)):
         ended = failures(troubles(run.results, fine=fine))
         yield Section(title, ended or ["None."], level=3)
+    drawn, papers, ranked = started_as_drawn(run), papers_of(run), Run(run.meta, run.ranked)
+    for case in cases_of(run):
+        start, printed = drawn.get(case, {}), papers.get(case, {})
+        others = (("from the model as drawn", start), ("as the paper prints it", printed))
+        yield Section(f"Case {case}", list(_case(ranked, case, others)))
+    yield from _changes(ranked)
+    if cited := run.meta.get("citations"):
+        yield Section("Strategies", [Items(list(cited.items()))])
 
 
 def _case(run: Run, case: str, others: Iterable[tuple[str, _Printed]]) -> Iterator[Block]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -74,15 +73,6 @@ def spared(results: Iterable[JobResult]) -> dict[str, list[str]]:
         if item.strategy not in names:
             names.append(item.strategy)
     return reasons
-
-
-def unconverged(results: Iterable[JobResult]) -> dict[str, int]:
-    """Return how many jobs of a strategy ended with its iteration still moving."""
-    return Counter(
-        result.strategy
-        for result in results
-        if result.status == "ok" and result.diagnostics.get("converged") == 0.0
-    )
 
 
 def first_seed(run: Run) -> int:

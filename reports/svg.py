@@ -66,14 +66,14 @@ def embedded(svg: str, prefix: str, label: str) -> Markup:
 
 def _clean(element: ElementTree.Element, prefix: str) -> None:
     for child in list(element):
-        if _local(child.tag) in _REFUSED:
+        if child.tag.rpartition("}")[2] in _REFUSED:
             element.remove(child)
         else:
             _clean(child, prefix)
     kept = _prefixed(element.attrib, prefix)
     element.attrib.clear()
     element.attrib.update(kept)
-    if element.text and _local(element.tag) == "style":
+    if element.text and element.tag.rpartition("}")[2] == "style":
         element.text = _REFERENCE.sub("none", element.text).replace("@import", "")
 
 
@@ -86,7 +86,7 @@ def _prefixed(attributes: Mapping[str, str], prefix: str) -> dict[str, str]:
 
     found = {}
     for name, value in attributes.items():
-        local = _local(name)
+        local = name.rpartition("}")[2]
         if local.startswith("on") or (local == "href" and not value.startswith(("#", _PICTURE))):
             continue
         if name == "id":
@@ -98,7 +98,3 @@ def _prefixed(attributes: Mapping[str, str], prefix: str) -> dict[str, str]:
         else:
             found[name] = _REFERENCE.sub(renamed, value)
     return found
-
-
-def _local(name: str) -> str:
-    return name.rpartition("}")[2]

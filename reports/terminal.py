@@ -39,10 +39,10 @@ def _screen(section: Section) -> Iterator[str]:
 
 def _shown(block: Block, indent: str) -> Iterator[str]:
     if isinstance(block, str):
-        yield _filled(block)
+        yield textwrap.fill(plain(block), WIDTH, break_on_hyphens=False)
     elif isinstance(block, Table):
         if block.caption:
-            yield _filled(block.caption)
+            yield textwrap.fill(plain(block.caption), WIDTH, break_on_hyphens=False)
         yield textwrap.indent("\n\n".join(_parts(block, WIDTH - len(indent))), indent)
         if more := len(block.rows[block.most :]) if block.most else 0:
             yield f"... and {more} more in the report"
@@ -52,10 +52,6 @@ def _shown(block: Block, indent: str) -> Iterator[str]:
     else:
         drawings = block.drawings if isinstance(block, Row) else (block,)
         yield from (_entry(one.title, one.caption) for one in drawings)
-
-
-def _filled(text: str) -> str:
-    return textwrap.fill(plain(text), WIDTH, break_on_hyphens=False)
 
 
 def _entry(label: str, *texts: str, whole: bool = False) -> str:

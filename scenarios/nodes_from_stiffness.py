@@ -40,7 +40,14 @@ def labelled_rows(
         across: rows that go along y.
         upright: rows that go along z; the first are at nodes that do not move lengthwise.
     """
-    shifts, rolls = _free_motions(stiffness, turns)
+    # Motions without force: those in which no row turns, and the others.
+    scale = 1.0 / np.sqrt(stiffness.diagonal())
+    values, vectors = la.eigh(scale[:, None] * stiffness * scale)
+    motions = scale[:, None] * vectors[:, np.abs(values) < _FREE]
+    _, size, mix = la.svd(motions[turns])
+    size = np.append(size, np.zeros(len(mix) - len(size)))
+    straight = size < _FREE * size.max(initial=1e-300)
+    shifts, rolls = motions @ mix[straight].T, motions @ mix[~straight].T
     if shifts.shape[1] != 2 or rolls.shape[1] != 2:
         return None
     kind = _shifted(shifts, turns, across[0], upright[0])
@@ -54,8 +61,16 @@ def labelled_rows(
         rolls = rolls[:, ::-1]
     near = [np.abs(rolls - way).max(axis=1) < _SAME for way in ([1.0, 0.0], [0.0, 1.0])]
     kind[turns] = np.select([near[0][turns], near[1][turns]], ["rx", "ry"], "rz")
-    nodes = _nodes(kind, {*across[:2], *upright[:2]})
-    if nodes is None or not x.any():
+    held = {*across[:2], *upright[:2]}  # rows of nodes that do not move along x
+    # The rows come one node after the other, in any order within.
+    nodes: list[list[int]] = [[]]
+    for row, direction in enumerate(kind):
+        known = [kind[other] for other in nodes[-1]]
+        if direction in known or (direction == "x" and held & set(nodes[-1])):
+            nodes.append([])
+        nodes[-1].append(row)
+    wanted = {"y", "z", "rx", "ry", "rz"}
+    if not x.any() or not all(wanted <= {kind[row] for row in rows} for rows in nodes):
         return None
     found: list[Row] = []
     for number, rows in enumerate(nodes):
@@ -64,17 +79,6 @@ def labelled_rows(
         xyz = (float(along), float(rolls[at["z"], 0]), float(up))
         found += [Row(number, str(kind[row]), xyz) for row in rows]
     return found
-
-
-def _free_motions(stiffness: FloatArray, turns: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Return motions without force, (n, k) each: those in which no row turns, and the others."""
-    scale = 1.0 / np.sqrt(stiffness.diagonal())
-    values, vectors = la.eigh(scale[:, None] * stiffness * scale)
-    motions = scale[:, None] * vectors[:, np.abs(values) < _FREE]
-    _, size, mix = la.svd(motions[turns])
-    size = np.append(size, np.zeros(len(mix) - len(size)))
-    straight = size < _FREE * size.max(initial=1e-300)
-    return motions @ mix[straight].T, motions @ mix[~straight].T
 
 
 def _axes(rolls: FloatArray) -> FloatArray | None:
@@ -95,23 +99,3 @@ def _shifted(shifts: FloatArray, turns: BoolArray, across: int, upright: int) ->
     kind: _Words = np.select(like, ["y", "z"], "x").astype(object)
     kind[turns] = "r"
     return kind
-
-
-def _nodes(kind: _Words, held: set[int]) -> list[list[int]] | None:
-    """Return the rows of every node: they come one node after the other, in any order within.
-
-    Arguments:
-        kind: direction of every row, (n,).
-        held: rows of nodes that do not move along x.
-    """
-    nodes: list[list[int]] = [[]]
-    for row, direction in enumerate(kind):
-        inside = nodes[-1]
-        known = [kind[other] for other in inside]
-        closed = direction in known or (direction == "x" and held & set(inside))
-        if closed:
-            nodes.append([])
-        nodes[-1].append(row)
-    wanted = {"y", "z", "rx", "ry", "rz"}
-    complete = all(wanted <= {kind[row] for row in rows} for rows in nodes)
-    return nodes if complete else None

@@ -19,16 +19,6 @@ NOT_HELD = "free = false, or no supports"
 _NORMAL: dict[Plane, str] = {"in-plane": "y", "out-of-plane": "z"}
 
 
-def _check_factors(model: FrameSpec, members: dict[str, int]) -> None:
-    for i, item in enumerate(model.factors):
-        if item.factor == 0.0 and item.quantity not in MAY_VANISH:
-            what = f"a factor 0 leaves no {item.quantity}"
-            raise Fault(("factors", i, "factor"), what, "a number > 0")
-        for place in item.at:
-            if place != "all" and place not in members:
-                _check_element(place, members, i)
-
-
 def _check_element(place: str, members: dict[str, int], i: int) -> None:
     path, expected = ("factors", i, "at"), '"all", the name of a member or "member/k"'
     member, found, number = place.rpartition("/")
@@ -39,26 +29,6 @@ def _check_element(place: str, members: dict[str, int], i: int) -> None:
     if number not in map(str, range(1, count + 1)):
         what = f"member {member!r} has no element {number[:20]!r}"
         raise Fault(path, what, f"a number from 1 to {count}")
-
-
-def _check_eccentricities(model: FrameSpec) -> None:
-    idle = _NORMAL.get(model.plane)
-    for i, item in enumerate(model.eccentricities):
-        if idle is not None and getattr(item, idle) != 0.0:
-            what = f"an offset along {idle} does nothing in plane {model.plane!r}"
-            raise Fault(("eccentricities", i, idle), what, "0, or no key")
-
-
-def _check_couplings(model: FrameSpec) -> None:
-    total: dict[str, float] = {}
-    for i, item in enumerate(model.couplings):
-        if model.plane == "in-plane":
-            what = "there is no torsion in plane 'in-plane'"
-            raise Fault(("couplings", i), what, "plane 'out-of-plane' or '3d'")
-        total[item.member] = total.get(item.member, 0.0) + item.coefficient
-        if abs(total[item.member]) >= 1.0:
-            what = f"the coefficients of member {item.member!r} add up to {total[item.member]:g}"
-            raise Fault(("couplings", i, "coefficient"), what, "a sum > -1 and < 1")
 
 
 def _check_braces(model: FrameSpec) -> None:
@@ -86,20 +56,53 @@ def check_frame(model: FrameSpec) -> None:
     _check_links(model)
     _check_joints(model)
     _check_members(model)
-    _check_connected(model)
+    bodies = _bodies(model, members=True)
+    whole = bodies[model.joints[0].name]
+    for i, joint in enumerate(model.joints):
+        if joint.name not in whole:
+            what = f"joint {joint.name!r} is not connected to {model.joints[0].name!r}"
+            raise Fault(("joints", i), what, "members or links that connect all joints")
     for key, items in (("joint_springs", model.joint_springs), ("rigid_ends", model.rigid_ends)):
         _check_ends(model, key, items)
-    _check_joint_springs(model)
+    for i, spring in enumerate(model.joint_springs):
+        path: KeyPath = ("joint_springs", i)
+        _check_directions(tuple(spring.stiffness), model.plane, (*path, "stiffness"))
+        if spring.arm_factor is not None and spring.arm == 0.0:
+            raise Fault((*path, "arm_factor"), "there is no arm", "arm > 0 beside arm_factor")
     for i, support in enumerate(model.supports):
         _check_directions(support.fixed, model.plane, ("supports", i, "fixed"))
     members = {member.name: member.elements for member in model.members}
     for key in ("preloads", "eccentricities", "couplings"):
         for i, item in enumerate(getattr(model, key)):
             _check_known("member", item.member, members, (key, i, "member"))
-    _check_sets(model, members)
-    _check_factors(model, members)
-    _check_eccentricities(model)
-    _check_couplings(model)
+    check_unique((("sets", i, "name"), group.name) for i, group in enumerate(model.sets))
+    for i, group in enumerate(model.sets):
+        path = ("sets", i, "members")
+        check_unique(((*path, j), name) for j, name in enumerate(group.members))
+        for j, name in enumerate(group.members):
+            _check_known("member", name, members, (*path, j))
+    for i, factor in enumerate(model.factors):
+        if factor.factor == 0.0 and factor.quantity not in MAY_VANISH:
+            what = f"a factor 0 leaves no {factor.quantity}"
+            raise Fault(("factors", i, "factor"), what, "a number > 0")
+        for place in factor.at:
+            if place != "all" and place not in members:
+                _check_element(place, members, i)
+    idle = _NORMAL.get(model.plane)
+    for i, offset in enumerate(model.eccentricities):
+        if idle is not None and getattr(offset, idle) != 0.0:
+            what = f"an offset along {idle} does nothing in plane {model.plane!r}"
+            raise Fault(("eccentricities", i, idle), what, "0, or no key")
+    total: dict[str, float] = {}
+    for i, coupling in enumerate(model.couplings):
+        if model.plane == "in-plane":
+            what = "there is no torsion in plane 'in-plane'"
+            raise Fault(("couplings", i), what, "plane 'out-of-plane' or '3d'")
+        member = coupling.member
+        total[member] = total.get(member, 0.0) + coupling.coefficient
+        if abs(total[member]) >= 1.0:
+            what = f"the coefficients of member {member!r} add up to {total[member]:g}"
+            raise Fault(("couplings", i, "coefficient"), what, "a sum > -1 and < 1")
     _check_braces(model)
 
 
@@ -128,15 +131,6 @@ def _bodies(model: FrameSpec, *, members: bool) -> dict[str, set[str]]:
             for name in small:
                 group[name] = large
     return group
-
-
-def _check_sets(model: FrameSpec, members: Collection[str]) -> None:
-    check_unique((("sets", i, "name"), item.name) for i, item in enumerate(model.sets))
-    for i, item in enumerate(model.sets):
-        path = ("sets", i, "members")
-        check_unique(((*path, j), name) for j, name in enumerate(item.members))
-        for j, name in enumerate(item.members):
-            _check_known("member", name, members, (*path, j))
 
 
 def _check_known(
@@ -217,15 +211,6 @@ def _check_up(model: FrameSpec, i: int, along: FloatArray) -> None:
         raise Fault(path, "lies along the member", "a vector in the local x-z plane")
 
 
-def _check_connected(model: FrameSpec) -> None:
-    group = _bodies(model, members=True)
-    whole = group[model.joints[0].name]
-    for i, joint in enumerate(model.joints):
-        if joint.name not in whole:
-            what = f"joint {joint.name!r} is not connected to {model.joints[0].name!r}"
-            raise Fault(("joints", i), what, "members or links that connect all joints")
-
-
 def _check_ends(
     model: FrameSpec, key: str, items: Sequence[JointSpringSpec | RigidEndSpec]
 ) -> None:
@@ -240,11 +225,3 @@ def _check_ends(
             what = f"the end of {item.member!r} at {item.joint!r} is listed twice"
             raise Fault((key, i), what, "every member end once")
         seen.add((item.joint, item.member))
-
-
-def _check_joint_springs(model: FrameSpec) -> None:
-    for i, spring in enumerate(model.joint_springs):
-        path = ("joint_springs", i)
-        _check_directions(tuple(spring.stiffness), model.plane, (*path, "stiffness"))
-        if spring.arm_factor is not None and spring.arm == 0.0:
-            raise Fault((*path, "arm_factor"), "there is no arm", "arm > 0 beside arm_factor")

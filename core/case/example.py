@@ -138,30 +138,25 @@ def write_example(folder: Path) -> tuple[Path, ...]:
         files = (folder / CASE_FILE, folder / "sensors.csv")
         for path, text in zip(files, (CASE_TOML, SENSORS_CSV), strict=True):
             path.write_text(text, encoding="utf-8")
-        tables = _measured(files[1])
+        spec = parse_spec(tomllib.loads(CASE_TOML))
+        assert isinstance(spec.model, FrameSpec)
+        better = _better(frame_of(spec.model))
+        site = FrameSite(better)
+        sensors = read_sensors(files[1], site, Alignment.of(None, None, None)).sensors
+        change = spec.modification[0]
+        heavier = better.with_attachments(
+            attachments("masses", change.masses, site), attachments("springs", change.springs, site)
+        )
+        tables = {
+            spec.measurement.modes: _modes_csv(better, sensors),
+            change.modes: _modes_csv(heavier, sensors),
+        }
         for name, text in tables.items():
             (folder / name).write_text(text, encoding="utf-8")
     except OSError as error:
         what = f"cannot be written: {error.strerror}"
         raise InputError(what, file=folder, expected="a folder that can be written") from None
     return (*files, *(folder / name for name in tables))
-
-
-def _measured(sensor_file: Path) -> dict[str, str]:
-    """Return the tables of modes that the better model gives."""
-    spec = parse_spec(tomllib.loads(CASE_TOML))
-    assert isinstance(spec.model, FrameSpec)
-    better = _better(frame_of(spec.model))
-    site = FrameSite(better)
-    sensors = read_sensors(sensor_file, site, Alignment.of(None, None, None)).sensors
-    change = spec.modification[0]
-    heavier = better.with_attachments(
-        attachments("masses", change.masses, site), attachments("springs", change.springs, site)
-    )
-    return {
-        spec.measurement.modes: _modes_csv(better, sensors),
-        change.modes: _modes_csv(heavier, sensors),
-    }
 
 
 def _better(frame: Frame) -> Frame:

@@ -129,7 +129,7 @@ def _described(schema: type[BaseModel], path: KeyPath, tag: str) -> tuple[type[B
             break
         expected = field.description or expected
         tables = list(_tables(field.annotation))
-        inside_mapping = _is_mapping(field.annotation)
+        inside_mapping = getattr(field.annotation, "__origin__", None) is dict
         if tables and part != path[-1]:
             owner = next((t for t in tables if t.__name__.lower().startswith(tag)), tables[0])
     return owner, expected
@@ -140,10 +140,6 @@ def _tables(annotation: object) -> Iterator[type[BaseModel]]:
         yield annotation
     for argument in get_args(annotation):
         yield from _tables(argument)
-
-
-def _is_mapping(annotation: object) -> bool:
-    return getattr(annotation, "__origin__", None) is dict
 
 
 _BLANK = re.compile(r"[ \t\r\n]*(?:#[^\n]*[ \t\r\n]*)*")

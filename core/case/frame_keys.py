@@ -81,16 +81,21 @@ def named_tables(
     """
     found = [_known_name(content, own.get(member), tables) for member, content in contents]
     bases = [own.get(member, plain) for member, _ in contents]
-    pairs = {(base, _frozen(c)) for base, (_, c) in zip(bases, contents, strict=True)}
+    pairs = {(base, tuple(c.items())) for base, (_, c) in zip(bases, contents, strict=True)}
     taken = {name for name in found if name is not None}
     new: dict[tuple[object, ...], str] = {}
     names, result = [], {}
     for name, base, (member, content) in zip(found, bases, contents, strict=True):
-        key = _frozen(content)
+        key = tuple(content.items())
         chosen = name or new.get(key)
         if chosen is None:
             alone = sum(base == other for other, _ in pairs) == 1
-            chosen = new[key] = _free_name(base if alone else f"{base}-{member}", taken)
+            free = base if alone else f"{base}-{member}"
+            chosen, count = free[:_LONGEST].rstrip(), 1
+            while chosen in taken:
+                count += 1
+                chosen = f"{free[: _LONGEST - 8].rstrip()}-{count}"
+            new[key] = chosen
         names.append(chosen)
         result[chosen] = content
         taken.add(chosen)
@@ -101,18 +106,6 @@ def _known_name(content: Keys, own: str | None, tables: Mapping[str, Keys]) -> s
     if own is not None and tables.get(own) == content:
         return own
     return next((name for name, table in tables.items() if table == content), None)
-
-
-def _frozen(content: Keys) -> tuple[object, ...]:
-    return tuple(content.items())
-
-
-def _free_name(name: str, taken: set[str]) -> str:
-    chosen, count = name[:_LONGEST].rstrip(), 1
-    while chosen in taken:
-        count += 1
-        chosen = f"{name[: _LONGEST - 8].rstrip()}-{count}"
-    return chosen
 
 
 _Factors = dict[tuple[str, str], float]
@@ -211,8 +204,27 @@ def frame_keys(frame: Frame, known: Known) -> Keys:
     # A beam without length is no arm, and the reader takes none.
     springs = (replace(s, arm_factor=s.arm_factor if s.arm else None) for s in frame.joint_springs)
     plain = keys_of(replace(frame, joint_springs=tuple(springs)), without=("members", "families"))
-    sections, section_tables = _sections(frame, known)
-    materials, material_tables = _materials(frame, known)
+    own = known.names("section")
+    contents, seen = [], dict[tuple[int, float, str], Keys]()
+    for member in frame.members:
+        name = own.get(member.name, "")
+        key = id(member.section), member.material.nu, name
+        if key not in seen:
+            seen[key] = _section_keys(member, frame.plane, known.sections.get(name))
+        contents.append((member.name, seen[key]))
+    tables = {}
+    for name, spec in known.sections.items():
+        try:
+            section = section_of(spec, frame.plane, "euler-bernoulli")
+        except Fault:
+            continue
+        tables[name] = section_keys(section, _ANY_NU, frame.plane, spec)
+    sections, section_tables = named_tables(contents, own, tables, "section")
+    contents = [
+        (member.name, keys_of(member.material, without=("name",))) for member in frame.members
+    ]
+    tables = {name: spec.model_dump() for name, spec in known.materials.items()}
+    materials, material_tables = named_tables(contents, known.names("material"), tables, "material")
     members = [
         {
             **keys_of(member, without=("section", "material")),
@@ -257,33 +269,6 @@ def _plain(value: object) -> Any:  # noqa: ANN401 - what TOML can hold
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     return float(value) if isinstance(value, (int, float, np.number)) else keys_of(value)
-
-
-def _materials(frame: Frame, known: Known) -> tuple[list[str], dict[str, Keys]]:
-    contents = [
-        (member.name, keys_of(member.material, without=("name",))) for member in frame.members
-    ]
-    tables = {name: spec.model_dump() for name, spec in known.materials.items()}
-    return named_tables(contents, known.names("material"), tables, "material")
-
-
-def _sections(frame: Frame, known: Known) -> tuple[list[str], dict[str, Keys]]:
-    own = known.names("section")
-    contents, seen = [], dict[tuple[int, float, str], Keys]()
-    for member in frame.members:
-        name = own.get(member.name, "")
-        key = id(member.section), member.material.nu, name
-        if key not in seen:
-            seen[key] = _section_keys(member, frame.plane, known.sections.get(name))
-        contents.append((member.name, seen[key]))
-    tables = {}
-    for name, spec in known.sections.items():
-        try:
-            section = section_of(spec, frame.plane, "euler-bernoulli")
-        except Fault:
-            continue
-        tables[name] = section_keys(section, _ANY_NU, frame.plane, spec)
-    return named_tables(contents, own, tables, "section")
 
 
 def _section_keys(member: Member, plane: Plane, hint: SectionSpec | None) -> Keys:

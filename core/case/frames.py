@@ -215,20 +215,16 @@ def frame_of(model: FrameSpec) -> Frame:
         Member(m.name, m.ends, m.elements, sections[m.section], materials[m.material], m.up)
         for m in model.members
     )
-    site = FrameSite(Frame(**parts, members=members, families=_families(model)))
+    families: dict[str, list[str]] = {}  # the members of every section and of every material
+    for word in ("section", "material"):
+        for member in model.members:
+            families.setdefault(f"{word}:{getattr(member, word)}", []).append(member.name)
+    parts["families"] = tuple(MemberSet(word, tuple(names)) for word, names in families.items())
+    site = FrameSite(Frame(**parts, members=members))
     attached: dict[str, Any] = {
         key: attachments(key, getattr(model, key), site) for key in _ATTACHED
     }
     return replace(site.frame, **attached)
-
-
-def _families(model: FrameSpec) -> tuple[MemberSet, ...]:
-    """Return the members of every section and of every material."""
-    found: dict[str, list[str]] = {}
-    for kind in ("section", "material"):
-        for member in model.members:
-            found.setdefault(f"{kind}:{getattr(member, kind)}", []).append(member.name)
-    return tuple(MemberSet(word, tuple(names)) for word, names in found.items())
 
 
 def _made(kind: Any, spec: Table) -> Any:  # noqa: ANN401 - a part of a frame

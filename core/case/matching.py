@@ -213,7 +213,8 @@ def _advice(every: FloatArray, site: Site, alignment: Alignment) -> str:
         return f"; the sensors span {sizes}: is one of the units wrong?"
     for unit in units:
         for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
-            turn = _turn(order, signs)
+            turn = np.zeros((3, 3))
+            turn[range(3), list(order)] = signs
             points = METRES[unit] * every @ turn.T
             if np.linalg.det(turn) > 0.0 and _gaps(points, site).max() <= limit:
                 axes = zip(order, signs, strict=True)
@@ -223,12 +224,6 @@ def _advice(every: FloatArray, site: Site, alignment: Alignment) -> str:
                 keys += [] if np.array_equal(turn, alignment.turn) else [f'frame = "{frame}"']
                 return f"; with {' and '.join(keys)} all fit" if keys else ""
     return ""
-
-
-def _turn(order: Sequence[int], signs: Sequence[float]) -> FloatArray:
-    turn = np.zeros((3, 3))
-    turn[range(3), list(order)] = signs
-    return turn
 
 
 def check_apart(

@@ -137,29 +137,24 @@ def checked(matrix: SparseArray, file: Path, size: int) -> SparseArray:
     if matrix.dtype.kind not in "fiu":
         raise InputError("an entry is not a number", file=file, expected="real numbers")
     matrix = sp.csc_array(matrix, dtype=float)
-    _check_entries(matrix, file)
-    largest = np.abs(matrix.data).max(initial=0.0)
-    if largest == 0.0 or matrix.diagonal().min() < 0.0:
-        what = "the matrix is zero" if largest == 0.0 else "a diagonal entry is negative"
-        raise InputError(what, file=file, expected="a positive semidefinite matrix")
-    return sp.csc_array(0.5 * (matrix + matrix.T))
-
-
-def _check_entries(matrix: SparseArray, file: Path) -> None:
-    """Raise for the first entry that is not finite or has no equal across the diagonal."""
     entries = sp.coo_array(matrix)
-    size = np.abs(entries.data)
-    wrong = np.flatnonzero(~(size <= LARGEST))
+    sizes = np.abs(entries.data)
+    wrong = np.flatnonzero(~(sizes <= LARGEST))
     if len(wrong):
         i, j = entries.row[wrong[0]] + 1, entries.col[wrong[0]] + 1
         what = f"entry ({i}, {j}) is {entries.data[wrong[0]]:g}"
         raise InputError(what, file=file, expected=f"finite numbers up to {LARGEST:g}")
     apart = sp.coo_array(matrix - matrix.T)
-    wrong = np.flatnonzero(np.abs(apart.data) > _ASYMMETRY * size.max(initial=0.0))
+    wrong = np.flatnonzero(np.abs(apart.data) > _ASYMMETRY * sizes.max(initial=0.0))
     if len(wrong):
         i, j = apart.row[wrong[0]] + 1, apart.col[wrong[0]] + 1
         what = f"the matrix is not symmetric at ({i}, {j})"
         raise InputError(what, file=file, expected="A = A'")
+    largest = np.abs(matrix.data).max(initial=0.0)
+    if largest == 0.0 or matrix.diagonal().min() < 0.0:
+        what = "the matrix is zero" if largest == 0.0 else "a diagonal entry is negative"
+        raise InputError(what, file=file, expected="a positive semidefinite matrix")
+    return sp.csc_array(0.5 * (matrix + matrix.T))
 
 
 def reader_of(file: Path, readers: Sequence[Reader]) -> Reader | None:
@@ -242,9 +237,19 @@ def with_groups(
     groups, mass_groups = dict(model.groups), dict(model.mass_groups)
     for i, spec in enumerate(specs):
         with at_key("groups", i):
-            _check_group(spec)
+            if spec.dofs is not None and (spec.stiffness is not None or spec.mass is not None):
+                raise Fault(("dofs",), "a group of dofs with files", "either files or dofs")
+            if spec.stiffness is None and spec.mass is None and spec.dofs is None:
+                raise Fault((), "a group without a part", "stiffness, mass or dofs")
             if spec.dofs is not None:
-                groups[spec.name] = _between(spec.dofs, geometry, model.stiffness)
+                inside = np.zeros(len(geometry.dofs))
+                for i, entry in enumerate(spec.dofs):
+                    with at_key("dofs", i):
+                        inside[_rows(entry, geometry)] = 1.0
+                pick = sp.diags_array(inside)
+                part = sp.csc_array(pick @ model.stiffness @ pick)
+                part.eliminate_zeros()
+                groups[spec.name] = part
             for key, found in (("stiffness", groups), ("mass", mass_groups)):
                 if (file := getattr(spec, key)) is not None:
                     with at_key(key):
@@ -252,27 +257,6 @@ def with_groups(
                     found[spec.name] = read_matrix(path, model.size, readers)
     priors = {spec.name: spec.prior for spec in specs if spec.prior is not None}
     return replace(model, groups=groups, mass_groups=mass_groups, group_priors=priors)
-
-
-def _check_group(spec: GroupSpec) -> None:
-    if spec.dofs is not None and (spec.stiffness is not None or spec.mass is not None):
-        raise Fault(("dofs",), "a group of dofs with files", "either files or dofs")
-    if spec.stiffness is None and spec.mass is None and spec.dofs is None:
-        raise Fault((), "a group without a part", "stiffness, mass or dofs")
-
-
-def _between(
-    dofs: Sequence[int | str], geometry: MatrixGeometry, stiffness: SparseArray
-) -> SparseArray:
-    """Return the stiffness between some dofs."""
-    inside = np.zeros(len(geometry.dofs))
-    for i, entry in enumerate(dofs):
-        with at_key("dofs", i):
-            inside[_rows(entry, geometry)] = 1.0
-    pick = sp.diags_array(inside)
-    part = sp.csc_array(pick @ stiffness @ pick)
-    part.eliminate_zeros()
-    return part
 
 
 def _rows(entry: int | str, geometry: MatrixGeometry) -> list[int]:

@@ -24,7 +24,7 @@ from femubench.core.fem.model import LowRank, Model
 from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.fem.structure import Structure
 from femubench.core.files import make_folder, write_atomically
-from femubench.core.typing import IntArray, SparseArray
+from femubench.core.typing import SparseArray
 
 Files = dict[str, bytes]
 _MOST_DENSE = 4_000  # dofs; a low-rank change fills the whole matrix
@@ -144,6 +144,9 @@ def frame_places(model: Model, places: Sequence[Place]) -> dict[Place, Place]:
 def dofs_csv(geometry: MatrixGeometry) -> bytes:
     """Return the table row,node,direction,x,y,z, nodes in the order of their names."""
     dofs = geometry.dofs
+    order = np.arange(len(dofs))
+    if np.any(np.diff(np.unique(dofs.node, return_index=True)[1]) <= 0):
+        order = np.argsort(dofs.node, kind="stable")  # nodes by their numbers
     rows = [
         [
             int(i) + geometry.first_row,
@@ -151,16 +154,9 @@ def dofs_csv(geometry: MatrixGeometry) -> bytes:
             dofs.direction[i],
             *(number(v) for v in dofs.xyz[i]),
         ]
-        for i in _order(dofs.node)
+        for i in order
     ]
     return csv_bytes(["row", "node", "direction", "x", "y", "z"], rows)
-
-
-def _order(node: IntArray) -> IntArray:
-    """Return the rows such that nodes come first in the order of their numbers."""
-    first = np.unique(node, return_index=True)[1]
-    rows = np.arange(len(node))
-    return rows if np.all(np.diff(first) > 0) else np.argsort(node, kind="stable")
 
 
 def matrix_keys(

@@ -258,7 +258,12 @@ def write_model(
     if folder.resolve() == like.model.parent.resolve():
         raise InputError("holds the files of the model", file=folder, expected="another folder")
     try:
-        model = from_si(_multiplied_out(model), unit)
+        if model.mass_change is not None or model.stiffness_change is not None:
+            mass, whole = matrices_of(model)
+            model = replace(
+                model, mass=mass, stiffness=whole, mass_change=None, stiffness_change=None
+            )
+        model = from_si(model, unit)
     except Fault as fault:
         what = f"cannot be written: {fault.what}"
         raise InputError(what, file=made, expected=fault.expected) from None
@@ -280,13 +285,6 @@ def write_model(
             return
     expected = "a format that goes both ways: see docs/readers.md"
     raise InputError("no such file is written", file=made, expected=expected)
-
-
-def _multiplied_out(model: Model) -> Model:
-    if model.mass_change is None and model.stiffness_change is None:
-        return model
-    mass, stiffness = matrices_of(model)
-    return replace(model, mass=mass, stiffness=stiffness, mass_change=None, stiffness_change=None)
 
 
 def files_of(folder: Path) -> tuple[ModelFiles, LengthUnit] | None:

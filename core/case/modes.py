@@ -47,14 +47,23 @@ def read_modes(file: Path, sensors: Sensors, shape_std: float) -> Measurement:
         what = f"{len(table.rows)} modes at {len(labels)} sensors are too many numbers"
         raise InputError(what, file=file, expected=f"at most {_MOST_NUMBERS}")
     numbers: dict[int, None] = {}
+    columns: list[tuple[float, float, float]] = []
     for row in table.rows:
         number = row.whole("mode")
         if number in numbers or number < 1:
             what = f"mode {number} is listed twice" if number else "mode 0"
             raise row.error("mode", what, "a whole number >= 1 of its own")
         numbers[number] = None
-    frequencies, frequency_std, damping = _frequencies(table)
-    shapes, std = _shapes(table, labels)
+    for row in table.rows:
+        frequency = row.number("frequency", "a number > 0 in Hz", lambda v: v >= SMALLEST)
+        if frequency is None:
+            raise row.error("frequency", "empty cell", "a number > 0 in Hz")
+        std = row.number("frequency_std", "a number >= 0 in Hz, or nothing", _not_negative)
+        std = FREQUENCY_STD * frequency if std is None else std
+        ratio = row.number("damping", "a ratio >= 0 and < 1, or nothing", lambda v: 0 <= v < 1)
+        columns.append((frequency, std, np.nan if ratio is None else ratio))
+    frequencies, frequency_std, damping = np.array(columns).T
+    shapes, shape_stds = _shapes(table, labels)
     return Measurement(
         sensors=sensors,
         numbers=tuple(numbers),
@@ -62,26 +71,8 @@ def read_modes(file: Path, sensors: Sensors, shape_std: float) -> Measurement:
         frequency_std=frequency_std,
         damping=damping,
         shapes=shapes,
-        shape_std=with_default_std(shapes, std, shape_std),
+        shape_std=with_default_std(shapes, shape_stds, shape_std),
     )
-
-
-def _frequencies(table: Table) -> tuple[FloatArray, FloatArray, FloatArray]:
-    columns: list[tuple[float, float, float]] = []
-    for row in table.rows:
-        frequency = row.number("frequency", "a number > 0 in Hz", _positive)
-        if frequency is None:
-            raise row.error("frequency", "empty cell", "a number > 0 in Hz")
-        std = row.number("frequency_std", "a number >= 0 in Hz, or nothing", _not_negative)
-        damping = row.number("damping", "a ratio >= 0 and < 1, or nothing", lambda v: 0 <= v < 1)
-        std = FREQUENCY_STD * frequency if std is None else std
-        columns.append((frequency, std, np.nan if damping is None else damping))
-    frequencies, stds, ratios = np.array(columns).T
-    return frequencies, stds, ratios
-
-
-def _positive(value: float) -> bool:
-    return value >= SMALLEST
 
 
 def _not_negative(value: float) -> bool:
@@ -175,10 +166,7 @@ def seen_at(measurement: Measurement, sensors: Sensors) -> Measurement:
 
 def measured_only(sensors: Sensors, shapes: FloatArray) -> Sensors:
     """Return the sensors at which some mode has a shape."""
-    return _some(sensors, [int(i) for i in np.flatnonzero(np.isfinite(shapes).any(axis=1))])
-
-
-def _some(sensors: Sensors, keep: list[int]) -> Sensors:
+    keep = [int(i) for i in np.flatnonzero(np.isfinite(shapes).any(axis=1))]
     labels, directions = (
         [names[i] for i in keep] for names in (sensors.labels, sensors.directions)
     )

@@ -51,7 +51,14 @@ def from_opensees() -> Model:
     if sum(int(ops.getNDF(tag)[0]) for tag in tags) > _MOST:
         what = f"the model of {len(tags)} nodes in OpenSees is too large"
         raise ModelError(f"{what}: its matrices are printed whole, at most {_MOST} rows")
-    if not _free(ops, tags):  # to solve for nothing ends the whole process
+    held = {int(tag): set(ops.getFixedDOFs(int(tag))) for tag in ops.getFixedNodes() or ()}
+    led = {
+        int(tag): set(ops.getConstrainedDOFs(int(tag))) for tag in ops.getConstrainedNodes() or ()
+    }
+    none: set[int] = set()
+    if not any(
+        len(held.get(tag, none) | led.get(tag, none)) < int(ops.getNDF(tag)[0]) for tag in tags
+    ):  # to solve for nothing ends the whole process
         raise ModelError("nothing can move in the model of OpenSees")
     ops.wipeAnalysis()
     try:
@@ -59,18 +66,6 @@ def from_opensees() -> Model:
         return matrix_model(mass, stiffness, *_labels(ops, tags, len(mass)))
     finally:
         ops.wipeAnalysis()
-
-
-def _free(ops: Any, tags: Sequence[int]) -> bool:  # noqa: ANN401 - a module
-    """Tell whether a node moves by itself in any direction."""
-    held = {int(tag): set(ops.getFixedDOFs(int(tag))) for tag in ops.getFixedNodes() or ()}
-    led = {
-        int(tag): set(ops.getConstrainedDOFs(int(tag))) for tag in ops.getConstrainedNodes() or ()
-    }
-    none: set[int] = set()
-    return any(
-        len(held.get(tag, none) | led.get(tag, none)) < int(ops.getNDF(tag)[0]) for tag in tags
-    )
 
 
 def _labels(
@@ -82,27 +77,23 @@ def _labels(
     nodes, directions, places = [""] * size, [""] * size, np.full((size, 3), np.nan)
     led = {int(tag) for tag in ops.getConstrainedNodes() or ()}
     for tag in tags:
-        for direction, row in _rows(ops, tag, tag in led):
-            nodes[row], directions[row] = str(tag), direction
-            coordinates = ops.nodeCoord(tag)
-            places[row] = [*coordinates, *[0.0] * (3 - len(coordinates))]
+        space, count = int(ops.getNDM(tag)[0]), int(ops.getNDF(tag)[0])
+        motions = _MOTIONS.get((space, count))
+        if motions is None:
+            what = f"node {tag} has {count} degrees of freedom in {space} dimensions"
+            raise ModelError(f"{what}; known are displacements and rotations")
+        follow = {int(dof) for dof in ops.getConstrainedDOFs(tag)} if tag in led else set()
+        own = [name for i, name in enumerate(motions, 1) if i not in follow]
+        # Behind those of its own stand the equations of the node that it follows.
+        equations = [int(row) for row in ops.nodeDOFs(tag)[: len(own)]]
+        coordinates = ops.nodeCoord(tag)
+        for direction, row in zip(own, equations, strict=True):
+            if row >= 0:
+                nodes[row], directions[row] = str(tag), direction
+                places[row] = [*coordinates, *[0.0] * (3 - len(coordinates))]
     if "" in directions:
         raise ModelError("OpenSees has equations that belong to no node")
     return nodes, directions, places
-
-
-def _rows(ops: Any, tag: int, led: bool) -> list[tuple[str, int]]:  # noqa: ANN401 - a module
-    """Return the directions in which a node moves by itself, with their equations."""
-    space, count = int(ops.getNDM(tag)[0]), int(ops.getNDF(tag)[0])
-    motions = _MOTIONS.get((space, count))
-    if motions is None:
-        what = f"node {tag} has {count} degrees of freedom in {space} dimensions"
-        raise ModelError(f"{what}; known are displacements and rotations")
-    follow = {int(dof) for dof in ops.getConstrainedDOFs(tag)} if led else set()
-    own = [name for i, name in enumerate(motions, 1) if i not in follow]
-    # Behind those of its own stand the equations of the node that it follows.
-    equations = [int(row) for row in ops.nodeDOFs(tag)[: len(own)]]
-    return [(name, row) for name, row in zip(own, equations, strict=True) if row >= 0]
 
 
 def _matrices(ops: Any) -> tuple[FloatArray, FloatArray]:  # noqa: ANN401 - a module

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from femubench.core.case.case import Match
 from femubench.core.case.faults import Misfit, WrongDirection
 from femubench.core.case.frames import Site
 from femubench.core.case.matching import (
@@ -18,7 +17,7 @@ from femubench.core.case.matching import (
     span_told,
     told_of,
 )
-from femubench.core.case.tables import RESERVED, Row, Table, parse_place, read_table
+from femubench.core.case.tables import RESERVED, Row, parse_place, read_table
 from femubench.core.errors import InputError
 from femubench.core.fem.frame import Vector
 from femubench.core.fem.sensors import Sensors
@@ -64,7 +63,12 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> Placed:
             np.eye(3),
         )
     every = np.array([row.vector() for row in table.rows], dtype=float)
-    matches = _placed(table, every, site, alignment)
+    matches = tuple(matches_of(list(labels), every, site, alignment, alignment.unit or 1.0))
+    for row, match in zip(table.rows, matches, strict=True):
+        try:
+            check_near(match, site, alignment, every)
+        except Misfit as misfit:
+            raise row.error("x", misfit.what, misfit.expected) from None
     directions = [alignment.direction(way) for way in directions]
     for row, match, way in zip(table.rows, matches, directions, strict=True):
         _check_sensor(row, match.xyz, way, site, "x")
@@ -77,18 +81,6 @@ def read_sensors(file: Path, site: Site, alignment: Alignment) -> Placed:
     sensors = Sensors(tuple(labels), xyz, tuple(directions))
     turn = (alignment.unit or 1.0) * alignment.turn
     return Placed(sensors, matches, (*close, *told_of(matches, file.name)), turn)
-
-
-def _placed(table: Table, xyz: FloatArray, site: Site, alignment: Alignment) -> tuple[Match, ...]:
-    """Return where the coordinates of a table put its sensors."""
-    labels = [row.cells["label"] for row in table.rows]
-    matches = matches_of(labels, xyz, site, alignment, alignment.unit or 1.0)
-    for row, match in zip(table.rows, matches, strict=True):
-        try:
-            check_near(match, site, alignment, xyz)
-        except Misfit as misfit:
-            raise row.error("x", misfit.what, misfit.expected) from None
-    return tuple(matches)
 
 
 def _point_at(row: Row, direction: str, site: Site) -> Vector:

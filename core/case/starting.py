@@ -86,8 +86,12 @@ def start_case(
         try:
             case = read_case(fresh, readers=readers)
         except InputError as error:
-            raise _of_original(
-                error, {fresh / name: path for path, name in copies.items()}
+            # The file that the user has, and not its copy.
+            origins = {fresh / name: path for path, name in copies.items()}
+            file = None if error.file is None else origins.get(Path(error.file))
+            line = error.line if file is not None else None
+            raise InputError(
+                error.what, file=file, line=line, key=error.key, expected=error.expected
             ) from None
         (fresh / CASE_FILE).write_text(keys.text(readers, case), encoding="utf-8")
         if case.matches:
@@ -96,13 +100,6 @@ def start_case(
         if draw is not None and case.matches:
             draw(case, fresh / PICTURE)
     return replace(case, folder=folder)
-
-
-def _of_original(error: InputError, origins: Mapping[Path, Path]) -> InputError:
-    """Return the error of a copy as one of the file that the user has."""
-    file = None if error.file is None else origins.get(Path(error.file))
-    line = error.line if file is not None else None
-    return InputError(error.what, file=file, line=line, key=error.key, expected=error.expected)
 
 
 def _copied(given: Beginning, fresh: Path, readers: Sequence[Reader]) -> dict[Path, str]:

@@ -239,7 +239,11 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
         Fault: for what no case folder can say.
     """
     keys, files, modifications = _model_part(case, known)
-    _into_tables(keys, files)
+    # Long lists of joints and members go to files of their own.
+    for part in ("joints", "members"):
+        if len(keys.get(part, ())) > MANY:
+            files[f"{part}.csv"] = part_csv(part, keys[part])
+            keys[part] = f"{part}.csv"
     if case.model.free:
         keys = {"kind": keys["kind"], "free": True, **keys}
     share = common_share(_measurements(case), known.shape_std)
@@ -251,7 +255,12 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
     if case.measurement.frequency_correlation is not None:
         measurement["covariance"] = "covariance.csv"
         files["covariance.csv"] = covariance_csv(case.measurement)
-    measurement |= _settings(case)
+    measurement["used"] = [int(number) for number in case.used]
+    if case.held_out:
+        measurement["held_out"] = [int(number) for number in case.held_out]
+    if case.band is not None:
+        measurement["band"] = [float(frequency) for frequency in case.band]
+    measurement |= _weight(case.measurement)
     if case.frfs is not None:
         measurement["frfs"] = "frfs.npz"
         files["frfs.npz"] = responses_npz(case.frfs)
@@ -260,7 +269,11 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
     content: Keys = {"case": info, "model": keys, "measurement": measurement}
     tables = []
     for item in modifications:
-        file = _file_name(item.name, files)
+        slug = re.sub(r"[^a-z0-9]+", "-", item.name.lower()).strip("-")[:60] or "structure"
+        file, count = f"modified-{slug}.csv", 1
+        while file in files:
+            count += 1
+            file = f"modified-{slug}-{count}.csv"
         files[file] = modes_csv(item.measurement, share)
         attached = {"masses": item.masses, "springs": item.springs}
         plain = {key: [keys_of(one) for one in many] for key, many in attached.items() if many}
@@ -287,38 +300,11 @@ def case_files(case: Case, known: Known, comment: Sequence[str]) -> Files:
     return {CASE_FILE: toml_bytes(content, comment), **files}
 
 
-def _into_tables(keys: Keys, files: Files) -> None:
-    """Move long lists of joints and members from the keys of a model to files of their own."""
-    for part in ("joints", "members"):
-        if len(keys.get(part, ())) > MANY:
-            files[f"{part}.csv"] = part_csv(part, keys[part])
-            keys[part] = f"{part}.csv"
-
-
-def _settings(case: Case) -> Keys:
-    """Return the keys of `[measurement]` behind the files."""
-    keys: Keys = {"used": [int(number) for number in case.used]}
-    if case.held_out:
-        keys["held_out"] = [int(number) for number in case.held_out]
-    if case.band is not None:
-        keys["band"] = [float(frequency) for frequency in case.band]
-    return keys | _weight(case.measurement)
-
-
 def _weight(measurement: Measurement) -> Keys:
     if measurement.total_mass is None:
         return {}
     value, std = measurement.total_mass
     return {"mass": {"value": float(value), "std": float(std)}}
-
-
-def _file_name(name: str, taken: Files) -> str:
-    slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")[:60] or "structure"
-    file, count = f"modified-{slug}.csv", 1
-    while file in taken:
-        count += 1
-        file = f"modified-{slug}-{count}.csv"
-    return file
 
 
 def _model_part(case: Case, known: Known) -> tuple[Keys, Files, tuple[Modification, ...]]:

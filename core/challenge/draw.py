@@ -328,27 +328,17 @@ def draw_case(
     candidates = Candidates(
         specimen, kind, catalogue, scatter, np.random.default_rng(choice), elements
     )
-    _check_effect(candidates, hidden, effect)
+    if hidden != "none":
+        known = tuple(candidates.strangers if hidden == "outside" else candidates.places)
+        if effect is not None and effect not in known:
+            what = f"{effect!r} cannot be hidden in {structure}"
+            raise InputError(what, key="effect", expected=f"one of {', '.join(known)}")
+        if not known:
+            raise InputError("no effect can be hidden", expected="a plugin with effects")
     drawn, seen = _accepted(candidates, hidden, effect)
     case = _case(candidates, drawn, seen, np.random.default_rng(noise))
     truth = Truth(seed, kind, structure, hidden, drawn.causes, drawn.outside, drawn.excess, scatter)
     return BlindCase(case, truth)
-
-
-def _check_effect(candidates: Candidates, hidden: Hidden, effect: str | None) -> None:
-    """Refuse an effect that cannot be hidden.
-
-    Raises:
-        InputError: when it is unknown, or has no place on the structure.
-    """
-    if hidden == "none":
-        return
-    known = tuple(candidates.strangers if hidden == "outside" else candidates.places)
-    if effect is not None and effect not in known:
-        what = f"{effect!r} cannot be hidden in {candidates.specimen.name}"
-        raise InputError(what, key="effect", expected=f"one of {', '.join(known)}")
-    if not known:
-        raise InputError("no effect can be hidden", expected="a plugin with effects")
 
 
 def _accepted(candidates: Candidates, hidden: Hidden, effect: str | None) -> tuple[Candidate, Seen]:

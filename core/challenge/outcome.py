@@ -83,26 +83,6 @@ def _only(truth: Truth, parts: Parts, same: Same) -> bool:
     return all(any(is_finding(part, cause, same) for cause in truth.causes) for part in parts)
 
 
-def _half(truth: Truth, parts: Parts, same: Same) -> bool:
-    """Tell whether parts are just one of two causes."""
-    if len(truth.causes) != 2 or len(parts) != 1:
-        return False
-    return any(is_finding(parts[0], cause, same) for cause in truth.causes)
-
-
-def said_sets(truth: Truth, record: Record) -> list[Parts]:
-    """Return what a record takes for possible, without what it takes at the textbook value.
-
-    What handbooks give a drawn model lacks whether the structure has a defect or not.
-    """
-    wanted = {effect for cause in truth.causes for effect, _ in cause.findings}
-    textbook = set(record.get("textbook", ())) - wanted
-    return [
-        tuple(part for part in parts if part[0] not in textbook)
-        for parts in candidates(Answer.model_validate(record["answer"]))
-    ]
-
-
 def outcome(truth: Truth, record: Record, same: Same) -> str:
     """Return which of `OUTCOMES` a record is.
 
@@ -110,11 +90,20 @@ def outcome(truth: Truth, record: Record, same: Same) -> str:
     one of its members is right by itself.
     """
     verdict = str(record["verdict"]).replace("-", " ")
-    if truth.kind.endswith("-fault") and (found := faults_said(record)):
-        return fault_outcome(truth, found, same)
+    faulty = truth.kind.endswith("-fault") and "answer" in record
+    if faulty and (found := faults_in(Answer.model_validate(record["answer"]))):
+        if _holds(truth, found, same):
+            return "right" if _only(truth, found, same) else "with others"
+        return "other place" if _holds(truth, found, anywhere) else "wrong"
     if verdict not in ("named", "ambiguous"):
         return verdict
-    sets = said_sets(truth, record)
+    # What handbooks give a drawn model lacks whether the structure has a defect or not.
+    wanted = {effect for cause in truth.causes for effect, _ in cause.findings}
+    textbook = set(record.get("textbook", ())) - wanted
+    sets = [
+        tuple(part for part in parts if part[0] not in textbook)
+        for parts in candidates(Answer.model_validate(record["answer"]))
+    ]
     if not any(sets):
         return "none"
     if not truth.causes:
@@ -128,19 +117,9 @@ def outcome(truth: Truth, record: Record, same: Same) -> str:
         return "other place"
     if any(_holds(truth, parts, same) for parts in sets):
         return "with others"
-    return "one of two" if any(_half(truth, parts, same) for parts in sets) else "wrong"
-
-
-def faults_said(record: Record) -> Parts:
-    """Return the faults of data and input that a record names."""
-    return faults_in(Answer.model_validate(record["answer"])) if "answer" in record else ()
-
-
-def fault_outcome(truth: Truth, found: Parts, same: Same) -> str:
-    """Return which of `OUTCOMES` the faults are that were named, whatever else was."""
-    if _holds(truth, found, same):
-        return "right" if _only(truth, found, same) else "with others"
-    return "other place" if _holds(truth, found, anywhere) else "wrong"
+    single = [parts[0] for parts in sets if len(parts) == 1 and len(truth.causes) == 2]
+    half = any(is_finding(part, cause, same) for part in single for cause in truth.causes)
+    return "one of two" if half else "wrong"
 
 
 def beside(record: Record) -> str:

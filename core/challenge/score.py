@@ -78,19 +78,20 @@ def judge_answer(truth: Truth, answer: Answer, delta_chi2: Sequence[float]) -> J
             cause; for a cause outside the catalogue by how much it raises it.
     """
     if truth.outside:
-        return _judge_outside(truth, answer, min(delta_chi2, default=0.0))
+        too_small = min(delta_chi2, default=0.0) < TOO_SMALL
+        right = answer.verdict in ("unknown", "not-confirmed")
+        right = right or (too_small and answer.verdict == "none")
+        in_data = bool(answer.causes) and all(cause.side == "data" for cause in answer.causes)
+        right = right or (in_data and truth.outside.startswith("sensor"))
+        reason = "the cause is outside the catalogue"
+        reason = reason if right else f"{reason}, but it says {_said(answer)}"
+        return Judgement(right, None, None, group_size(answer), 0, too_small, False, (), reason)
     group = group_size(answer)
     if not truth.causes:
         right = answer.verdict == "none"
         reason = "nothing is hidden" if right else f"nothing is hidden, but it says {_said(answer)}"
         alarm = answer.verdict != "none"
         return Judgement(right, None, None, group, 0, False, alarm, (), reason)
-    return _judge_causes(truth, answer, delta_chi2, group)
-
-
-def _judge_causes(
-    truth: Truth, answer: Answer, delta_chi2: Sequence[float], group: int
-) -> Judgement:
     frame = structure_named(truth.structure).frame
     pairs = list(zip(truth.causes, delta_chi2, strict=True))
     visible = frozenset(cause.effect for cause, delta in pairs if delta >= TOO_SMALL)
@@ -119,17 +120,6 @@ def _judge_causes(
     else:
         reason = f"it says {_said(answer)}; hidden is {truth}"
     return Judgement(names, names, places, group, found, too_small, False, sizes, reason)
-
-
-def _judge_outside(truth: Truth, answer: Answer, excess: float) -> Judgement:
-    too_small = excess < TOO_SMALL
-    right = answer.verdict in ("unknown", "not-confirmed")
-    right = right or (too_small and answer.verdict == "none")
-    in_data = bool(answer.causes) and all(cause.side == "data" for cause in answer.causes)
-    right = right or (in_data and truth.outside.startswith("sensor"))
-    reason = "the cause is outside the catalogue"
-    reason = reason if right else f"{reason}, but it says {_said(answer)}"
-    return Judgement(right, None, None, group_size(answer), 0, too_small, False, (), reason)
 
 
 def candidates(answer: Answer) -> tuple[Parts, ...]:

@@ -82,15 +82,6 @@ def _at(word: str) -> Place:
     return Place(member=member, s=float(station)) if found else Place(joint=word)
 
 
-def _points(words: Sequence[str]) -> dict[str, tuple[Place, str]]:
-    """Return measuring points written as ``place:direction``, labelled P1x, P2x, ..."""
-    points = {}
-    for i, word in enumerate(words):
-        place, _, direction = word.partition(":")
-        points[f"P{i + 1}{direction}"] = (_at(place), direction)
-    return points
-
-
 def _specimen(
     name: str, title: str, frame: Frame, words: Sequence[str], at: str, mass: float, spring: str
 ) -> Specimen:
@@ -102,7 +93,11 @@ def _specimen(
     middle = Place(member=at.removeprefix("the "), s=0.5)
     change = (PointMass(middle, mass),), (GroundSpring(middle, "z", float(spring)),)
     told = f"{mass:g} kg and {spring} N/m at the middle of {at}"
-    return Specimen(name, title, frame, _points(words), change, told)
+    points = {}
+    for i, word in enumerate(words):
+        place, _, direction = word.partition(":")
+        points[f"P{i + 1}{direction}"] = (_at(place), direction)
+    return Specimen(name, title, frame, points, change, told)
 
 
 def _ladder(name: str, stretch: float = 1.0) -> Specimen:

@@ -38,13 +38,10 @@ _SAME = 1e-6  # relative, of frequencies: stiff springs stand for rigid joints
 _STEP = 1e-4  # of the scale
 
 
-def _models() -> Iterator[tuple[str, Model]]:
-    return ((name, problem(name).model) for name in _PROBLEMS)
-
-
 def _spots(effect: Effect) -> Iterator[tuple[str, Model, str]]:
     """Return the places of every model, two of each kind of word at most: first and last."""
-    for name, model in _models():
+    for name in _PROBLEMS:
+        model = problem(name).model
         places = tuple(effect.places(model))
         for place in dict.fromkeys((*places[:2], *places[-1:])):
             yield f"{name}, place {place!r}", model, place
@@ -118,7 +115,8 @@ def _given(model: Model, extended: Model) -> Given:
 def places(effect: Effect) -> Verdict:
     """Read every place of every model."""
     count = 0
-    for name, model in _models():
+    for name in _PROBLEMS:
+        model = problem(name).model
         found = list(effect.places(model))
         count += len(found)
         for place in found:
@@ -227,7 +225,9 @@ def worded(effect: Effect) -> Verdict:
         parameters = tuple(effect.parameters(model, place))
         faults = [*_wordings(effect, parameters), *_sizes(effect, model, place, parameters)]
         half = getattr(effect, "in_half", lambda values: None)(_values(parameters, 1.0))
-        if half is not None and not _within(half, parameters):
+        pairs = list(zip(half or (), parameters, strict=False))
+        fits = all(item.lower <= value <= item.upper for value, item in pairs)
+        if half is not None and not (len(half) == len(parameters) and fits):
             faults.append(f"in_half gives {half}, expected a value within bounds a parameter")
         if faults:
             return failed(f"{where}: {faults[0]}")
@@ -292,9 +292,3 @@ def _sizes(
                 f"sizes of {item.name!r} from {low:.3g} to {high:.3g}, expected two numbers, 0 or "
                 f"more, ascending, and some between them within {item.lower:g} .. {item.upper:g}"
             )
-
-
-def _within(values: Sequence[float], parameters: Sequence[EffectParameter]) -> bool:
-    pairs = list(zip(values, parameters, strict=False))
-    fits = all(item.lower <= value <= item.upper for value, item in pairs)
-    return len(values) == len(parameters) and fits

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +17,6 @@ from femubench.core.conformance.problems import Problem
 from femubench.core.conformance.results import Given, faults_of
 from femubench.core.conformance.trial import Observation
 from femubench.core.run.answers import AnswerError, unpacked
-from femubench.core.run.jobs import JobOutcome
 from femubench.core.run.workers import Ending
 from femubench.core.update.strategy import ParameterEstimate, UpdateResult
 
@@ -46,23 +44,10 @@ def judge_handed(handed: Handed) -> bytes:
     try:
         outcome = unpacked(handed.answer, handed.problem.model)
     except AnswerError as error:
-        return _said({_TRAVELLED: str(error)}, {})
+        return json.dumps([{_TRAVELLED: str(error)}, {}]).encode()
     if outcome.model is None:
-        return _said({_TRAVELLED: outcome.reason or "there is no model in it"}, {})
-    result = _result(outcome)
-    with warnings.catch_warnings(), np.errstate(all="warn"):
-        warnings.simplefilter("ignore")
-        faults = faults_of(Given(handed.problem, result, handed.promises))
-    return _said(faults, fingerprint(result, "the result outside"))
-
-
-def _said(faults: Mapping[str, str], prints: Mapping[str, str]) -> bytes:
-    return json.dumps([faults, prints]).encode()
-
-
-def _result(outcome: JobOutcome) -> UpdateResult:
-    assert outcome.model is not None
-    return UpdateResult(
+        return json.dumps([{_TRAVELLED: outcome.reason or "there is no model in it"}, {}]).encode()
+    result = UpdateResult(
         model=outcome.model,
         parameters=tuple(
             ParameterEstimate(*(item[name] for name in _ESTIMATE)) for item in outcome.parameters
@@ -71,6 +56,10 @@ def _result(outcome: JobOutcome) -> UpdateResult:
         diagnostics=outcome.diagnostics,
         parameter_count=outcome.parameter_count or 0,
     )
+    with warnings.catch_warnings(), np.errstate(all="warn"):
+        warnings.simplefilter("ignore")
+        faults = faults_of(Given(handed.problem, result, handed.promises))
+    return json.dumps([faults, fingerprint(result, "the result outside")]).encode()
 
 
 def confirmed(told: Observation, ending: Ending) -> Observation:

@@ -220,7 +220,13 @@ class Bench:
         ending = run_apart({0: task}, self.limits, 1)[0]
         if ending.how != "answer":
             return failed(f"{ending.reason}, expected an answer")
-        return _told(ending.answer)
+        try:
+            status, message = json.loads(ending.answer)
+            if status in get_args(Status):
+                return Verdict(status, harmless(str(message)[:_LONGEST]))
+        except (ValueError, TypeError, RecursionError):
+            pass
+        return failed("what its process told is no verdict")
 
     def _trial(self, want: Want) -> Trial:
         code = sent(self.reference) if want.reference else self.code
@@ -267,17 +273,6 @@ def _judged(task: tuple[Callable[..., Verdict], bytes]) -> bytes:
     except BaseException as error:
         verdict = failed(f"{one_line(error)}, expected no exception")
     return json.dumps([verdict.status, verdict.message]).encode()
-
-
-def _told(answer: bytes) -> Verdict:
-    """Return the verdict that a process tells in which a stranger's code ran."""
-    try:
-        status, message = json.loads(answer)
-        if status in get_args(Status):
-            return Verdict(status, harmless(str(message)[:_LONGEST]))
-    except (ValueError, TypeError, RecursionError):
-        pass
-    return failed("what its process told is no verdict")
 
 
 def inspected(bench: Bench, function: Callable[..., Verdict]) -> Verdict:

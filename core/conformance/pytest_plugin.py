@@ -188,7 +188,8 @@ class _Item(pytest.Item):
 
         bench = self.parent.subject.bench
         if self.check.role == "strategy":
-            prepare(self._chosen(), bench)
+            same = (item for item in self.session.items if isinstance(item, _Item))
+            prepare([item.check for item in same if item.parent is self.parent], bench)
         verdict = judged(self.check, bench)
         if verdict.status == "fail":
             raise ConformanceError(verdict.message)
@@ -196,11 +197,6 @@ class _Item(pytest.Item):
             pytest.skip(verdict.message)
         if verdict.status == "warn":
             self.config.stash[_WARNINGS].append(f"{self.nodeid}: {verdict.message}")
-
-    def _chosen(self) -> list[Check]:
-        """Return the checks that run in this session, whose trials can run side by side."""
-        same = (item for item in self.session.items if isinstance(item, _Item))
-        return [item.check for item in same if item.parent is self.parent]
 
     def repr_failure(self, excinfo: Any, style: Any = None) -> Any:  # noqa: ANN401 - pytest's own
         if isinstance(excinfo.value, ConformanceError):

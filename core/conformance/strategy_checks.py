@@ -121,10 +121,6 @@ for _name, _sentence in _RESULTS.items():
     check("strategy", _name, _sentence, wants=_with_results)(partial(_of_results, name=_name))
 
 
-def _inner(subject: Strategy) -> Strategy:
-    return subject.base if isinstance(subject, Variant) else subject
-
-
 @check(
     "strategy",
     "described",
@@ -138,7 +134,7 @@ def described(bench: Bench) -> Verdict:
 
 def is_described(subject: Strategy) -> Verdict:
     """Look at citation, docstring and promises of a strategy."""
-    strategy = _inner(subject)
+    strategy = subject.base if isinstance(subject, Variant) else subject
     if not str(strategy.citation).strip():
         return failed("citation is empty, expected author, year, title, equation")
     promises: object = declared(strategy, "promises")
@@ -164,7 +160,7 @@ def options_documented(bench: Bench) -> Verdict:
 
 def names_options(subject: Strategy) -> Verdict:
     """Look for the fields of a strategy in its docstring and those of its bases."""
-    strategy: Any = _inner(subject)
+    strategy: Any = subject.base if isinstance(subject, Variant) else subject
     fields = dataclasses.fields(strategy) if dataclasses.is_dataclass(strategy) else ()
     if not fields:
         return kit.not_applicable("it has no options")

@@ -155,12 +155,10 @@ def stiffness_difference(nominal: Model, updated: Model) -> FloatArray:
 
 def _one_unit(model: Model) -> FloatArray:
     turns = np.array([name.startswith("r") for name in model.dofs.direction])
-    return np.where(turns, 1.0 / _spacing(model), 1.0)
-
-
-def _spacing(model: Model) -> float:
     if model.structure is not None:
-        return float(model.structure.properties.length.mean())
-    xyz = np.unique(model.dofs.xyz, axis=0)
-    extent = float(np.linalg.norm(np.ptp(xyz, axis=0)))
-    return extent / max(len(xyz) - 1, 1) or 1.0
+        spacing = float(model.structure.properties.length.mean())
+    else:
+        xyz = np.unique(model.dofs.xyz, axis=0)
+        extent = float(np.linalg.norm(np.ptp(xyz, axis=0)))
+        spacing = extent / max(len(xyz) - 1, 1) or 1.0
+    return np.where(turns, 1.0 / spacing, 1.0)

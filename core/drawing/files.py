@@ -130,7 +130,7 @@ class Exhibits:
 
     def case(self, digest: str) -> dict[str, Any] | None:
         """Return the structure of a case by the digest of its files; None likewise."""
-        return self._read(_name(digest), _CaseDrawing)
+        return self._read(f"{_CASE}{digest[:32]}", _CaseDrawing)
 
     def tidy(self) -> None:
         """Remove what a killed process left half-written."""
@@ -141,7 +141,7 @@ class Exhibits:
 
     def has_case(self, digest: str) -> bool:
         """Tell whether a case is drawn already, or cannot be."""
-        path = self._path(_name(digest))
+        path = self._path(f"{_CASE}{digest[:32]}")
         return path is None or path.exists()
 
     def faults(self) -> list[InputError]:
@@ -160,7 +160,7 @@ class Exhibits:
 
     def put_case(self, digest: str, drawing: Mapping[str, Any]) -> None:
         """Keep what is drawn of a case."""
-        self._write(_name(digest), drawing)
+        self._write(f"{_CASE}{digest[:32]}", drawing)
 
     def _path(self, name: str) -> Path | None:
         known = _KEY.fullmatch(name.removeprefix(_CASE))
@@ -204,7 +204,3 @@ def _whole(path: Path) -> bytes:
     if not is_whole(content) and (content.startswith(_HEAD) or sum_of(content)):
         raise InputError("damaged", file=path, expected="the picture that was written")
     return content
-
-
-def _name(digest: str) -> str:
-    return f"{_CASE}{digest[:32]}"

@@ -130,20 +130,15 @@ def relative_change(item: Data) -> float | None:
     before, after = item["before"], item["after"]
     if before is None or after is None or not (math.isfinite(before) and math.isfinite(after)):
         return None
-    if _quantity(item).startswith(_CHANGE) and not item["unit"]:
+    if str(item["name"]).rpartition(": ")[2].startswith(_CHANGE) and not item["unit"]:
         return float(after - before)
     # A length that changes its sign is no stiffness that fell by more than all of it.
     return float(after / before - 1.0) if before * after > 0.0 else None
 
 
-def _quantity(item: Data) -> str:
-    """Return the name of a parameter without the cause that it belongs to."""
-    return str(item["name"]).rpartition(": ")[2]
-
-
 def _estimate_label(item: Data) -> str:
     change = relative_change(item)
-    name = _quantity(item).removeprefix(_CHANGE)
+    name = str(item["name"]).rpartition(": ")[2].removeprefix(_CHANGE)
     if change is not None and symbol_of([item["unit"]]) == "change":
         return f"{name} {percent(change)}"
     return f"{name} {_size(item['after'], item['unit'])}"

@@ -124,7 +124,13 @@ def _place(wireframe: Wireframe, frame: Frame | None, word: str) -> DrawnPlace:
         held = [point_of(frame, at) for at in supports_of(frame, word)]
         return DrawnPlace(word, "point", points=tuple(to_point(place_xyz(frame, p)) for p in held))
     with suppress(ModelError):
-        return DrawnPlace(word, "end", _ends(frame, head))
+        parts = []
+        for end in ends_of(frame, head):
+            name, _, joint = end.rpartition("@")
+            member = frame.member_index[name]
+            first = frame.members[member].ends[0] == joint
+            parts.append(Span(member, *((0.0, _END) if first else (1.0 - _END, 1.0))))
+        return DrawnPlace(word, "end", tuple(parts))
     with suppress(ModelError):
         at = to_point(place_xyz(frame, point_of(frame, head)))
         return DrawnPlace(word, "point", points=(at,))
@@ -135,13 +141,3 @@ def _place(wireframe: Wireframe, frame: Frame | None, word: str) -> DrawnPlace:
 
 def _points(frame: Frame, joints: Iterable[str]) -> tuple[Point, ...]:
     return tuple(to_point(place_xyz(frame, Place(joint=name))) for name in joints)
-
-
-def _ends(frame: Frame, head: str) -> tuple[Span, ...]:
-    spans = []
-    for end in ends_of(frame, head):
-        name, _, joint = end.rpartition("@")
-        member = frame.member_index[name]
-        first = frame.members[member].ends[0] == joint
-        spans.append(Span(member, *((0.0, _END) if first else (1.0 - _END, 1.0))))
-    return tuple(spans)

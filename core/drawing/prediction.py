@@ -156,7 +156,8 @@ def _modes(case: Case, model: Model, nodes: IntArray | None = None) -> dict[str,
 
 def frequency_axis(case: Case) -> FloatArray:
     """Return the frequencies of the receptances of a case in Hz, (400,)."""
-    return np.linspace(2.0, _ABOVE * highest_measured(case), _POINTS)
+    found = (hz for *_, data in measured_blocks(case) for hz in data.frequencies)
+    return np.linspace(2.0, _ABOVE * float(max(found, default=0.0)), _POINTS)
 
 
 def damping_of(case: Case) -> float:
@@ -383,12 +384,6 @@ def _unit(shape: FloatArray) -> FloatArray:
     """Return a shape whose largest component is 1 or -1."""
     largest = np.nanmax(np.abs(shape)) if np.isfinite(shape).any() else 0.0
     return np.asarray(shape / largest if largest > 0.0 else shape)
-
-
-def highest_measured(case: Case) -> float:
-    """Return the highest measured frequency in Hz, of the structure as tested and modified."""
-    found = (hz for *_, data in measured_blocks(case) for hz in data.frequencies)
-    return float(max(found, default=0.0))
 
 
 def keep_drawings(exhibits: Exhibits, cases: Iterable[Case]) -> None:

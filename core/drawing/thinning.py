@@ -10,7 +10,6 @@ from scipy.spatial import cKDTree
 from femubench.core.case.case import Case
 from femubench.core.drawing.wireframe import (
     MOST_NODES,
-    DrawnJoint,
     Wireframe,
     node_positions,
     to_point,
@@ -46,18 +45,16 @@ class Thinned:
         place = {int(node): k for k, node in enumerate(self.nodes)}
         return replace(
             whole,
-            joints=tuple(_kept_joints(whole, place)),
+            # Without types there are too many joints to name.
+            joints=tuple(
+                replace(j, node=place[j.node]) for j in whole.joints if j.type and j.node in place
+            ),
             members=(),
             nodes=points,
             elements=tuple((int(i), int(j)) for i, j in self.lines),
             element_labels=tuple(f"line {k + 1}" for k in range(len(self.lines))),
             member_of=(),
         )
-
-
-def _kept_joints(whole: Wireframe, place: dict[int, int]) -> list[DrawnJoint]:
-    """Return the joints of a type that have a node; without types there are too many to name."""
-    return [replace(j, node=place[j.node]) for j in whole.joints if j.type and j.node in place]
 
 
 def thinned(case: Case) -> Thinned | None:

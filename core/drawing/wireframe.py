@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence, Sized
+from collections.abc import Iterable, Sized
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, ClassVar, Literal
@@ -16,7 +16,6 @@ from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.fem.mesh import ON_MEMBER, place_xyz
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import Sensors
-from femubench.core.fem.structure import Structure
 from femubench.core.typing import FloatArray
 
 Point = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
@@ -182,7 +181,42 @@ def wireframe_of(source: Case | Model) -> Wireframe:
     xyz = node_positions(model)
     nodes = tuple(map(to_point, xyz)) if len(xyz) <= MOST_NODES else ()
     if model.structure is not None:
-        return _of_frame(model.structure, nodes, sensors)
+        frame, mesh = model.structure.frame, model.structure.mesh
+        index = frame.joint_index
+        kept = np.full(len(mesh.xyz), -1)
+        stays = np.setdiff1d(np.arange(len(mesh.xyz)), mesh.oscillators)
+        kept[stays] = np.arange(len(stays))
+        rows = range(len(mesh.ends)) if nodes else range(0)
+        return Wireframe(
+            plane=frame.plane,
+            joints=tuple(
+                DrawnJoint(joint.name, to_point(joint.xyz), joint.type, k)
+                for k, joint in enumerate(frame.joints)
+            ),
+            members=tuple(
+                DrawnMember(m.name, (index[m.ends[0]], index[m.ends[1]]), m.elements)
+                for m in frame.members
+            ),
+            sensors=sensors,
+            supports=tuple(
+                DrawnSupport(to_point(place_xyz(frame, s.at)), tuple(s.fixed))
+                for s in frame.supports
+            ),
+            masses=tuple(DrawnMass(to_point(place_xyz(frame, m.at)), m.mass) for m in frame.masses),
+            springs=tuple(
+                DrawnSpring(
+                    to_point(place_xyz(frame, spring.at)),
+                    tuple(float(name == spring.direction[-1]) for name in "xyz"),
+                    spring.stiffness,
+                    "r" in spring.direction,
+                )
+                for spring in frame.springs
+            ),
+            nodes=tuple(nodes),
+            elements=tuple((int(kept[i]), int(kept[j])) for i, j in mesh.ends[: len(rows)]),
+            element_labels=tuple(model.structure.labels[: len(rows)]),
+            member_of=tuple(mesh.member[: len(rows)].tolist()),
+        )
     known = model.geometry.places if isinstance(model.geometry, MatrixGeometry) else {}
     joints = tuple(
         DrawnJoint(name, to_point(at), "", k) for k, (name, at) in enumerate(known.items())
@@ -229,43 +263,3 @@ def _sensors(sensors: Sensors) -> tuple[DrawnSensor, ...]:
         axis = to_point(axes[3:] if turns else axes[:3])
         drawn.append(DrawnSensor(label, to_point(xyz), direction, axis, turns))
     return tuple(drawn)
-
-
-def _of_frame(
-    structure: Structure, nodes: Sequence[Point], sensors: tuple[DrawnSensor, ...]
-) -> Wireframe:
-    frame, mesh = structure.frame, structure.mesh
-    index = frame.joint_index
-    kept = np.full(len(mesh.xyz), -1)
-    stays = np.setdiff1d(np.arange(len(mesh.xyz)), mesh.oscillators)
-    kept[stays] = np.arange(len(stays))
-    rows = range(len(mesh.ends)) if nodes else range(0)
-    return Wireframe(
-        plane=frame.plane,
-        joints=tuple(
-            DrawnJoint(joint.name, to_point(joint.xyz), joint.type, k)
-            for k, joint in enumerate(frame.joints)
-        ),
-        members=tuple(
-            DrawnMember(m.name, (index[m.ends[0]], index[m.ends[1]]), m.elements)
-            for m in frame.members
-        ),
-        sensors=sensors,
-        supports=tuple(
-            DrawnSupport(to_point(place_xyz(frame, s.at)), tuple(s.fixed)) for s in frame.supports
-        ),
-        masses=tuple(DrawnMass(to_point(place_xyz(frame, m.at)), m.mass) for m in frame.masses),
-        springs=tuple(
-            DrawnSpring(
-                to_point(place_xyz(frame, spring.at)),
-                tuple(float(name == spring.direction[-1]) for name in "xyz"),
-                spring.stiffness,
-                "r" in spring.direction,
-            )
-            for spring in frame.springs
-        ),
-        nodes=tuple(nodes),
-        elements=tuple((int(kept[i]), int(kept[j])) for i, j in mesh.ends[: len(rows)]),
-        element_labels=tuple(structure.labels[: len(rows)]),
-        member_of=tuple(mesh.member[: len(rows)].tolist()),
-    )

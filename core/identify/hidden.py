@@ -6,7 +6,7 @@ import numpy as np
 
 from femubench.core.identify.basis import Lines
 from femubench.core.identify.modal_fit import ModalFit, predicted
-from femubench.core.typing import AnyArray, FloatArray
+from femubench.core.typing import AnyArray
 
 _DAMPING = (0.0025, 0.006, 0.015)
 _STEP = 0.004  # between frequencies that are looked at, relative
@@ -37,21 +37,16 @@ def hidden_poles(lines: Lines, fit: ModalFit) -> tuple[AnyArray, AnyArray]:
     flat = (weight.conj()[:, None, None] * left).reshape(len(weight), -1).astype(np.complex64)
     residues = (shapes.conj().T @ flat / size[:, None]).reshape(-1, *left.shape[1:])
     gains = np.square(np.abs(residues)).sum(axis=(1, 2))
-    best = _peaks(gains, poles)
+    # The largest gains that are not side by side.
+    best: list[int] = []
+    for k in np.argsort(-gains):
+        width = _APART * max(abs(poles[k].real), _STEP * abs(poles[k]))
+        if all(abs(poles[k].imag - poles[j].imag) > width for j in best):
+            best.append(int(k))
+        if len(best) == _MOST:
+            break
     found = np.divide(
         residues[best], fit.weights, out=np.zeros_like(residues[best]), where=fit.weights > 0.0
     )
     forces = np.linalg.svd(found, full_matrices=False)[2][:, 0, :]
     return poles[best], forces.T
-
-
-def _peaks(gains: FloatArray, poles: AnyArray) -> list[int]:
-    """Return the largest gains that are not side by side."""
-    found: list[int] = []
-    for k in np.argsort(-gains):
-        width = _APART * max(abs(poles[k].real), _STEP * abs(poles[k]))
-        if all(abs(poles[k].imag - poles[j].imag) > width for j in found):
-            found.append(int(k))
-        if len(found) == _MOST:
-            break
-    return found

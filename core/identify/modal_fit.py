@@ -87,7 +87,13 @@ def fit_modes(
     for _ in range(_MOST_STEPS):
         better = None
         while better is None and damping < 1e6:
-            moved = _moved(point, damping)
+            # Poles and participations after one damped step.
+            step = _solved(point.normal, point.gradient, damping)
+            n, references = len(point.poles), len(point.participation)
+            change = np.zeros((1 + references, n, 2))
+            change.reshape(-1)[_free(point.participation)] = step
+            complex_change = change[..., 0] + 1j * change[..., 1]
+            moved = point.poles + complex_change[0], point.participation + complex_change[1:]
             if (moved[0].real < 0.0).all():
                 trial = _point(lines, *moved, weights)
                 if trial.misfit.sum() < point.misfit.sum():
@@ -105,16 +111,6 @@ def fit_modes(
 def _scaled(participation: AnyArray) -> AnyArray:
     largest = np.abs(participation).argmax(axis=0)
     return np.asarray(participation / participation[largest, np.arange(participation.shape[1])])
-
-
-def _moved(point: _Point, damping: float) -> tuple[AnyArray, AnyArray]:
-    """Return poles and participations after one damped step."""
-    step = _solved(point.normal, point.gradient, damping)
-    n, references = len(point.poles), len(point.participation)
-    change = np.zeros((1 + references, n, 2))
-    change.reshape(-1)[_free(point.participation)] = step
-    complex_change = change[..., 0] + 1j * change[..., 1]
-    return point.poles + complex_change[0], point.participation + complex_change[1:]
 
 
 def _free(participation: AnyArray) -> BoolArray:
@@ -223,7 +219,9 @@ def _result(point: _Point, weights: FloatArray) -> ModalFit:
         own = inverse[:, : 2 * n].reshape(n, 2, n, 2)
         at = np.arange(n)
         covariance[at, :, o, :, o] = own[at, :, at, :]
-    covariance += _spread(follow, shared)
+    # What the covariance of the shared unknowns adds to that of the shapes.
+    moved = follow @ shared
+    covariance += np.asarray(np.einsum("oraf,prbf->raobp", moved, follow, optimize=True))
     at = np.arange(n)
     own_poles = poles[: 2 * n, : 2 * n].reshape(n, 2, n, 2)[at, :, at, :]
     return ModalFit(
@@ -236,12 +234,6 @@ def _result(point: _Point, weights: FloatArray) -> ModalFit:
         pole_covariance=own_poles,
         shape_covariance=covariance.reshape(n, 2 * count, 2 * count),
     )
-
-
-def _spread(follow: FloatArray, shared: FloatArray) -> FloatArray:
-    """Return what the covariance of the shared unknowns adds to that of the shapes."""
-    moved = follow @ shared
-    return np.asarray(np.einsum("oraf,prbf->raobp", moved, follow, optimize=True))
 
 
 def predicted(fit: ModalFit, lines: Lines) -> AnyArray:

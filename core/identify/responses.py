@@ -16,7 +16,7 @@ from femubench.core.identify.lscf import Poles, lscf_poles
 from femubench.core.identify.modal_fit import ModalFit, fit_modes, predicted
 from femubench.core.identify.noise import first_weights, noise_left, unevenness
 from femubench.core.identify.selection import needed, select
-from femubench.core.identify.shape_scale import scaled_shapes
+from femubench.core.modal.complex_modes import mean_phase
 from femubench.core.modal.correlation import mac
 from femubench.core.modal.frf import DERIVATIVES, FrequencyResponses
 from femubench.core.typing import AnyArray, BoolArray, FloatArray
@@ -46,19 +46,6 @@ def identify_responses(
     Raises:
         InputError: when there are too few lines, or no mode stands out of the noise.
     """
-    data = _usable(measured, band)
-    seen: BoolArray = np.asarray(np.isfinite(data.values).all(axis=0))
-    values = np.where(seen, data.values, 0.0)
-    poles = _all_poles(data.frequencies, values, seen, most_poles)
-    omega, derivative = 2.0 * np.pi * data.frequencies, DERIVATIVES[data.quantity]
-    lines = Lines.of(omega, derivative, values, np.ones(len(omega)))
-    clusters = _candidates(poles)
-    fit, lines = _fitted(lines, clusters, seen)
-    return _identification(data, fit, lines, clusters, poles)
-
-
-def _usable(measured: FrequencyResponses, band: tuple[float, float] | None) -> FrequencyResponses:
-    """Return the lines to work with, responses the longer side."""
     data = measured if band is None else measured.within(*band)
     data = data.within(np.nextafter(0.0, 1.0), np.inf)
     if len(data.references) > len(data.responses):
@@ -68,7 +55,16 @@ def _usable(measured: FrequencyResponses, band: tuple[float, float] | None) -> F
         raise InputError(what, key="band", expected=f"{_FEWEST_LINES} or more")
     if not np.abs(np.nan_to_num(data.values)).any():
         raise InputError("all responses are zero", expected="measured responses")
-    return data
+    seen: BoolArray = np.asarray(np.isfinite(data.values).all(axis=0))
+    values = np.where(seen, data.values, 0.0)
+    poles = _all_poles(data.frequencies, values, seen, most_poles)
+    omega, derivative = 2.0 * np.pi * data.frequencies, DERIVATIVES[data.quantity]
+    lines = Lines.of(omega, derivative, values, np.ones(len(omega)))
+    able = (poles.damping > 1e-6) & (poles.damping < _LARGEST_DAMPING)
+    orders = len(np.unique(poles.orders))
+    clusters = [c for c in clusters_of(poles.select(able), orders) if c.support >= _SUPPORT]
+    fit, lines = _fitted(lines, clusters, seen)
+    return _identification(data, fit, lines, clusters, poles)
 
 
 def _all_poles(
@@ -95,16 +91,11 @@ def _all_poles(
     return replace(found, participation=forces)
 
 
-def _candidates(poles: Poles) -> list[Cluster]:
-    """Return the clusters of poles that may be modes."""
-    able = (poles.damping > 1e-6) & (poles.damping < _LARGEST_DAMPING)
-    orders = len(np.unique(poles.orders))
-    return [c for c in clusters_of(poles.select(able), orders) if c.support >= _SUPPORT]
-
-
 def _fitted(lines: Lines, clusters: Sequence[Cluster], seen: BoolArray) -> tuple[ModalFit, Lines]:
     """Return the fit of all modes that the data need, and the data with the noise they show."""
-    poles, forces = _starts(clusters, seen)
+    poles: AnyArray = np.array([cluster.pole for cluster in clusters], dtype=complex)
+    forces: AnyArray = np.array([cluster.participation for cluster in clusters], dtype=complex)
+    forces = forces.reshape(len(clusters), seen.shape[1]).T
     weights = first_weights(lines, poles, seen)
     chosen = select(lines, poles, weights, poles[:0])
     if not len(chosen):
@@ -129,13 +120,6 @@ def _fitted(lines: Lines, clusters: Sequence[Cluster], seen: BoolArray) -> tuple
         pole_covariance=of_poles * fit.pole_covariance,
         shape_covariance=of_shapes * fit.shape_covariance,
     ), lines
-
-
-def _starts(clusters: Sequence[Cluster], seen: BoolArray) -> tuple[AnyArray, AnyArray]:
-    """Return poles and participations of clusters, (n,) and (n_ref, n)."""
-    poles = np.array([cluster.pole for cluster in clusters], dtype=complex)
-    forces = np.array([cluster.participation for cluster in clusters], dtype=complex)
-    return poles, forces.reshape(len(clusters), seen.shape[1]).T
 
 
 def _twice(fit: ModalFit) -> BoolArray:
@@ -171,7 +155,7 @@ def _identification(
         np.sqrt(np.einsum("na,nab,nb->n", way, fit.pole_covariance, way))
         for way in (to_hz, to_ratio)
     ]
-    shapes, shape_std = scaled_shapes(fit.shapes[:, order], fit.shape_covariance[order])
+    shapes, shape_std = _scaled_shapes(fit.shapes[:, order], fit.shape_covariance[order])
     support = [
         max((c.support for c in clusters if abs(c.pole - pole) < _SAME * abs(pole)), default=0.0)
         for pole in s[order]
@@ -190,3 +174,28 @@ def _identification(
         measured=data,
         synthesised=predicted(fit, lines) * lines.noise[:, None, None],
     )
+
+
+def _scaled_shapes(shapes: AnyArray, covariance: FloatArray) -> tuple[AnyArray, FloatArray]:
+    """Return shapes as real as they can be with the largest real part 1, and their deviations.
+
+    The scale of a shape is arbitrary: what only changes it is taken out of the deviations, which
+    are those of a shape of fixed length. No component is without one.
+
+    Arguments:
+        shapes: complex, (n_out, m).
+        covariance: of real, then imaginary parts, (m, 2 n_out, 2 n_out).
+    """
+    angle = mean_phase(shapes)
+    turned = shapes * np.exp(-1j * angle)
+    largest = np.abs(turned.real).argmax(axis=0)
+    scale = turned.real[largest, np.arange(turned.shape[1])]
+    deviations = np.zeros(shapes.shape)
+    count = len(shapes)
+    for k in range(shapes.shape[1]):
+        real = turned[:, k].real
+        to_real = np.hstack([np.cos(angle[k]) * np.eye(count), np.sin(angle[k]) * np.eye(count)])
+        across = (np.eye(count) - np.outer(real, real) / (real @ real)) @ to_real
+        spread = np.einsum("ia,ab,ib->i", across, covariance[k], across)
+        deviations[:, k] = np.sqrt(np.maximum(spread, 0.0)) / abs(scale[k])
+    return turned / scale, deviations

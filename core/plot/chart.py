@@ -195,7 +195,16 @@ class Chart:
         if self.kind == "calibration":
             ax.plot([0.0, 1.0], [0.0, 1.0], color=SOFT, linewidth=0.8, zorder=0)
         for mark in self.marks:
-            _mark(mark, ax)
+            look: dict[str, Any] = {"color": SOFT, "zorder": 0}
+            name: dict[str, Any] = {"color": SOFT, "fontsize": 8.0, "ha": "right"}
+            if mark.axis == "x":
+                ax.axvline(mark.value, linewidth=1.0, linestyle=(0, (4, 2)), **look)
+                place, name = ax.get_xaxis_transform(), {**name, "ha": "center", "va": "bottom"}
+                ax.text(mark.value, 1.01, name_of(mark.label), transform=place, **name)
+            else:
+                ax.axhline(mark.value, linewidth=1.0, linestyle=(0, (4, 2)), **look)
+                place, name = ax.get_yaxis_transform(), {**name, "va": "bottom"}
+                ax.text(0.99, mark.value, name_of(mark.label), transform=place, **name)
         if len(self.series) > 1:
             columns = 3 if figure_of(ax).get_figwidth() > _NARROW else 1
             figure_of(ax).legend(
@@ -381,20 +390,6 @@ def _dots(ax: Axes, at: FloatArray, series: Series, rank: int) -> None:
         at[:, 0], at[:, 1], 34.0, curve_style(series.role, rank, 1)["color"],
         marker=_MARKERS[rank % len(_MARKERS)], label=name_of(series.name), zorder=3, clip_on=False,
     )  # fmt: skip
-
-
-def _mark(mark: Mark, ax: Axes) -> None:
-    """Draw a line across, its name at its end."""
-    look: dict[str, Any] = {"color": SOFT, "zorder": 0}
-    name: dict[str, Any] = {"color": SOFT, "fontsize": 8.0, "ha": "right"}
-    if mark.axis == "x":
-        ax.axvline(mark.value, linewidth=1.0, linestyle=(0, (4, 2)), **look)
-        place, name = ax.get_xaxis_transform(), {**name, "ha": "center", "va": "bottom"}
-        ax.text(mark.value, 1.01, name_of(mark.label), transform=place, **name)
-    else:
-        ax.axhline(mark.value, linewidth=1.0, linestyle=(0, (4, 2)), **look)
-        place, name = ax.get_yaxis_transform(), {**name, "va": "bottom"}
-        ax.text(0.99, mark.value, name_of(mark.label), transform=place, **name)
 
 
 _DRAWERS = {"scatter": _scatter, "bars": _bars, "interval": _interval}

@@ -113,6 +113,8 @@ def draw_findings(
         taken: points on the page that numbers are to avoid, (n, 2).
         further: handles that the list ends with.
     """
+    from matplotlib.lines import Line2D
+
     changed = [f.value for f in findings if f.symbol == "change" and f.value is not None]
     end = scale_end(changed)
     handles: list[Any] = []
@@ -122,7 +124,10 @@ def draw_findings(
     for finding in sorted(findings, key=lambda finding: finding.kind != "all"):
         look = _look(finding, end)
         if len(covering) > 1 and finding in covering:
-            look |= _turn(covering.index(finding), len(covering))
+            # Several lines along the same members show each in its turn.
+            place = covering.index(finding)
+            dashes = (-_DASH * place, (_DASH, _DASH * (len(covering) - 1)))
+            look |= {"color": _EVERYWHERE[place % len(_EVERYWHERE)], "linestyle": dashes}
         lines = lines_of(wireframe, view, finding)
         gid = f"finding-{len(handles)}"
         at = lines.mean(axis=1) if len(lines) and finding.kind != "all" else np.empty((0, 2))
@@ -142,13 +147,16 @@ def draw_findings(
     at_badges = np.array([point for point, _ in badges]).reshape(-1, 2)
     place_names(ax, at_badges, [number for _, number in badges], avoid=taken, size=8.5,
                 color=PAGE, weight="bold", bbox=badge, zorder=5)  # fmt: skip
-    _list_below(ax, handles, further)
-
-
-def _turn(place: int, count: int) -> dict[str, Any]:
-    """Return the look of one of several lines along the same members: each shows in its turn."""
-    dashes = (-_DASH * place, (_DASH, _DASH * (count - 1)))
-    return {"color": _EVERYWHERE[place % len(_EVERYWHERE)], "linestyle": dashes}
+    more = len(handles) - _MOST_LISTED
+    listed = list(handles[:_MOST_LISTED])
+    if more > 0:
+        listed.append(Line2D([], [], linestyle="none", label=f"and {more} more"))
+    listed += further
+    if listed:
+        ax.legend(
+            handles=listed, loc="upper center", bbox_to_anchor=(0.5, 0.0), frameon=False,
+            fontsize=8.5, labelcolor=INK, handlelength=1.6,
+        )  # fmt: skip
 
 
 def _look(finding: Finding, end: float) -> dict[str, Any]:
@@ -187,18 +195,3 @@ def _handle(finding: Finding, look: dict[str, Any]) -> Any:  # noqa: ANN401 - an
     if finding.symbol == "change" and not finding.points:
         shown = {**look, "linestyle": "solid", "label": shown["label"]}
     return Line2D([], [], **shown)
-
-
-def _list_below(ax: Axes, handles: Sequence[Any], further: Sequence[Any]) -> None:
-    from matplotlib.lines import Line2D
-
-    more = len(handles) - _MOST_LISTED
-    listed = list(handles[:_MOST_LISTED])
-    if more > 0:
-        listed.append(Line2D([], [], linestyle="none", label=f"and {more} more"))
-    listed += further
-    if listed:
-        ax.legend(
-            handles=listed, loc="upper center", bbox_to_anchor=(0.5, 0.0), frameon=False,
-            fontsize=8.5, labelcolor=INK, handlelength=1.6,
-        )  # fmt: skip

@@ -18,7 +18,7 @@ from femubench.core.plot.style import (
     check_kind,
     own_axes,
 )
-from femubench.core.typing import BoolArray, FloatArray
+from femubench.core.typing import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,7 +56,10 @@ def stabilisation(found: Identification, *, ax: Axes | None = None) -> Axes:
     poles = found.poles
     hz, low, high = poles.frequencies, *found.band
     keep = (poles.damping > 0.0) & (poles.damping < _MOST_DAMPING) & (hz >= low) & (hz <= high)
-    near = _near_mode(found)
+    own = 2.0 * np.pi * found.frequencies
+    modes = own * (-found.damping + 1j * np.sqrt(1.0 - np.square(found.damping)))
+    apart = np.abs(found.poles.values[:, None] - modes) / np.abs(modes)
+    near = np.asarray(apart.min(axis=1, initial=np.inf) < _NEAR)
     for at_mode in (False, True):
         some = keep & (near == at_mode)
         ax.scatter(
@@ -73,14 +76,6 @@ def stabilisation(found: Identification, *, ax: Axes | None = None) -> Axes:
     ax.set(xlim=found.band, xlabel="frequency, Hz", ylabel="poles of the model")
     ax.legend(fontsize=8.5, loc="upper left", bbox_to_anchor=(0.0, 1.13), ncols=2, frameon=False)
     return ax
-
-
-def _near_mode(found: Identification) -> BoolArray:
-    """Tell which poles lie at an identified mode."""
-    own = 2.0 * np.pi * found.frequencies
-    modes = own * (-found.damping + 1j * np.sqrt(1.0 - np.square(found.damping)))
-    apart = np.abs(found.poles.values[:, None] - modes) / np.abs(modes)
-    return np.asarray(apart.min(axis=1, initial=np.inf) < _NEAR)
 
 
 def _background(found: Identification, ax: Axes) -> None:

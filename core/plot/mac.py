@@ -9,7 +9,6 @@ import numpy as np
 from femubench.core.case.case import Case
 from femubench.core.errors import InputError
 from femubench.core.fem.model import Model
-from femubench.core.fem.sensors import Sensors
 from femubench.core.modal import correlation
 from femubench.core.modal.eigen import Modes, modes_of
 from femubench.core.modal.measurement import Measurement
@@ -66,7 +65,12 @@ def mac(
             )
         model = second if isinstance(second, Model) else second.model
         top = _ABOVE * float(data.frequencies.max(initial=0.0))
-        columns, names, label = _predicted(model, data.sensors, top)
+        elastic = modes_of(model).elastic
+        shown = np.flatnonzero(elastic.natural_frequencies <= top)
+        shown = shown if len(shown) else np.arange(min(1, len(elastic)))
+        columns = np.asarray(model.observe(data.sensors) @ elastic.shapes[:, shown])
+        names = [f"{k + 1}: {elastic.natural_frequencies[k]:.4g}" for k in shown]
+        label = "mode of the model: frequency, Hz"
     else:
         columns, names, label = _shapes(second, "second")
     if len(rows) != len(columns):
@@ -82,15 +86,11 @@ def mac(
     ax.set(xlabel=label, ylabel=row_label)
     ax.set_title("MAC", fontsize=10.0)
     if values.size <= _MOST_NUMBERED:
-        _write_numbers(ax, values)
+        for (i, j), value in np.ndenumerate(values):
+            colour = "white" if value > 0.6 else "black"
+            text = f"{value:.2f}" if np.isfinite(value) else "–"
+            ax.text(j, i, text, ha="center", va="center", fontsize=8.0, color=colour)
     return ax
-
-
-def _write_numbers(ax: Axes, values: FloatArray) -> None:
-    for (i, j), value in np.ndenumerate(values):
-        colour = "white" if value > 0.6 else "black"
-        text = f"{value:.2f}" if np.isfinite(value) else "–"
-        ax.text(j, i, text, ha="center", va="center", fontsize=8.0, color=colour)
 
 
 def _shapes(source: Any, key: str) -> Named:  # noqa: ANN401 - whatever a caller brings
@@ -108,12 +108,3 @@ def _shapes(source: Any, key: str) -> Named:  # noqa: ANN401 - whatever a caller
         return source, [str(k + 1) for k in range(source.shape[1])], "shape"
     expected = "a Case, a Measurement, Modes or an array (n, m)"
     raise InputError(f"{type(source).__name__} has no shapes", key=key, expected=expected)
-
-
-def _predicted(model: Model, sensors: Sensors, top: float) -> Named:
-    elastic = modes_of(model).elastic
-    shown = np.flatnonzero(elastic.natural_frequencies <= top)
-    shown = shown if len(shown) else np.arange(min(1, len(elastic)))
-    shapes = np.asarray(model.observe(sensors) @ elastic.shapes[:, shown])
-    names = [f"{k + 1}: {elastic.natural_frequencies[k]:.4g}" for k in shown]
-    return shapes, names, "mode of the model: frequency, Hz"

@@ -57,7 +57,11 @@ def mode_shape(
     if not wireframe.nodes:
         raise InputError(f"more than {MOST_NODES} nodes are no picture")
     elastic = modes_of(model).elastic
-    numbers = _numbers_in(mode, len(elastic))
+    numbers = [mode] if isinstance(mode, int) else list(mode)
+    for number in numbers:
+        if not 1 <= number <= len(elastic):
+            expected = f"1 to {len(elastic)}"
+            raise InputError(f"there is no elastic mode {number!r}", key="mode", expected=expected)
     view = view_of(wireframe, oblique=wireframe.plane != "in-plane")
     columns = [number - 1 for number in numbers]
     motion = node_motions(model, model, elastic.shapes[:, columns])
@@ -81,20 +85,6 @@ def mode_shape(
     below = (0.5, -0.12 if view.names else 0.0)
     ax.legend(loc="upper center", bbox_to_anchor=below, ncols=3, fontsize=8.5, frameon=False)
     return ax
-
-
-def _numbers_in(mode: int | Sequence[int], count: int) -> list[int]:
-    """Return the numbers of modes that are asked for.
-
-    Raises:
-        InputError: when one of them is not among so many.
-    """
-    numbers = [mode] if isinstance(mode, int) else list(mode)
-    for number in numbers:
-        if not 1 <= number <= count:
-            expected = f"1 to {count}"
-            raise InputError(f"there is no elastic mode {number!r}", key="mode", expected=expected)
-    return numbers
 
 
 def _draw_moved(

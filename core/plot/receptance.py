@@ -54,7 +54,15 @@ def receptance(
         'receptance at 9Z, dB re 1 m/N'
     """
     check_kind(case, (Case,), "receptance")
-    label = _sensor(case, sensor)
+    sensors = case.measurement.sensors
+    pairs = zip(sensors.labels, sensors.directions, strict=True)
+    moving = [label for label, direction in pairs if "r" not in direction]
+    if sensor is not None and sensor not in moving:
+        expected = f"one of {', '.join(moving)}"
+        raise InputError(f"there is no displacement sensor {sensor!r}", expected=expected)
+    label = sensor or drive_sensor(case)
+    if label is None:
+        raise InputError("the case has no measured shape", expected="a sensor that sees a mode")
     names = [change.name for change in case.modifications]
     if modification is not None and modification not in names:
         expected = ", ".join(names) or "none: the case has no modifications"
@@ -76,16 +84,3 @@ def receptance(
     ax.set(xlabel="frequency, Hz", ylabel=f"receptance at {name_of(label)}, dB re 1 m/N")
     ax.legend(fontsize=8.5, handlelength=3.6)
     return ax
-
-
-def _sensor(case: Case, sensor: str | None) -> str:
-    sensors = case.measurement.sensors
-    pairs = zip(sensors.labels, sensors.directions, strict=True)
-    moving = [label for label, direction in pairs if "r" not in direction]
-    if sensor is not None and sensor not in moving:
-        expected = f"one of {', '.join(moving)}"
-        raise InputError(f"there is no displacement sensor {sensor!r}", expected=expected)
-    label = sensor or drive_sensor(case)
-    if label is None:
-        raise InputError("the case has no measured shape", expected="a sensor that sees a mode")
-    return label

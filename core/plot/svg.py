@@ -62,7 +62,13 @@ def svg(
         if artist.get_gid()
     }
     found = _element(text.getvalue(), name, title, caption, titles)
-    return _themed(found) if themed else found
+    if not themed:
+        return found
+    # For the middle of a page, whose style sheet has the colours.
+    found = re.sub(r' (?:xmlns(?::\w+)?|clip-path)="[^"]*"', "", found)
+    for role, colour in COLOURS.items():
+        found = found.replace(colour, f"var(--{role})")
+    return re.sub(r' style="([^"]*)"', _as_attributes, found)
 
 
 def _element(text: str, name: str, title: str, caption: str, titles: dict[str, str]) -> str:
@@ -94,14 +100,6 @@ def _element(text: str, name: str, title: str, caption: str, titles: dict[str, s
         f' <desc id="{slug}-desc">{escape(harmless(caption))}</desc>'
     )
     return f"{named}{body}\n"
-
-
-def _themed(text: str) -> str:
-    """Return a drawing for the middle of a page, whose style sheet has the colours."""
-    text = re.sub(r' (?:xmlns(?::\w+)?|clip-path)="[^"]*"', "", text)
-    for role, colour in COLOURS.items():
-        text = text.replace(colour, f"var(--{role})")
-    return re.sub(r' style="([^"]*)"', _as_attributes, text)
 
 
 def _as_attributes(style: re.Match[str]) -> str:

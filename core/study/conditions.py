@@ -39,9 +39,22 @@ class VariedCase(Case):
         out the same and more.
         """
         assert self.origin is not None
-        louder = _scaled(self.origin.measurement, self.noise)
+        louder = replace(
+            self.origin.measurement,
+            frequency_std=self.noise * self.origin.measurement.frequency_std,
+            shape_std=self.noise * self.origin.measurement.shape_std,
+        )
         whole = replace(self.origin, measurement=louder).used_measurement(seed)
-        return _at(whole, np.setdiff1d(np.arange(len(whole.sensors)), self._hidden(seed)))
+        rows = np.setdiff1d(np.arange(len(whole.sensors)), self._hidden(seed))
+        known = whole.sensors
+        fewer = Sensors(
+            tuple(known.labels[row] for row in rows),
+            known.xyz[rows],
+            tuple(known.directions[row] for row in rows),
+        )
+        return replace(
+            whole, sensors=fewer, shapes=whole.shapes[rows], shape_std=whole.shape_std[rows]
+        )
 
     def conditions(self, seed: int) -> Mapping[str, float | str]:
         """Return the factor on the noise, and the labels of the sensors left out."""
@@ -73,24 +86,3 @@ def varied(case: Case, noise: float, left_out: int) -> Case:
     # Whose copies they are: of a structure every copy has a share, and not a vote.
     own["structure"] = case.structure or case.name
     return VariedCase(**own, origin=case, noise=noise, left_out=left_out)
-
-
-def _scaled(measured: Measurement, factor: float) -> Measurement:
-    return replace(
-        measured,
-        frequency_std=factor * measured.frequency_std,
-        shape_std=factor * measured.shape_std,
-    )
-
-
-def _at(measured: Measurement, rows: IntArray) -> Measurement:
-    """Return the same modes at some of the sensors."""
-    known = measured.sensors
-    fewer = Sensors(
-        tuple(known.labels[row] for row in rows),
-        known.xyz[rows],
-        tuple(known.directions[row] for row in rows),
-    )
-    return replace(
-        measured, sensors=fewer, shapes=measured.shapes[rows], shape_std=measured.shape_std[rows]
-    )

@@ -53,26 +53,21 @@ def skill_by(run: Run, *axes: str) -> pd.DataFrame:
     for nominal in known.nominals:
         for result in run.started_from(nominal):
             by_arm[nominal, result.case, result.strategy].append(result)
-    rows = [
-        {**dict(zip(chosen, cell, strict=True)), **_figures(run, arms, by_arm)}
-        for cell, arms in _cells(known, chosen).items()
-    ]
-    return pd.DataFrame(rows, columns=[*chosen, *FIGURES])
-
-
-def _cells(axes: StudyAxes, chosen: Sequence[str]) -> dict[tuple[Value, ...], list[_Arm]]:
-    """Return what is in every cell, in the order of the study's values."""
     found: dict[tuple[Value, ...], list[_Arm]] = defaultdict(list)
-    for nominal, case, strategy in product(axes.nominals, axes.cases, axes.strategies):
-        place = axes.place(case, strategy, nominal)
+    for nominal, case, strategy in product(known.nominals, known.cases, known.strategies):
+        place = known.place(case, strategy, nominal)
         if "strategy" in chosen or all(name in place for name in chosen):
             found[tuple(place.get(name) for name in chosen)].append((nominal, case, strategy))
-    orders = [{value: i for i, value in enumerate(axes.values(name))} for name in chosen]
+    orders = [{value: i for i, value in enumerate(known.values(name))} for name in chosen]
 
     def order(cell: tuple[Value, ...]) -> list[int]:
         return [places.get(value, -1) for places, value in zip(orders, cell, strict=True)]
 
-    return {cell: found[cell] for cell in sorted(found, key=order)}
+    rows = [
+        {**dict(zip(chosen, cell, strict=True)), **_figures(run, found[cell], by_arm)}
+        for cell in sorted(found, key=order)
+    ]
+    return pd.DataFrame(rows, columns=[*chosen, *FIGURES])
 
 
 def _figures(run: Run, arms: Sequence[_Arm], by_arm: dict[_Arm, list[JobResult]]) -> dict[str, Any]:

@@ -176,23 +176,14 @@ def read_study(file: str | PathLike[str]) -> StudyFile:
     text = read_text(path, _LARGEST)
     try:
         found = StudyFile(path, text, spec_of(text, path, StudyTables))
-        _check(found)
+        axes = found.tables.axes
+        if axes.noise != (1.0,) and 0 in found.seeds:
+            where = ("axes", "noise") if axes.seeds is None else ("axes", "seeds")
+            what = "noise is a factor on what is drawn, and seed 0 draws none"
+            raise Fault(where, what, "seeds = N, or a list of seeds >= 1")
     except Fault as fault:
         raise located(fault, text, path) from None
     return found
-
-
-def _check(study: StudyFile) -> None:
-    """Check what keys mean to each other.
-
-    Raises:
-        Fault: for noise to be scaled where none is drawn.
-    """
-    axes = study.tables.axes
-    if axes.noise != (1.0,) and 0 in study.seeds:
-        where = ("axes", "noise") if axes.seeds is None else ("axes", "seeds")
-        what = "noise is a factor on what is drawn, and seed 0 draws none"
-        raise Fault(where, what, "seeds = N, or a list of seeds >= 1")
 
 
 def grid(options: Mapping[str, tuple[Value, ...]]) -> Iterator[dict[str, Value]]:

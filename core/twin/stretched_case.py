@@ -16,8 +16,9 @@ from femubench.core.fem.model import Model
 from femubench.core.fem.sections import Section, rectangular_tube, solid_rectangle
 from femubench.core.fem.sensors import Sensors
 from femubench.core.files import read_bytes
+from femubench.core.modal.eigen import solve_modes
 from femubench.core.modal.measurement import Measurement
-from femubench.core.twin.nearness import is_as_near, nearness
+from femubench.core.modal.pairing import pair_measured
 from femubench.core.twin.reduced_solid import LARGEST, ReducedSolid
 from femubench.core.twin.similarity import similar_section
 from femubench.core.typing import FloatArray
@@ -26,6 +27,7 @@ FILE = "stretch.npz"  # in the folder of a case
 _MOST_DRAWS = 100
 _LEAST_SHIFT = 0.04  # of ratios of frequencies: who knows them must not find them again
 _GAIN_SHARE = 0.5  # of the variance of the largest reading: a sensor's gain, alike in every mode
+_FARTHER = 1.5  # times as far from what was measured as on the case at most
 _SCALED = "section"  # the factor of sections that are given by numbers
 _Part = TypeVar("_Part", PointMass, GroundSpring)
 
@@ -67,6 +69,46 @@ def _as_hard(case: Case, solid: ReducedSolid, rng: np.random.Generator) -> Case:
     raise NotApplicable(f"no stretch of {case.name} is as hard as it is")
 
 
+@dataclass(frozen=True)
+class Nearness:
+    """How near a model is to the modes of one state of a structure.
+
+    Arguments:
+        alone: number of measured modes without a partner in the model.
+        error: rms of ln(f_predicted / f_measured) of the others.
+    """
+
+    alone: int
+    error: float
+
+
+def nearness(case: Case) -> tuple[Nearness, ...]:
+    """Return how near the nominal model is, as built and after each design change."""
+    found = [_nearness(case.model, case.measurement)]
+    for change in case.modifications:
+        model = case.model.attach(change.masses, change.springs)
+        found.append(_nearness(model, change.measurement))
+    return tuple(found)
+
+
+def is_as_near(found: tuple[Nearness, ...], known: tuple[Nearness, ...]) -> bool:
+    """Tell whether a model is about as near to one structure as another one to another."""
+    return all(
+        one.alone <= other.alone and one.error <= _FARTHER * other.error
+        for one, other in zip(found, known, strict=True)
+    )
+
+
+def _nearness(model: Model, measured: Measurement) -> Nearness:
+    modes = solve_modes(model)
+    partners = pair_measured(measured, modes, model.observe(measured.sensors) @ modes.shapes).index
+    paired = partners >= 0
+    predicted = modes.natural_frequencies[partners[paired]]
+    off = np.log(np.abs(predicted) / measured.frequencies[paired])
+    error = np.sqrt(np.square(off).sum() / max(off.size, 1))
+    return Nearness(int((~paired).sum()), float(error))
+
+
 def stretched_case(
     case: Case, solid: ReducedSolid, factors: FloatArray, rng: np.random.Generator | None
 ) -> Case:
@@ -89,20 +131,6 @@ def stretched_case(
         )
         for number, change in enumerate(case.modifications, start=1)
     )
-    return replace(
-        case,
-        model=Model.of(stretched_frame(frame, solid, factors)),
-        measurement=test.measured(case.measurement, 0),
-        modifications=changes,
-        # What is told of the files is of the structure that it was.
-        notes=(),
-        matches=(),
-        lines=None,
-    )
-
-
-def stretched_frame(frame: Frame, solid: ReducedSolid, factors: FloatArray) -> Frame:
-    """Return the drawing with joints and sections where and as large as the stretch has them."""
     corners = solid.moved(factors, frame.corners)
     joints = [
         Joint(joint.name, _vector(xyz), joint.type)
@@ -110,11 +138,22 @@ def stretched_frame(frame: Frame, solid: ReducedSolid, factors: FloatArray) -> F
     ]
     sections = {id(m.section): _section(m.section, solid, factors) for m in frame.members}
     return replace(
-        frame,
-        joints=tuple(joints),
-        members=tuple(replace(m, section=sections[id(m.section)]) for m in frame.members),
-        masses=_at_places(frame, solid, factors, frame.masses),
-        springs=_at_places(frame, solid, factors, frame.springs),
+        case,
+        model=Model.of(
+            replace(
+                frame,
+                joints=tuple(joints),
+                members=tuple(replace(m, section=sections[id(m.section)]) for m in frame.members),
+                masses=_at_places(frame, solid, factors, frame.masses),
+                springs=_at_places(frame, solid, factors, frame.springs),
+            )
+        ),
+        measurement=test.measured(case.measurement, 0),
+        modifications=changes,
+        # What is told of the files is of the structure that it was.
+        notes=(),
+        matches=(),
+        lines=None,
     )
 
 
@@ -196,7 +235,17 @@ class _Test:
         shapes, relative = _scaled(shapes), known.frequency_std / known.frequencies
         frequencies = exact
         if self.rng is not None:
-            frequencies, shapes = self._scattered(exact, shapes, self.rng)
+            scatter, together, of_shapes = (
+                float(self.solid.arrays[name]) for name in ("scatter", "together", "shape_scatter")
+            )
+            # The scatter of the test that the case describes.
+            common = np.sqrt(together) * self.rng.standard_normal()
+            each = np.sqrt(1.0 - together) * self.rng.standard_normal(len(exact))
+            # What the gain leaves of the stated variance, so that every reading scatters as stated.
+            share = np.sqrt(1.0 - _GAIN_SHARE * np.square(shapes))
+            noise = of_shapes * share * self.rng.standard_normal(shapes.shape)
+            read = _scaled(shapes * self.gains[:, None] + noise)
+            frequencies, shapes = exact * (1.0 + scatter * (common + each)), read
         weight = known.total_mass
         own: dict[str, Any] = {
             "sensors": Sensors(
@@ -211,21 +260,6 @@ class _Test:
         if weight is not None:
             own["total_mass"] = (self.weighed, weight[1] / weight[0] * self.weighed)
         return replace(known, **own)
-
-    def _scattered(
-        self, exact: FloatArray, shapes: FloatArray, rng: np.random.Generator
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return frequencies and shapes with the scatter of the test that the case describes."""
-        scatter, together, of_shapes = (
-            float(self.solid.arrays[name]) for name in ("scatter", "together", "shape_scatter")
-        )
-        common = np.sqrt(together) * rng.standard_normal()
-        own = np.sqrt(1.0 - together) * rng.standard_normal(len(exact))
-        # What the gain leaves of the stated variance, so that every reading scatters as stated.
-        share = np.sqrt(1.0 - _GAIN_SHARE * np.square(shapes))
-        noise = of_shapes * share * rng.standard_normal(shapes.shape)
-        read = _scaled(shapes * self.gains[:, None] + noise)
-        return exact * (1.0 + scatter * (common + own)), read
 
 
 def _scaled(shapes: FloatArray) -> FloatArray:

@@ -36,20 +36,6 @@ def finding(bench: Workbench) -> tuple[tuple[Extra, ...], tuple[Figure, ...], tu
     """
     ladder = Ladder.of(bench)
     shares = shares_of(ladder)
-    untuned = untuned_models(ladder, bench)
-    extras = (untuned_table(ladder, untuned), steps_table(ladder, shares))
-    figures: tuple[Figure, ...] = (chain_bars(ladder), cause_bars(ladder, shares))
-    told = (
-        torsion_sentence(ladder),
-        untuned_sentence(ladder, untuned),
-        shares_sentence(shares),
-        joints_sentence(ladder, shares, bench),
-    )
-    return extras, figures, told + change_sentences(bench) + receptance_sentences(bench)
-
-
-def untuned_models(ladder: Ladder, bench: Workbench) -> dict[str, FloatArray]:
-    """Return the frequencies of models of which no figure was fitted to the test, in Hz."""
     bare = partial(ladder.frame, young=TEXTBOOK_YOUNG, accelerometer=False)
     solid = bench.cases["frame-solid"].measurement.frequencies[: len(ladder.measured)]
     frames = {
@@ -60,7 +46,16 @@ def untuned_models(ladder: Ladder, bench: Workbench) -> dict[str, FloatArray]:
         "- and the accelerometer": ladder.frame(_TEXTBOOK, young=TEXTBOOK_YOUNG),
     }
     found = {name: ladder.frequencies(frame) for name, frame in frames.items()}
-    return found | {f"solid model, E {SOLID_YOUNG / 1e9:.0f} GPa, ideal welds": solid}
+    untuned = found | {f"solid model, E {SOLID_YOUNG / 1e9:.0f} GPa, ideal welds": solid}
+    extras = (untuned_table(ladder, untuned), steps_table(ladder, shares))
+    figures: tuple[Figure, ...] = (chain_bars(ladder), cause_bars(ladder, shares))
+    told = (
+        torsion_sentence(ladder),
+        untuned_sentence(ladder, untuned),
+        shares_sentence(shares),
+        joints_sentence(ladder, shares, bench),
+    )
+    return extras, figures, told + change_sentences(bench) + receptance_sentences(bench)
 
 
 def untuned_table(ladder: Ladder, untuned: dict[str, FloatArray]) -> Extra:
@@ -131,7 +126,7 @@ def chain_bars(ladder: Ladder) -> Bars:
         title="Error of the ladder frame's model, one change after the other",
         caption="The first three keep the paper's Young's modulus and the accelerometer; no figure "
         "is fitted to the test. The last multiplies all frequencies by one factor.",
-        groups=_modes(ladder.measured),
+        groups=tuple(f"{i + 1}: {f:.1f} Hz" for i, f in enumerate(ladder.measured)),
         series=tuple((name, _numbers(ladder.errors(f))) for name, f in chain.items()),
         group_label="strain mode",
         value_label=_POINTS,
@@ -158,10 +153,6 @@ def cause_bars(ladder: Ladder, shares: Shares) -> Bars:
         value_label=f"taken off the error of mode 1, % of {ladder.measured[0]:.1f} Hz",
         lines=((f"whole error {shares.whole[0]:.1f} %", float(shares.whole[0])),),
     )
-
-
-def _modes(measured: FloatArray) -> tuple[str, ...]:
-    return tuple(f"{i + 1}: {f:.1f} Hz" for i, f in enumerate(measured))
 
 
 def _numbers(values: Iterable[float]) -> tuple[float, ...]:

@@ -92,18 +92,14 @@ def _torsional_mass(bench: Workbench) -> tuple[str, ...]:
 def coupling_terms(structure: Structure) -> dict[str, tuple[str, ...]]:
     """Return which couplings a symmetric element may have, by kind of symmetry."""
     found: dict[str, tuple[str, ...]] = {}
-    plain = _plain(structure)
+    touched = {structure.element_ends[e][0] for ends in structure.joint_ends.values() for e in ends}
+    plain = next(label for i, label in enumerate(structure.labels) if i not in touched)
     kinds: tuple[Symmetry, ...] = ("half-turn", "mirror", "full")
     for kind in kinds:
         names = generic_family(structure, plain=kind, joint="none").names
         terms = (name.split(" ", 1)[0] for name in names if name.endswith(f" {plain}"))
         found[kind] = tuple(term for term in terms if term[1] != term[2])
     return found
-
-
-def _plain(structure: Structure) -> str:
-    touched = {structure.element_ends[e][0] for ends in structure.joint_ends.values() for e in ends}
-    return next(label for i, label in enumerate(structure.labels) if i not in touched)
 
 
 def _symmetry(bench: Workbench) -> tuple[str, ...]:

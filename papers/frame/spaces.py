@@ -94,11 +94,11 @@ def compare_spaces(model: Model) -> Spaces:
         beam_and_rod=ranks.split(assembled)[0],
         outside=int(added.sum()),
         within=ranks.split(assembled @ inside)[0],
-        same_as_generic=_angle(kept, (assembled @ inside)[present]),
+        same_as_generic=float(la.subspace_angles(kept, (assembled @ inside)[present]).max()),
         nobari=ranks.split(nobari)[0],
         nobari_kept=free.shape[1],
         physical=ranks.split(physical)[0],
-        same_as_physical=_angle(nobari @ free, physical),
+        same_as_physical=float(la.subspace_angles(nobari @ free, physical).max()),
         gap=ranks.gap,
     )
 
@@ -126,10 +126,6 @@ def spaces_extra(bench: Workbench) -> tuple[Extra, tuple[str, ...], Spaces]:
         f"Ranks by singular values; the closest call has a gap of {s.gap:.0e} between those that "
         "count and those that do not.",
     )
-    return extra, _findings(s), s
-
-
-def _findings(s: Spaces) -> tuple[str, ...]:
     generic = (
         f"Of {s.entries} non-zero entries, {s.kept_by_rigid} are free once the rigid-body modes "
         f"are kept: {s.beam_and_rod // 4} x 4 - {s.outside}, four parameters an element less "
@@ -143,7 +139,7 @@ def _findings(s: Spaces) -> tuple[str, ...]:
         f"that set is the physical one (dimension {s.physical}, largest principal angle "
         f"{s.same_as_physical:.0e} rad), as equation (21) says."
     )
-    return generic, nobari
+    return extra, (generic, nobari), s
 
 
 def _upper(matrix: FloatArray, size: FloatArray) -> FloatArray:
@@ -172,8 +168,3 @@ def _forces(
     off = rows != columns
     np.add.at(forces, columns[off], rigid[rows[off]][:, :, None] * entries[off][:, None, :])
     return forces.reshape(-1, entries.shape[1])
-
-
-def _angle(one: FloatArray, other: FloatArray) -> float:
-    """Return the largest principal angle between two column spaces in rad."""
-    return float(la.subspace_angles(one, other).max())

@@ -13,14 +13,6 @@ from femubench.reproduction import Entry, Grid, PrintedTable, Workbench
 
 def layout(bench: Workbench) -> tuple[PrintedTable, ...]:
     """Return the tables; those of which nothing but cells is in print stand by their rows."""
-    return (
-        PrintedTable("2", "Frequencies on four meshes, divided by those on the first", ()),
-        _mac(),
-        *(_update(bench, row) for row in ROWS),
-    )
-
-
-def _mac() -> PrintedTable:
     table = printed("hframe")["table3"]
     columns = [f"analytical {mode}" for mode in range(1, MODES + 1)]
     top: tuple[Entry, ...] = tuple(("analytical frequency", column) for column in columns)
@@ -32,7 +24,11 @@ def _mac() -> PrintedTable:
             for k, value in enumerate(values)
         ]
         rows.append((f"measured {number}", tuple(entries)))
-    return PrintedTable("3", "MAC in %", (Grid(("", *columns), tuple(rows)),))
+    return (
+        PrintedTable("2", "Frequencies on four meshes, divided by those on the first", ()),
+        PrintedTable("3", "MAC in %", (Grid(("", *columns), tuple(rows)),)),
+        *(_update(bench, row) for row in ROWS),
+    )
 
 
 def _update(bench: Workbench, row: Row) -> PrintedTable:

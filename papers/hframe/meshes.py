@@ -40,21 +40,22 @@ def bare(case: Case, mesh: Sequence[int]) -> Model:
     return Model.of(replace(frame, members=members, masses=()))
 
 
-def mesh_frequencies(case: Case) -> dict[str, FloatArray]:
-    """Return frequencies in Hz, (8,) for every row of table 2."""
-    meshes = printed("hframe")["test_article"]["mesh"]
-    found = {name: frequencies(bare(case, mesh)) for name, mesh in meshes.items()}
-    return {**found, "C_a": frequencies(case.model)}
-
-
 def mesh_cells(case: Case) -> tuple[Cell, ...]:
     """Return table 2, normalised with mesh A; what agrees rounds to the printed digit."""
-    tables, found = printed("hframe"), mesh_frequencies(case)
+    tables = printed("hframe")
+    meshes = tables["test_article"]["mesh"]
+    found = {name: frequencies(bare(case, mesh)) for name, mesh in meshes.items()}
+    found["C_a"] = frequencies(case.model)
     cells = []
     for row, values in tables["table2"].items():
         for k, (theirs, hertz, base) in enumerate(zip(values, found[row], found["A"], strict=True)):
             ours = float(hertz / base)
-            reason = _edge(theirs, ours)
+            edge = theirs + (0.0005 if ours > theirs else -0.0005)
+            off = 100.0 * abs(ours / edge - 1.0)
+            reason = (
+                f"at a rounding edge: {ours:.6f} rounds to {ours:.3f}, the printed digit begins at "
+                f"{edge:.4f}, {off:.4f} % away"
+            )
             if row == "C_a":
                 own = tables["table3"]["analytical"][k]
                 reason += f"; the printed {own} Hz of table 3 over our mesh A is {own / base:.6f}"
@@ -63,13 +64,3 @@ def mesh_cells(case: Case) -> tuple[Cell, ...]:
             page = Page("hframe", "2", (ground,), "", 0.0, 3, fault)
             cells.append(page.cell(row, f"mode {k + 1}", theirs, ours))
     return tuple(cells)
-
-
-def _edge(theirs: float, ours: float) -> str:
-    """Return why a ratio rounds to another digit."""
-    edge = theirs + (0.0005 if ours > theirs else -0.0005)
-    off = 100.0 * abs(ours / edge - 1.0)
-    return (
-        f"at a rounding edge: {ours:.6f} rounds to {ours:.3f}, the printed digit begins at "
-        f"{edge:.4f}, {off:.4f} % away"
-    )

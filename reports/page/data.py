@@ -86,7 +86,17 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
         "as_drawn": started_as_drawn(run),
         "strategies": _strategies(run),
     }
-    downloads, too_large = _downloads(run)
+    downloads, too_large, room = [], [], MOST_DOWNLOADS
+    for title, kind, reporter in _FILES:
+        packed = gzip.compress(reporter.render(run).encode(), 6, mtime=0)
+        name = f"{plain(run.meta.get('run', '')) or 'run'}{reporter.suffix}"
+        text = base64.b64encode(packed).decode("ascii")
+        if (room := room - len(packed)) >= 0:
+            downloads.append({"title": title, "name": name, "type": kind, "gzip": text})
+        else:
+            room += len(packed)
+            more = f"`bench report -f {reporter.name}` has it"
+            too_large.append(f"{title}: too large for the page; {more}")
     notes = [*notes_of(run), *suspicions(run), *map(plain, getattr(exhibits, "notes", ()))]
     baseline = run.meta.get("baseline")
     run = Run(run.meta, rank_results(run.ranked, run.meta.get("reference") or None, baseline))
@@ -127,22 +137,6 @@ def page_data(run: Run, exhibits: Exhibits | None = None) -> dict[str, Any]:
         "papers": papers_of(run),
         "downloads": downloads,
     }
-
-
-def _downloads(run: Run) -> tuple[list[dict[str, str]], list[str]]:
-    """Return the files that come with the page, compressed, and what is too large for it."""
-    found, notes, room = [], [], MOST_DOWNLOADS
-    for title, kind, reporter in _FILES:
-        packed = gzip.compress(reporter.render(run).encode(), 6, mtime=0)
-        name = f"{plain(run.meta.get('run', '')) or 'run'}{reporter.suffix}"
-        text = base64.b64encode(packed).decode("ascii")
-        if (room := room - len(packed)) >= 0:
-            found.append({"title": title, "name": name, "type": kind, "gzip": text})
-        else:
-            room += len(packed)
-            more = f"`bench report -f {reporter.name}` has it"
-            notes.append(f"{title}: too large for the page; {more}")
-    return found, notes
 
 
 def _strategies(run: Run) -> list[dict[str, Any]]:
