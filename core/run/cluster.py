@@ -89,7 +89,12 @@ class DaskWorkers:
             InputError: naming the first one that has not, or where there is none.
         """
         if not self._waits:
-            self._meet()
+            try:
+                self._client.wait_for_workers(1, timeout=_ANSWER)
+            except TimeoutError as error:
+                what = f"the scheduler at {self._where} has no worker"
+                expected = f"one or more: dask worker {self._where}"
+                raise InputError(what, expected=expected) from error
         homes = {home_of(strategy)[0] for strategy in strategies}
         packages = tuple(sorted({"femubench", *homes} - {"__main__"}))
         self._demand = Demand(all_versions(packages), packages, memory, self.sandbox)
@@ -111,13 +116,6 @@ class DaskWorkers:
             return Enclosure("none", "no worker is there yet; every result says how it ran")
         return Enclosure("namespaces")
 
-    def _meet(self) -> None:
-        try:
-            self._client.wait_for_workers(1, timeout=_ANSWER)
-        except TimeoutError as error:
-            what = f"the scheduler at {self._where} has no worker"
-            raise InputError(what, expected=f"one or more: dask worker {self._where}") from error
-
     def computed(
         self,
         slots: Sequence[Slot],
@@ -133,13 +131,6 @@ class DaskWorkers:
                 machine; results that came before stay.
         """
         flight = _Flight(self._client, self._demand, slots, references, limits, show)
-        try:
-            yield from flight.landed(wanted, self._capacity())
-        finally:
-            flight.call_off()
-
-    def _capacity(self) -> Callable[[], int]:
-        """Return what tells how many jobs may be on their way."""
         counted, threads = -_COUNTED, 0
 
         def capacity() -> int:
@@ -148,7 +139,10 @@ class DaskWorkers:
                 counted, threads = time.monotonic(), self.workers
             return max(_AHEAD * threads, _LEAST_AHEAD)
 
-        return capacity
+        try:
+            yield from flight.landed(wanted, capacity)
+        finally:
+            flight.call_off()
 
 
 def _unlike(what: str) -> InputError:

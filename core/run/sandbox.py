@@ -168,16 +168,6 @@ def enter(walls: Walls, at: str, room: int, processes: int) -> None:
         OSError: where the system refuses the namespaces; the processes are as before then.
     """
     go_apart(walls, at, room, processes)
-    _forget_environment()
-    os.environ["HOME"] = os.environ["TMPDIR"] = tempfile.tempdir = FOLDER
-    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    most = _MOST_FILES if hard == resource.RLIM_INFINITY else min(_MOST_FILES, hard)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
-    refuse_system_calls()
-
-
-def _forget_environment() -> None:
-    """Keep of the environment what programs need, also in the memory where it came from."""
     kept = {name: os.environ[name] for name in _bare(os.environ)}
     for name in tuple(os.environ):
         del os.environ[name]
@@ -187,6 +177,11 @@ def _forget_environment() -> None:
         words = stream.read().rpartition(b")")[2].split()
     start, end = int(words[_ENVIRONMENT_START]), int(words[_ENVIRONMENT_START + 1])
     ctypes.memset(start, 0, end - start)
+    os.environ["HOME"] = os.environ["TMPDIR"] = tempfile.tempdir = FOLDER
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    most = _MOST_FILES if hard == resource.RLIM_INFINITY else min(_MOST_FILES, hard)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+    refuse_system_calls()
 
 
 def _bare(given: Iterable[str]) -> set[str]:
