@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.frame import ACTIVE, Brace, Frame, Oscillator
+from femubench.core.fem.frame import ACTIVE, Frame, Oscillator
 from femubench.core.fem.kinematics import point_rows
 from femubench.core.fem.meshed_frame import MeshedFrame
 from femubench.core.fem.sensors import DIRECTIONS
@@ -86,11 +86,8 @@ def brace_rows(structure: MeshedFrame) -> SparseArray:
 def brace_stiffness(structure: MeshedFrame) -> SparseArray:
     """Return the stiffness of the braces, (n, n)."""
     rows = brace_rows(structure)
-    return rows.T @ sp.diags_array(_stiffness(structure.frame.braces)) @ rows
-
-
-def _stiffness(braces: tuple[Brace, ...]) -> FloatArray:
-    return np.array([brace.stiffness for brace in braces], dtype=float)
+    stiffness = np.array([brace.stiffness for brace in structure.frame.braces], dtype=float)
+    return rows.T @ sp.diags_array(stiffness) @ rows
 
 
 def oscillator_matrices(structure: MeshedFrame) -> tuple[SparseArray, SparseArray]:

@@ -269,27 +269,6 @@ class Derivatives:
         return result
 
 
-def _slopes(
-    properties: BeamProperties, part: Touched
-) -> tuple[FloatArray | None, FloatArray | None]:
-    """Return dk/dp and dm/dp by the complex step (Squire & Trapp 1998).
-
-    A factor on E leaves the shape of every element, and so its mass, as it is.
-    """
-    if part.is_factor:
-        values = {
-            name: getattr(properties, name) * (1.0 + 1j * exponent * _STEP)
-            for name, exponent in part.slopes
-        }
-    else:
-        values = {part.kind: getattr(properties, part.kind) + 1j * _STEP}
-    stepped = replace(properties, **values)
-    shear = part.kind in _BOTH and properties.shear_shape.any()
-    k = None if part.kind in _MASS else stiffness_matrices(stepped).imag / _STEP
-    m = mass_matrices(stepped).imag / _STEP if part.kind in _MASS or shear else None
-    return k, m
-
-
 def derivatives(structure: MeshedFrame, parameters: Sequence[Parameter]) -> Derivatives:
     """Return the derivatives of stiffness and mass with respect to parameters.
 
@@ -306,8 +285,19 @@ def derivatives(structure: MeshedFrame, parameters: Sequence[Parameter]) -> Deri
         if part.kind == _SPRING:
             springs = part.incidence(len(structure.springs), count)
         else:
-            slopes = _slopes(structure.properties, part)
-            parts.append(ElementSlopes(part.incidence(size, count), *slopes))
+            # A factor on E leaves the shape of every element, and so its mass, as it is.
+            if part.is_factor:
+                values = {
+                    name: getattr(structure.properties, name) * (1.0 + 1j * exponent * _STEP)
+                    for name, exponent in part.slopes
+                }
+            else:
+                values = {part.kind: getattr(structure.properties, part.kind) + 1j * _STEP}
+            stepped = replace(structure.properties, **values)
+            shear = part.kind in _BOTH and structure.properties.shear_shape.any()
+            k = None if part.kind in _MASS else stiffness_matrices(stepped).imag / _STEP
+            m = mass_matrices(stepped).imag / _STEP if part.kind in _MASS or shear else None
+            parts.append(ElementSlopes(part.incidence(size, count), k, m))
     return Derivatives(tuple(parts), structure.gather, structure.spring_rows, springs)
 
 

@@ -272,7 +272,15 @@ def build_mesh(frame: Frame) -> Mesh:
     hung = [place_xyz(frame, item.at) for item in frame.oscillators]
     xyz = np.concatenate([corners, inner, np.reshape(hung, (-1, 3))])
     member = np.repeat(np.arange(len(rows)), rows)
-    ends, stations, number = _regular(member, row, node, joints, elements)
+    # The elements of a member are equal.
+    k, count = np.arange(len(member)) - row[member], elements[member]
+    last = k >= count - 1
+    first = np.where(k == 0, joints[member, 0], node[member] + k - 1)
+    second = np.where(last, joints[member, 1], node[member] + k)
+    step = (1.0 / elements)[member]
+    stations = np.stack([k * step, np.where(last, 1.0, (k + 1) * step)], axis=1)
+    number = np.minimum((stations.sum(axis=1) / 2 * count).astype(np.int64) + 1, count)
+    ends = np.stack([first, second], axis=1)
     arm_factor, connections = np.full(len(member), np.nan), list[Connection]()
     for m, piece in pieces.items():
         own, table = slice(row[m], row[m] + rows[m]), piece.rows
@@ -316,27 +324,6 @@ def _inner_nodes(
     place = np.arange(len(member)) - (np.cumsum(nodes) - nodes)[member] + 1
     s = place * (1.0 / elements)[member]
     return np.asarray(start[member] + along[member] * s[:, None])
-
-
-def _regular(
-    member: IntArray, row: IntArray, node: IntArray, joints: IntArray, elements: IntArray
-) -> tuple[IntArray, FloatArray, IntArray]:
-    """Return ends, stations and number of every element, those of a member being equal.
-
-    Arguments:
-        member: of every element, (n_elements,).
-        row, node: the first element, and the first node inside, of every member, (n_members,).
-        joints: the ends of every member, (n_members, 2).
-        elements: of every member, (n_members,).
-    """
-    k, count = np.arange(len(member)) - row[member], elements[member]
-    last = k >= count - 1
-    first = np.where(k == 0, joints[member, 0], node[member] + k - 1)
-    second = np.where(last, joints[member, 1], node[member] + k)
-    step = (1.0 / elements)[member]
-    stations = np.stack([k * step, np.where(last, 1.0, (k + 1) * step)], axis=1)
-    number = np.minimum((stations.sum(axis=1) / 2 * count).astype(np.int64) + 1, count)
-    return np.stack([first, second], axis=1), stations, number
 
 
 def place_xyz(frame: Frame, place: Place) -> FloatArray:

@@ -253,14 +253,28 @@ def _prepare(structure: MeshedFrame) -> Statics:
     directions = ACTIVE[frame.plane]
     if frame.plane == "out-of-plane":
         directions = _IN_PLANE
-        frame = replace(frame, supports=_clamps(frame))
+        # In the plane clamps hold everything, other supports nothing.
+        whole = set(ACTIVE[frame.plane])
+        clamps = (s.at for s in frame.supports if set(s.fixed) == whole)
+        frame = replace(frame, supports=tuple(Support(at, _IN_PLANE) for at in clamps))
         flat = next((m.name for m in frame.members if m.section.Iz <= 0.0), None)
         if flat is not None:
             what = f"member {flat!r}: the stress of a lack of fit needs Iz"
             raise ModelError(what, next(iter(frame.preloads), None))
     kinematics = build_kinematics(frame, structure.mesh, directions)
     flat_structure = replace(structure, frame=frame, kinematics=kinematics)
-    loose = _loose(flat_structure)
+    kinematics, xyz = flat_structure.kinematics, flat_structure.mesh.xyz
+    centre, size = xyz.mean(axis=0), max(float(np.ptp(xyz, axis=0).max()), 1e-12)
+
+    def motion(points: FloatArray, axes: FloatArray) -> FloatArray:
+        scale = np.repeat([1.0, size], 3)
+        return np.asarray(rigid_motions(points - centre, axes) / scale)
+
+    own = motion(xyz[kinematics.node], kinematics.motions())
+    moving = np.abs(own).max(axis=0, initial=0.0) > _HELD
+    _, singular, turn = la.svd(np.linalg.qr(flat_structure.held(motion)[:, moving], mode="r"))
+    rank = int(np.sum(singular > _HELD))
+    loose = np.asarray(own[:, moving] @ turn[rank:].T)
     # As few dofs as possible stop the rigid motions.
     stopped = la.qr(loose.T, mode="r", pivoting=True)[1][: loose.shape[1]]
     free = np.setdiff1d(np.arange(len(loose)), stopped)
@@ -271,28 +285,6 @@ def _prepare(structure: MeshedFrame) -> Statics:
         raise ModelError("the frame is a mechanism in its plane") from None
     stiffness = stiffness_matrices(flat_structure.properties)
     return Statics(flat_structure, stiffness, factor, matrix, free, loose)
-
-
-def _clamps(frame: Frame) -> tuple[Support, ...]:
-    """Return what supports out of plane hold in the plane: clamps everything, others nothing."""
-    whole = set(ACTIVE[frame.plane])
-    return tuple(Support(s.at, _IN_PLANE) for s in frame.supports if set(s.fixed) == whole)
-
-
-def _loose(structure: MeshedFrame) -> FloatArray:
-    """Return the rigid motions that nothing holds, (n, r)."""
-    kinematics, xyz = structure.kinematics, structure.mesh.xyz
-    centre, size = xyz.mean(axis=0), max(float(np.ptp(xyz, axis=0).max()), 1e-12)
-
-    def motion(points: FloatArray, axes: FloatArray) -> FloatArray:
-        scale = np.repeat([1.0, size], 3)
-        return np.asarray(rigid_motions(points - centre, axes) / scale)
-
-    own = motion(xyz[kinematics.node], kinematics.motions())
-    moving = np.abs(own).max(axis=0, initial=0.0) > _HELD
-    _, singular, turn = la.svd(np.linalg.qr(structure.held(motion)[:, moving], mode="r"))
-    rank = int(np.sum(singular > _HELD))
-    return np.asarray(own[:, moving] @ turn[rank:].T)
 
 
 def preload_stiffness(structure: MeshedFrame, member: str, force: float) -> SparseArray:

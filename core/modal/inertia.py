@@ -74,7 +74,15 @@ def negative_by_pins(
         spring = np.zeros(model.size)
         spring[pins] = size[pins]
         if definite.factorise(sp.csc_array(matrix + sp.diags_array(spring))):
-            return _without(definite, model.size, pins, np.sqrt(size[pins]), change)
+            count = len(pins)
+            basis = sp.csc_array(
+                (np.sqrt(size[pins]), (pins, np.arange(count))), shape=(model.size, count)
+            )
+            values = np.full(count, -1.0)
+            if change is not None:
+                basis = sp.hstack([basis, sp.csc_array(change[0])], format="csc")
+                values = np.concatenate([values, change[1]])
+            return negative_after(0, values, np.diag(1.0 / values) + definite.compliance(basis))
     return None
 
 
@@ -95,19 +103,6 @@ def negative_after(negative: int, values: FloatArray, capacitance: FloatArray) -
     if np.abs(inner).min(initial=1.0) < _LOST:
         return None
     return negative + int(np.sum(values < 0.0)) - int(np.sum(inner < 0.0))
-
-
-def _without(
-    definite: Definite, size: int, pins: IntArray, root: FloatArray, change: Change | None
-) -> int | None:
-    """Return the number of negative eigenvalues once the springs are out and the change is in."""
-    count = len(pins)
-    basis = sp.csc_array((root, (pins, np.arange(count))), shape=(size, count))
-    values = np.full(count, -1.0)
-    if change is not None:
-        basis = sp.hstack([basis, sp.csc_array(change[0])], format="csc")
-        values = np.concatenate([values, change[1]])
-    return negative_after(0, values, np.diag(1.0 / values) + definite.compliance(basis))
 
 
 def _pins(model: Model, count: int) -> IntArray:

@@ -73,7 +73,14 @@ def shape_sensitivities(
     """
     change = matrix_slopes(model, parameters) if change is None else change
     if len(modes) == model.size:
-        return _modal_sum(modes, index, change)
+        shapes, eigenvalue = modes.shapes, modes.eigenvalues[index]
+        shape = shapes[:, index]
+        force = change.products(shape, float(eigenvalue))
+        gap = eigenvalue - modes.eigenvalues
+        gap[_same_eigenvalue(modes, index)] = np.inf
+        share = (shapes.T @ force) / gap[:, None]
+        share[index] = -0.5 * _mass_part(shape, change)
+        return np.asarray(shapes @ share)
     return _nelson(model, modes, index, change)
 
 
@@ -82,17 +89,6 @@ def _same_eigenvalue(modes: Modes, index: int) -> IntArray:
     gap = np.abs(modes.eigenvalues - modes.eigenvalues[index])
     scale = max(abs(float(modes.eigenvalues[index])), 1.0)
     return np.flatnonzero(gap <= _REPEATED * scale)
-
-
-def _modal_sum(modes: Modes, index: int, change: MatrixSlopes) -> FloatArray:
-    shapes, eigenvalue = modes.shapes, modes.eigenvalues[index]
-    shape = shapes[:, index]
-    force = change.products(shape, float(eigenvalue))
-    gap = eigenvalue - modes.eigenvalues
-    gap[_same_eigenvalue(modes, index)] = np.inf
-    share = (shapes.T @ force) / gap[:, None]
-    share[index] = -0.5 * _mass_part(shape, change)
-    return np.asarray(shapes @ share)
 
 
 def _mass_part(shape: FloatArray, change: MatrixSlopes) -> FloatArray:

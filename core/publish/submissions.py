@@ -147,7 +147,13 @@ def read_submission(
         raise InputError(what, file=file, key="schema", expected=str(SCHEMA))
     run = run_from_json(data, file=file)
     meta = _meta(run, file)
-    results = _deduplicated(run, meta, file)
+    # Of several results with one key the last counts, as in the store.
+    if not run.results:
+        raise InputError("no results", file=file, key="results", expected="at least one")
+    results: dict[str, JobResult] = {}
+    for number, result in enumerate(run.results):
+        _check(result, meta, file, f"results[{number}]")
+        results[result.key] = result
     verified = published and data.get("verified") is True
     if verify is not None:
         verify(run, data, file)
@@ -193,7 +199,9 @@ def _records(results: Iterable[JobResult]) -> list[dict[str, Any]]:
 
 def _meta(run: Run, file: Path) -> dict[str, Any]:
     try:
-        record = _Meta.model_validate(_encodable(run.meta))
+        record = _Meta.model_validate(
+            json.loads(json.dumps(run.meta, ensure_ascii=False).encode("utf-8", "replace"))
+        )
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         key = ".".join(["meta", *map(str, first["loc"])])
@@ -208,22 +216,6 @@ def _meta(run: Run, file: Path) -> dict[str, Any]:
                 key = f"meta.reference.{name}.{block}"
                 raise InputError(f"{value}", file=file, key=key, expected="an error >= 0 in %")
     return data
-
-
-def _encodable(data: Mapping[str, Any]) -> Any:  # noqa: ANN401 - JSON data of any form
-    """Return the meta data without halves of characters, which no file could hold."""
-    return json.loads(json.dumps(data, ensure_ascii=False).encode("utf-8", "replace"))
-
-
-def _deduplicated(run: Run, meta: Mapping[str, Any], file: Path) -> dict[str, JobResult]:
-    """Return the results by key; the last of a key counts, as in the store."""
-    if not run.results:
-        raise InputError("no results", file=file, key="results", expected="at least one")
-    found: dict[str, JobResult] = {}
-    for number, result in enumerate(run.results):
-        _check(result, meta, file, f"results[{number}]")
-        found[result.key] = result
-    return found
 
 
 def _check(result: JobResult, meta: Mapping[str, Any], file: Path, key: str) -> None:

@@ -223,7 +223,10 @@ def compare_runs(
     if not shared:
         expected = "one (case, strategy, seed) with the same case files"
         raise InputError("the two runs have no job in common", expected=expected)
-    references = _references(before, after, shared)
+    known = {**(after.meta.get("reference") or {}), **(before.meta.get("reference") or {})}
+    references = {
+        case: known[case] for case in dict.fromkeys(job.case for job in shared) if case in known
+    }
     structures = {**structures_of(after), **structures_of(before)}
     shares = block_shares(references, structures)
     pairs = [
@@ -231,6 +234,7 @@ def compare_runs(
         for j in shared
     ]
     rows = tuple(_rows(pairs))
+    told = (t.metric for t in thresholds if all(row.values[t.metric] is None for row in rows))
     return Comparison(
         before=str(before.meta.get("run") or "A"),
         after=str(after.meta.get("run") or "B"),
@@ -246,24 +250,13 @@ def compare_runs(
         notes=tuple(dict.fromkeys((*_notes(before), *_notes(after)))),
         thresholds=tuple(thresholds),
         excesses=tuple(_excesses(rows, thresholds)),
-        untested=_untested(rows, thresholds),
+        untested=tuple(told),
     )
-
-
-def _untested(rows: Sequence[Row], thresholds: Iterable[Threshold]) -> tuple[str, ...]:
-    told = (t.metric for t in thresholds if all(row.values[t.metric] is None for row in rows))
-    return tuple(told)
 
 
 def _notes(run: Run) -> list[str]:
     told = run.meta.get("notes")
     return list(map(str, told)) if isinstance(told, (list, tuple)) else []
-
-
-def _references(before: Run, after: Run, jobs: Iterable[Job]) -> dict[str, Mapping[str, float]]:
-    """Return the nominal errors of the cases of jobs, as A has them where both do."""
-    known = {**(after.meta.get("reference") or {}), **(before.meta.get("reference") or {})}
-    return {case: known[case] for case in dict.fromkeys(job.case for job in jobs) if case in known}
 
 
 def _common_start(before: Run, after: Run) -> Nominal:
@@ -383,24 +376,20 @@ def _rows(pairs: Iterable[_Pair]) -> Iterable[Row]:
         group.setdefault(pair.before.case.partition("/")[0], []).append(pair)
     for strategy, scenarios in groups.items():
         for scenario, listed in scenarios.items():
-            yield Row(strategy, scenario, len(listed), _values(listed))
-
-
-def _values(pairs: Sequence[_Pair]) -> dict[str, float | None]:
-    ratios = [(pair.unseen, pair.weight) for pair in pairs if pair.weight > 0.0]
-    known = [(ratio, weight) for ratio, weight in ratios if ratio is not None]
-    values: dict[str, float | None] = {"unseen": None}
-    if known:
-        values["unseen"] = geometric_mean((r for r, _ in known), (w for _, w in known))
-    for block in BLOCKS:
-        errors = [pair.blocks[block] for pair in pairs if block in pair.blocks]
-        values[block] = geometric_mean(errors) if errors else None
-    timed = [pair for pair in pairs if pair.before.status == pair.after.status == "ok"]
-    total = sum(pair.before.seconds for pair in timed)
-    ratio = sum(pair.after.seconds for pair in timed) / total if total > 0.0 else math.inf
-    values["seconds"] = ratio if math.isfinite(ratio) else None
-    values["failures"] = float(sum(change.kind == "lost" for change in _changes(pairs)))
-    return values
+            ratios = [(pair.unseen, pair.weight) for pair in listed if pair.weight > 0.0]
+            known = [(ratio, weight) for ratio, weight in ratios if ratio is not None]
+            values: dict[str, float | None] = {"unseen": None}
+            if known:
+                values["unseen"] = geometric_mean((r for r, _ in known), (w for _, w in known))
+            for block in BLOCKS:
+                errors = [pair.blocks[block] for pair in listed if block in pair.blocks]
+                values[block] = geometric_mean(errors) if errors else None
+            timed = [pair for pair in listed if pair.before.status == pair.after.status == "ok"]
+            total = sum(pair.before.seconds for pair in timed)
+            ratio = sum(pair.after.seconds for pair in timed) / total if total > 0.0 else math.inf
+            values["seconds"] = ratio if math.isfinite(ratio) else None
+            values["failures"] = float(sum(change.kind == "lost" for change in _changes(listed)))
+            yield Row(strategy, scenario, len(listed), values)
 
 
 def _excesses(rows: Sequence[Row], thresholds: Iterable[Threshold]) -> Iterable[Excess]:

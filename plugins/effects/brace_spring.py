@@ -50,7 +50,11 @@ class BraceSpring(FrameEffect):
         if model.structure is None or model.structure.frame.plane == "out-of-plane":
             return ()
         frame = model.structure.frame
-        body = _bodies(frame)
+        body = dict(frame.joint_index)  # the number of the rigid body that links make of joints
+        for link in frame.links:
+            if len(link.motions) in (0, len(ACTIVE[frame.plane])):
+                taken = {body[name] for name in (link.leads, *link.follows)}
+                body = {name: min(taken) if own in taken else own for name, own in body.items()}
         joined = {frozenset(body[name] for name in member.ends) for member in frame.members}
         joined |= {frozenset([number]) for number in body.values()}
         joined |= _in_line(frame, body) if frame.links else set()
@@ -86,16 +90,6 @@ def _rigidity(frame: Frame) -> float:
     """Return the stiffness of the members along themselves in the mean in N/m."""
     each = [m.material.E * m.section.A / member_length(frame, m.name) for m in frame.members]
     return float(np.mean(each))
-
-
-def _bodies(frame: Frame) -> dict[str, int]:
-    """Return from every joint to the number of the rigid body that links make it part of."""
-    body = dict(frame.joint_index)
-    for link in frame.links:
-        if len(link.motions) in (0, len(ACTIVE[frame.plane])):
-            taken = {body[name] for name in (link.leads, *link.follows)}
-            body = {name: min(taken) if own in taken else own for name, own in body.items()}
-    return body
 
 
 def _in_line(frame: Frame, body: Mapping[str, int]) -> set[frozenset[int]]:

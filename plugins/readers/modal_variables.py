@@ -51,8 +51,24 @@ def read_modal(variables: Mapping[str, Any], path: Path, names: Mapping[str, str
     Raises:
         InputError: where frequencies are missing, or sizes do not fit.
     """
-    found = _found(variables, path, names)
-    hertz = _hertz(found, path)
+    plain = {name.lower().replace("_", ""): name for name in variables}
+    found: dict[str, Any] = {}
+    for key, known in NAMES.items():
+        wanted = names.get(key)
+        if wanted is not None and wanted not in variables:
+            there = ", ".join(list(variables)[:12])
+            raise InputError(f"there is no variable {wanted!r}", file=path, expected=there)
+        name = wanted or next((plain[word] for word in known if word in plain), None)
+        if name is not None:
+            found[key] = variables[name]
+    hertz = _column(found, "frequencies", None, path)
+    squared = _column(found, "eigenvalues", None, path)
+    if hertz is None:
+        if squared is None:
+            raise InputError("no frequencies", file=path, expected=EXPECTED)
+        hertz = np.sqrt(np.maximum(squared, 0.0)) / (2.0 * np.pi)
+    if not len(hertz) or not (hertz > 0.0).all():
+        raise _wrong("frequencies", "one is not positive", "numbers > 0", path)
     m = len(hertz)
     shapes = _table(found, "shapes", m, path)
     n = 0 if shapes is None else len(shapes)
@@ -70,21 +86,6 @@ def read_modal(variables: Mapping[str, Any], path: Path, names: Mapping[str, str
         shapes=np.zeros((0, m)) if shapes is None else real_modes(shapes, align_phase=True),
         shape_std=np.full((n, m), np.nan) if std is None else np.abs(std),
     )
-
-
-def _found(variables: Mapping[str, Any], path: Path, names: Mapping[str, str]) -> dict[str, Any]:
-    """Return what is there, by key of `NAMES`."""
-    plain = {name.lower().replace("_", ""): name for name in variables}
-    found: dict[str, Any] = {}
-    for key, known in NAMES.items():
-        wanted = names.get(key)
-        if wanted is not None and wanted not in variables:
-            there = ", ".join(list(variables)[:12])
-            raise InputError(f"there is no variable {wanted!r}", file=path, expected=there)
-        name = wanted or next((plain[word] for word in known if word in plain), None)
-        if name is not None:
-            found[key] = variables[name]
-    return found
 
 
 def _numbers(found: Mapping[str, Any], key: str, path: Path) -> NDArray[Any] | None:
@@ -122,18 +123,6 @@ def _table(found: Mapping[str, Any], key: str, count: int, path: Path) -> NDArra
 
 def _wrong(key: str, what: str, expected: str, path: Path) -> InputError:
     return InputError(f"{key}: {what}", file=path, expected=expected)
-
-
-def _hertz(found: Mapping[str, Any], path: Path) -> Array:
-    hertz = _column(found, "frequencies", None, path)
-    squared = _column(found, "eigenvalues", None, path)
-    if hertz is None:
-        if squared is None:
-            raise InputError("no frequencies", file=path, expected=EXPECTED)
-        hertz = np.sqrt(np.maximum(squared, 0.0)) / (2.0 * np.pi)
-    if not len(hertz) or not (hertz > 0.0).all():
-        raise _wrong("frequencies", "one is not positive", "numbers > 0", path)
-    return hertz
 
 
 def _hertz_std(found: Mapping[str, Any], hertz: Array, path: Path) -> Array:
