@@ -82,16 +82,6 @@ def linkage(
         raise ModelError(what, item) from None
     bodies = np.array([(i, _root(leader, i, active)) for i in range(len(names))])
     bodies = bodies[bodies[:, 0] != bodies[:, 1]]
-    return Linkage(_spread(leader, xyz, active), leader >= 0, bodies)
-
-
-def _root(leader: IntArray, joint: int, active: BoolArray) -> int:
-    """Return the joint at the end of the chain of those that lead in all motions."""
-    own = np.unique(leader[joint, active])
-    return _root(leader, int(own[0]), active) if len(own) == 1 and own[0] >= 0 else joint
-
-
-def _spread(leader: IntArray, xyz: FloatArray, active: BoolArray) -> SparseArray:
     size = leader.size
     node, motion = np.nonzero(leader >= 0)
     base = leader[node, motion]
@@ -108,4 +98,10 @@ def _spread(leader: IntArray, xyz: FloatArray, active: BoolArray) -> SparseArray
         step = sp.csr_array(follow @ step)
         spread = spread + step
     spread.eliminate_zeros()
-    return spread
+    return Linkage(spread, leader >= 0, bodies)
+
+
+def _root(leader: IntArray, joint: int, active: BoolArray) -> int:
+    """Return the joint at the end of the chain of those that lead in all motions."""
+    own = np.unique(leader[joint, active])
+    return _root(leader, int(own[0]), active) if len(own) == 1 and own[0] >= 0 else joint

@@ -210,19 +210,12 @@ class Statics:
         stiffness = np.array([brace.stiffness for brace in frame.braces])
         stretch = brace_rows(self.structure) @ motion if frame.braces else np.zeros(0)
         spring, tension = (outer[:, 0], outer[:, 1]), stiffness * stretch
-        link = self._at_followers(ends, motion, spring[0], tension)
-        return StressState(ends[:, 6:9], ends[:, 9:], *spring, link, tension)
-
-    def _at_followers(
-        self, ends: FloatArray, motion: FloatArray, spring: FloatArray, tension: FloatArray
-    ) -> FloatArray:
-        """Return what pulls at joints that follow as one body with others, global, (l, 3)."""
         structure, mesh, frame = self.structure, self.structure.mesh, self.structure.frame
         followers = structure.kinematics.bodies[:, 0]
         total = np.zeros((len(mesh.xyz), 3))
         forces = -np.einsum("eij,eki->ekj", mesh.axes, ends.reshape(-1, 2, 2, 3)[:, :, 0])
         np.add.at(total, mesh.ends.ravel(), forces.reshape(-1, 3))
-        np.add.at(total, [c.base for c in mesh.connections], spring)
+        np.add.at(total, [c.base for c in mesh.connections], spring[0])
         pull = tension[:, None] * brace_lines(frame)[0] if frame.braces else np.zeros((0, 3))
         for side, sign in ((0, 1.0), (1, -1.0)):
             np.add.at(total, brace_ends(frame)[:, side], sign * pull)
@@ -232,7 +225,8 @@ class Statics:
                 column = _TRANSLATIONS.index(direction)
                 row = structure.kinematics.transform[[6 * node + column]]
                 total[node, column] -= item.stiffness * float((row @ motion)[0])
-        return total[followers]
+        link = total[followers]
+        return StressState(ends[:, 6:9], ends[:, 9:], *spring, link, tension)
 
 
 def statics_of(structure: MeshedFrame) -> Statics:

@@ -159,7 +159,8 @@ def condense_massless(
     unit = np.eye(len(mass))
     rest = unit[:, ~bare]
     loaded = mass[np.ix_(~bare, ~bare)]
-    scale = _scaling(loaded)
+    diagonal = np.diagonal(loaded)
+    scale = np.where(diagonal > 0.0, 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)), 1.0)
     values, vectors = la.eigh(np.asarray(loaded * np.outer(scale, scale)))
     if values[0] < -1e-9 * values[-1]:
         raise ModelError("the mass matrix is not positive semidefinite")
@@ -175,11 +176,6 @@ def condense_massless(
         raise ModelError("a degree of freedom has neither mass nor stiffness")
     expand = carrying - null @ la.solve(inner, null.T @ stiffness @ carrying, assume_a="sym")
     return expand.T @ stiffness @ expand, carrying.T @ mass @ carrying, expand
-
-
-def _scaling(mass: FloatArray) -> FloatArray:
-    diagonal = np.diagonal(mass)
-    return np.where(diagonal > 0.0, 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)), 1.0)
 
 
 def solve_modes(model: Model, count: int | None = None) -> Modes:

@@ -86,7 +86,10 @@ def run_jobs(
     with threadpool_limits(1), ExitStack() as stack:
         references = _references(cases, starts)
         slots = Slots(starts.of_all(cases), strategies, seeds)
-        slots.meta = _meta(cases, slots, references, asked, starts)
+        planned = {**asked, "plan": plan_digest(slots.keys)}
+        who, about = slots.strategies, {**starts.about(cases), **starts.beside.about(references)}
+        own = {case.name: references[case.name] for case in cases}
+        slots.meta = run_meta(cases, who, own, slots.seeds, planned, about)
         meta, known = recorded(stack, store, slots.meta, overwrite, resume)
         ending = stack.enter_context(ended(store, meta["run"]))
         results = Results(slots, store, meta["run"], progress, told)
@@ -113,19 +116,6 @@ def _unseen(cases: Sequence[Case], store: Store | None) -> tuple[str, ...]:
     """Return the folders of the cases and of the results, which no strategy is to see."""
     found = {case.folder.absolute() for case in cases if (case.folder / "case.toml").is_file()}
     return tuple(sorted(map(str, found | ({store.folder.absolute()} if store else set()))))
-
-
-def _meta(
-    cases: Sequence[Case],
-    slots: Slots,
-    references: Mapping[str, Reference],
-    settings: Mapping[str, Any],
-    starts: Starts,
-) -> dict[str, Any]:
-    planned = {**settings, "plan": plan_digest(slots.keys)}
-    who, about = slots.strategies, {**starts.about(cases), **starts.beside.about(references)}
-    own = {case.name: references[case.name] for case in cases}
-    return run_meta(cases, who, own, slots.seeds, planned, about)
 
 
 def _check_names(**given: Sequence[Case] | Sequence[Strategy]) -> None:
