@@ -146,15 +146,10 @@ def _over(running: list[_Asked]) -> Iterator[_Asked]:
             asked.received += data
             over = not data or asked.complete or asked.length > asked.most
         else:
-            over = _gone(asked.process)
+            options = os.WEXITED | os.WNOHANG | os.WNOWAIT
+            over = os.waitid(os.P_PID, asked.process, options) is not None
         if over or time.monotonic() >= asked.deadline:
             yield asked
-
-
-def _gone(process: int) -> bool:
-    """Tell whether a process has ended, whose pipe its own children may hold open."""
-    options = os.WEXITED | os.WNOHANG | os.WNOWAIT
-    return os.waitid(os.P_PID, process, options) is not None
 
 
 def _told(asked: _Asked) -> dict[str, str]:

@@ -90,7 +90,11 @@ def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) 
     if run.meta.get("yardstick") != "textbook":
         what = "errors are not measured against the textbook models"
         _refuse(file, what, "meta.yardstick", _AGAIN)
-    _check_sandbox(run, file)
+    told = run.meta.get("sandbox")
+    mode = (result.provenance.get("sandbox", told) for result in chain(run.results, run.beside))
+    if any(one != SANDBOX for one in (told, *mode)):
+        what = "the strategies ran without a sandbox"
+        _refuse(file, what, "meta.sandbox", "a run with `--sandbox require`, or --unverified")
     cases = _own_cases(run, installed, file)
     twins = _own_twins(run, list(cases.values()), installed, file)
     _check_complete(run, file)
@@ -106,14 +110,6 @@ def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) 
 
 def _refuse(file: Path, what: str, key: str, expected: str) -> NoReturn:
     raise InputError(what, file=file, key=key, expected=expected)
-
-
-def _check_sandbox(run: Run, file: Path) -> None:
-    told = run.meta.get("sandbox")
-    own = (result.provenance.get("sandbox", told) for result in chain(run.results, run.beside))
-    if any(one != SANDBOX for one in (told, *own)):
-        what = "the strategies ran without a sandbox"
-        _refuse(file, what, "meta.sandbox", "a run with `--sandbox require`, or --unverified")
 
 
 def _own_cases(run: Run, installed: Installed, file: Path) -> dict[str, Case]:

@@ -139,7 +139,10 @@ def run_errand(yardstick: Yardstick, errand: Errand, demand: Demand) -> Arrived:
     slots, references = [Slot(start, name, errand.seed, errand.code)], {start.case.name: reference}
     exhibits: list[Mapping[str, Any]] = []
     show = (lambda _, exhibit: exhibits.append(exhibit)) if errand.shown else None
-    found = computed(slots, [0], references, {name: limits}, 1, show, wanted, _judges())
+    if not hasattr(_OF_THREAD, "judges"):
+        _OF_THREAD.judges = Judges[Any]()
+    judges: Judges[Any] = _OF_THREAD.judges
+    found = computed(slots, [0], references, {name: limits}, 1, show, wanted, judges)
     ((_, result),) = found
     how = {"cpu": cpu_name(), "blas": _blas(), "sandbox": enclosure(limits.sandbox).sandbox}
     result = replace(result, provenance=how)
@@ -147,14 +150,6 @@ def run_errand(yardstick: Yardstick, errand: Errand, demand: Demand) -> Arrived:
 
 
 _OPEN, _OF_THREAD = ExitStack(), threading.local()
-
-
-def _judges() -> Judges[Any]:
-    """Return the judges of this thread, which live as long as the worker."""
-    if not hasattr(_OF_THREAD, "judges"):
-        _OF_THREAD.judges = Judges[Any]()
-    found: Judges[Any] = _OF_THREAD.judges
-    return found
 
 
 @cache

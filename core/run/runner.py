@@ -75,21 +75,36 @@ def run_jobs(
     place = executor or LocalProcesses(worker_count(jobs))
     place.admit(strategies, memory)
     share = place.share if memory is None else memory
-    asked = {"seed": run_seed, "timeout": timeout, "memory": share, **_about(place, request)}
+    how = place.enclosure()
+    why = {"sandbox_reason": how.reason} if how.reason else {}
+    where = {"jobs": place.workers, "sandbox": how.sandbox, **why}
+    asked: dict[str, Any] = {"seed": run_seed, "timeout": timeout, "memory": share, **where}
     own = {s.name: (timeouts or {}).get(s.name, timeout) for s in strategies}
     # The module of a strategy may be in no folder of code.
     names = {home_of(strategy)[1] for strategy in strategies} - {"__main__"}
     files = {getattr(sys.modules.get(name), "__file__", None) for name in names}
     code = tuple(sorted(os.path.abspath(file) for file in files if file))
-    sight = partial(replace, sandbox=place.sandbox, hidden=_unseen(cases, store), shown=code)
+    # No strategy is to see the folders of the cases and of the results.
+    folders = {case.folder.absolute() for case in cases if (case.folder / "case.toml").is_file()}
+    folders |= {store.folder.absolute()} if store else set()
+    hidden = tuple(sorted(map(str, folders)))
+    sight = partial(replace, sandbox=place.sandbox, hidden=hidden, shown=code)
     limits = {name: sight(Limits(seconds, share)) for name, seconds in own.items()}
     with threadpool_limits(1), ExitStack() as stack:
-        references = _references(cases, starts)
+        # What the yardstick of every case gives, solved once for those that share it.
+        solved: dict[tuple[int, int, int], Reference] = {}
+        given = {}
+        for case in map(starts.yardstick, (*cases, *starts.beside.twins)):
+            same = id(case.model), id(case.measurement), id(case.modifications)
+            if same not in solved:
+                solved[same] = reference_of(case)
+            given[case.name] = solved[same]
+        references = starts.beside.repeated(given)
         slots = Slots(starts.of_all(cases), strategies, seeds)
-        planned = {**asked, "plan": plan_digest(slots.keys)}
+        asked |= {"request": dict(request or {}), "plan": plan_digest(slots.keys)}
         who, about = slots.strategies, {**starts.about(cases), **starts.beside.about(references)}
-        own = {case.name: references[case.name] for case in cases}
-        slots.meta = run_meta(cases, who, own, slots.seeds, planned, about)
+        yardsticks = {case.name: references[case.name] for case in cases}
+        slots.meta = run_meta(cases, who, yardsticks, seeds, asked, about)
         meta, known = recorded(stack, store, slots.meta, overwrite, resume)
         ending = stack.enter_context(ended(store, meta["run"]))
         results = Results(slots, store, meta["run"], progress, told)
@@ -104,35 +119,9 @@ def run_jobs(
     return replace(found, meta={**meta, **ending})
 
 
-def _about(place: Executor, request: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Return how and where strategies run, and what was asked for."""
-    how = place.enclosure()
-    why = {"sandbox_reason": how.reason} if how.reason else {}
-    own = {"jobs": place.workers, "sandbox": how.sandbox, **why}
-    return {"request": dict(request or {}), **own}
-
-
-def _unseen(cases: Sequence[Case], store: Store | None) -> tuple[str, ...]:
-    """Return the folders of the cases and of the results, which no strategy is to see."""
-    found = {case.folder.absolute() for case in cases if (case.folder / "case.toml").is_file()}
-    return tuple(sorted(map(str, found | ({store.folder.absolute()} if store else set()))))
-
-
 def _check_names(**given: Sequence[Case] | Sequence[Strategy]) -> None:
     for kind, things in given.items():
         names = [thing.name for thing in things]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise InputError(f"{kind} {twice[0]!r} occurs twice", expected="every name once")
-
-
-def _references(cases: Sequence[Case], starts: Starts) -> dict[str, Reference]:
-    """Return what the yardstick of every case gives, solved once for cases that share it."""
-    solved: dict[tuple[int, int, int], Reference] = {}
-    found = {}
-    for case in map(starts.yardstick, (*cases, *starts.beside.twins)):
-        same = id(case.model), id(case.measurement), id(case.modifications)
-        if same not in solved:
-            solved[same] = reference_of(case)
-        found[case.name] = solved[same]
-    return starts.beside.repeated(found)

@@ -141,7 +141,7 @@ def walls_around(hidden: Iterable[str], code: Iterable[str] = ()) -> Walls:
     covers.update(path for given in hidden for path in (given, os.path.realpath(given)))
     outermost = tuple(path for path in _outermost(both) if path not in covers)
     covers.update(_elsewhere(covers, outermost))
-    inside = (path for path in covers if _below(path, outermost))
+    inside = (path for path in covers if any(Path(path).is_relative_to(top) for top in outermost))
     return Walls(outermost, links, tuple(_outermost(inside)))
 
 
@@ -273,7 +273,3 @@ def _elsewhere(paths: Iterable[str], shown: Iterable[str]) -> Iterator[str]:
         for path in listed if real != other else ():
             if Path(path).is_relative_to(real):
                 yield os.path.normpath(os.path.join(other, os.path.relpath(path, real)))
-
-
-def _below(path: str, folders: Iterable[str]) -> bool:
-    return any(Path(path).is_relative_to(folder) for folder in folders)

@@ -13,7 +13,6 @@ from femubench.core.score.counting import block_shares, counted_blocks
 from femubench.core.score.ranking import OFFSET_PERCENT, geometric_mean, score_of
 from femubench.core.score.repeatability import environment_differences
 from femubench.core.score.statistics import Evidence, ScoreTable, evidence_of, structures_of
-from femubench.core.typing import FloatArray
 
 Metric = Literal["unseen", "used", "higher", "modified", "seconds", "failures"]
 METRICS: tuple[Metric, ...] = get_args(Metric)
@@ -235,6 +234,10 @@ def compare_runs(
     ]
     rows = tuple(_rows(pairs))
     told = (t.metric for t in thresholds if all(row.values[t.metric] is None for row in rows))
+    ran = list(dict.fromkeys(pair.strategy for pair in pairs))
+    columns = [[pair.before for pair in pairs if pair.strategy == name] for name in ran]
+    columns += [[pair.after for pair in pairs if pair.strategy == name] for name in ran]
+    table = ScoreTable.of(columns, references, structures)
     return Comparison(
         before=str(before.meta.get("run") or "A"),
         after=str(after.meta.get("run") or "B"),
@@ -242,7 +245,7 @@ def compare_runs(
         jobs=len(pairs),
         changes=_changes(pairs),
         rows=rows,
-        evidence=evidence_of(_ratios(pairs, references, structures)),
+        evidence=evidence_of({name: table.ratios(k, k + len(ran)) for k, name in enumerate(ran)}),
         only_before=tuple(job for job in old if job not in new),
         only_after=tuple(job for job in new if job not in old),
         other_cases=tuple(other),
@@ -353,19 +356,6 @@ def _damage(result: JobResult) -> str:
         "surplus partners": result.surplus_partners or 0,
     }
     return ", ".join(f"{number} {what}" for what, number in counts.items() if number)
-
-
-def _ratios(
-    pairs: Sequence[_Pair],
-    references: Mapping[str, Mapping[str, float]],
-    structures: Mapping[str, str],
-) -> dict[str, FloatArray]:
-    """Return the ratios of the scores on all structures by strategy."""
-    names = list(dict.fromkeys(pair.strategy for pair in pairs))
-    columns = [[pair.before for pair in pairs if pair.strategy == name] for name in names]
-    columns += [[pair.after for pair in pairs if pair.strategy == name] for name in names]
-    table = ScoreTable.of(columns, references, structures)
-    return {name: table.ratios(k, k + len(names)) for k, name in enumerate(names)}
 
 
 def _rows(pairs: Iterable[_Pair]) -> Iterable[Row]:

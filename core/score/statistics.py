@@ -402,20 +402,15 @@ def _cliques(apart: Sequence[int]) -> list[int] | None:
                 split += [found & ~bit, found & ~others]
             else:
                 split.append(found)
-        sets = _largest(split)
+        kept: list[int] = []
+        for best in sorted(set(split), key=lambda bits: -bits.bit_count()):
+            if not any(best & ~other == 0 for other in kept):
+                kept.append(best)
+        sets = kept
         # Between two steps there may be more sets than in the end, but not by much.
         if len(sets) > 4 * _MOST_GROUPS:
             return None
     return sets if len(sets) <= _MOST_GROUPS else None
-
-
-def _largest(sets: Sequence[int]) -> list[int]:
-    """Return the sets that lie in no other one."""
-    kept: list[int] = []
-    for found in sorted(set(sets), key=lambda bits: -bits.bit_count()):
-        if not any(found & ~other == 0 for other in kept):
-            kept.append(found)
-    return kept
 
 
 def _stretches(apart: Sequence[int]) -> list[int]:
