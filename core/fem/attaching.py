@@ -77,7 +77,12 @@ def attach(
         # Nothing is split too near to a node.
         if inside and np.abs(grid - s).min() > SHORTEST_PIECE / frame.members[m].elements:
             element = int(rows[np.searchsorted(grid, s) - 1])
-            if _between_nodes(structure, frame.members[m].name):
+            # Something else may hang on the member between two of its nodes.
+            old, member = structure.frame, frame.members[m].name
+            attached: tuple[PointMass | GroundSpring | Oscillator, ...]
+            attached = (*old.masses, *old.springs, *old.oscillators)
+            on = (item.at for item in attached if item.at.member == member)
+            if any(node_at(old, structure.mesh, place) is None for place in on):
                 return None
             new = _with_split(new, element, s)
             origin = _doubled(origin, element)
@@ -97,16 +102,6 @@ def _unused(structure: MeshedFrame, springs: Sequence[GroundSpring]) -> bool:
         for item in springs
         if item.at.joint in joints
     )
-
-
-def _between_nodes(structure: MeshedFrame, member: str) -> bool:
-    """Tell whether something hangs on a member between two of its nodes."""
-    frame = structure.frame
-    attached: tuple[PointMass | GroundSpring | Oscillator, ...]
-    attached = (*frame.masses, *frame.springs, *frame.oscillators)
-    places = [item.at for item in attached]
-    on = (place for place in places if place.member == member)
-    return any(node_at(frame, structure.mesh, place) is None for place in on)
 
 
 def _doubled(array: AnyArray, row: int) -> AnyArray:

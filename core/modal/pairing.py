@@ -107,10 +107,16 @@ def pair_modes(
     admissible = (likeness >= least_mac) & (apart <= edge)
     cost = 1.0 - likeness + FREQUENCY_WEIGHT * np.where(admissible, apart, 0.0)
     worst = 1.0 - least_mac + FREQUENCY_WEIGHT * edge
+    far = float(np.log(window_without_shape))
+    within = distance <= far
+    near = far - np.where(within, distance, far)
+    # Of two modes above two others, either may go with either at the same sum of distances: a
+    # trace of their squares keeps the order.
+    by_distance = _WITHOUT_SHAPE * near * (1.0 + _IN_ORDER * (2.0 * far - near))
     gain = np.where(
         by_shape,
         np.where(admissible, worst - cost + _TINY, -1.0),
-        _gain_by_frequency(distance, window_without_shape),
+        np.where(within, by_distance + _TINY, -1.0),
     )
     # One column of gain 0 a measured mode: to stay alone is always possible.
     rows, columns = linear_sum_assignment(np.hstack([gain, np.zeros((m, m))]), maximize=True)
@@ -145,13 +151,3 @@ def pair_measured(measurement: Measurement, modes: Modes, readings: FloatArray) 
         np.asarray(readings)[:, elastic],
     )
     return replace(found, index=np.append(elastic, -1)[found.index])
-
-
-def _gain_by_frequency(distance: FloatArray, window: float) -> FloatArray:
-    edge = float(np.log(window))
-    admissible = distance <= edge
-    near = edge - np.where(admissible, distance, edge)
-    # Of two modes above two others, either may go with either at the same sum of distances: a
-    # trace of their squares keeps the order.
-    gain = _WITHOUT_SHAPE * near * (1.0 + _IN_ORDER * (2.0 * edge - near))
-    return np.where(admissible, gain + _TINY, -1.0)

@@ -155,9 +155,6 @@ class _Known:
     modes: FloatArray
     weighted: FloatArray
 
-    def with_more(self, shapes: FloatArray, weighted: FloatArray) -> _Known:
-        return _Known(np.hstack([self.modes, shapes]), np.hstack([self.weighted, weighted]))
-
     def out_of(self, motion: FloatArray) -> FloatArray:
         return motion - self.modes @ (self.weighted.T @ motion)
 
@@ -230,7 +227,8 @@ def lowest_eigenpairs(model: Model, count: int) -> tuple[FloatArray, FloatArray]
             break
         # One start leads to one direction of a repeated eigenvalue: another is needed for the next.
         start = _random(model, number)
-        known = rigid.with_more(shapes, model.mass_times(shapes))
+        weighted = np.hstack([rigid.weighted, model.mass_times(shapes)])
+        known = _Known(np.hstack([rigid.modes, shapes]), weighted)
         more, others = _shift_invert(shifted, known, missed + _SPARE, start)
         order = np.argsort(np.concatenate([eigenvalues, more]), kind="stable")[: len(eigenvalues)]
         eigenvalues = np.concatenate([eigenvalues, more])[order]

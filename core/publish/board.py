@@ -67,7 +67,19 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
     ranked = _ranked(latest.values(), versions, current)
     told = _told(submissions, "structures"), _told(submissions, "classes")
     ground = Ground(ranked, current, references, *told)
-    runs = [_run_entry(item) for item in submissions]
+    runs = [
+        {
+            "file": f"data/{item.name}",
+            "run": item.run.meta["run"],
+            "started": item.started,
+            "machine": dict(item.run.meta["machine"]),
+            "versions": dict(item.run.meta["versions"]),
+            "results": len(item.run.results),
+            "strategies": len({result.strategy for result in item.run.results}),
+            "verified": item.verified,
+        }
+        for item in submissions
+    ]
     described = {v: _described(v, listed, ground) for v, listed in versions.items()}
     entrants = {name: versions[version] for name, version in latest.items()}
     boards = [
@@ -235,18 +247,4 @@ def _conflict(item: Finding) -> dict[str, Any]:
             }
             for number, other in enumerate((item, *item.others))
         ],
-    }
-
-
-def _run_entry(item: Submission) -> dict[str, Any]:
-    meta = item.run.meta
-    return {
-        "file": f"data/{item.name}",
-        "run": meta["run"],
-        "started": item.started,
-        "machine": dict(meta["machine"]),
-        "versions": dict(meta["versions"]),
-        "results": len(item.run.results),
-        "strategies": len({result.strategy for result in item.run.results}),
-        "verified": item.verified,
     }

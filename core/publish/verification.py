@@ -99,7 +99,14 @@ def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) 
     twins = _own_twins(run, list(cases.values()), installed, file)
     _check_complete(run, file)
     known = {name: _Known.of(case, installed) for name, case in (cases | twins).items()}
-    _check_references(run, known, file)
+    # The nominal errors, which every score is relative to.
+    for key, stated, names in (
+        ("meta.reference", run.meta["reference"], run.meta["cases"]),
+        ("meta.twins.reference", run.meta["twins"]["reference"], run.meta["twins"]["of"]),
+    ):
+        for name in names:
+            errors, right = stated.get(name, {}), known[name].reference
+            _check_errors(errors, right, f"{key}.{name}", nominal="textbook", file=file)
     origins = run.meta["twins"]["again"]
     for key, results in (("results", run.results), ("beside", run.beside)):
         for number, result in enumerate(results):
@@ -179,18 +186,6 @@ def _check_complete(run: Run, file: Path) -> None:
     keys = (result.key for result in chain(run.results, run.beside))
     if plan_digest(keys) != meta.get("plan"):
         _refuse(file, "the jobs are not those that the run began with", "meta.plan", _AGAIN)
-
-
-def _check_references(run: Run, known: Mapping[str, _Known], file: Path) -> None:
-    """Check the nominal errors, which every score is relative to."""
-    told = (
-        ("meta.reference", run.meta["reference"], run.meta["cases"]),
-        ("meta.twins.reference", run.meta["twins"]["reference"], run.meta["twins"]["of"]),
-    )
-    for key, stated, names in told:
-        for name in names:
-            found, own = stated.get(name, {}), known[name].reference
-            _check_errors(found, own, f"{key}.{name}", nominal="textbook", file=file)
 
 
 def _check_errors(

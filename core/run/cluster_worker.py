@@ -106,11 +106,6 @@ def unfit(demand: Demand, dask_worker: Any) -> str | None:  # noqa: ANN401 - a d
     return None
 
 
-def share_of(dask_worker: Any) -> int:  # noqa: ANN401 - a distributed.Worker
-    """Return the bytes that one of the jobs of a worker may take."""
-    return memory_share(dask_worker.state.nthreads, dask_worker.memory_manager.memory_limit)
-
-
 def run_errand(yardstick: Yardstick, errand: Errand, demand: Demand) -> Arrived:
     """Return the result of a job and its exhibit.
 
@@ -135,7 +130,8 @@ def run_errand(yardstick: Yardstick, errand: Errand, demand: Demand) -> Arrived:
     start, reference = yardstick
     name, limits = errand.strategy, errand.limits
     if limits.memory is None:
-        limits = replace(limits, memory=share_of(worker))
+        share = memory_share(worker.state.nthreads, worker.memory_manager.memory_limit)
+        limits = replace(limits, memory=share)
     slots, references = [Slot(start, name, errand.seed, errand.code)], {start.case.name: reference}
     exhibits: list[Mapping[str, Any]] = []
     show = (lambda _, exhibit: exhibits.append(exhibit)) if errand.shown else None

@@ -157,8 +157,15 @@ def performed(job: Job) -> tuple[JobOutcome, Model | None]:
             elif isinstance(error, MemoryError):
                 reason = f"out of memory: {reason}"
             outcome = JobOutcome(status, reason, _traceback(error))
-    if outcome.status == "ok" and _changed(model, before, job):
-        outcome = JobOutcome("failed", "the nominal model was changed in place, expected a new one")
+    if outcome.status == "ok":
+        try:  # entries may have changed places
+            same = before is not None and _digest(model) == before
+            changed = not same and differ(model, pickle.loads(job.model))
+        except Exception:  # what it holds now is no matrix
+            changed = True
+        if changed:
+            what = "the nominal model was changed in place, expected a new one"
+            outcome = JobOutcome("failed", what)
     seconds = time.perf_counter() - start
     return replace(outcome, seconds=seconds, evaluations=counter.count), model
 
@@ -172,15 +179,6 @@ def _digest(model: Model) -> bytes | None:
         for part in (matrix.data, matrix.indices, matrix.indptr):
             found.update(np.ascontiguousarray(part).data)
     return found.digest()
-
-
-def _changed(model: Model, before: bytes | None, job: Job) -> bool:
-    """Tell whether a model has other matrices than it had; entries may have changed places."""
-    try:
-        same = before is not None and _digest(model) == before
-        return not same and differ(model, pickle.loads(job.model))
-    except Exception:  # what it holds now is no matrix
-        return True
 
 
 def one_line(error: BaseException) -> str:

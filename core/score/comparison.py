@@ -217,7 +217,9 @@ def compare_runs(
     old = _by_job(before.started_from(nominal), names)
     new = _by_job(after.started_from(nominal), {b: b for b in names.values()})
     shared = [job for job in old if job in new]
-    other = [job for job in shared if _moved(before, old[job], after, new[job])]
+    # One name may stand for two different cases.
+    digests = ((job, _digest(before, old[job]), _digest(after, new[job])) for job in shared)
+    other = [job for job, first, second in digests if first and second and first != second]
     shared = [job for job in shared if job not in set(other)]
     if not shared:
         expected = "one (case, strategy, seed) with the same case files"
@@ -233,6 +235,12 @@ def compare_runs(
         for j in shared
     ]
     rows = tuple(_rows(pairs))
+    excesses = (
+        Excess(row.strategy, row.scenario, t.metric, value, t.most)
+        for t in thresholds
+        for row in rows
+        if (value := row.values[t.metric]) is not None and value > t.most + _ROUNDING * abs(t.most)
+    )
     told = (t.metric for t in thresholds if all(row.values[t.metric] is None for row in rows))
     ran = list(dict.fromkeys(pair.strategy for pair in pairs))
     columns = [[pair.before for pair in pairs if pair.strategy == name] for name in ran]
@@ -252,7 +260,7 @@ def compare_runs(
         environment=tuple(environment_differences(_safe(before.meta), _safe(after.meta))),
         notes=tuple(dict.fromkeys((*_notes(before), *_notes(after)))),
         thresholds=tuple(thresholds),
-        excesses=tuple(_excesses(rows, thresholds)),
+        excesses=tuple(excesses),
         untested=tuple(told),
     )
 
@@ -312,12 +320,6 @@ def _digest(run: Run, result: JobResult) -> str:
     """Return the digest of the case files of a result, nothing where it is not known."""
     listed = (run.meta.get("cases") or {}).get(result.case) or {}
     return str(result.provenance.get("case") or listed.get("digest") or "")
-
-
-def _moved(before: Run, old: JobResult, after: Run, new: JobResult) -> bool:
-    """Tell whether one name stands for two different cases."""
-    first, second = _digest(before, old), _digest(after, new)
-    return bool(first and second and first != second)
 
 
 def _safe(meta: Mapping[str, Any]) -> dict[str, Any]:
@@ -380,11 +382,3 @@ def _rows(pairs: Iterable[_Pair]) -> Iterable[Row]:
             values["seconds"] = ratio if math.isfinite(ratio) else None
             values["failures"] = float(sum(change.kind == "lost" for change in _changes(listed)))
             yield Row(strategy, scenario, len(listed), values)
-
-
-def _excesses(rows: Sequence[Row], thresholds: Iterable[Threshold]) -> Iterable[Excess]:
-    for item in thresholds:
-        for row in rows:
-            value = row.values[item.metric]
-            if value is not None and value > item.most + _ROUNDING * abs(item.most):
-                yield Excess(row.strategy, row.scenario, item.metric, value, item.most)

@@ -71,7 +71,14 @@ class BraceSpring(FrameEffect):
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return the stiffness along the line of the joints."""
         frame = model.frame_structure.frame
-        scale = once_for(model, "stiffness of a brace", lambda: _SHARE * _rigidity(frame))
+
+        def rigidity() -> float:  # of the members along themselves in the mean, N/m
+            each = [
+                m.material.E * m.section.A / member_length(frame, m.name) for m in frame.members
+            ]
+            return _SHARE * float(np.mean(each))
+
+        scale = once_for(model, "stiffness of a brace", rigidity)
         return (EffectParameter("stiffness", "N/m", scale, scaling="exponential", one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
@@ -84,12 +91,6 @@ class BraceSpring(FrameEffect):
         """Return the stiffness matrix of 1 N/m."""
         row = elongation_row(model, pair_of(model.frame_structure.frame, place))
         return proportional(Term("stiffness", RowOperator(row, np.eye(1))))
-
-
-def _rigidity(frame: Frame) -> float:
-    """Return the stiffness of the members along themselves in the mean in N/m."""
-    each = [m.material.E * m.section.A / member_length(frame, m.name) for m in frame.members]
-    return float(np.mean(each))
 
 
 def _in_line(frame: Frame, body: Mapping[str, int]) -> set[frozenset[int]]:

@@ -77,11 +77,18 @@ def read_modal(variables: Mapping[str, Any], path: Path, names: Mapping[str, str
         raise _wrong("shape_std", f"{std.shape[0]} x {std.shape[1]}", f"{n} x {m} as shapes", path)
     numbers = _column(found, "numbers", m, path)
     damping = _column(found, "damping", m, path)
+    sensors, hertz_std = _sensors(found, n, path), _column(found, "frequency_std", m, path)
+    if hertz_std is None:
+        squared_std = _column(found, "eigenvalue_std", m, path)  # of (2 pi f)^2
+        if squared_std is None:
+            hertz_std = np.full(m, np.nan)
+        else:
+            hertz_std = np.abs(squared_std) / (8.0 * np.pi**2 * hertz)
     return Measurement(
-        sensors=_sensors(found, n, path),
+        sensors=sensors,
         numbers=tuple(range(1, m + 1) if numbers is None else (int(v) for v in numbers)),
         frequencies=hertz,
-        frequency_std=_hertz_std(found, hertz, path),
+        frequency_std=np.abs(hertz_std),
         damping=np.full(m, np.nan) if damping is None else damping,
         shapes=np.zeros((0, m)) if shapes is None else real_modes(shapes, align_phase=True),
         shape_std=np.full((n, m), np.nan) if std is None else np.abs(std),
@@ -123,16 +130,6 @@ def _table(found: Mapping[str, Any], key: str, count: int, path: Path) -> NDArra
 
 def _wrong(key: str, what: str, expected: str, path: Path) -> InputError:
     return InputError(f"{key}: {what}", file=path, expected=expected)
-
-
-def _hertz_std(found: Mapping[str, Any], hertz: Array, path: Path) -> Array:
-    std = _column(found, "frequency_std", len(hertz), path)
-    if std is not None:
-        return np.abs(std)
-    squared = _column(found, "eigenvalue_std", len(hertz), path)
-    if squared is not None:  # of (2 pi f)^2
-        return np.asarray(np.abs(squared) / (8.0 * np.pi**2 * hertz))
-    return np.full(len(hertz), np.nan)
 
 
 def _words(value: Any) -> list[str]:  # noqa: ANN401 - numbers or words

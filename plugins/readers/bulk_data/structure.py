@@ -395,7 +395,10 @@ class Reading:
 
     def _spring(self, card: Card) -> None:
         direct = card.name == "CELAS2"
-        stiffness = card.real(2, "K") if direct else self._of_pelas(card)
+        number = 0 if direct else card.id(2, "PID", card.id(1, "EID"))
+        if not direct and number not in self.stiffnesses:
+            raise card.error(f"there is no PELAS {number}", "the number of a PELAS", "PID")
+        stiffness = card.real(2, "K") if direct else self.stiffnesses[number]
         if stiffness < 0.0:
             raise card.error(f"{stiffness:g}", "a stiffness >= 0", "K")
         ends = []
@@ -422,13 +425,6 @@ class Reading:
             expected = "to ground, or along the line between the two grids"
             raise card.error("a spring between two grids across their line", expected)
         self.parts.add("braces", Brace((first.name, second.name), stiffness), card)
-
-    def _of_pelas(self, card: Card) -> float:
-        wanted = card.id(2, "PID", card.id(1, "EID"))
-        if wanted not in self.stiffnesses:
-            what = f"there is no PELAS {wanted}"
-            raise card.error(what, "the number of a PELAS", "PID")
-        return self.stiffnesses[wanted]
 
     def _list(self, card: Card, first: int, key: str) -> list[int]:
         """Return the grids of a list; raises InputError for more than any structure needs."""

@@ -99,14 +99,25 @@ def _changed(
             raise _refusal(path)
     found: dict[str, tuple[Numbers, Numbers]] = {}
     for i, (name, bar) in enumerate(bars.items()):
-        ratio = _ratios(nominal.properties, new, i)
+        # By what every property of the element has been multiplied, 1 where it is 0.
+        ratio = {}
+        for f in fields(BeamProperties):
+            before, after = (float(getattr(p, f.name)[i]) for p in (nominal.properties, new))
+            times = after / before if before else 1.0
+            ratio[f.name] = 1.0 if abs(times - 1.0) <= _SAME else times
         # The cards leave open how a rigidity is parted between modulus and section: of the ways to
         # say it the one that changes least is taken, the first of several. RHO follows from the
         # torsional inertia RHO (I1 + I2), and NSM makes up the mass.
         moduli = dict.fromkeys((1.0, *(ratio[key] for key in ("EA", "EIy", "EIz", "GJ"))))
         ways = (_parted(bar, ratio, e) for e in moduli)
         found[name] = min(ways, key=lambda way: len(way[0]) + len(way[1]))
-        if not _says(bar, *found[name], ratio):
+        of, rho = dict(found[name][0]), dict(found[name][1]).get("rho", bar.rho)
+        inertia = (
+            (ratio["rhoIy"], rho * of.get("I2", bar.of.I2), bar.rho * bar.of.I2),
+            (ratio["rhoIz"], rho * of.get("I1", bar.of.I1), bar.rho * bar.of.I1),
+        )
+        kept = (abs(r * old - now) <= _KEPT * abs(old) for r, now, old in inertia)
+        if bar.has_shear and not all(kept):
             what = f"bar {name!r} has a rotary inertia or a shear of its own"
             raise InputError(what, file=path, expected=_EXPECTED)
     return found
@@ -116,16 +127,6 @@ def _alike(one: SparseArray, other: SparseArray) -> bool:
     apart = (one - other).tocoo()
     size = np.sqrt(np.abs(one.diagonal()))
     return bool(np.all(np.abs(apart.data) <= _KEPT * size[apart.row] * size[apart.col]))
-
-
-def _ratios(old: BeamProperties, new: BeamProperties, i: int) -> dict[str, float]:
-    """Return by what every property of an element has been multiplied, 1 where it is 0."""
-    found = {}
-    for f in fields(BeamProperties):
-        before, after = float(getattr(old, f.name)[i]), float(getattr(new, f.name)[i])
-        ratio = after / before if before else 1.0
-        found[f.name] = 1.0 if abs(ratio - 1.0) <= _SAME else ratio
-    return found
 
 
 def _parted(bar: Bar, ratio: Mapping[str, float], e: float) -> tuple[Numbers, Numbers]:
@@ -155,18 +156,6 @@ def _parted(bar: Bar, ratio: Mapping[str, float], e: float) -> tuple[Numbers, Nu
     moduli = (("E", e), ("G", e), ("rho", r))
     material = [(key, f * getattr(bar, key)) for key, f in moduli if abs(f - 1.0) > _SAME]
     return tuple(numbers), tuple(material)
-
-
-def _says(bar: Bar, section: Numbers, material: Numbers, ratio: Mapping[str, float]) -> bool:
-    """Tell whether new numbers have the rotary inertia and the shear that are wanted."""
-    if not bar.has_shear:
-        return True
-    of, rho = dict(section), dict(material).get("rho", bar.rho)
-    pairs = (
-        (ratio["rhoIy"], rho * of.get("I2", bar.of.I2), bar.rho * bar.of.I2),
-        (ratio["rhoIz"], rho * of.get("I1", bar.of.I1), bar.rho * bar.of.I1),
-    )
-    return all(abs(r * old - new) <= _KEPT * abs(old) for r, new, old in pairs)
 
 
 class _Cards:
