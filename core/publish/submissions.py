@@ -161,26 +161,8 @@ def read_submission(
     if not verified:
         meta = {name: value for name, value in meta.items() if name not in _OF_VERIFIED}
     beside = run.beside if verified else ()
-    return _submission(meta, results.values(), beside, file, verified=verified)
-
-
-def slug(text: str, longest: int = 40) -> str:
-    """Return a file name for any text: letters, digits, and a hash that keeps it apart."""
-    word = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")[:longest].strip("-")
-    digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]
-    return f"{word}-{digest}" if word else digest
-
-
-def _submission(
-    meta: Mapping[str, Any],
-    results: Iterable[JobResult],
-    beside: Iterable[JobResult],
-    file: Path,
-    *,
-    verified: bool,
-) -> Submission:
-    """Return a run as its file says it, so that it is the same when that is read again."""
-    data = {"schema": SCHEMA, "meta": meta, "results": _records(results)}
+    # A run as its file says it, so that it is the same when that is read again.
+    data = {"schema": SCHEMA, "meta": meta, "results": _records(results.values())}
     if verified:
         data |= {"beside": _records(beside), "verified": True}
     text = json.dumps(data, sort_keys=True, allow_nan=False, separators=(",", ":")) + "\n"
@@ -188,6 +170,13 @@ def _submission(
     run = run_from_json(json.loads(text), file=file)
     ranked = replace(run, results=rank_results(run.results, meta["reference"]))
     return Submission(ranked, text, f"{slug(str(meta['run']))}-{digest}.json", verified)
+
+
+def slug(text: str, longest: int = 40) -> str:
+    """Return a file name for any text: letters, digits, and a hash that keeps it apart."""
+    word = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")[:longest].strip("-")
+    digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+    return f"{word}-{digest}" if word else digest
 
 
 def _records(results: Iterable[JobResult]) -> list[dict[str, Any]]:

@@ -23,7 +23,7 @@ from femubench.core.run.plain_arrays import BytesError, Shelf
 from femubench.core.run.plain_frame import (
     frame_from_plain,
     frame_to_plain,
-    parameters_from_plain,
+    read_plain,
 )
 from femubench.core.typing import AnyArray, IntArray, SparseArray
 from femubench.core.update.uncertainty import MOST_SAMPLES
@@ -243,7 +243,7 @@ def _changes(
     data: Mapping[str, Any], arrays: Sequence[AnyArray]
 ) -> list[tuple[int, Parameter, float]]:
     """Return every parameter that was set, with its number and value, in turn."""
-    parameters = parameters_from_plain(data.get("parameters"))
+    parameters = read_plain(tuple[Parameter, ...], data.get("parameters"), "parameters")
     match data.get("changes"):
         case [int(numbers), int(values)]:
             each, given = _taken(arrays, numbers), _taken(arrays, values)
