@@ -7,7 +7,6 @@ import pickle
 import re
 import secrets
 import shutil
-import threading
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -36,7 +35,7 @@ from femubench.core.run.sandbox import OFF, Enclosure, Sandbox, enclosure
 from femubench.core.run.schedule import Show, unjudged
 from femubench.core.run.slots import Slot, Start, first_seed
 from femubench.core.run.stopping import interrupts_kept
-from femubench.core.run.workers import no_script
+from femubench.core.run.workers import no_script, repeating
 from femubench.core.schema.results import JobResult
 from femubench.core.score.scoring import Reference
 
@@ -328,7 +327,10 @@ def started(
             what = f"{words} cannot be started: {one_line(error)}"
             raise InputError(what, key="cluster", expected="machines to run on") from error
         size = {"jobs": jobs} if queued else {"n": jobs}
-        stack.enter_context(_kept(partial(cluster.scale, **size)))
+        scale = partial(cluster.scale, **size)
+        scale()
+        # A nanny gives up a worker that dies as it starts.
+        stack.enter_context(repeating(scale, _COUNTED))
         client = stack.enter_context(_client(cluster))
         yield DaskWorkers(client, words, waits=queued, sandbox=sandbox)
 
@@ -386,25 +388,6 @@ def slurm_cluster(queue: str) -> Cluster:
         silence_logs=logging.CRITICAL,
         **missing,
     )
-
-
-@contextmanager
-def _kept(scale: Callable[[], None]) -> Iterator[None]:
-    """Keep a cluster at its size: a nanny gives up a worker that dies as it starts."""
-    done = threading.Event()
-
-    def tend() -> None:
-        while not done.wait(_COUNTED):
-            scale()
-
-    scale()
-    tender = threading.Thread(target=tend, daemon=True)
-    tender.start()
-    try:
-        yield
-    finally:
-        done.set()
-        tender.join()
 
 
 @contextmanager

@@ -377,7 +377,7 @@ class Workers(Generic[Key]):
         if _source != source_digest():
             _end_server()
         self._mark = _server_mark()
-        with adopting(), _server_awake():
+        with adopting(), repeating(_wake_server, _TICK):
             try:
                 yield self
             finally:
@@ -528,16 +528,13 @@ def _end_server() -> None:
 
 
 @contextmanager
-def _server_awake() -> Iterator[None]:
-    """Let the server go on whenever a job stops it, even while a start waits for its answer."""
+def repeating(action: Callable[[], object], seconds: float) -> Iterator[None]:
+    """Call a function every so many seconds, in another thread, while the block runs."""
     done = threading.Event()
 
     def watch() -> None:
-        while not done.wait(_TICK):
-            server = _server()
-            with suppress(psutil.Error, ProcessLookupError):
-                if server is not None and psutil.Process(server).status() == psutil.STATUS_STOPPED:
-                    os.kill(server, signal.SIGCONT)
+        while not done.wait(seconds):
+            action()
 
     watcher = threading.Thread(target=watch, daemon=True)
     watcher.start()
@@ -546,6 +543,14 @@ def _server_awake() -> Iterator[None]:
     finally:
         done.set()
         watcher.join()
+
+
+def _wake_server() -> None:
+    """Let the server go on where a job has stopped it; a start may be waiting for its answer."""
+    server = _server()
+    with suppress(psutil.Error, ProcessLookupError):
+        if server is not None and psutil.Process(server).status() == psutil.STATUS_STOPPED:
+            os.kill(server, signal.SIGCONT)
 
 
 _hiding = threading.Lock()
