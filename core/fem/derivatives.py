@@ -124,19 +124,6 @@ def _rigid_ends(
     return [Touched(f"{_RIGID}_{k + 1}", *table.T) for k, table in enumerate(tables) if len(table)]
 
 
-def present_value(structure: MeshedFrame, parameter: Parameter) -> float:
-    """Return a parameter's value: 1 for a factor, else the mean rigid length or stiffness."""
-    if parameter.is_factor:
-        return 1.0
-    values = [
-        structure.springs[part.rows]
-        if part.kind == _SPRING
-        else getattr(structure.properties, part.kind)[part.rows]
-        for part in touched(structure, [parameter])
-    ]
-    return float(np.concatenate(values).mean())
-
-
 def apply_values(
     structure: MeshedFrame, parameters: Sequence[Parameter], values: Sequence[float] | FloatArray
 ) -> tuple[BeamProperties, FloatArray]:
