@@ -69,17 +69,17 @@ def publish(
         OutputError: where the site cannot be written; then it is as it was.
     """
     folder = resolved(folder)
+    # Its files are read as carefully as those that anybody sends.
+    check_site(folder)
+    data = folder / DATA
+    names = sorted(path for path in data.glob("*.json")) if data.is_dir() else []
+    old = [read_submission(path, published=True) for path in names]
     marker, told = folder / MARKER, address
     if told is None and marker.exists():
         told = parse_json(read_text(marker, MIB), file=marker, expected=KIND).get("address")
     if not _ADDRESS.fullmatch(told := str(told or "")):
         expected = "http or https, without a query"
         raise InputError(f"{harmless(told)!r} is no address of a site", expected=expected)
-    # Its files are read as carefully as those of strangers.
-    check_site(folder)
-    data = folder / DATA
-    names = sorted(path for path in data.glob("*.json")) if data.is_dir() else []
-    old = [read_submission(path, published=True) for path in names]
     home = f"{told.rstrip('/')}/" if told else ""
     merged = _merged([*old, *(_submission(file, verify, unverified) for file in files)])
     index = {**index_of(merged), "address": home}
@@ -191,6 +191,7 @@ def _replace(folder: Path, pages: Mapping[str, str]) -> None:
         else:
             new.rename(folder)
     finally:
+        # Somebody else's files may still be in there.
         old = room / "old"
         if not old.exists() or all(path.name in OWN for path in old.iterdir()):
             shutil.rmtree(room, ignore_errors=True)
