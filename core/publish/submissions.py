@@ -188,6 +188,7 @@ def _records(results: Iterable[JobResult]) -> list[dict[str, Any]]:
 
 def _meta(run: Run, file: Path) -> dict[str, Any]:
     try:
+        # Without halves of characters, which no file could hold.
         record = _Meta.model_validate(
             json.loads(json.dumps(run.meta, ensure_ascii=False).encode("utf-8", "replace"))
         )
