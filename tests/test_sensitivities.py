@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from femubench.core.fem.derivatives import derivatives, present_value
+from femubench.core.fem.derivatives import derivatives, touched
 from femubench.core.fem.frame import (
     Frame,
     Joint,
@@ -91,6 +91,19 @@ def all_parameters(structure: Structure) -> list[Property]:
     chosen.append(Property("rigid end", "rigid", ends, "m"))
     chosen += [Property(place, "spring", (place,), "N/m") for place in structure.spring_labels]
     return chosen
+
+
+def present_value(structure: Structure, parameter: Property) -> float:
+    """Return a parameter's value: 1 for a factor, else the mean rigid length or stiffness."""
+    if parameter.is_factor:
+        return 1.0
+    values = [
+        structure.springs[part.rows]
+        if part.kind == "spring"
+        else getattr(structure.properties, part.kind)[part.rows]
+        for part in touched(structure, [parameter])
+    ]
+    return float(np.concatenate(values).mean())
 
 
 def moved(structure: Structure, parameter: Property, sign: float) -> tuple[Structure, float]:

@@ -91,7 +91,16 @@ def plan_assembly(gather: SparseArray, order: int) -> AssemblyPlan:
     """
     g, size = sp.csr_array(gather), gather.shape[1]
     batches = tuple(_batches(g, order))
-    rows, columns, target = _distinct(_pair_side(batches, 0), _pair_side(batches, 1), size)
+    rows, columns = _pair_side(batches, 0), _pair_side(batches, 1)
+    turned = _by_column(rows, columns, size)
+    rows, columns = rows[turned], columns[turned]
+    new = np.ones(len(turned), dtype=bool)
+    new[1:] = (rows[1:] != rows[:-1]) | (columns[1:] != columns[:-1])
+    number = np.cumsum(new, dtype=turned.dtype)
+    number -= 1
+    target = np.empty_like(turned)
+    target[turned] = number
+    rows, columns = rows[new], columns[new]
     sizes = [(len(b.elements), len(b.triangle[0])) for b in batches]
     stops = np.cumsum([0, *(count * width for count, width in sizes)])
     targets = tuple(
@@ -137,19 +146,6 @@ def _batches(gather: SparseArray, order: int) -> Iterator[_Batch]:
                 place=(local * count + place[entries] - first[e]).astype(np.int32),
                 dofs=dof[first[own][:, None] + np.arange(count)].astype(np.int32),
             )
-
-
-def _distinct(rows: IntArray, columns: IntArray, size: int) -> tuple[IntArray, IntArray, IntArray]:
-    """Return every pair once, column by column, and where each given pair is among these."""
-    turn = _by_column(rows, columns, size)
-    rows, columns = rows[turn], columns[turn]
-    new = np.ones(len(turn), dtype=bool)
-    new[1:] = (rows[1:] != rows[:-1]) | (columns[1:] != columns[:-1])
-    number = np.cumsum(new, dtype=turn.dtype)
-    number -= 1
-    place = np.empty_like(turn)
-    place[turn] = number
-    return rows[new], columns[new], place
 
 
 def _by_column(rows: IntArray, columns: IntArray, size: int) -> IntArray:

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from femubench.core.fem.beam import BeamProperties, mass_matrices, stiffness_matrices
 from femubench.core.fem.frame import GroundSpring, Oscillator, PointMass
 from femubench.core.fem.kinematics import Kinematics, node_at
-from femubench.core.fem.mesh import SHORTEST_PIECE, Mesh
+from femubench.core.fem.mesh import SHORTEST_PIECE
 from femubench.core.fem.meshed_frame import MeshedFrame
 from femubench.core.fem.sensors import DIRECTIONS
 from femubench.core.typing import AnyArray, FloatArray, IntArray, SparseArray
@@ -67,9 +67,22 @@ def attach(
     new, whole = replace(structure, frame=frame), len(structure.mesh.ends)
     origin = np.arange(whole)
     for m, s in ((m, s) for m, found in stations.items() for s in found):
-        element = _split_element(new.mesh, m, frame.members[m].elements, s)
-        if element is not None:
-            if _between_nodes(structure, frame.members[m].name):
+        rows = np.flatnonzero((new.mesh.member == m) & np.isnan(new.mesh.arm_factor))
+        low, high = new.mesh.stations[rows, 0], new.mesh.stations[rows, 1]
+        grid = np.append(low, high[-1])
+        first = np.linalg.norm(np.diff(new.mesh.xyz[new.mesh.ends[rows[0]]], axis=0))
+        metre = first / (high[0] - low[0])
+        stiff = np.maximum(new.mesh.rigid[rows], new.mesh.rigid_mass[rows]) / metre
+        inside = max(grid[0], stiff[0, 0]) < s < min(grid[-1], 1.0 - stiff[-1, 1])
+        # Nothing is split too near to a node.
+        if inside and np.abs(grid - s).min() > SHORTEST_PIECE / frame.members[m].elements:
+            element = int(rows[np.searchsorted(grid, s) - 1])
+            # Something else may hang on the member between two of its nodes.
+            old, member = structure.frame, frame.members[m].name
+            attached: tuple[PointMass | GroundSpring | Oscillator, ...]
+            attached = (*old.masses, *old.springs, *old.oscillators)
+            on = (item.at for item in attached if item.at.member == member)
+            if any(node_at(old, structure.mesh, place) is None for place in on):
                 return None
             new = _with_split(new, element, s)
             origin = _doubled(origin, element)
@@ -89,30 +102,6 @@ def _unused(structure: MeshedFrame, springs: Sequence[GroundSpring]) -> bool:
         for item in springs
         if item.at.joint in joints
     )
-
-
-def _between_nodes(structure: MeshedFrame, member: str) -> bool:
-    """Tell whether something hangs on a member between two of its nodes."""
-    frame = structure.frame
-    attached: tuple[PointMass | GroundSpring | Oscillator, ...]
-    attached = (*frame.masses, *frame.springs, *frame.oscillators)
-    places = [item.at for item in attached]
-    on = (place for place in places if place.member == member)
-    return any(node_at(frame, structure.mesh, place) is None for place in on)
-
-
-def _split_element(mesh: Mesh, m: int, elements: int, s: float) -> int | None:
-    """Return the element that an attachment splits; None where it is too near to a node."""
-    rows = np.flatnonzero((mesh.member == m) & np.isnan(mesh.arm_factor))
-    low, high = mesh.stations[rows, 0], mesh.stations[rows, 1]
-    grid = np.append(low, high[-1])
-    metre = np.linalg.norm(np.diff(mesh.xyz[mesh.ends[rows[0]]], axis=0)) / (high[0] - low[0])
-    stiff = np.maximum(mesh.rigid[rows], mesh.rigid_mass[rows]) / metre
-    if not max(grid[0], stiff[0, 0]) < s < min(grid[-1], 1.0 - stiff[-1, 1]):
-        return None
-    if np.abs(grid - s).min() <= SHORTEST_PIECE / elements:
-        return None
-    return int(rows[np.searchsorted(grid, s) - 1])
 
 
 def _doubled(array: AnyArray, row: int) -> AnyArray:
@@ -184,22 +173,16 @@ def _of_pieces(
     for frame, rows, sign in ((new, pieces, 1.0), (old, np.unique(origin[pieces]), -1.0)):
         if len(rows) == 0:
             continue
-        local = _local_rows(frame, rows, size)
+        nodes = frame.mesh.ends[rows]
+        lines = (6 * nodes[:, :, None] + np.arange(6)).ravel()
+        turn = sp.block_diag([sp.block_diag([axes] * 4) for axes in frame.mesh.axes[rows]])
+        local = sp.csr_array(turn) @ frame.kinematics.transform[lines]
+        local.resize((local.shape[0], size))
         batch = frame.properties.take(rows)
         for k, matrices in ((0, mass_matrices(batch)), (1, stiffness_matrices(batch))):
             part = local.T @ sp.block_diag(list(sign * matrices), format="csr") @ local
             mass, stiffness = (mass + part, stiffness) if k == 0 else (mass, stiffness + part)
     return sp.csc_array(mass), sp.csc_array(stiffness)
-
-
-def _local_rows(structure: MeshedFrame, rows: IntArray, size: int) -> SparseArray:
-    """Return local displacements of some elements from free dofs, sparse (12 n_rows, size)."""
-    nodes = structure.mesh.ends[rows]
-    lines = (6 * nodes[:, :, None] + np.arange(6)).ravel()
-    turn = sp.block_diag([sp.block_diag([axes] * 4) for axes in structure.mesh.axes[rows]])
-    local = sp.csr_array(turn) @ structure.kinematics.transform[lines]
-    local.resize((local.shape[0], size))
-    return local
 
 
 def grown(matrix: SparseArray, size: int) -> SparseArray:

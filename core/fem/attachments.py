@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.frame import ACTIVE, Brace, Frame, Oscillator
+from femubench.core.fem.frame import ACTIVE, Frame
 from femubench.core.fem.kinematics import point_rows
 from femubench.core.fem.meshed_frame import MeshedFrame
 from femubench.core.fem.sensors import DIRECTIONS
@@ -86,18 +86,23 @@ def brace_rows(structure: MeshedFrame) -> SparseArray:
 def brace_stiffness(structure: MeshedFrame) -> SparseArray:
     """Return the stiffness of the braces, (n, n)."""
     rows = brace_rows(structure)
-    return rows.T @ sp.diags_array(_stiffness(structure.frame.braces)) @ rows
-
-
-def _stiffness(braces: tuple[Brace, ...]) -> FloatArray:
-    return np.array([brace.stiffness for brace in braces], dtype=float)
+    stiffness = np.array([brace.stiffness for brace in structure.frame.braces], dtype=float)
+    return rows.T @ sp.diags_array(stiffness) @ rows
 
 
 def oscillator_matrices(structure: MeshedFrame) -> tuple[SparseArray, SparseArray]:
     """Return mass and stiffness of the oscillators, (n, n) each."""
     moving, stretch, masses, stiffness = [], [], [], []
     for node, item in zip(structure.mesh.oscillators, structure.frame.oscillators, strict=True):
-        motion, spring = _oscillator_rows(structure, int(node), item)
+        at = int(node)
+        transform = structure.kinematics.transform
+        point = point_rows(structure.frame, structure.mesh, structure.properties, item.at)
+        place = point[:3] @ transform
+        direction = DIRECTIONS.index(item.direction.lstrip("+-"))
+        own = transform[6 * at + direction : 6 * at + direction + 1]
+        active = np.flatnonzero(structure.active_local[:3])
+        others = place[active[active != direction] if item.crosswise else active[:0]]
+        motion, spring = sp.vstack([own, others]), own - place[direction : direction + 1]
         moving.append(motion)
         stretch.append(spring)
         masses += [item.mass] * motion.shape[0]
@@ -105,17 +110,3 @@ def oscillator_matrices(structure: MeshedFrame) -> tuple[SparseArray, SparseArra
     rows, springs = sp.csr_array(sp.vstack(moving)), sp.csr_array(sp.vstack(stretch))
     mass = rows.T @ sp.diags_array(np.array(masses)) @ rows
     return mass, springs.T @ sp.diags_array(np.array(stiffness)) @ springs
-
-
-def _oscillator_rows(
-    structure: MeshedFrame, node: int, item: Oscillator
-) -> tuple[SparseArray, SparseArray]:
-    """Return the translations of an oscillator's mass and the stretch of its spring."""
-    transform = structure.kinematics.transform
-    point = point_rows(structure.frame, structure.mesh, structure.properties, item.at)
-    place = point[:3] @ transform
-    direction = DIRECTIONS.index(item.direction.lstrip("+-"))
-    own = transform[6 * node + direction : 6 * node + direction + 1]
-    active = np.flatnonzero(structure.active_local[:3])
-    others = place[active[active != direction] if item.crosswise else active[:0]]
-    return sp.vstack([own, others]), own - place[direction : direction + 1]

@@ -124,19 +124,6 @@ def _rigid_ends(
     return [Touched(f"{_RIGID}_{k + 1}", *table.T) for k, table in enumerate(tables) if len(table)]
 
 
-def present_value(structure: MeshedFrame, parameter: Property) -> float:
-    """Return a parameter's value: 1 for a factor, else the mean rigid length or stiffness."""
-    if parameter.is_factor:
-        return 1.0
-    values = [
-        structure.springs[part.rows]
-        if part.kind == _SPRING
-        else getattr(structure.properties, part.kind)[part.rows]
-        for part in touched(structure, [parameter])
-    ]
-    return float(np.concatenate(values).mean())
-
-
 def apply_values(
     structure: MeshedFrame, parameters: Sequence[Property], values: Sequence[float] | FloatArray
 ) -> tuple[BeamProperties, FloatArray]:
@@ -269,27 +256,6 @@ class Derivatives:
         return result
 
 
-def _slopes(
-    properties: BeamProperties, part: Touched
-) -> tuple[FloatArray | None, FloatArray | None]:
-    """Return dk/dp and dm/dp by the complex step (Squire & Trapp 1998).
-
-    A factor on E leaves the shape of every element, and so its mass, as it is.
-    """
-    if part.is_factor:
-        values = {
-            name: getattr(properties, name) * (1.0 + 1j * exponent * _STEP)
-            for name, exponent in part.slopes
-        }
-    else:
-        values = {part.kind: getattr(properties, part.kind) + 1j * _STEP}
-    stepped = replace(properties, **values)
-    shear = part.kind in _BOTH and properties.shear_shape.any()
-    k = None if part.kind in _MASS else stiffness_matrices(stepped).imag / _STEP
-    m = mass_matrices(stepped).imag / _STEP if part.kind in _MASS or shear else None
-    return k, m
-
-
 def derivatives(structure: MeshedFrame, parameters: Sequence[Property]) -> Derivatives:
     """Return the derivatives of stiffness and mass with respect to parameters.
 
@@ -306,8 +272,19 @@ def derivatives(structure: MeshedFrame, parameters: Sequence[Property]) -> Deriv
         if part.kind == _SPRING:
             springs = part.incidence(len(structure.springs), count)
         else:
-            slopes = _slopes(structure.properties, part)
-            parts.append(ElementSlopes(part.incidence(size, count), *slopes))
+            # A factor on E leaves the shape of every element, and so its mass, as it is.
+            if part.is_factor:
+                values = {
+                    name: getattr(structure.properties, name) * (1.0 + 1j * exponent * _STEP)
+                    for name, exponent in part.slopes
+                }
+            else:
+                values = {part.kind: getattr(structure.properties, part.kind) + 1j * _STEP}
+            stepped = replace(structure.properties, **values)
+            shear = part.kind in _BOTH and structure.properties.shear_shape.any()
+            k = None if part.kind in _MASS else stiffness_matrices(stepped).imag / _STEP
+            m = mass_matrices(stepped).imag / _STEP if part.kind in _MASS or shear else None
+            parts.append(ElementSlopes(part.incidence(size, count), k, m))
     return Derivatives(tuple(parts), structure.gather, structure.spring_rows, springs)
 
 

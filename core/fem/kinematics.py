@@ -158,7 +158,13 @@ def build_kinematics(
     hanging = {connection.node: connection for connection in mesh.connections}
     held = np.zeros(free.shape, dtype=bool)
     for support in frame.supports:
-        node = _support_node(frame, mesh, support.at)
+        # The mesh is split at a support.
+        number = frame.member_index.get(support.at.member or "")
+        if number is None:
+            node = node_at(frame, mesh, support.at)
+        else:
+            member = frame.members[number]
+            node = node_at(frame, mesh, support.at, ON_MEMBER / member_axes(frame, member)[1])
         if node is None or node in hanging:
             what = f"the support at {support.at} lies on the arm of a joint spring"
             raise ModelError(what, support)
@@ -198,15 +204,6 @@ def _tie(
             what = f"no member ends at joint {item.at.joint!r} and no link moves it along"
             raise ModelError(f"{what} {DIRECTIONS[column]}", item)
     return tie, np.flatnonzero(idle)
-
-
-def _support_node(frame: Frame, mesh: Mesh, place: Place) -> int | None:
-    """Return the node that a support holds; the mesh is split there."""
-    number = frame.member_index.get(place.member or "")
-    if number is None:
-        return node_at(frame, mesh, place)
-    member = frame.members[number]
-    return node_at(frame, mesh, place, ON_MEMBER / member_axes(frame, member)[1])
 
 
 def _own_motion(connection: Connection, active: BoolArray) -> tuple[FloatArray, tuple[str, ...]]:

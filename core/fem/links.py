@@ -58,7 +58,8 @@ def linkage(
     index = {name: i for i, name in enumerate(names)}
     leader = np.full((len(names), 6), -1)
     for link in links:
-        motions = _motions(link, active)
+        wanted = np.isin(DIRECTIONS, link.motions) if link.motions else active
+        motions = np.flatnonzero(wanted & active)
         for name in (link.leads, *link.follows):
             if name not in index:
                 raise ModelError(f"there is no joint {name!r}", link)
@@ -68,25 +69,7 @@ def linkage(
                 what = f"joint {name!r} follows {names[other]!r} and {link.leads!r}"
                 raise ModelError(what, link)
             leader[index[name], motions] = index[link.leads]
-    _check_rings(leader, names, links)
-    bodies = np.array([(i, _root(leader, i, active)) for i in range(len(names))])
-    bodies = bodies[bodies[:, 0] != bodies[:, 1]]
-    return Linkage(_spread(leader, xyz, active), leader >= 0, bodies)
-
-
-def _root(leader: IntArray, joint: int, active: BoolArray) -> int:
-    """Return the joint at the end of the chain of those that lead in all motions."""
-    own = np.unique(leader[joint, active])
-    return _root(leader, int(own[0]), active) if len(own) == 1 and own[0] >= 0 else joint
-
-
-def _motions(link: Link, active: BoolArray) -> IntArray:
-    wanted = np.isin(DIRECTIONS, link.motions) if link.motions else active
-    return np.flatnonzero(wanted & active)
-
-
-def _check_rings(leader: IntArray, names: Sequence[str], links: Sequence[Link]) -> None:
-    """Raise where a joint follows, by way of others, itself."""
+    # No joint follows, by way of others, itself.
     graph = {
         int(i): {int(j) for j in leader[i] if j >= 0} for i in np.flatnonzero((leader >= 0).any(1))
     }
@@ -97,9 +80,8 @@ def _check_rings(leader: IntArray, names: Sequence[str], links: Sequence[Link]) 
         item = next(link for link in links if link.leads in ring)
         what = f"the links go round in a circle: {', '.join(ring)}"
         raise ModelError(what, item) from None
-
-
-def _spread(leader: IntArray, xyz: FloatArray, active: BoolArray) -> SparseArray:
+    bodies = np.array([(i, _root(leader, i, active)) for i in range(len(names))])
+    bodies = bodies[bodies[:, 0] != bodies[:, 1]]
     size = leader.size
     node, motion = np.nonzero(leader >= 0)
     base = leader[node, motion]
@@ -116,4 +98,10 @@ def _spread(leader: IntArray, xyz: FloatArray, active: BoolArray) -> SparseArray
         step = sp.csr_array(follow @ step)
         spread = spread + step
     spread.eliminate_zeros()
-    return spread
+    return Linkage(spread, leader >= 0, bodies)
+
+
+def _root(leader: IntArray, joint: int, active: BoolArray) -> int:
+    """Return the joint at the end of the chain of those that lead in all motions."""
+    own = np.unique(leader[joint, active])
+    return _root(leader, int(own[0]), active) if len(own) == 1 and own[0] >= 0 else joint

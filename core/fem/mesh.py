@@ -258,7 +258,11 @@ def build_mesh(frame: Frame) -> Mesh:
         ModelError: for a member without length, an arm longer than its element, or a joint spring
             or rigid end at no member end.
     """
-    _check_ends(frame)
+    wanted: tuple[JointSpring | RigidEnd, ...] = (*frame.joint_springs, *frame.rigid_ends)
+    for spec in wanted:
+        at = frame.member_index.get(spec.member)
+        if at is None or spec.joint not in frame.members[at].ends:
+            raise ModelError(f"there is no member end {spec.member}@{spec.joint}", spec)
     corners, joints = frame.corners.reshape(-1, 3), frame.member_ends
     axes, length = _axes(frame.plane, frame.members, corners[joints])
     attached = _Attached(frame, axes, length)
@@ -268,11 +272,24 @@ def build_mesh(frame: Frame) -> Mesh:
     for m, piece in pieces.items():
         rows[m], nodes[m] = len(piece.rows), len(piece.xyz)
     row, node = np.cumsum(rows) - rows, len(corners) + np.cumsum(nodes) - nodes
-    inner = _inner_nodes(corners[joints[:, 0]], axes[:, 0] * length[:, None], elements, nodes)
+    # The nodes inside members, where elements are equal.
+    within = np.repeat(np.arange(len(nodes)), nodes)
+    nth = np.arange(len(within)) - (np.cumsum(nodes) - nodes)[within] + 1
+    s = nth * (1.0 / elements)[within]
+    along = axes[:, 0] * length[:, None]
+    inner = np.asarray(corners[joints[:, 0]][within] + along[within] * s[:, None])
     hung = [place_xyz(frame, item.at) for item in frame.oscillators]
     xyz = np.concatenate([corners, inner, np.reshape(hung, (-1, 3))])
     member = np.repeat(np.arange(len(rows)), rows)
-    ends, stations, number = _regular(member, row, node, joints, elements)
+    # The elements of a member are equal.
+    k, count = np.arange(len(member)) - row[member], elements[member]
+    last = k >= count - 1
+    first = np.where(k == 0, joints[member, 0], node[member] + k - 1)
+    second = np.where(last, joints[member, 1], node[member] + k)
+    step = (1.0 / elements)[member]
+    stations = np.stack([k * step, np.where(last, 1.0, (k + 1) * step)], axis=1)
+    number = np.minimum((stations.sum(axis=1) / 2 * count).astype(np.int64) + 1, count)
+    ends = np.stack([first, second], axis=1)
     arm_factor, connections = np.full(len(member), np.nan), list[Connection]()
     for m, piece in pieces.items():
         own, table = slice(row[m], row[m] + rows[m]), piece.rows
@@ -308,37 +325,6 @@ def _renumbered(nodes: IntArray, first: int) -> IntArray:
     return np.where(nodes < 0, first + ~nodes, nodes)
 
 
-def _inner_nodes(
-    start: FloatArray, along: FloatArray, elements: IntArray, nodes: IntArray
-) -> FloatArray:
-    """Return where the nodes inside members lie if their elements are equal, (n, 3)."""
-    member = np.repeat(np.arange(len(nodes)), nodes)
-    place = np.arange(len(member)) - (np.cumsum(nodes) - nodes)[member] + 1
-    s = place * (1.0 / elements)[member]
-    return np.asarray(start[member] + along[member] * s[:, None])
-
-
-def _regular(
-    member: IntArray, row: IntArray, node: IntArray, joints: IntArray, elements: IntArray
-) -> tuple[IntArray, FloatArray, IntArray]:
-    """Return ends, stations and number of every element, those of a member being equal.
-
-    Arguments:
-        member: of every element, (n_elements,).
-        row, node: the first element, and the first node inside, of every member, (n_members,).
-        joints: the ends of every member, (n_members, 2).
-        elements: of every member, (n_members,).
-    """
-    k, count = np.arange(len(member)) - row[member], elements[member]
-    last = k >= count - 1
-    first = np.where(k == 0, joints[member, 0], node[member] + k - 1)
-    second = np.where(last, joints[member, 1], node[member] + k)
-    step = (1.0 / elements)[member]
-    stations = np.stack([k * step, np.where(last, 1.0, (k + 1) * step)], axis=1)
-    number = np.minimum((stations.sum(axis=1) / 2 * count).astype(np.int64) + 1, count)
-    return np.stack([first, second], axis=1), stations, number
-
-
 def place_xyz(frame: Frame, place: Place) -> FloatArray:
     """Return where a place lies in m, (3,).
 
@@ -362,14 +348,6 @@ def _places(places: Sequence[Place]) -> dict[str, list[float]]:
         if place.member is not None and place.s is not None:
             stations.setdefault(place.member, []).append(place.s)
     return stations
-
-
-def _check_ends(frame: Frame) -> None:
-    wanted: tuple[JointSpring | RigidEnd, ...] = (*frame.joint_springs, *frame.rigid_ends)
-    for spec in wanted:
-        m = frame.member_index.get(spec.member)
-        if m is None or spec.joint not in frame.members[m].ends:
-            raise ModelError(f"there is no member end {spec.member}@{spec.joint}", spec)
 
 
 def _stations(grid: Sequence[float] | FloatArray, new: list[float], apart: float) -> FloatArray:

@@ -200,7 +200,18 @@ class Model(Shown):
         """
         found = self.attached(masses, springs)
         if found is None:
-            return self._meshed_anew(masses, springs)
+            meshed = self.frame_structure
+            frame = meshed.frame.with_attachments(tuple(masses), tuple(springs))
+            new = Model.of(meshed.rebuilt(frame))
+            old_mass, old_stiffness = meshed.matrices()
+            keep = common_dofs(meshed, new.frame_structure)
+            return replace(
+                new,
+                mass=new.mass + _spread(self.mass - old_mass, keep, new.size),
+                stiffness=new.stiffness + _spread(self.stiffness - old_stiffness, keep, new.size),
+                mass_change=_spread_low_rank(self.mass_change, keep, new.size),
+                stiffness_change=_spread_low_rank(self.stiffness_change, keep, new.size),
+            )
         structure, change = found
         size = change.mass.shape[0]
         mass, stiffness = grown(self.mass, size), grown(self.stiffness, size)
@@ -233,20 +244,6 @@ class Model(Shown):
             return attach(self.structure, masses, springs)
         mass, stiffness = self.geometry.attached(masses, springs)
         return None, MatrixChange(mass, stiffness, stiffness)
-
-    def _meshed_anew(self, masses: Sequence[PointMass], springs: Sequence[GroundSpring]) -> Model:
-        structure = self.frame_structure
-        frame = structure.frame.with_attachments(tuple(masses), tuple(springs))
-        new = Model.of(structure.rebuilt(frame))
-        old_mass, old_stiffness = structure.matrices()
-        keep = common_dofs(structure, new.frame_structure)
-        return replace(
-            new,
-            mass=new.mass + _spread(self.mass - old_mass, keep, new.size),
-            stiffness=new.stiffness + _spread(self.stiffness - old_stiffness, keep, new.size),
-            mass_change=_spread_low_rank(self.mass_change, keep, new.size),
-            stiffness_change=_spread_low_rank(self.stiffness_change, keep, new.size),
-        )
 
 
 def dofs_of(structure: Structure) -> Dofs:

@@ -210,19 +210,12 @@ class Statics:
         stiffness = np.array([brace.stiffness for brace in frame.braces])
         stretch = brace_rows(self.structure) @ motion if frame.braces else np.zeros(0)
         spring, tension = (outer[:, 0], outer[:, 1]), stiffness * stretch
-        link = self._at_followers(ends, motion, spring[0], tension)
-        return StressState(ends[:, 6:9], ends[:, 9:], *spring, link, tension)
-
-    def _at_followers(
-        self, ends: FloatArray, motion: FloatArray, spring: FloatArray, tension: FloatArray
-    ) -> FloatArray:
-        """Return what pulls at joints that follow as one body with others, global, (l, 3)."""
         structure, mesh, frame = self.structure, self.structure.mesh, self.structure.frame
         followers = structure.kinematics.bodies[:, 0]
         total = np.zeros((len(mesh.xyz), 3))
         forces = -np.einsum("eij,eki->ekj", mesh.axes, ends.reshape(-1, 2, 2, 3)[:, :, 0])
         np.add.at(total, mesh.ends.ravel(), forces.reshape(-1, 3))
-        np.add.at(total, [c.base for c in mesh.connections], spring)
+        np.add.at(total, [c.base for c in mesh.connections], spring[0])
         pull = tension[:, None] * brace_lines(frame)[0] if frame.braces else np.zeros((0, 3))
         for side, sign in ((0, 1.0), (1, -1.0)):
             np.add.at(total, brace_ends(frame)[:, side], sign * pull)
@@ -232,7 +225,8 @@ class Statics:
                 column = _TRANSLATIONS.index(direction)
                 row = structure.kinematics.transform[[6 * node + column]]
                 total[node, column] -= item.stiffness * float((row @ motion)[0])
-        return total[followers]
+        link = total[followers]
+        return StressState(ends[:, 6:9], ends[:, 9:], *spring, link, tension)
 
 
 def statics_of(structure: MeshedFrame) -> Statics:
@@ -253,14 +247,28 @@ def _prepare(structure: MeshedFrame) -> Statics:
     directions = ACTIVE[frame.plane]
     if frame.plane == "out-of-plane":
         directions = _IN_PLANE
-        frame = replace(frame, supports=_clamps(frame))
+        # In the plane clamps hold everything, other supports nothing.
+        whole = set(ACTIVE[frame.plane])
+        clamps = (s.at for s in frame.supports if set(s.fixed) == whole)
+        frame = replace(frame, supports=tuple(Support(at, _IN_PLANE) for at in clamps))
         flat = next((m.name for m in frame.members if m.section.Iz <= 0.0), None)
         if flat is not None:
             what = f"member {flat!r}: the stress of a lack of fit needs Iz"
             raise ModelError(what, next(iter(frame.preloads), None))
     kinematics = build_kinematics(frame, structure.mesh, directions)
     flat_structure = replace(structure, frame=frame, kinematics=kinematics)
-    loose = _loose(flat_structure)
+    kinematics, xyz = flat_structure.kinematics, flat_structure.mesh.xyz
+    centre, size = xyz.mean(axis=0), max(float(np.ptp(xyz, axis=0).max()), 1e-12)
+
+    def motion(points: FloatArray, axes: FloatArray) -> FloatArray:
+        scale = np.repeat([1.0, size], 3)
+        return np.asarray(rigid_motions(points - centre, axes) / scale)
+
+    own = motion(xyz[kinematics.node], kinematics.motions())
+    moving = np.abs(own).max(axis=0, initial=0.0) > _HELD
+    _, singular, turn = la.svd(np.linalg.qr(flat_structure.held(motion)[:, moving], mode="r"))
+    rank = int(np.sum(singular > _HELD))
+    loose = np.asarray(own[:, moving] @ turn[rank:].T)
     # As few dofs as possible stop the rigid motions.
     stopped = la.qr(loose.T, mode="r", pivoting=True)[1][: loose.shape[1]]
     free = np.setdiff1d(np.arange(len(loose)), stopped)
@@ -271,28 +279,6 @@ def _prepare(structure: MeshedFrame) -> Statics:
         raise ModelError("the frame is a mechanism in its plane") from None
     stiffness = stiffness_matrices(flat_structure.properties)
     return Statics(flat_structure, stiffness, factor, matrix, free, loose)
-
-
-def _clamps(frame: Frame) -> tuple[Support, ...]:
-    """Return what supports out of plane hold in the plane: clamps everything, others nothing."""
-    whole = set(ACTIVE[frame.plane])
-    return tuple(Support(s.at, _IN_PLANE) for s in frame.supports if set(s.fixed) == whole)
-
-
-def _loose(structure: MeshedFrame) -> FloatArray:
-    """Return the rigid motions that nothing holds, (n, r)."""
-    kinematics, xyz = structure.kinematics, structure.mesh.xyz
-    centre, size = xyz.mean(axis=0), max(float(np.ptp(xyz, axis=0).max()), 1e-12)
-
-    def motion(points: FloatArray, axes: FloatArray) -> FloatArray:
-        scale = np.repeat([1.0, size], 3)
-        return np.asarray(rigid_motions(points - centre, axes) / scale)
-
-    own = motion(xyz[kinematics.node], kinematics.motions())
-    moving = np.abs(own).max(axis=0, initial=0.0) > _HELD
-    _, singular, turn = la.svd(np.linalg.qr(structure.held(motion)[:, moving], mode="r"))
-    rank = int(np.sum(singular > _HELD))
-    return np.asarray(own[:, moving] @ turn[rank:].T)
 
 
 def preload_stiffness(structure: MeshedFrame, member: str, force: float) -> SparseArray:

@@ -81,19 +81,15 @@ class Structure(MeshedFrame):
             stiffness = stiffness + oscillator_matrices(self)[1]
         if self.preload is not None:
             stiffness = stiffness + self.preload
-        mass = self._mass()
+        if len(self.properties) > AT_ONCE:
+            mass = self._assembled_mass()
+        else:  # a copy of the last one where nothing of it changed
+            own = [getattr(self.properties, name) for name in MASS_PROPERTIES]
+            mass = self.once("mass", (*own, *self.interpolation), self._assembled_mass).copy()
         if not self.changes and len(self.mesh.ends) > _PLANNED_ONCE:
             for name in ("plan", "gather"):
                 self.__dict__.pop(name, None)
         return mass, prune(stiffness)
-
-    def _mass(self) -> SparseArray:
-        """Return the mass, of a small frame a copy of the last one where nothing of it changed."""
-        p = self.properties
-        if len(p) > AT_ONCE:
-            return self._assembled_mass()
-        own = [getattr(p, name) for name in MASS_PROPERTIES]
-        return self.once("mass", (*own, *self.interpolation), self._assembled_mass).copy()
 
     def _assembled_mass(self) -> SparseArray:
         mass = self.plan.assemble_from(lambda rows: mass_matrices(self.properties.take(rows)))

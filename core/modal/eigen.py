@@ -122,26 +122,18 @@ def solve_dense(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, Fl
             lower = la.cholesky(stiffness + factor * shift * mass, lower=True)
         except la.LinAlgError:
             continue
-        eigenvalues, shapes = _reciprocal(mass, lower, factor * shift)
+        half = la.solve_triangular(lower, mass, lower=True)
+        inner = la.solve_triangular(lower, half.T, lower=True)
+        mu, vectors = la.eigh(0.5 * (inner + inner.T))
+        if mu[0] < -1e-9 * mu[-1]:
+            raise ModelError("the mass matrix is not positive semidefinite")
+        finite = mu > 1e-13 * mu[-1]
+        mu, vectors = mu[finite][::-1], vectors[:, finite][:, ::-1]
+        shapes = la.solve_triangular(lower.T, vectors, lower=False) / np.sqrt(mu)
+        eigenvalues = 1.0 / mu - factor * shift
         # An eigenvalue that happens to lie at minus the shift would swamp all others.
         if eigenvalues[0] > -0.99 * factor * shift:
             return eigenvalues, shapes
-    return _direct(mass, stiffness)
-
-
-def _reciprocal(mass: FloatArray, lower: FloatArray, s: float) -> tuple[FloatArray, FloatArray]:
-    half = la.solve_triangular(lower, mass, lower=True)
-    inner = la.solve_triangular(lower, half.T, lower=True)
-    mu, vectors = la.eigh(0.5 * (inner + inner.T))
-    if mu[0] < -1e-9 * mu[-1]:
-        raise ModelError("the mass matrix is not positive semidefinite")
-    finite = mu > 1e-13 * mu[-1]
-    mu, vectors = mu[finite][::-1], vectors[:, finite][:, ::-1]
-    shapes = la.solve_triangular(lower.T, vectors, lower=False) / np.sqrt(mu)
-    return 1.0 / mu - s, shapes
-
-
-def _direct(mass: FloatArray, stiffness: FloatArray) -> tuple[FloatArray, FloatArray]:
     reduced_k, reduced_m, expand = condense_massless(mass, stiffness)
     try:
         eigenvalues, shapes = la.eigh(reduced_k, reduced_m)
@@ -161,7 +153,20 @@ def condense_massless(
     Raises:
         ModelError: when a massless motion has no stiffness.
     """
-    null, carrying = _split(mass)
+    # Dofs without any mass are taken as they are: an eigenvector of the mass would bring in traces
+    # of others, whose stiffness hides that the dof has none.
+    bare = ~mass.any(axis=0)
+    unit = np.eye(len(mass))
+    rest = unit[:, ~bare]
+    loaded = mass[np.ix_(~bare, ~bare)]
+    diagonal = np.diagonal(loaded)
+    scale = np.where(diagonal > 0.0, 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)), 1.0)
+    values, vectors = la.eigh(np.asarray(loaded * np.outer(scale, scale)))
+    if values[0] < -1e-9 * values[-1]:
+        raise ModelError("the mass matrix is not positive semidefinite")
+    empty = values < 1e-13 * values[-1]
+    basis = rest @ (scale[:, None] * vectors)
+    null, carrying = np.hstack([unit[:, bare], basis[:, empty]]), basis[:, ~empty]
     if null.shape[1] == 0:
         return stiffness, mass, np.eye(len(mass))
     inner = null.T @ stiffness @ null
@@ -171,34 +176,6 @@ def condense_massless(
         raise ModelError("a degree of freedom has neither mass nor stiffness")
     expand = carrying - null @ la.solve(inner, null.T @ stiffness @ carrying, assume_a="sym")
     return expand.T @ stiffness @ expand, carrying.T @ mass @ carrying, expand
-
-
-def _split(mass: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return bases of the motions without and with mass, (n, p) and (n, n - p).
-
-    Dofs without any mass are taken as they are: an eigenvector of the mass would bring in traces
-    of others, whose stiffness hides that the dof has none.
-    """
-    bare = ~mass.any(axis=0)
-    unit = np.eye(len(mass))
-    rest = unit[:, ~bare]
-    loaded = mass[np.ix_(~bare, ~bare)]
-    values, vectors = la.eigh(_scaled(loaded))
-    if values[0] < -1e-9 * values[-1]:
-        raise ModelError("the mass matrix is not positive semidefinite")
-    empty = values < 1e-13 * values[-1]
-    basis = rest @ (_scaling(loaded)[:, None] * vectors)
-    return np.hstack([unit[:, bare], basis[:, empty]]), basis[:, ~empty]
-
-
-def _scaling(mass: FloatArray) -> FloatArray:
-    diagonal = np.diagonal(mass)
-    return np.where(diagonal > 0.0, 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)), 1.0)
-
-
-def _scaled(mass: FloatArray) -> FloatArray:
-    scale = _scaling(mass)
-    return np.asarray(mass * np.outer(scale, scale))
 
 
 def solve_modes(model: Model, count: int | None = None) -> Modes:
@@ -230,18 +207,12 @@ def solve_modes(model: Model, count: int | None = None) -> Modes:
     else:
         eigenvalues, shapes = lowest_eigenpairs(model, wanted)
     share = rigid_share(model, shapes, rigid_modes_of(model))
-    return Modes(_without_roundoff(model, eigenvalues, shapes), shapes, share > _RIGID_SHARE)
-
-
-def _without_roundoff(model: Model, eigenvalues: FloatArray, shapes: FloatArray) -> FloatArray:
-    """Return the eigenvalues with those that cannot be told from zero set to zero.
-
-    phi' K phi sums terms of the size of |phi|' |K| |phi|, so that is what its rounding error
-    scales with; on fine meshes it exceeds any fixed share of the first elastic eigenvalue.
-    """
+    # phi' K phi sums terms of the size of |phi|' |K| |phi|, so that is what its rounding error
+    # scales with; on fine meshes it exceeds any fixed share of the first elastic eigenvalue.
     small = np.abs(shapes)
     bound = np.einsum("ij,ij->j", small, np.abs(model.stiffness) @ small)
-    return np.where(np.abs(eigenvalues) <= _ROUNDOFF * bound, 0.0, eigenvalues)
+    eigenvalues = np.where(np.abs(eigenvalues) <= _ROUNDOFF * bound, 0.0, eigenvalues)
+    return Modes(eigenvalues, shapes, share > _RIGID_SHARE)
 
 
 def enough_modes(model: Model, measured: int) -> int | None:

@@ -69,12 +69,31 @@ def negative_by_pins(
         return None
     size = size + _HELD * heavy
     for attempt in range(_TRIES):
-        pins = np.union1d(_pins(model, (2 * about + 4) << attempt), loose)
+        # Translations of joints that lie far from each other. A joint, where many elements meet,
+        # takes more of the structure along than a node within a member does.
+        wanted = (2 * about + 4) << attempt
+        translates = np.abs(model.dofs.motions[:, :3]).max(axis=1) > 0.5
+        dofs = np.flatnonzero(translates if translates.any() else ~translates)
+        nodes, first = np.unique(model.dofs.node[dofs], return_index=True)
+        entries = np.diff(sp.csc_array(model.stiffness).indptr)[dofs[first]]
+        wanted = min(wanted, len(nodes))
+        at_least = np.sort(entries)[-min(_CHOICE * wanted, len(nodes))]
+        nodes, first = nodes[entries >= at_least], first[entries >= at_least]
+        chosen = nodes[_scattered(model.dofs.xyz[dofs[first]], wanted)]
+        pins = np.union1d(np.asarray(dofs[np.isin(model.dofs.node[dofs], chosen)]), loose)
         pins = pins[size[pins] > 0.0]
         spring = np.zeros(model.size)
         spring[pins] = size[pins]
         if definite.factorise(sp.csc_array(matrix + sp.diags_array(spring))):
-            return _without(definite, model.size, pins, np.sqrt(size[pins]), change)
+            count = len(pins)
+            basis = sp.csc_array(
+                (np.sqrt(size[pins]), (pins, np.arange(count))), shape=(model.size, count)
+            )
+            values = np.full(count, -1.0)
+            if change is not None:
+                basis = sp.hstack([basis, sp.csc_array(change[0])], format="csc")
+                values = np.concatenate([values, change[1]])
+            return negative_after(0, values, np.diag(1.0 / values) + definite.compliance(basis))
     return None
 
 
@@ -95,36 +114,6 @@ def negative_after(negative: int, values: FloatArray, capacitance: FloatArray) -
     if np.abs(inner).min(initial=1.0) < _LOST:
         return None
     return negative + int(np.sum(values < 0.0)) - int(np.sum(inner < 0.0))
-
-
-def _without(
-    definite: Definite, size: int, pins: IntArray, root: FloatArray, change: Change | None
-) -> int | None:
-    """Return the number of negative eigenvalues once the springs are out and the change is in."""
-    count = len(pins)
-    basis = sp.csc_array((root, (pins, np.arange(count))), shape=(size, count))
-    values = np.full(count, -1.0)
-    if change is not None:
-        basis = sp.hstack([basis, sp.csc_array(change[0])], format="csc")
-        values = np.concatenate([values, change[1]])
-    return negative_after(0, values, np.diag(1.0 / values) + definite.compliance(basis))
-
-
-def _pins(model: Model, count: int) -> IntArray:
-    """Return the translations of so many joints that lie as far from each other as they can.
-
-    A joint, where many elements meet, takes more of the structure along than a node within a
-    member does: the most coupled nodes are chosen from.
-    """
-    translates = np.abs(model.dofs.motions[:, :3]).max(axis=1) > 0.5
-    dofs = np.flatnonzero(translates if translates.any() else ~translates)
-    nodes, first = np.unique(model.dofs.node[dofs], return_index=True)
-    entries = np.diff(sp.csc_array(model.stiffness).indptr)[dofs[first]]
-    count = min(count, len(nodes))
-    at_least = np.sort(entries)[-min(_CHOICE * count, len(nodes))]
-    nodes, first = nodes[entries >= at_least], first[entries >= at_least]
-    chosen = nodes[_scattered(model.dofs.xyz[dofs[first]], count)]
-    return np.asarray(dofs[np.isin(model.dofs.node[dofs], chosen)])
 
 
 def _scattered(xyz: FloatArray, count: int) -> IntArray:

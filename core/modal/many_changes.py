@@ -11,10 +11,9 @@ import numpy as np
 import scipy.linalg as la
 
 from femubench.core.errors import ModelError
-from femubench.core.fem.attaching import MatrixChange, few_dofs
+from femubench.core.fem.attaching import few_dofs
 from femubench.core.fem.frame import GroundSpring, PointMass
 from femubench.core.fem.model import Model
-from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import (
     DENSE_LIMIT,
     Modes,
@@ -137,12 +136,26 @@ class ManyChanges:
         if attached is None or count >= len(self.modes):
             return None
         structure, change = attached
-        place = _place(self.model.size, change)
+        dofs, blocks = few_dofs((change.mass, change.stiffness, change.ground))
+        old = dofs[dofs < self.model.size]
+        place = _Place(old, len(dofs) - len(old), *blocks)
         if not 0 < len(place.old) + place.new <= _MOST_DOFS:
             return None
         if len(place.old) * self.model.size > _MOST_NUMBERS:
             return None
-        free = self._free_motions(place, structure)
+        rigid, momentum = self._rigid
+        at = rigid[place.old]
+        if structure is not None and place.new:
+            kinematics, new = structure.kinematics, slice(self.model.size, None)
+            xyz = structure.mesh.xyz[kinematics.node[new]]
+            at = np.vstack([at, self._continued(xyz, kinematics.motions(new))])
+        energy, size = at.T @ place.ground @ at, np.abs(at).T @ np.abs(place.ground) @ np.abs(at)
+        values, turn = la.eigh(0.5 * (energy + energy.T))
+        turn = turn[:, np.abs(values) <= _FREE * np.trace(size)]
+        gram = turn.T @ (rigid.T @ momentum + at.T @ place.mass @ at) @ turn
+        if gram.size:
+            turn = la.solve_triangular(la.cholesky(gram, lower=True), turn.T, lower=True).T
+        free = _Motions(momentum @ turn, at @ turn)
         space = None
         for _ in range(_MOST_STEPS):
             space = self._space(place.old, space)
@@ -179,22 +192,6 @@ class ManyChanges:
     @cached_property
     def _continued(self) -> Callable[[FloatArray, FloatArray], FloatArray]:
         return rigid_continuation(self.model.dofs, self._rigid[0])
-
-    def _free_motions(self, place: _Place, structure: Structure | None) -> _Motions:
-        """Return the rigid-body motions that the change leaves free."""
-        rigid, momentum = self._rigid
-        at = rigid[place.old]
-        if structure is not None and place.new:
-            kinematics, new = structure.kinematics, slice(self.model.size, None)
-            xyz = structure.mesh.xyz[kinematics.node[new]]
-            at = np.vstack([at, self._continued(xyz, kinematics.motions(new))])
-        energy, size = at.T @ place.ground @ at, np.abs(at).T @ np.abs(place.ground) @ np.abs(at)
-        values, turn = la.eigh(0.5 * (energy + energy.T))
-        turn = turn[:, np.abs(values) <= _FREE * np.trace(size)]
-        gram = turn.T @ (rigid.T @ momentum + at.T @ place.mass @ at) @ turn
-        if gram.size:
-            turn = la.solve_triangular(la.cholesky(gram, lower=True), turn.T, lower=True).T
-        return _Motions(momentum @ turn, at @ turn)
 
     def _space(self, place: IntArray, previous: _Space | None) -> _Space:
         """Return one step more of the residual answers to forces at a place."""
@@ -259,7 +256,13 @@ class ManyChanges:
         shapes = self.modes.shapes @ vectors[:m]
         shapes += space.vectors @ (turn @ vectors[m : m + len(inner)])
         moved = at @ vectors
-        if self._residual(place, shapes, moved, values) > _RESIDUAL:
+        force = self.model.stiffness_times(shapes) - self.model.mass_times(shapes) * values
+        local = place.stiffness @ moved - (place.mass @ moved) * values
+        force[place.old] += local[: len(place.old)]
+        size = self._stiffness_sizes @ np.abs(shapes)
+        size[place.old] += (np.abs(place.stiffness) @ np.abs(moved))[: len(place.old)]
+        total = np.hypot(la.norm(force, axis=0), la.norm(local[len(place.old) :], axis=0))
+        if float((total / la.norm(size, axis=0)).max()) > _RESIDUAL:
             return None
         share = free.momentum.T @ shapes + free.at.T @ place.mass @ moved
         rigid = np.square(share).sum(axis=0) > _RIGID_SHARE
@@ -306,27 +309,9 @@ class ManyChanges:
             counts = counts + np.sum(np.linalg.eigvalsh(matrices) < 0.0, axis=-1)
         return np.asarray(counts)
 
-    def _residual(
-        self, place: _Place, shapes: FloatArray, moved: FloatArray, values: FloatArray
-    ) -> float:
-        """Return the largest unbalanced force of the modes beside the forces in the structure."""
-        force = self.model.stiffness_times(shapes) - self.model.mass_times(shapes) * values
-        local = place.stiffness @ moved - (place.mass @ moved) * values
-        force[place.old] += local[: len(place.old)]
-        size = self._stiffness_sizes @ np.abs(shapes)
-        size[place.old] += (np.abs(place.stiffness) @ np.abs(moved))[: len(place.old)]
-        total = np.hypot(la.norm(force, axis=0), la.norm(local[len(place.old) :], axis=0))
-        return float((total / la.norm(size, axis=0)).max())
-
 
 def _symmetric(matrix: FloatArray) -> FloatArray:
     return np.asarray(0.5 * (matrix + matrix.T))
-
-
-def _place(size: int, change: MatrixChange) -> _Place:
-    dofs, blocks = few_dofs((change.mass, change.stiffness, change.ground))
-    old = dofs[dofs < size]
-    return _Place(old, len(dofs) - len(old), *blocks)
 
 
 def many_changes(model: Model, count: int) -> ManyChanges:

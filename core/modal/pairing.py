@@ -10,7 +10,7 @@ from scipy.optimize import linear_sum_assignment
 from femubench.core.modal.correlation import mac, seen_modes
 from femubench.core.modal.eigen import Modes
 from femubench.core.modal.measurement import Measurement
-from femubench.core.typing import BoolArray, FloatArray, IntArray
+from femubench.core.typing import FloatArray, IntArray
 
 # Two shapes with a MAC below one half have more in what differs than in what they share; any
 # third shape can then be as near to either.
@@ -95,21 +95,39 @@ def pair_modes(
     m, p = len(measured), len(predicted)
     if m == 0 or p == 0:
         return Pairing(np.full(m, -1), np.full(m, np.nan), np.zeros(m, dtype=np.int64))
-    distance = _distance(measured, predicted)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.abs(np.log(predicted)[None, :] - np.log(measured)[:, None])
+    distance = np.where(np.isfinite(ratio), ratio, np.inf)
     shaped = seen_modes(measured_shapes)[:, None]
     likeness = np.where(seen_modes(predicted_shapes), mac(measured_shapes, predicted_shapes), 0.0)
-    by_shape = shaped & _comparable(measured_shapes, predicted_shapes)
+    common = np.isfinite(measured_shapes).T.astype(int) @ np.isfinite(predicted_shapes).astype(int)
+    by_shape = shaped & np.asarray(common >= LEAST_SENSORS)
+    edge = float(np.log(window))
+    apart = np.where((predicted < 0.0)[None, :], edge, distance)
+    admissible = (likeness >= least_mac) & (apart <= edge)
+    cost = 1.0 - likeness + FREQUENCY_WEIGHT * np.where(admissible, apart, 0.0)
+    worst = 1.0 - least_mac + FREQUENCY_WEIGHT * edge
+    far = float(np.log(window_without_shape))
+    within = distance <= far
+    near = far - np.where(within, distance, far)
+    # Of two modes above two others, either may go with either at the same sum of distances: a
+    # trace of their squares keeps the order.
+    by_distance = _WITHOUT_SHAPE * near * (1.0 + _IN_ORDER * (2.0 * far - near))
     gain = np.where(
         by_shape,
-        _gain_by_shape(likeness, distance, predicted < 0.0, least_mac, window),
-        _gain_by_frequency(distance, window_without_shape),
+        np.where(admissible, worst - cost + _TINY, -1.0),
+        np.where(within, by_distance + _TINY, -1.0),
     )
     # One column of gain 0 a measured mode: to stay alone is always possible.
     rows, columns = linear_sum_assignment(np.hstack([gain, np.zeros((m, m))]), maximize=True)
     index = np.full(m, -1, dtype=np.int64)
     taken = columns < p
     index[rows[taken]] = columns[taken]
-    return _told(index, likeness, by_shape, gain)
+    rows = np.arange(len(index))
+    score = likeness[rows, index]
+    known = (index >= 0) & by_shape[rows, index]
+    alike = (gain > 0.0) & (~by_shape | (likeness > score[:, None] - ALIKE))
+    return Pairing(index, np.where(known, score, np.nan), alike.sum(axis=1) * (index >= 0))
 
 
 def pair_measured(measurement: Measurement, modes: Modes, readings: FloatArray) -> Pairing:
@@ -133,50 +151,3 @@ def pair_measured(measurement: Measurement, modes: Modes, readings: FloatArray) 
         np.asarray(readings)[:, elastic],
     )
     return replace(found, index=np.append(elastic, -1)[found.index])
-
-
-def _told(index: IntArray, likeness: FloatArray, by_shape: BoolArray, gain: FloatArray) -> Pairing:
-    """Return partners with their MAC, and how many modes could have been them."""
-    rows = np.arange(len(index))
-    score = likeness[rows, index]
-    known = (index >= 0) & by_shape[rows, index]
-    alike = (gain > 0.0) & (~by_shape | (likeness > score[:, None] - ALIKE))
-    return Pairing(index, np.where(known, score, np.nan), alike.sum(axis=1) * (index >= 0))
-
-
-def _distance(measured: FloatArray, predicted: FloatArray) -> FloatArray:
-    """Return |ln(f_p / f_m)|, infinite where either is not positive, (m, p)."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.abs(np.log(predicted)[None, :] - np.log(measured)[:, None])
-    return np.where(np.isfinite(ratio), ratio, np.inf)
-
-
-def _comparable(measured: FloatArray, predicted: FloatArray) -> BoolArray:
-    """Tell which pairs share enough sensors for their MAC to mean something, (m, p)."""
-    common = np.isfinite(measured).T.astype(int) @ np.isfinite(predicted).astype(int)
-    return np.asarray(common >= LEAST_SENSORS)
-
-
-def _gain_by_shape(
-    likeness: FloatArray,
-    distance: FloatArray,
-    imaginary: BoolArray,
-    least_mac: float,
-    window: float,
-) -> FloatArray:
-    edge = float(np.log(window))
-    apart = np.where(imaginary[None, :], edge, distance)
-    admissible = (likeness >= least_mac) & (apart <= edge)
-    cost = 1.0 - likeness + FREQUENCY_WEIGHT * np.where(admissible, apart, 0.0)
-    worst = 1.0 - least_mac + FREQUENCY_WEIGHT * edge
-    return np.where(admissible, worst - cost + _TINY, -1.0)
-
-
-def _gain_by_frequency(distance: FloatArray, window: float) -> FloatArray:
-    edge = float(np.log(window))
-    admissible = distance <= edge
-    near = edge - np.where(admissible, distance, edge)
-    # Of two modes above two others, either may go with either at the same sum of distances: a
-    # trace of their squares keeps the order.
-    gain = _WITHOUT_SHAPE * near * (1.0 + _IN_ORDER * (2.0 * edge - near))
-    return np.where(admissible, gain + _TINY, -1.0)

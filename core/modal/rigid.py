@@ -60,7 +60,15 @@ def rigid_modes_of(model: Model) -> FloatArray:
     motion, structure = _motions(model.dofs), model.structure
     vectors = motion(model.dofs.xyz, model.dofs.motions)
     if structure is None:
-        candidates = _without_energy(model, vectors[:, _moving(vectors)])
+        basis = vectors[:, _moving(vectors)]
+        basis = _orthonormal(basis, basis.T @ (model.mass @ basis))
+        candidates = basis
+        if basis.shape[1] > 0:  # those without energy
+            scale = np.abs(model.stiffness).sum(axis=0) @ np.square(basis)
+            energy = basis.T @ (model.stiffness @ basis) / np.sqrt(np.outer(scale, scale))
+            values, turn = la.eigh(0.5 * (energy + energy.T))
+            free = turn[:, np.abs(values) < _ZERO_ENERGY] / np.sqrt(scale)[:, None]
+            candidates = np.asarray(basis @ free)
     else:
         rests_on = structure.interpolation if structure.frame.springs else ()
         candidates = structure.once(
@@ -87,18 +95,6 @@ def rigid_continuation(dofs: Dofs, rigid: FloatArray) -> _Motion:
     motion = _motions(dofs)
     combined = la.lstsq(motion(dofs.xyz, dofs.motions), rigid)[0]
     return lambda xyz, axes: np.asarray(motion(xyz, axes) @ combined)
-
-
-def _without_energy(model: Model, vectors: FloatArray) -> FloatArray:
-    """Return the combinations of motions that cost no strain energy but rounding."""
-    vectors = _orthonormal(vectors, vectors.T @ (model.mass @ vectors))
-    if vectors.shape[1] == 0:
-        return vectors
-    scale = np.abs(model.stiffness).sum(axis=0) @ np.square(vectors)
-    energy = vectors.T @ (model.stiffness @ vectors) / np.sqrt(np.outer(scale, scale))
-    values, turn = la.eigh(0.5 * (energy + energy.T))
-    free = turn[:, np.abs(values) < _ZERO_ENERGY] / np.sqrt(scale)[:, None]
-    return np.asarray(vectors @ free)
 
 
 def _orthonormal(vectors: FloatArray, gram: FloatArray) -> FloatArray:

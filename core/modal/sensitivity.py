@@ -71,35 +71,15 @@ def shape_sensitivities(
     """
     change = matrix_slopes(model, parameters) if isinstance(parameters, Sequence) else parameters
     if len(modes) == model.size:
-        return _modal_sum(modes, index, change)
-    return _nelson(model, modes, index, change)
-
-
-def _same_eigenvalue(modes: Modes, index: int) -> IntArray:
-    """Return the modes whose eigenvalue cannot be told from the given one, itself included."""
-    gap = np.abs(modes.eigenvalues - modes.eigenvalues[index])
-    scale = max(abs(float(modes.eigenvalues[index])), 1.0)
-    return np.flatnonzero(gap <= _REPEATED * scale)
-
-
-def _modal_sum(modes: Modes, index: int, change: MatrixSlopes) -> FloatArray:
-    shapes, eigenvalue = modes.shapes, modes.eigenvalues[index]
-    shape = shapes[:, index]
-    force = change.products(shape, float(eigenvalue))
-    gap = eigenvalue - modes.eigenvalues
-    gap[_same_eigenvalue(modes, index)] = np.inf
-    share = (shapes.T @ force) / gap[:, None]
-    share[index] = -0.5 * _mass_part(shape, change)
-    return np.asarray(shapes @ share)
-
-
-def _mass_part(shape: FloatArray, change: MatrixSlopes) -> FloatArray:
-    """Return phi' dM/dp phi, (n_parameters,)."""
-    _, mass = change.quadratic(shape[:, None], shape[:, None])
-    return np.asarray(mass[0])
-
-
-def _nelson(model: Model, modes: Modes, index: int, change: MatrixSlopes) -> FloatArray:
+        shapes, eigenvalue = modes.shapes, modes.eigenvalues[index]
+        shape = shapes[:, index]
+        force = change.products(shape, float(eigenvalue))
+        gap = eigenvalue - modes.eigenvalues
+        gap[_same_eigenvalue(modes, index)] = np.inf
+        share = (shapes.T @ force) / gap[:, None]
+        share[index] = -0.5 * _mass_part(shape, change)
+        return np.asarray(shapes @ share)
+    # Nelson's method, with the mode at hand alone.
     if model.stiffness_change is not None or model.mass_change is not None:
         raise ModelError("shape sensitivities of a model with low-rank changes need all its modes")
     shape, eigenvalue = modes.shapes[:, index], float(modes.eigenvalues[index])
@@ -120,6 +100,19 @@ def _nelson(model: Model, modes: Modes, index: int, change: MatrixSlopes) -> Flo
         raise ModelError(f"mode {index + 1}: shape sensitivities have no solution") from error
     particular = np.asarray(solved[: model.size])
     return np.asarray(particular - 0.5 * np.outer(shape, _mass_part(shape, change)))
+
+
+def _same_eigenvalue(modes: Modes, index: int) -> IntArray:
+    """Return the modes whose eigenvalue cannot be told from the given one, itself included."""
+    gap = np.abs(modes.eigenvalues - modes.eigenvalues[index])
+    scale = max(abs(float(modes.eigenvalues[index])), 1.0)
+    return np.flatnonzero(gap <= _REPEATED * scale)
+
+
+def _mass_part(shape: FloatArray, change: MatrixSlopes) -> FloatArray:
+    """Return phi' dM/dp phi, (n_parameters,)."""
+    _, mass = change.quadratic(shape[:, None], shape[:, None])
+    return np.asarray(mass[0])
 
 
 def frequency_sensitivities(

@@ -143,19 +143,6 @@ class ShiftedModel:
         return negative_after(below, change[1], self._woodbury[1])
 
 
-def _free_rigid_modes(model: Model) -> FloatArray:
-    """Return rigid-body modes that the model, changes included, leaves at zero frequency."""
-    rigid = rigid_modes_of(model)
-    if rigid.shape[1] == 0:
-        return rigid
-    force = np.linalg.norm(model.stiffness_times(rigid))
-    scale = np.linalg.norm(np.abs(model.stiffness) @ np.abs(rigid))
-    gram = rigid.T @ model.mass_times(rigid)
-    if force > _RIGID_RESIDUAL * scale:
-        return np.zeros((model.size, 0))
-    return np.asarray(la.solve_triangular(la.cholesky(gram, lower=True), rigid.T, lower=True).T)
-
-
 @dataclass(frozen=True)
 class _Known:
     """Mass-orthonormal modes that are known, to be kept out of motions and forces.
@@ -167,9 +154,6 @@ class _Known:
 
     modes: FloatArray
     weighted: FloatArray
-
-    def with_more(self, shapes: FloatArray, weighted: FloatArray) -> _Known:
-        return _Known(np.hstack([self.modes, shapes]), np.hstack([self.weighted, weighted]))
 
     def out_of(self, motion: FloatArray) -> FloatArray:
         return motion - self.modes @ (self.weighted.T @ motion)
@@ -222,7 +206,16 @@ def lowest_eigenpairs(model: Model, count: int) -> tuple[FloatArray, FloatArray]
     Raises:
         ModelError: when a residual is too large or modes are missed.
     """
-    modes = _free_rigid_modes(model)
+    modes = rigid_modes_of(model)
+    if modes.shape[1] > 0:
+        force = np.linalg.norm(model.stiffness_times(modes))
+        scale = np.linalg.norm(np.abs(model.stiffness) @ np.abs(modes))
+        gram = modes.T @ model.mass_times(modes)
+        if force > _RIGID_RESIDUAL * scale:
+            modes = np.zeros((model.size, 0))
+        else:
+            lower = la.cholesky(gram, lower=True)
+            modes = np.asarray(la.solve_triangular(lower, modes.T, lower=True).T)
     free = modes.shape[1]
     rigid = _Known(modes, model.mass_times(modes))
     shifted, start = _below_elastic(model, rigid)
@@ -234,7 +227,8 @@ def lowest_eigenpairs(model: Model, count: int) -> tuple[FloatArray, FloatArray]
             break
         # One start leads to one direction of a repeated eigenvalue: another is needed for the next.
         start = _random(model, number)
-        known = rigid.with_more(shapes, model.mass_times(shapes))
+        weighted = np.hstack([rigid.weighted, model.mass_times(shapes)])
+        known = _Known(np.hstack([rigid.modes, shapes]), weighted)
         more, others = _shift_invert(shifted, known, missed + _SPARE, start)
         order = np.argsort(np.concatenate([eigenvalues, more]), kind="stable")[: len(eigenvalues)]
         eigenvalues = np.concatenate([eigenvalues, more])[order]

@@ -44,11 +44,8 @@ def answer(question: dict[str, Any]) -> dict[str, Any]:
         function = EntryPoint("", question["do"], "").load()
         return dict(function(Origin(*question["origin"]), question))
     except BaseException as fault:
-        return {"fault": [_kind(fault), " ".join(str(fault).split())]}
-
-
-def _kind(fault: BaseException) -> str:
-    return "InputError" if isinstance(fault, InputError) else type(fault).__name__
+        kind = "InputError" if isinstance(fault, InputError) else type(fault).__name__
+        return {"fault": [kind, " ".join(str(fault).split())]}
 
 
 def described(origin: Origin, _: Mapping[str, Any]) -> dict[str, Any]:

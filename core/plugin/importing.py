@@ -155,7 +155,17 @@ def take(
         The names of what was taken by kind; None where it is no plugin.
     """
     try:
-        manager = _register(source)
+        manager = pluggy.PluginManager(PROJECT)
+        manager.add_hookspecs(hookspecs)
+        plugin = source.load()
+        _check_spelling(plugin, manager)
+        try:
+            manager.register(plugin, source.name)
+            manager.check_pending()
+        except pluggy.PluginValidationError as fault:
+            text = " ".join(str(fault).split())
+            hook = next((name for name in HOOKS if repr(name) in text), "")
+            raise _HookError(hook, text.removeprefix(f"Plugin {source.name!r} ")) from fault
     except _FAULTS as fault:
         broken.append(_broken(source, fault))
         return None
@@ -200,26 +210,6 @@ class _HookError(PluginError):
     def __init__(self, hook: str, message: str) -> None:
         self.hook = hook
         super().__init__(message)
-
-
-def _register(source: Source) -> pluggy.PluginManager:
-    """Return a manager of this one plugin, so that a fault of another cannot reach it.
-
-    Raises:
-        PluginError: when a hook is misspelt, unmarked or has arguments that it cannot get.
-    """
-    manager = pluggy.PluginManager(PROJECT)
-    manager.add_hookspecs(hookspecs)
-    plugin = source.load()
-    _check_spelling(plugin, manager)
-    try:
-        manager.register(plugin, source.name)
-        manager.check_pending()
-    except pluggy.PluginValidationError as fault:
-        text = " ".join(str(fault).split())
-        hook = next((name for name in HOOKS if repr(name) in text), "")
-        raise _HookError(hook, text.removeprefix(f"Plugin {source.name!r} ")) from fault
-    return manager
 
 
 def _check_spelling(plugin: object, manager: pluggy.PluginManager) -> None:

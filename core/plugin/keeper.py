@@ -65,11 +65,6 @@ class _Asked:
     received: bytearray = field(default_factory=bytearray)
 
     @property
-    def barred(self) -> bool:
-        """Tell whether the sandbox was not entered, so that no plugin has been imported yet."""
-        return self.walled and not self.received
-
-    @property
     def start(self) -> int:
         """Return where the answer begins, behind its length."""
         return HEAD + (len(_INSIDE) if self.walled else 0)
@@ -129,7 +124,8 @@ def _all(
         for asked in list(_over(running)):
             running.remove(asked)
             told = _told(asked)
-            if asked.barred:
+            # Where the sandbox was not entered no plugin has been imported yet.
+            if asked.walled and not asked.received:
                 waiting.append((asked.number, {**asked.question, "walled": False}))
             else:
                 found[asked.number] = told
@@ -146,15 +142,10 @@ def _over(running: list[_Asked]) -> Iterator[_Asked]:
             asked.received += data
             over = not data or asked.complete or asked.length > asked.most
         else:
-            over = _gone(asked.process)
+            options = os.WEXITED | os.WNOHANG | os.WNOWAIT
+            over = os.waitid(os.P_PID, asked.process, options) is not None
         if over or time.monotonic() >= asked.deadline:
             yield asked
-
-
-def _gone(process: int) -> bool:
-    """Tell whether a process has ended, whose pipe its own children may hold open."""
-    options = os.WEXITED | os.WNOHANG | os.WNOWAIT
-    return os.waitid(os.P_PID, process, options) is not None
 
 
 def _told(asked: _Asked) -> dict[str, str]:

@@ -99,7 +99,10 @@ def labelled(strategy: Strategy, default: Strategy | None = None) -> Variant:
             default = strategy
     usual, present = _settings(default), _settings(strategy)
     told = {key: value for key, value in present.items() if usual.get(key, _UNKNOWN) != value}
-    words = [f"{_shortest(key, usual)}={_text(value)}" for key, value in told.items()]
+    words = [
+        f"{_shortest(key, usual)}={str(value).lower() if isinstance(value, bool) else str(value)}"
+        for key, value in told.items()
+    ]
     return Variant(strategy, strategy.name + (f":{','.join(words)}" if words else ""))
 
 
@@ -126,7 +129,13 @@ def _changed(base: Strategy, options: Mapping[str, object]) -> Strategy:
     known = options_of(base)
     wanted: dict[str, object] = {}
     for name, given in options.items():
-        key = _full(base.name, name, known)
+        ends = [key for key in known if key.endswith(f".{name}")]
+        if name in known or not ends:
+            key = name
+        else:
+            if len(ends) > 1:
+                raise InputError(f"strategy {base.name!r}: option {name!r} is {' or '.join(ends)}")
+            key = ends[0]
         present = known.get(key, entry_of(base, key, _UNKNOWN))
         if present is _UNKNOWN:
             raise _no_option(base.name, name, known)
@@ -140,25 +149,11 @@ def _no_option(strategy: str, key: str, known: Mapping[str, object]) -> InputErr
     return InputError(f"strategy {strategy!r} has no option {key!r}{near}")
 
 
-def _full(strategy: str, name: str, known: Iterable[str]) -> str:
-    """Return the dotted name of an option whose last part will do where no other ends in it."""
-    ends = [key for key in known if key.endswith(f".{name}")]
-    if name in known or not ends:
-        return name
-    if len(ends) > 1:
-        raise InputError(f"strategy {strategy!r}: option {name!r} is {' or '.join(ends)}")
-    return ends[0]
-
-
 def _shortest(key: str, known: Iterable[str]) -> str:
     """Return the last part of a dotted name where it stands for no other option."""
     last = key.rpartition(".")[2]
     found = [other for other in known if other == last or other.endswith(f".{last}")]
     return last if found == [key] else key
-
-
-def _text(value: object) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _value(strategy: str, key: str, given: object, present: object) -> object:

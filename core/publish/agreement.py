@@ -56,7 +56,9 @@ def findings_of(submissions: Iterable[Submission], references: References) -> li
     for item in submissions:
         for result in item.run.ranked:
             # The names go with the key: a forged key must not put two jobs together.
-            job = result.case, result.strategy, result.seed, _whole_key(result)
+            told = (result.provenance[name] for name in ("case", "strategy", "femubench"))
+            key = "\0".join((result.key, *map(str, told)))
+            job = result.case, result.strategy, result.seed, key
             listed = groups.setdefault(job, [])
             for number, known in enumerate(listed):
                 if agree(known.result, result):
@@ -82,12 +84,6 @@ def machine_of(item: Submission) -> tuple[str, str, str]:
     """Return what tells a machine from another."""
     machine = item.run.meta["machine"]
     return str(machine["cpu"]), str(machine["blas"]), str(machine["platform"])
-
-
-def _whole_key(result: JobResult) -> str:
-    """Return the key with the versions, which a forged key could contradict."""
-    told = (result.provenance[name] for name in ("case", "strategy", "femubench"))
-    return "\0".join((result.key, *map(str, told)))
 
 
 def _settled(found: Sequence[Finding], references: References) -> Finding:

@@ -39,15 +39,47 @@ def index_of(submissions: Sequence[Submission]) -> dict[str, Any]:
     if len({item.run.meta.get("yardstick") or "drawn" for item in submissions}) > 1:
         what = "some runs are measured against the textbook models, others against the drawn ones"
         raise InputError(what, expected="one of both: run again with this version")
-    references = _references(submissions)
+    # The nominal errors by case and digest: the median of what the runs found.
+    found: dict[tuple[str, str], dict[str, list[float]]] = {}
+    for item in submissions:
+        for name, case in _cases(item).items():
+            blocks = found.setdefault((name, case["digest"]), {})
+            for block, value in item.run.meta["reference"][name].items():
+                blocks.setdefault(block, []).append(value)
+    references = {
+        case: {name: statistics.median(blocks[name]) for name in BLOCKS if name in blocks}
+        for case, blocks in found.items()
+    }
     findings = findings_of(submissions, references)
     current = {name: case["digest"] for item in submissions for name, case in _cases(item).items()}
-    versions = _versions(findings)
+    groups: dict[_Version, list[Finding]] = {}
+    for one in findings:
+        provenance = one.result.provenance
+        number, own = str(provenance["strategy"]), str(provenance["femubench"])
+        groups.setdefault(_Version(one.result.strategy, number, own), []).append(one)
+
+    def age(version: _Version) -> tuple[tuple[str, str], _Version]:
+        return max(run.order for one in groups[version] for run in one.runs), version
+
+    # The version with the earliest last run comes first.
+    versions = {version: groups[version] for version in sorted(groups, key=age)}
     latest = {version.strategy: version for version in versions}  # the last one stays
     ranked = _ranked(latest.values(), versions, current)
     told = _told(submissions, "structures"), _told(submissions, "classes")
     ground = Ground(ranked, current, references, *told)
-    runs = [_run_entry(item) for item in submissions]
+    runs = [
+        {
+            "file": f"data/{item.name}",
+            "run": item.run.meta["run"],
+            "started": item.started,
+            "machine": dict(item.run.meta["machine"]),
+            "versions": dict(item.run.meta["versions"]),
+            "results": len(item.run.results),
+            "strategies": len({result.strategy for result in item.run.results}),
+            "verified": item.verified,
+        }
+        for item in submissions
+    ]
     described = {v: _described(v, listed, ground) for v, listed in versions.items()}
     entrants = {name: versions[version] for name, version in latest.items()}
     boards = [
@@ -73,34 +105,6 @@ def _cases(item: Submission) -> dict[str, dict[str, Any]]:
     return {name: case for name, case in item.run.meta["cases"].items() if name in used}
 
 
-def _references(submissions: Iterable[Submission]) -> dict[tuple[str, str], dict[str, float]]:
-    """Return the nominal errors by case and digest: the median of what the runs found."""
-    found: dict[tuple[str, str], dict[str, list[float]]] = {}
-    for item in submissions:
-        for name, case in _cases(item).items():
-            blocks = found.setdefault((name, case["digest"]), {})
-            for block, value in item.run.meta["reference"][name].items():
-                blocks.setdefault(block, []).append(value)
-    return {
-        case: {name: statistics.median(blocks[name]) for name in BLOCKS if name in blocks}
-        for case, blocks in found.items()
-    }
-
-
-def _versions(findings: Iterable[Finding]) -> dict[_Version, list[Finding]]:
-    """Return the findings of every version, the version with the earliest last run first."""
-    groups: dict[_Version, list[Finding]] = {}
-    for item in findings:
-        provenance = item.result.provenance
-        number, own = str(provenance["strategy"]), str(provenance["femubench"])
-        groups.setdefault(_Version(item.result.strategy, number, own), []).append(item)
-
-    def age(version: _Version) -> tuple[tuple[str, str], _Version]:
-        return max(run.order for item in groups[version] for run in item.runs), version
-
-    return {version: groups[version] for version in sorted(groups, key=age)}
-
-
 def _ranked(
     latest: Iterable[_Version],
     versions: Mapping[_Version, Sequence[Finding]],
@@ -113,13 +117,10 @@ def _ranked(
     listed = list(latest)
     counts = dict.fromkeys(current, 0)
     for version in listed:
-        for case in {item.result.case for item in versions[version] if _is_current(item, current)}:
+        known = (item.result for item in versions[version])
+        for case in {r.case for r in known if r.provenance["case"] == current[r.case]}:
             counts[case] += 1
     return tuple(sorted(case for case, count in counts.items() if 2 * count > len(listed)))
-
-
-def _is_current(item: Finding, current: Mapping[str, str]) -> bool:
-    return bool(item.result.provenance["case"] == current[item.result.case])
 
 
 def _described(version: _Version, findings: Sequence[Finding], ground: Ground) -> dict[str, Any]:
@@ -246,18 +247,4 @@ def _conflict(item: Finding) -> dict[str, Any]:
             }
             for number, other in enumerate((item, *item.others))
         ],
-    }
-
-
-def _run_entry(item: Submission) -> dict[str, Any]:
-    meta = item.run.meta
-    return {
-        "file": f"data/{item.name}",
-        "run": meta["run"],
-        "started": item.started,
-        "machine": dict(meta["machine"]),
-        "versions": dict(meta["versions"]),
-        "results": len(item.run.results),
-        "strategies": len({result.strategy for result in item.run.results}),
-        "verified": item.verified,
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from femubench.core.score.ranking import ranked
@@ -32,7 +32,10 @@ def news_of(
     leader = ""
     for run in runs:
         found = owners.get(run["file"].rpartition("/")[2], [])
-        told += _arrivals(found, present, run)
+        for strategy, version in sorted(found, key=lambda item: str(item[0]["name"])):
+            if version["runs"][0] == run["file"].rpartition("/")[2]:
+                kind = "version" if strategy["name"] in present else "strategy"
+                told.append(_entry(kind, strategy["name"], version, run))
         present |= {strategy["name"]: version for strategy, version in found}
         first = _leaders(present)
         if first and leader not in first:
@@ -40,18 +43,6 @@ def news_of(
             told.append(_entry("leader", leader, present[leader], run))
     pages = {strategy["name"]: strategy["page"] for strategy in strategies}
     return [{**item, "page": pages[item["strategy"]]} for item in told[::-1][:_MOST]]
-
-
-def _arrivals(
-    found: Sequence[tuple[Mapping[str, Any], Mapping[str, Any]]],
-    present: Mapping[str, object],
-    run: Mapping[str, Any],
-) -> Iterator[dict[str, Any]]:
-    """Yield the versions whose first run this is."""
-    for strategy, version in sorted(found, key=lambda item: str(item[0]["name"])):
-        if version["runs"][0] == run["file"].rpartition("/")[2]:
-            kind = "version" if strategy["name"] in present else "strategy"
-            yield _entry(kind, strategy["name"], version, run)
 
 
 def _leaders(present: Mapping[str, Mapping[str, Any]]) -> list[str]:

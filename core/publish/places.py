@@ -96,7 +96,14 @@ def board_on(ground: Ground, entrants: Mapping[str, Sequence[Finding]]) -> dict[
 
     listed = in_order(rows, order)
     sound = [n for _, n in listed if figures[n]["complete"] and not figures[n]["unphysical"]]
-    below = _below({name: logs_of(ground, rows[name]) for name in sound})
+    # None where too few structures are there.
+    logs = {name: logs_of(ground, rows[name]) for name in sound}
+    best, *others = logs or [""]
+    if not others or len(logs[best]) < FEWEST:
+        below = None
+    else:
+        ratios = {n: [math.exp(logs[n][key] - logs[best][key]) for key in logs[n]] for n in others}
+        below = frozenset(item.strategy for item in evidence_of(ratios) if item.verdict == "worse")
     return {
         "cases": list(ground.cases),
         "structures": len(ground.owners(ground.cases)),
@@ -111,19 +118,6 @@ def board_on(ground: Ground, entrants: Mapping[str, Sequence[Finding]]) -> dict[
             for rank, name in listed
         ],
     }
-
-
-def _below(logs: Mapping[str, Mapping[str, float]]) -> frozenset[str] | None:
-    """Return who is shown to be worse than the first; None where too few structures are there.
-
-    Arguments:
-        logs: of the scores by structure, of the best strategy first.
-    """
-    best, *others = logs or [""]
-    if not others or len(logs[best]) < FEWEST:
-        return None
-    ratios = {n: [math.exp(logs[n][key] - logs[best][key]) for key in logs[n]] for n in others}
-    return frozenset(item.strategy for item in evidence_of(ratios) if item.verdict == "worse")
 
 
 def logs_of(ground: Ground, counted: Iterable[Mapping[str, Any]]) -> dict[str, float]:

@@ -69,7 +69,18 @@ def publish(
         OutputError: where the site cannot be written; then it is as it was.
     """
     folder = resolved(folder)
-    old, home = _published(folder), _home(folder, address)
+    # Its files are read as carefully as those that anybody sends.
+    check_site(folder)
+    data = folder / DATA
+    names = sorted(path for path in data.glob("*.json")) if data.is_dir() else []
+    old = [read_submission(path, published=True) for path in names]
+    marker, told = folder / MARKER, address
+    if told is None and marker.exists():
+        told = parse_json(read_text(marker, MIB), file=marker, expected=KIND).get("address")
+    if not _ADDRESS.fullmatch(told := str(told or "")):
+        expected = "http or https, without a query"
+        raise InputError(f"{harmless(told)!r} is no address of a site", expected=expected)
+    home = f"{told.rstrip('/')}/" if told else ""
     merged = _merged([*old, *(_submission(file, verify, unverified) for file in files)])
     index = {**index_of(merged), "address": home}
     pages = {
@@ -94,18 +105,6 @@ def _submission(file: Path, verify: Verify | None, unverified: bool) -> Submissi
         if not unverified:
             raise
     return read_submission(file)
-
-
-def _home(folder: Path, address: str | None) -> str:
-    """Return the address of a site, which ends with a slash; empty where nobody has told it."""
-    file = folder / MARKER
-    told = address
-    if told is None and file.exists():
-        told = parse_json(read_text(file, MIB), file=file, expected=KIND).get("address")
-    if not _ADDRESS.fullmatch(told := str(told or "")):
-        expected = "http or https, without a query"
-        raise InputError(f"{harmless(told)!r} is no address of a site", expected=expected)
-    return f"{told.rstrip('/')}/" if told else ""
 
 
 def check_site(folder: Path) -> None:
@@ -134,14 +133,6 @@ def check_site(folder: Path) -> None:
         raise InputError(what, file=file, key="schema", expected=str(SCHEMA))
 
 
-def _published(folder: Path) -> list[Submission]:
-    """Return what a site holds; its files are read as carefully as those of strangers."""
-    check_site(folder)
-    data = folder / DATA
-    names = sorted(path for path in data.glob("*.json")) if data.is_dir() else []
-    return [read_submission(path, published=True) for path in names]
-
-
 def _merged(submissions: Iterable[Submission]) -> list[Submission]:
     """Return every run once, whatever order they came in.
 
@@ -150,7 +141,12 @@ def _merged(submissions: Iterable[Submission]) -> list[Submission]:
     """
     unique = {item.name: item for item in submissions}
     listed = sorted(unique.values(), key=lambda item: item.order)
-    parts = {item.name: _results(item) for item in listed}
+    parts = {
+        item.name: frozenset(
+            json.dumps(one, sort_keys=True) for one in json.loads(item.text)["results"]
+        )
+        for item in listed
+    }
 
     def within(item: Submission, other: Submission) -> bool:
         if item.run.meta["run"] != other.run.meta["run"]:
@@ -165,11 +161,6 @@ def _merged(submissions: Iterable[Submission]) -> list[Submission]:
         what = f"{len(kept)} runs with {results} results"
         raise InputError(what, expected=f"at most {MOST_RUNS} runs and {MOST_RESULTS} results")
     return kept
-
-
-def _results(item: Submission) -> frozenset[str]:
-    """Return the results of a run, each as a text."""
-    return frozenset(json.dumps(one, sort_keys=True) for one in json.loads(item.text)["results"])
 
 
 def _replace(folder: Path, pages: Mapping[str, str]) -> None:
@@ -194,22 +185,13 @@ def _replace(folder: Path, pages: Mapping[str, str]) -> None:
             except OSError:
                 old.rename(folder)
                 raise
-            _move_rest(old, folder)
+            for path in sorted(old.iterdir()):
+                if path.name not in OWN:
+                    os.rename(path, folder / path.name)
         else:
             new.rename(folder)
     finally:
-        _remove(room)
-
-
-def _move_rest(old: Path, folder: Path) -> None:
-    """Move what somebody else put there into the new folder."""
-    for path in sorted(old.iterdir()):
-        if path.name not in OWN:
-            os.rename(path, folder / path.name)
-
-
-def _remove(room: Path) -> None:
-    """Remove the temporary folder, but never what somebody else's files are still in."""
-    old = room / "old"
-    if not old.exists() or all(path.name in OWN for path in old.iterdir()):
-        shutil.rmtree(room, ignore_errors=True)
+        # Somebody else's files may still be in there.
+        old = room / "old"
+        if not old.exists() or all(path.name in OWN for path in old.iterdir()):
+            shutil.rmtree(room, ignore_errors=True)

@@ -147,7 +147,13 @@ def read_submission(
         raise InputError(what, file=file, key="schema", expected=str(SCHEMA))
     run = run_from_json(data, file=file)
     meta = _meta(run, file)
-    results = _deduplicated(run, meta, file)
+    # Of several results with one key the last counts, as in the store.
+    if not run.results:
+        raise InputError("no results", file=file, key="results", expected="at least one")
+    results: dict[str, JobResult] = {}
+    for number, result in enumerate(run.results):
+        _check(result, meta, file, f"results[{number}]")
+        results[result.key] = result
     verified = published and data.get("verified") is True
     if verify is not None:
         verify(run, data, file)
@@ -155,26 +161,8 @@ def read_submission(
     if not verified:
         meta = {name: value for name, value in meta.items() if name not in _OF_VERIFIED}
     beside = run.beside if verified else ()
-    return _submission(meta, results.values(), beside, file, verified=verified)
-
-
-def slug(text: str, longest: int = 40) -> str:
-    """Return a file name for any text: letters, digits, and a hash that keeps it apart."""
-    word = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")[:longest].strip("-")
-    digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]
-    return f"{word}-{digest}" if word else digest
-
-
-def _submission(
-    meta: Mapping[str, Any],
-    results: Iterable[JobResult],
-    beside: Iterable[JobResult],
-    file: Path,
-    *,
-    verified: bool,
-) -> Submission:
-    """Return a run as its file says it, so that it is the same when that is read again."""
-    data = {"schema": SCHEMA, "meta": meta, "results": _records(results)}
+    # A run as its file says it, so that it is the same when that is read again.
+    data = {"schema": SCHEMA, "meta": meta, "results": _records(results.values())}
     if verified:
         data |= {"beside": _records(beside), "verified": True}
     text = json.dumps(data, sort_keys=True, allow_nan=False, separators=(",", ":")) + "\n"
@@ -182,6 +170,13 @@ def _submission(
     run = run_from_json(json.loads(text), file=file)
     ranked = replace(run, results=rank_results(run.results, meta["reference"]))
     return Submission(ranked, text, f"{slug(str(meta['run']))}-{digest}.json", verified)
+
+
+def slug(text: str, longest: int = 40) -> str:
+    """Return a file name for any text: letters, digits, and a hash that keeps it apart."""
+    word = re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")[:longest].strip("-")
+    digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+    return f"{word}-{digest}" if word else digest
 
 
 def _records(results: Iterable[JobResult]) -> list[dict[str, Any]]:
@@ -193,7 +188,10 @@ def _records(results: Iterable[JobResult]) -> list[dict[str, Any]]:
 
 def _meta(run: Run, file: Path) -> dict[str, Any]:
     try:
-        record = _Meta.model_validate(_encodable(run.meta))
+        # Without halves of characters, which no file could hold.
+        record = _Meta.model_validate(
+            json.loads(json.dumps(run.meta, ensure_ascii=False).encode("utf-8", "replace"))
+        )
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         key = ".".join(["meta", *map(str, first["loc"])])
@@ -208,22 +206,6 @@ def _meta(run: Run, file: Path) -> dict[str, Any]:
                 key = f"meta.reference.{name}.{block}"
                 raise InputError(f"{value}", file=file, key=key, expected="an error >= 0 in %")
     return data
-
-
-def _encodable(data: Mapping[str, Any]) -> Any:  # noqa: ANN401 - JSON data of any form
-    """Return the meta data without halves of characters, which no file could hold."""
-    return json.loads(json.dumps(data, ensure_ascii=False).encode("utf-8", "replace"))
-
-
-def _deduplicated(run: Run, meta: Mapping[str, Any], file: Path) -> dict[str, JobResult]:
-    """Return the results by key; the last of a key counts, as in the store."""
-    if not run.results:
-        raise InputError("no results", file=file, key="results", expected="at least one")
-    found: dict[str, JobResult] = {}
-    for number, result in enumerate(run.results):
-        _check(result, meta, file, f"results[{number}]")
-        found[result.key] = result
-    return found
 
 
 def _check(result: JobResult, meta: Mapping[str, Any], file: Path, key: str) -> None:

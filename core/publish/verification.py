@@ -90,12 +90,23 @@ def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) 
     if run.meta.get("yardstick") != "textbook":
         what = "errors are not measured against the textbook models"
         _refuse(file, what, "meta.yardstick", _AGAIN)
-    _check_sandbox(run, file)
+    told = run.meta.get("sandbox")
+    mode = (result.provenance.get("sandbox", told) for result in chain(run.results, run.beside))
+    if any(one != SANDBOX for one in (told, *mode)):
+        what = "the strategies ran without a sandbox"
+        _refuse(file, what, "meta.sandbox", "a run with `--sandbox require`, or --unverified")
     cases = _own_cases(run, installed, file)
     twins = _own_twins(run, list(cases.values()), installed, file)
     _check_complete(run, file)
     known = {name: _Known.of(case, installed) for name, case in (cases | twins).items()}
-    _check_references(run, known, file)
+    # The nominal errors, which every score is relative to.
+    for key, stated, names in (
+        ("meta.reference", run.meta["reference"], run.meta["cases"]),
+        ("meta.twins.reference", run.meta["twins"]["reference"], run.meta["twins"]["of"]),
+    ):
+        for name in names:
+            errors, right = stated.get(name, {}), known[name].reference
+            _check_errors(errors, right, f"{key}.{name}", nominal="textbook", file=file)
     origins = run.meta["twins"]["again"]
     for key, results in (("results", run.results), ("beside", run.beside)):
         for number, result in enumerate(results):
@@ -106,14 +117,6 @@ def verify(run: Run, data: Mapping[str, Any], installed: Installed, file: Path) 
 
 def _refuse(file: Path, what: str, key: str, expected: str) -> NoReturn:
     raise InputError(what, file=file, key=key, expected=expected)
-
-
-def _check_sandbox(run: Run, file: Path) -> None:
-    told = run.meta.get("sandbox")
-    own = (result.provenance.get("sandbox", told) for result in chain(run.results, run.beside))
-    if any(one != SANDBOX for one in (told, *own)):
-        what = "the strategies ran without a sandbox"
-        _refuse(file, what, "meta.sandbox", "a run with `--sandbox require`, or --unverified")
 
 
 def _own_cases(run: Run, installed: Installed, file: Path) -> dict[str, Case]:
@@ -183,18 +186,6 @@ def _check_complete(run: Run, file: Path) -> None:
     keys = (result.key for result in chain(run.results, run.beside))
     if plan_digest(keys) != meta.get("plan"):
         _refuse(file, "the jobs are not those that the run began with", "meta.plan", _AGAIN)
-
-
-def _check_references(run: Run, known: Mapping[str, _Known], file: Path) -> None:
-    """Check the nominal errors, which every score is relative to."""
-    told = (
-        ("meta.reference", run.meta["reference"], run.meta["cases"]),
-        ("meta.twins.reference", run.meta["twins"]["reference"], run.meta["twins"]["of"]),
-    )
-    for key, stated, names in told:
-        for name in names:
-            found, own = stated.get(name, {}), known[name].reference
-            _check_errors(found, own, f"{key}.{name}", nominal="textbook", file=file)
 
 
 def _check_errors(

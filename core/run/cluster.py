@@ -7,7 +7,6 @@ import pickle
 import re
 import secrets
 import shutil
-import threading
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -36,7 +35,7 @@ from femubench.core.run.sandbox import OFF, Enclosure, Sandbox, enclosure
 from femubench.core.run.schedule import Show, unjudged
 from femubench.core.run.slots import Slot, Start, first_seed
 from femubench.core.run.stopping import interrupts_kept
-from femubench.core.run.workers import no_script
+from femubench.core.run.workers import no_script, repeating
 from femubench.core.schema.results import JobResult
 from femubench.core.score.scoring import Reference
 
@@ -89,7 +88,12 @@ class DaskWorkers:
             InputError: naming the first one that has not, or where there is none.
         """
         if not self._waits:
-            self._meet()
+            try:
+                self._client.wait_for_workers(1, timeout=_ANSWER)
+            except TimeoutError as error:
+                what = f"the scheduler at {self._where} has no worker"
+                expected = f"one or more: dask worker {self._where}"
+                raise InputError(what, expected=expected) from error
         homes = {home_of(strategy)[0] for strategy in strategies}
         packages = tuple(sorted({"femubench", *homes} - {"__main__"}))
         self._demand = Demand(all_versions(packages), packages, memory, self.sandbox)
@@ -111,13 +115,6 @@ class DaskWorkers:
             return Enclosure("none", "no worker is there yet; every result says how it ran")
         return Enclosure("namespaces")
 
-    def _meet(self) -> None:
-        try:
-            self._client.wait_for_workers(1, timeout=_ANSWER)
-        except TimeoutError as error:
-            what = f"the scheduler at {self._where} has no worker"
-            raise InputError(what, expected=f"one or more: dask worker {self._where}") from error
-
     def computed(
         self,
         slots: Sequence[Slot],
@@ -133,13 +130,6 @@ class DaskWorkers:
                 machine; results that came before stay.
         """
         flight = _Flight(self._client, self._demand, slots, references, limits, show)
-        try:
-            yield from flight.landed(wanted, self._capacity())
-        finally:
-            flight.call_off()
-
-    def _capacity(self) -> Callable[[], int]:
-        """Return what tells how many jobs may be on their way."""
         counted, threads = -_COUNTED, 0
 
         def capacity() -> int:
@@ -148,7 +138,10 @@ class DaskWorkers:
                 counted, threads = time.monotonic(), self.workers
             return max(_AHEAD * threads, _LEAST_AHEAD)
 
-        return capacity
+        try:
+            yield from flight.landed(wanted, capacity)
+        finally:
+            flight.call_off()
 
 
 def _unlike(what: str) -> InputError:
@@ -334,7 +327,10 @@ def started(
             what = f"{words} cannot be started: {one_line(error)}"
             raise InputError(what, key="cluster", expected="machines to run on") from error
         size = {"jobs": jobs} if queued else {"n": jobs}
-        stack.enter_context(_kept(partial(cluster.scale, **size)))
+        scale = partial(cluster.scale, **size)
+        scale()
+        # A nanny gives up a worker that dies as it starts.
+        stack.enter_context(repeating(scale, _COUNTED))
         client = stack.enter_context(_client(cluster))
         yield DaskWorkers(client, words, waits=queued, sandbox=sandbox)
 
@@ -392,25 +388,6 @@ def slurm_cluster(queue: str) -> Cluster:
         silence_logs=logging.CRITICAL,
         **missing,
     )
-
-
-@contextmanager
-def _kept(scale: Callable[[], None]) -> Iterator[None]:
-    """Keep a cluster at its size: a nanny gives up a worker that dies as it starts."""
-    done = threading.Event()
-
-    def tend() -> None:
-        while not done.wait(_COUNTED):
-            scale()
-
-    scale()
-    tender = threading.Thread(target=tend, daemon=True)
-    tender.start()
-    try:
-        yield
-    finally:
-        done.set()
-        tender.join()
 
 
 @contextmanager

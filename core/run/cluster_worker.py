@@ -106,11 +106,6 @@ def unfit(demand: Demand, dask_worker: Any) -> str | None:  # noqa: ANN401 - a d
     return None
 
 
-def share_of(dask_worker: Any) -> int:  # noqa: ANN401 - a distributed.Worker
-    """Return the bytes that one of the jobs of a worker may take."""
-    return memory_share(dask_worker.state.nthreads, dask_worker.memory_manager.memory_limit)
-
-
 def run_errand(yardstick: Yardstick, errand: Errand, demand: Demand) -> Arrived:
     """Return the result of a job and its exhibit.
 
@@ -135,11 +130,15 @@ def run_errand(yardstick: Yardstick, errand: Errand, demand: Demand) -> Arrived:
     start, reference = yardstick
     name, limits = errand.strategy, errand.limits
     if limits.memory is None:
-        limits = replace(limits, memory=share_of(worker))
+        share = memory_share(worker.state.nthreads, worker.memory_manager.memory_limit)
+        limits = replace(limits, memory=share)
     slots, references = [Slot(start, name, errand.seed, errand.code)], {start.case.name: reference}
     exhibits: list[Mapping[str, Any]] = []
     show = (lambda _, exhibit: exhibits.append(exhibit)) if errand.shown else None
-    found = computed(slots, [0], references, {name: limits}, 1, show, wanted, _judges())
+    if not hasattr(_OF_THREAD, "judges"):
+        _OF_THREAD.judges = Judges[Any]()
+    judges: Judges[Any] = _OF_THREAD.judges
+    found = computed(slots, [0], references, {name: limits}, 1, show, wanted, judges)
     ((_, result),) = found
     how = {"cpu": cpu_name(), "blas": _blas(), "sandbox": enclosure(limits.sandbox).sandbox}
     result = replace(result, provenance=how)
@@ -147,14 +146,6 @@ def run_errand(yardstick: Yardstick, errand: Errand, demand: Demand) -> Arrived:
 
 
 _OPEN, _OF_THREAD = ExitStack(), threading.local()
-
-
-def _judges() -> Judges[Any]:
-    """Return the judges of this thread, which live as long as the worker."""
-    if not hasattr(_OF_THREAD, "judges"):
-        _OF_THREAD.judges = Judges[Any]()
-    found: Judges[Any] = _OF_THREAD.judges
-    return found
 
 
 @cache

@@ -72,7 +72,9 @@ def modes_frame(run: Run) -> pd.DataFrame:
             "mode": mode.number,
             "measured_hz": mode.measured_hz,
             "predicted_hz": mode.predicted_hz,
-            "error_percent": _signed(mode.measured_hz, mode.predicted_hz),
+            "error_percent": None
+            if mode.predicted_hz is None or mode.predicted_hz <= 0.0
+            else 100.0 * (mode.predicted_hz / mode.measured_hz - 1.0),
             "counted_percent": 100.0 * frequency_error(mode),
             "mac": mode.mac,
             "predicted_std_hz": mode.predicted_std_hz,
@@ -87,12 +89,6 @@ def modes_frame(run: Run) -> pd.DataFrame:
     )
     names = ("case", "strategy", "seed", "nominal", "block", "modification", "mode", *floats)
     return pd.DataFrame(rows, columns=list(names)).astype(dict.fromkeys(floats, "float64"))
-
-
-def _signed(measured: float, predicted: float | None) -> float | None:
-    if predicted is None or predicted <= 0.0:
-        return None
-    return 100.0 * (predicted / measured - 1.0)
 
 
 _JOB = ("case", "strategy", "seed", "nominal", "status", "reason", "seconds")

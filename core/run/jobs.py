@@ -18,7 +18,7 @@ from femubench.core.fem.joints import place_words
 from femubench.core.fem.model import Model, differ
 from femubench.core.modal.eigen import counted_evaluations
 from femubench.core.modal.measurement import Measurement
-from femubench.core.roles import CAPABILITIES, Result, Strategy, declared
+from femubench.core.roles import CAPABILITIES, Result, declared
 from femubench.core.schema.results import Status
 from femubench.core.update.uncertainty import MOST_SAMPLES
 
@@ -145,9 +145,27 @@ def performed(job: Job) -> tuple[JobOutcome, Model | None]:
     with warnings.catch_warnings(), counted_evaluations() as counter:
         # A result is judged by its figures; what numerical libraries mutter on the way is not.
         warnings.simplefilter("ignore")
-        outcome = _attempt(strategy, model, measurement, rng)
-    if outcome.status == "ok" and _changed(model, before, job):
-        outcome = JobOutcome("failed", "the nominal model was changed in place, expected a new one")
+        try:
+            outcome = plain_outcome(strategy.update(model, measurement, rng))
+        except BaseException as error:  # Ctrl-C does not reach a worker: this is the strategy's own
+            status: Status = "failed"
+            if isinstance(error, NotApplicable | Diverged):
+                status = "diverged" if isinstance(error, Diverged) else "not-applicable"
+            reason = one_line(error)
+            if isinstance(error, NotApplicable | StrategyFailure):
+                reason = _text(error) or type(error).__name__
+            elif isinstance(error, MemoryError):
+                reason = f"out of memory: {reason}"
+            outcome = JobOutcome(status, reason, _traceback(error))
+    if outcome.status == "ok":
+        try:  # entries may have changed places
+            same = before is not None and _digest(model) == before
+            changed = not same and differ(model, pickle.loads(job.model))
+        except Exception:  # what it holds now is no matrix
+            changed = True
+        if changed:
+            what = "the nominal model was changed in place, expected a new one"
+            outcome = JobOutcome("failed", what)
     seconds = time.perf_counter() - start
     return replace(outcome, seconds=seconds, evaluations=counter.count), model
 
@@ -161,15 +179,6 @@ def _digest(model: Model) -> bytes | None:
         for part in (matrix.data, matrix.indices, matrix.indptr):
             found.update(np.ascontiguousarray(part).data)
     return found.digest()
-
-
-def _changed(model: Model, before: bytes | None, job: Job) -> bool:
-    """Tell whether a model has other matrices than it had; entries may have changed places."""
-    try:
-        same = before is not None and _digest(model) == before
-        return not same and differ(model, pickle.loads(job.model))
-    except Exception:  # what it holds now is no matrix
-        return True
 
 
 def one_line(error: BaseException) -> str:
@@ -197,23 +206,6 @@ def _traceback(error: BaseException | None) -> str:
         parts.append(f"Traceback (most recent call last):\n{''.join(lines)}{one_line(error)}\n")
         error = error.__cause__ or (None if error.__suppress_context__ else error.__context__)
     return "\n".join(reversed(parts))[-_LONGEST_TEXT:]
-
-
-def _attempt(
-    strategy: Strategy, model: Model, measurement: Measurement, rng: np.random.Generator
-) -> JobOutcome:
-    try:
-        return plain_outcome(strategy.update(model, measurement, rng))
-    except BaseException as error:  # Ctrl-C does not reach a worker: this is the strategy's own
-        status: Status = "failed"
-        if isinstance(error, NotApplicable | Diverged):
-            status = "diverged" if isinstance(error, Diverged) else "not-applicable"
-        reason = one_line(error)
-        if isinstance(error, NotApplicable | StrategyFailure):
-            reason = _text(error) or type(error).__name__
-        elif isinstance(error, MemoryError):
-            reason = f"out of memory: {reason}"
-        return JobOutcome(status, reason, _traceback(error))
 
 
 def plain_outcome(result: Result) -> JobOutcome:

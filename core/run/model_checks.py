@@ -29,7 +29,14 @@ def check_model(model: Model, nominal: Model) -> None:
             f"the updated model has {size} degrees of freedom, expected {nominal.size}"
         )
     for name in ("mass", "stiffness"):
-        _check_sparse(name, getattr(model, name), size)
+        matrix = getattr(model, name)
+        check_entries(name, matrix)
+        _check_shape(name, matrix.shape, (size, size))
+        check_indices(name, matrix)
+        entries = sp.coo_array(matrix)
+        _check_numbers(name, entries.data)
+        transposed = sp.csr_array(entries).T
+        _check_symmetry(name, sp.csr_array(entries) - transposed, entries.data)
         change = getattr(model, f"{name}_change")
         if change is not None:
             _check_low_rank(f"{name}_change", change, size)
@@ -50,16 +57,6 @@ def check_change(name: str, change: Any) -> None:  # noqa: ANN401
         raise StrategyFailure(f"{name} is {type(change).__name__}, expected LowRank")
     for part in ("basis", "core"):
         _check_real(f"{name}: {part}", np.asarray(getattr(change, part)))
-
-
-def _check_sparse(name: str, matrix: Any, size: int) -> None:  # noqa: ANN401
-    check_entries(name, matrix)
-    _check_shape(name, matrix.shape, (size, size))
-    check_indices(name, matrix)
-    entries = sp.coo_array(matrix)
-    _check_numbers(name, entries.data)
-    transposed = sp.csr_array(entries).T
-    _check_symmetry(name, sp.csr_array(entries) - transposed, entries.data)
 
 
 def check_indices(name: str, matrix: Any) -> None:  # noqa: ANN401

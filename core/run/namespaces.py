@@ -24,7 +24,7 @@ import sys
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, NoReturn
+from typing import Any
 
 _NEW = 0x00020000 | 0x04000000 | 0x08000000 | 0x10000000 | 0x20000000 | 0x40000000
 _READ_ONLY, _NO_SUID, _NO_DEV, _NO_EXEC, _BIND, _RECURSIVE, _PRIVATE = (
@@ -83,33 +83,9 @@ def go_apart(walls: Walls, at: str, room: int, processes: int) -> None:
     _write("/proc/self/setgroups", "deny")
     _write("/proc/self/uid_map", f"{user} {user} 1")
     _write("/proc/self/gid_map", f"{group} {group} 1")
-    first, alive = _first_process()
-    strategy = os.fork()
-    if strategy:
-        _end_alike(strategy, first, alive)
-    os.close(alive)
-    try:
-        _few_numbers(processes)
-        _build(walls, at, room)
-        _network_within()
-        os.setsid()
-        resource.setrlimit(resource.RLIMIT_NPROC, (processes, processes))
-        _give_up_capabilities()
-    except Exception as error:
-        os.write(2, f"no sandbox: {error}\n".encode())
-        os._exit(FAILED)
-
-
-def _first_process() -> tuple[int, int]:
-    """Start the first process of the namespace of processes, whose end ends all in it.
-
-    It is a program that reads until the end, and small, where a copy of this process would be as
-    large as this one. That it hears of no signal from within makes it no place for a strategy: one
-    that ends itself would go on.
-
-    Returns:
-        its number, and what keeps it alive as long as somebody holds it open.
-    """
+    # The first process of the namespace, whose end ends all in it, is a program that reads until
+    # the end, and small, where a copy of this process would be as large as this one. That it hears
+    # of no signal from within makes it no place for a strategy: one that ends itself would go on.
     # Whoever may look at it goes where its folder leads. From the root it moves to the new one.
     os.chdir("/")
     reads, alive = os.pipe()
@@ -122,23 +98,49 @@ def _first_process() -> tuple[int, int]:
     ]
     first = os.posix_spawn(_READER, [_READER], {}, file_actions=actions)
     os.close(reads)
-    return first, alive
-
-
-def _end_alike(strategy: int, first: int, alive: int) -> NoReturn:
-    """Wait until the strategy's process has ended, end all that is left, and end as it did."""
-    os.closerange(3, alive)
-    _, status = os.waitpid(strategy, 0)
+    strategy = os.fork()
+    if strategy:
+        os.closerange(3, alive)
+        _, status = os.waitpid(strategy, 0)
+        os.close(alive)
+        os.kill(first, signal.SIGKILL)
+        os.waitpid(first, 0)
+        code = os.waitstatus_to_exitcode(status)
+        if code < 0:
+            with suppress(OSError):
+                signal.signal(-code, signal.SIG_DFL)
+            os.kill(os.getpid(), -code)
+            signal.pause()
+        os._exit(code)
     os.close(alive)
-    os.kill(first, signal.SIGKILL)
-    os.waitpid(first, 0)
-    code = os.waitstatus_to_exitcode(status)
-    if code < 0:
-        with suppress(OSError):
-            signal.signal(-code, signal.SIG_DFL)
-        os.kill(os.getpid(), -code)
-        signal.pause()
-    os._exit(code)
+    try:
+        # The limit on a user's processes does not bind root, that on their numbers does.
+        release = tuple(int(part) for part in platform.release().split(".")[:2])
+        # Before Linux 6.14 the file is that of the whole machine.
+        if release >= (6, 14):
+            with suppress(OSError):
+                _write("/proc/sys/kernel/pid_max", str(max(processes, 301)))
+        _build(walls, at, room)
+        # A loopback that leads to nobody else, and another name of the host.
+        _call("sethostname", "a name", b"sandbox", 7)
+        import fcntl
+
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket, suppress(OSError):
+            request = struct.pack("16sh14x", b"lo", 0)
+            (flags,) = struct.unpack_from("16xh", fcntl.ioctl(any_socket, _FLAGS_OF, request))
+            fcntl.ioctl(any_socket, _SET_FLAGS_OF, struct.pack("16sh14x", b"lo", flags | _UP))
+        os.setsid()
+        resource.setrlimit(resource.RLIMIT_NPROC, (processes, processes))
+        libc = _libc()
+        capability = 0
+        while libc.prctl(_DROP_BOUND, capability, 0, 0, 0) == 0:
+            capability += 1
+        _call("prctl", "ambient capabilities", _AMBIENT, _CLEAR_AMBIENT, 0, 0, 0)
+        head = struct.pack("=Ii", _CAPABILITY_VERSION, 0)
+        _call("capset", "capabilities", head, bytes(24))
+    except Exception as error:
+        os.write(2, f"no sandbox: {error}\n".encode())
+        os._exit(FAILED)
 
 
 def _build(walls: Walls, at: str, room: int) -> None:
@@ -157,7 +159,10 @@ def _build(walls: Walls, at: str, room: int) -> None:
             _mount("tmpfs", at + path, "tmpfs", _NO_SUID | _NO_DEV, "mode=755,size=4k")
     for name in ("proc", FOLDER.strip("/"), "dev", "etc"):
         os.makedirs(f"{at}/{name}", exist_ok=True)
-    _accounts(f"{at}/etc")
+    # Libraries ask for the name and the home of a user.
+    user, group = os.geteuid(), os.getegid()
+    _write(f"{at}/etc/passwd", f"judge:x:{user}:{group}::{FOLDER}:/bin/sh\n")
+    _write(f"{at}/etc/group", f"judge:x:{group}:\n")
     for name in _DEVICES:
         _point(f"{at}/dev/{name}", folder=False)
     os.symlink(FOLDER, f"{at}/dev/shm")
@@ -190,50 +195,12 @@ def _point(path: str, *, folder: bool) -> None:
         os.close(os.open(path, os.O_CREAT | os.O_WRONLY, 0o644))
 
 
-def _accounts(folder: str) -> None:
-    """Say who the only user is, for libraries that ask for a name or a home."""
-    user, group = os.geteuid(), os.getegid()
-    _write(f"{folder}/passwd", f"judge:x:{user}:{group}::{FOLDER}:/bin/sh\n")
-    _write(f"{folder}/group", f"judge:x:{group}:\n")
-
-
 def _lock(at: str, attributes: int) -> None:
     """Give attributes to everything that is mounted at a path and below."""
     wanted = struct.pack("=QQQQ", attributes, 0, 0, 0)
     path, flags = os.fsencode(at), ctypes.c_uint(_WHOLE_TREE)
     size = ctypes.c_size_t(len(wanted))
     _call("syscall", "mount_setattr", _MOUNT_SETATTR, _HERE, path, flags, wanted, size)
-
-
-def _few_numbers(processes: int) -> None:
-    """Limit the numbers of processes of this namespace: the limit of a user does not bind root."""
-    release = tuple(int(part) for part in platform.release().split(".")[:2])
-    # Before Linux 6.14 the file is that of the whole machine.
-    if release >= (6, 14):
-        with suppress(OSError):
-            _write("/proc/sys/kernel/pid_max", str(max(processes, 301)))
-
-
-def _network_within() -> None:
-    """Set the loopback up, which leads to nobody else, and give the host another name."""
-    _call("sethostname", "a name", b"sandbox", 7)
-    import fcntl
-
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as any_socket, suppress(OSError):
-        request = struct.pack("16sh14x", b"lo", 0)
-        (flags,) = struct.unpack_from("16xh", fcntl.ioctl(any_socket, _FLAGS_OF, request))
-        fcntl.ioctl(any_socket, _SET_FLAGS_OF, struct.pack("16sh14x", b"lo", flags | _UP))
-
-
-def _give_up_capabilities() -> None:
-    """Drop all capabilities of this process and of all that it starts."""
-    libc = _libc()
-    capability = 0
-    while libc.prctl(_DROP_BOUND, capability, 0, 0, 0) == 0:
-        capability += 1
-    _call("prctl", "ambient capabilities", _AMBIENT, _CLEAR_AMBIENT, 0, 0, 0)
-    head = struct.pack("=Ii", _CAPABILITY_VERSION, 0)
-    _call("capset", "capabilities", head, bytes(24))
 
 
 @cache

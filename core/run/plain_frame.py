@@ -16,7 +16,6 @@ from pydantic import TypeAdapter, ValidationError
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame, Material, Member, Vector
-from femubench.core.fem.parameters import Property
 from femubench.core.fem.sections import Section, TabulatedKappa
 from femubench.core.run.plain_arrays import BytesError
 
@@ -95,12 +94,6 @@ def frame_from_plain(data: object, nominal: Frame, most_elements: int) -> Frame:
         raise BytesError("a member has no element")
     if sum(member.elements for member in found.members) > most_elements:
         raise BytesError(f"the members have more than the {most_elements} elements of its arrays")
-    return found
-
-
-def parameters_from_plain(data: object) -> tuple[Property, ...]:
-    """Return parameters of a frame, each checked; raises BytesError."""
-    found: tuple[Property, ...] = read_plain(tuple[Property, ...], data, "parameters")
     return found
 
 

@@ -23,7 +23,7 @@ from femubench.core.run.plain_arrays import BytesError, Shelf
 from femubench.core.run.plain_frame import (
     frame_from_plain,
     frame_to_plain,
-    parameters_from_plain,
+    read_plain,
 )
 from femubench.core.typing import AnyArray, IntArray, SparseArray
 from femubench.core.update.uncertainty import MOST_SAMPLES
@@ -45,8 +45,20 @@ def model_to_plain(
     """
     model, samples = _in_order(model, samples, nominal)
     structure = model.structure
-    if structure is None or structure.frame is _frame(nominal):
-        _check_dofs(model, nominal)
+    frame = None if nominal.structure is None else nominal.structure.frame
+    if structure is None or structure.frame is frame:
+        own, given = model.dofs, nominal.dofs
+        if len(own) != len(given):
+            raise StrategyFailure(
+                f"the updated model has {len(own)} degrees of freedom, expected {len(given)}"
+            )
+        if own is not given and not (
+            own.direction == given.direction and np.array_equal(own.node, given.node)
+        ):
+            raise StrategyFailure(
+                "the updated model has other degrees of freedom than the nominal model, expected "
+                "those of the nominal model in its order"
+            )
     plain = {"model": _matrices(model, nominal, shelf)}
     plain["samples"] = [_matrices(sample, model, shelf) for sample in samples]  # type: ignore[assignment]
     if structure is nominal.structure:
@@ -65,30 +77,15 @@ def model_from_plain(data: Mapping[str, Any], arrays: Sequence[AnyArray], nomina
     if "structure" in data:
         base = replace(nominal, structure=None)
         if data["structure"] is not None:
-            base = _on(nominal, _structure(data["structure"], arrays, nominal))
+            structure = _structure(data["structure"], arrays, nominal)
+            base = replace(nominal, geometry=structure, structure=structure)
+            assert nominal.structure is not None
+            if structure.mesh is not nominal.structure.mesh:
+                base = replace(base, dofs=dofs_of(structure), groups={}, mass_groups={})
     if len(data["samples"]) > MOST_SAMPLES:
         raise BytesError(f"{len(data['samples'])} samples, allowed {MOST_SAMPLES}")
     model = replace(base, **_read(data["model"], arrays, nominal))
     return model, tuple(replace(model, **_read(item, arrays, model)) for item in data["samples"])
-
-
-def _frame(nominal: Model) -> object:
-    return None if nominal.structure is None else nominal.structure.frame
-
-
-def _check_dofs(model: Model, nominal: Model) -> None:
-    own, given = model.dofs, nominal.dofs
-    if len(own) != len(given):
-        raise StrategyFailure(
-            f"the updated model has {len(own)} degrees of freedom, expected {len(given)}"
-        )
-    if own is not given and not (
-        own.direction == given.direction and np.array_equal(own.node, given.node)
-    ):
-        raise StrategyFailure(
-            "the updated model has other degrees of freedom than the nominal model, expected "
-            "those of the nominal model in its order"
-        )
 
 
 # --- matrices ---------------------------------------------------------------------------------
@@ -216,10 +213,20 @@ def _structure(data: object, arrays: Sequence[AnyArray], nominal: Model) -> Stru
     springs = _taken(arrays, data.get("springs"))
     plain = nominal.structure
     if "fields" in data:
-        plain = _meshed(data, arrays, plain, count)
+        plain = Structure.build(frame_from_plain(data["fields"], plain.frame, count))
+        kinematics = plain.kinematics
+        direction = "".join(name.ljust(2) for name in kinematics.direction)
+        same = direction == data.get("direction")
+        if not same or not np.array_equal(kinematics.node, _taken(arrays, data.get("node"))):
+            raise BytesError("its degrees of freedom are not those of its frame, meshed anew")
     elif plain.changes:
         plain = Structure.build(plain.frame)
-    expected = _with_changes(plain, _changes(data, arrays))
+    changes, expected = _changes(data, arrays), replace(plain)
+    # What is kept of a nominal structure is for its own parameters alone.
+    expected.__dict__.update({name: own for name, own in vars(plain).items() if name != "kept"})
+    for turn in _turns(changes):
+        values = [value for *_, value in turn]
+        expected = expected.with_values([each for _, each, _ in turn], values)
     if springs.shape != expected.springs.shape or count != len(expected.properties):
         raise BytesError("its element properties are those of another mesh")
     present = [getattr(expected.properties, name) for name in names]
@@ -232,23 +239,11 @@ def _structure(data: object, arrays: Sequence[AnyArray], nominal: Model) -> Stru
     return replace(expected, properties=properties, springs=springs)
 
 
-def _meshed(
-    data: Mapping[str, Any], arrays: Sequence[AnyArray], nominal: Structure, count: int
-) -> Structure:
-    found = Structure.build(frame_from_plain(data["fields"], nominal.frame, count))
-    kinematics = found.kinematics
-    direction = "".join(name.ljust(2) for name in kinematics.direction)
-    same = direction == data.get("direction")
-    if not same or not np.array_equal(kinematics.node, _taken(arrays, data.get("node"))):
-        raise BytesError("its degrees of freedom are not those of its frame, meshed anew")
-    return found
-
-
 def _changes(
     data: Mapping[str, Any], arrays: Sequence[AnyArray]
 ) -> list[tuple[int, Property, float]]:
     """Return every parameter that was set, with its number and value, in turn."""
-    parameters = parameters_from_plain(data.get("parameters"))
+    parameters = read_plain(tuple[Property, ...], data.get("parameters"), "parameters")
     match data.get("changes"):
         case [int(numbers), int(values)]:
             each, given = _taken(arrays, numbers), _taken(arrays, values)
@@ -259,15 +254,6 @@ def _changes(
         raise BytesError("the changes are not one value a parameter")
     pairs = zip(each.tolist(), given.tolist(), strict=True)
     return [(number, parameters[number], value) for number, value in pairs]
-
-
-def _with_changes(plain: Structure, changes: Sequence[tuple[int, Property, float]]) -> Structure:
-    found = replace(plain)
-    # What is kept of a nominal structure is for its own parameters alone.
-    found.__dict__.update({name: value for name, value in vars(plain).items() if name != "kept"})
-    for turn in _turns(changes):
-        found = found.with_values([each for _, each, _ in turn], [value for *_, value in turn])
-    return found
 
 
 def _turns(
@@ -284,15 +270,6 @@ def _turns(
         seen.add(change[0])
     if turn:
         yield turn
-
-
-def _on(nominal: Model, structure: Structure) -> Model:
-    """Return the nominal model on a structure; its matrices are still to come."""
-    own: dict[str, Any] = {"geometry": structure, "structure": structure}
-    assert nominal.structure is not None
-    if structure.mesh is nominal.structure.mesh:
-        return replace(nominal, **own)
-    return replace(nominal, **own, dofs=dofs_of(structure), groups={}, mass_groups={})
 
 
 def _in_order(model: Model, samples: Sequence[Model], nominal: Model) -> Kept:

@@ -20,12 +20,11 @@ from femubench.core.run.executor import Executor, LocalProcesses, worker_count
 from femubench.core.run.limits import Limits
 from femubench.core.run.provenance import home_of, plan_digest, run_meta
 from femubench.core.run.recording import Overwrite, Progress, Results, ended, recorded
-from femubench.core.run.sandbox import Sandbox
 from femubench.core.run.slots import Slots
 from femubench.core.run.starts import Starts
 from femubench.core.run.stopping import stopping
 from femubench.core.run.store import Store
-from femubench.core.schema.results import JobResult, Run, origins_of
+from femubench.core.schema.results import Run, origins_of
 from femubench.core.score.repeatability import unsteady
 from femubench.core.score.scoring import Reference, rank_results, reference_of
 
@@ -76,79 +75,48 @@ def run_jobs(
     place = executor or LocalProcesses(worker_count(jobs))
     place.admit(strategies, memory)
     share = place.share if memory is None else memory
-    asked = {"seed": run_seed, "timeout": timeout, "memory": share, **_about(place, request)}
+    how = place.enclosure()
+    why = {"sandbox_reason": how.reason} if how.reason else {}
+    where = {"jobs": place.workers, "sandbox": how.sandbox, **why}
+    asked: dict[str, Any] = {"seed": run_seed, "timeout": timeout, "memory": share, **where}
     own = {s.name: (timeouts or {}).get(s.name, timeout) for s in strategies}
-    limits = _limits(own, share, place.sandbox, _unseen(cases, store), _modules(strategies))
+    # The module of a strategy may be in no folder of code.
+    names = {home_of(strategy)[1] for strategy in strategies} - {"__main__"}
+    files = {getattr(sys.modules.get(name), "__file__", None) for name in names}
+    code = tuple(sorted(os.path.abspath(file) for file in files if file))
+    # No strategy is to see the folders of the cases and of the results.
+    folders = {case.folder.absolute() for case in cases if (case.folder / "case.toml").is_file()}
+    folders |= {store.folder.absolute()} if store else set()
+    hidden = tuple(sorted(map(str, folders)))
+    sight = partial(replace, sandbox=place.sandbox, hidden=hidden, shown=code)
+    limits = {name: sight(Limits(seconds, share)) for name, seconds in own.items()}
     with threadpool_limits(1), ExitStack() as stack:
-        references = _references(cases, starts)
+        # What the yardstick of every case gives, solved once for those that share it.
+        solved: dict[tuple[int, int, int], Reference] = {}
+        given = {}
+        for case in map(starts.yardstick, (*cases, *starts.beside.twins)):
+            same = id(case.model), id(case.measurement), id(case.modifications)
+            if same not in solved:
+                solved[same] = reference_of(case)
+            given[case.name] = solved[same]
+        references = starts.beside.repeated(given)
         slots = Slots(starts.of_all(cases), strategies, seeds)
-        slots.meta = _meta(cases, slots, references, asked, starts)
+        asked |= {"request": dict(request or {}), "plan": plan_digest(slots.keys)}
+        who, about = slots.strategies, {**starts.about(cases), **starts.beside.about(references)}
+        yardsticks = {case.name: references[case.name] for case in cases}
+        slots.meta = run_meta(cases, who, yardsticks, seeds, asked, about)
         meta, known = recorded(stack, store, slots.meta, overwrite, resume)
         ending = stack.enter_context(ended(store, meta["run"]))
         results = Results(slots, store, meta["run"], progress, told)
         wanted = stack.enter_context(stopping()).until(results.keep(known, place.workers))
         for one in place.computed(slots, wanted, references, limits, results.shelf):
             results.add(*one)
-        ending |= _only_now(found := _run(meta, results.in_order()))
+        others, done = origins_of(meta), results.in_order()
+        ranked = rank_results([r for r in done if r.case not in others], meta["reference"])
+        found = Run(meta, ranked, tuple(result for result in done if result.case in others))
+        if origins_of(meta, "again"):
+            ending["unsteady"] = unsteady(found)
     return replace(found, meta={**meta, **ending})
-
-
-def _run(meta: Mapping[str, Any], results: Sequence[JobResult]) -> Run:
-    """Return a run, its results apart from those on what ran beside its cases."""
-    others = origins_of(meta)
-    own = rank_results([r for r in results if r.case not in others], meta["reference"])
-    return Run(meta, own, tuple(result for result in results if result.case in others))
-
-
-def _only_now(run: Run) -> dict[str, Any]:
-    """Return meta data that are known only when all jobs are done."""
-    return {"unsteady": unsteady(run)} if origins_of(run.meta, "again") else {}
-
-
-def _about(place: Executor, request: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Return how and where strategies run, and what was asked for."""
-    how = place.enclosure()
-    why = {"sandbox_reason": how.reason} if how.reason else {}
-    own = {"jobs": place.workers, "sandbox": how.sandbox, **why}
-    return {"request": dict(request or {}), **own}
-
-
-def _limits(
-    seconds: Mapping[str, float | None],
-    memory: int | None,
-    sandbox: Sandbox,
-    hidden: tuple[str, ...],
-    shown: tuple[str, ...],
-) -> dict[str, Limits]:
-    """Return the limits by strategy: what each may take, and what it sees."""
-    sight = partial(replace, sandbox=sandbox, hidden=hidden, shown=shown)
-    return {name: sight(Limits(own, memory)) for name, own in seconds.items()}
-
-
-def _unseen(cases: Sequence[Case], store: Store | None) -> tuple[str, ...]:
-    """Return the folders of the cases and of the results, which no strategy is to see."""
-    found = {case.folder.absolute() for case in cases if (case.folder / "case.toml").is_file()}
-    return tuple(sorted(map(str, found | ({store.folder.absolute()} if store else set()))))
-
-
-def _modules(strategies: Sequence[Strategy]) -> tuple[str, ...]:
-    """Return the files of the modules of strategies, one of which may be in no folder of code."""
-    names = {home_of(strategy)[1] for strategy in strategies} - {"__main__"}
-    files = {getattr(sys.modules.get(name), "__file__", None) for name in names}
-    return tuple(sorted(os.path.abspath(file) for file in files if file))
-
-
-def _meta(
-    cases: Sequence[Case],
-    slots: Slots,
-    references: Mapping[str, Reference],
-    settings: Mapping[str, Any],
-    starts: Starts,
-) -> dict[str, Any]:
-    planned = {**settings, "plan": plan_digest(slots.keys)}
-    who, about = slots.strategies, {**starts.about(cases), **starts.beside.about(references)}
-    own = {case.name: references[case.name] for case in cases}
-    return run_meta(cases, who, own, slots.seeds, planned, about)
 
 
 def _check_names(**given: Sequence[Case] | Sequence[Strategy]) -> None:
@@ -157,15 +125,3 @@ def _check_names(**given: Sequence[Case] | Sequence[Strategy]) -> None:
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise InputError(f"{kind} {twice[0]!r} occurs twice", expected="every name once")
-
-
-def _references(cases: Sequence[Case], starts: Starts) -> dict[str, Reference]:
-    """Return what the yardstick of every case gives, solved once for cases that share it."""
-    solved: dict[tuple[int, int, int], Reference] = {}
-    found = {}
-    for case in map(starts.yardstick, (*cases, *starts.beside.twins)):
-        same = id(case.model), id(case.measurement), id(case.modifications)
-        if same not in solved:
-            solved[same] = reference_of(case)
-        found[case.name] = solved[same]
-    return starts.beside.repeated(found)

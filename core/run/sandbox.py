@@ -141,7 +141,7 @@ def walls_around(hidden: Iterable[str], code: Iterable[str] = ()) -> Walls:
     covers.update(path for given in hidden for path in (given, os.path.realpath(given)))
     outermost = tuple(path for path in _outermost(both) if path not in covers)
     covers.update(_elsewhere(covers, outermost))
-    inside = (path for path in covers if _below(path, outermost))
+    inside = (path for path in covers if any(Path(path).is_relative_to(top) for top in outermost))
     return Walls(outermost, links, tuple(_outermost(inside)))
 
 
@@ -168,16 +168,6 @@ def enter(walls: Walls, at: str, room: int, processes: int) -> None:
         OSError: where the system refuses the namespaces; the processes are as before then.
     """
     go_apart(walls, at, room, processes)
-    _forget_environment()
-    os.environ["HOME"] = os.environ["TMPDIR"] = tempfile.tempdir = FOLDER
-    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    most = _MOST_FILES if hard == resource.RLIM_INFINITY else min(_MOST_FILES, hard)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
-    refuse_system_calls()
-
-
-def _forget_environment() -> None:
-    """Keep of the environment what programs need, also in the memory where it came from."""
     kept = {name: os.environ[name] for name in _bare(os.environ)}
     for name in tuple(os.environ):
         del os.environ[name]
@@ -187,6 +177,11 @@ def _forget_environment() -> None:
         words = stream.read().rpartition(b")")[2].split()
     start, end = int(words[_ENVIRONMENT_START]), int(words[_ENVIRONMENT_START + 1])
     ctypes.memset(start, 0, end - start)
+    os.environ["HOME"] = os.environ["TMPDIR"] = tempfile.tempdir = FOLDER
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    most = _MOST_FILES if hard == resource.RLIM_INFINITY else min(_MOST_FILES, hard)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+    refuse_system_calls()
 
 
 def _bare(given: Iterable[str]) -> set[str]:
@@ -278,7 +273,3 @@ def _elsewhere(paths: Iterable[str], shown: Iterable[str]) -> Iterator[str]:
         for path in listed if real != other else ():
             if Path(path).is_relative_to(real):
                 yield os.path.normpath(os.path.join(other, os.path.relpath(path, real)))
-
-
-def _below(path: str, folders: Iterable[str]) -> bool:
-    return any(Path(path).is_relative_to(folder) for folder in folders)

@@ -113,7 +113,11 @@ class _Bench:
             names = slot.strategy, slot.seed, slot.nominal
             digest, case = self._case(slot.start)
             verdict = Verdict(case, answer, *names, exhibited=shown)
-            ending = judges.start(task, digest, verdict, self._judging(slot.strategy))
+            limits = self._limits[slot.strategy]
+            seconds = None if limits.seconds is None else max(_LEAST_JUDGING, limits.seconds)
+            ending = judges.start(
+                task, digest, verdict, replace(limits, seconds=seconds, sandbox="off")
+            )
         else:
             ending = workers.start(task, run_strategy, job, self._limits[slot.strategy])
         if ending is not None and not self._again(task):
@@ -142,7 +146,14 @@ class _Bench:
             found = self._judgement(self._slots[index], ending)
             yield index, self.unjudged(index, found) if isinstance(found, JobOutcome) else found
         else:
-            outcome = _outcome_of(ending)
+            if ending.how != "answer":
+                status: Status = "timeout" if ending.how == "timeout" else "crashed"
+                outcome = JobOutcome(status, ending.reason, seconds=ending.seconds)
+            else:
+                try:
+                    outcome = head_of(ending.answer)
+                except AnswerError as error:
+                    outcome = JobOutcome("failed", str(error), seconds=ending.seconds)
             if outcome.status == "ok":
                 self.answers.append((index, ending.answer))
             else:
@@ -171,23 +182,7 @@ class _Bench:
         data = pickle.dumps(pair, protocol=pickle.HIGHEST_PROTOCOL)
         return hashlib.blake2b(data, digest_size=16).digest(), data
 
-    def _judging(self, strategy: str) -> Limits:
-        limits = self._limits[strategy]
-        seconds = None if limits.seconds is None else max(_LEAST_JUDGING, limits.seconds)
-        return replace(limits, seconds=seconds, sandbox="off")
-
 
 def unjudged(slot: Slot, reference: Reference, outcome: JobOutcome) -> JobResult:
     """Return the result of a job that has no model to be judged."""
     return judged(slot.case, reference, (slot.strategy, slot.seed, slot.nominal), outcome)
-
-
-def _outcome_of(ending: Ending) -> JobOutcome:
-    """Return how a strategy's process says that its job ended, or what ended the process."""
-    if ending.how != "answer":
-        status: Status = "timeout" if ending.how == "timeout" else "crashed"
-        return JobOutcome(status, ending.reason, seconds=ending.seconds)
-    try:
-        return head_of(ending.answer)
-    except AnswerError as error:
-        return JobOutcome("failed", str(error), seconds=ending.seconds)

@@ -132,11 +132,8 @@ class Slots(Sequence[Slot]):
             None if comes_along(strategy) else _Lately(partial(strategy_version, strategy))
             for strategy in strategies
         ]
-        known = map(_identity, strategies, self._codes)
-        self.keys = self._all_keys(list(known))
-
-    def _all_keys(self, known: Sequence[bytes]) -> list[str]:
-        return [
+        known = list(map(_identity, strategies, self._codes))
+        self.keys = [
             job_key(start.case, strategy.name, code, version, seed)
             for start in self.starts
             for seed in self.seeds

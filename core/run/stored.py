@@ -187,25 +187,21 @@ def records_of(path: Path, faults: list[InputError]) -> Iterator[AnyRecord]:
     for number, text, with_end in lines_of(path):
         try:
             if not old:
-                yield _record(path, run, number, text)
+                if not is_whole(text):
+                    expected = "the line that was written"
+                    raise InputError("damaged", file=path, line=number, expected=expected)
+                head = _HEAD.match(text)
+                if head is None:
+                    what, expected = f"schema {json.loads(text).get('schema')!r}", f"{SCHEMA}"
+                    raise InputError(what, file=path, line=number, key="schema", expected=expected)
+                kind, after, key, status = head.groups(b"")
+                name = json.loads(key) if b"\\" in key else key[1:-1].decode()
+                yield Record(path, number, kind.decode(), run, after, name, status.decode(), text)
             elif text.strip():
                 yield _old_record(path, number, text)
         except InputError as fault:
             cut = InputError(CUT_SHORT, file=path, line=number, expected="a whole record")
             faults.append(fault if with_end else cut)
-
-
-def _record(path: Path, run: str, number: int, text: bytes) -> Record:
-    if not is_whole(text):
-        expected = "the line that was written"
-        raise InputError("damaged", file=path, line=number, expected=expected)
-    head = _HEAD.match(text)
-    if head is None:
-        what, expected = f"schema {json.loads(text).get('schema')!r}", f"{SCHEMA}"
-        raise InputError(what, file=path, line=number, key="schema", expected=expected)
-    kind, after, key, status = head.groups(b"")
-    name = json.loads(key) if b"\\" in key else key[1:-1].decode()
-    return Record(path, number, kind.decode(), run, after, name, status.decode(), text)
 
 
 def _old_record(path: Path, number: int, text: bytes) -> OldRecord:

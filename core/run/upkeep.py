@@ -95,28 +95,24 @@ def repair(store: Store) -> list[Repair]:
         for _ in _chained(file, faults):
             pass
         if file.name == OLD_FILE:
-            done.append(_converted(store, file, faults))
+            # The records of schema 1 become files of this version.
+            kept, runs = 0, dict.fromkeys(record.run for record in records_of(file, []))
+            with ExitStack() as stack:
+                for run in runs:
+                    stack.enter_context(store.exclusive(run))
+                aside = _set_aside(file, faults)
+                for run in runs:
+                    own = store.file_of(run)
+                    kept += _rewritten(store.folder, own, store.records(run, []))
+                file.replace(file.with_name(f"{file.name}{_CONVERTED}"))
+                sync(store.folder)
+            done.append(Repair(file, kept, len(faults), aside))
         elif faults:
             with store.exclusive(file.stem):
                 aside = _set_aside(file, faults)
                 kept = _rewritten(store.folder, file, records_of(file, []))
                 done.append(Repair(file, kept, len(faults), aside))
     return done
-
-
-def _converted(store: Store, old: Path, faults: list[InputError]) -> Repair:
-    """Let the records of schema 1 be files of this version."""
-    kept, runs = 0, dict.fromkeys(record.run for record in records_of(old, []))
-    with ExitStack() as stack:
-        for run in runs:
-            stack.enter_context(store.exclusive(run))
-        aside = _set_aside(old, faults)
-        for run in runs:
-            own = store.file_of(run)
-            kept += _rewritten(store.folder, own, store.records(run, []))
-        old.replace(old.with_name(f"{old.name}{_CONVERTED}"))
-        sync(store.folder)
-    return Repair(old, kept, len(faults), aside)
 
 
 def _set_aside(file: Path, faults: Iterable[InputError]) -> Path | None:

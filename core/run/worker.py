@@ -78,11 +78,21 @@ def serve(
     """
     descriptor = answer.fileno()
     stand_alone(output, descriptor)
-    _settle(scratch)
+    os.chdir(scratch)
+    os.environ["TMPDIR"] = tempfile.tempdir = scratch
+    # The words of the command line are none of a strategy's business.
+    sys.argv = [""]
+    # PYTHONWARNINGS and -W of the parent are for the parent.
+    sys.warnoptions = []
     if walls is not None:
         room = limits.file if limits.memory is None else min(limits.file, limits.memory)
         enter(walls, scratch, room, limits.processes)
-    _set_limits(limits)
+    _lower(resource.RLIMIT_CORE, 0)
+    _lower(resource.RLIMIT_FSIZE, limits.file)
+    # Without this the signal would end the process before the write could fail.
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    if limits.memory is not None:
+        _lower(resource.RLIMIT_AS, address_space() + limits.memory)
     os.write(descriptor, READY)
     with warnings.catch_warnings():
         data = function(argument)
@@ -116,29 +126,10 @@ def stand_alone(output: Connection, *kept: int) -> None:
         os.closerange(low + 1, high)
 
 
-def _settle(scratch: str) -> None:
-    """Work in a folder of its own, and forget how the parent was called."""
-    os.chdir(scratch)
-    os.environ["TMPDIR"] = tempfile.tempdir = scratch
-    # The words of the command line are none of a strategy's business.
-    sys.argv = [""]
-    # PYTHONWARNINGS and -W of the parent are for the parent.
-    sys.warnoptions = []
-
-
 def end_with_parent() -> None:
     """Let this process be ended when its parent ends (Linux)."""
     if sys.platform == "linux":
         _LIBC.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-
-
-def _set_limits(limits: Limits) -> None:
-    _lower(resource.RLIMIT_CORE, 0)
-    _lower(resource.RLIMIT_FSIZE, limits.file)
-    # Without this the signal would end the process before the write could fail.
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    if limits.memory is not None:
-        _lower(resource.RLIMIT_AS, address_space() + limits.memory)
 
 
 def address_space() -> int:

@@ -251,7 +251,22 @@ def parts_of(task: Task[Key]) -> list[Any]:
 def progress_of(task: Task[Key], *, look: bool) -> Ending | None:
     """Take what a task has sent; return how it ended, None while it goes on."""
     gone = bool(connection.wait([task.process.sentinel], 0.0))
-    _take(task)
+    for end in (task.output, task.answer):
+        while not end.closed:
+            try:
+                data = os.read(end.fileno(), _CHUNK)
+            except BlockingIOError:
+                break
+            except OSError:
+                data = b""
+            if not data:
+                end.close()
+            elif end is task.output:
+                task.printed += len(data)
+                if task.printed > task.limits.output:
+                    break
+            elif _receive(task, data):
+                break
     limits, now = task.limits, time.monotonic()
     seconds = now - (task.ready or now)
     if task.complete:
@@ -288,25 +303,6 @@ def _excess(task: Task[Key]) -> str | None:
         if used > limits.memory + _BASE:
             return f"used {spoken_bytes(used)} of memory, allowed {spoken_bytes(limits.memory)}"
     return None
-
-
-def _take(task: Task[Key]) -> None:
-    for end in (task.output, task.answer):
-        while not end.closed:
-            try:
-                data = os.read(end.fileno(), _CHUNK)
-            except BlockingIOError:
-                break
-            except OSError:
-                data = b""
-            if not data:
-                end.close()
-            elif end is task.output:
-                task.printed += len(data)
-                if task.printed > task.limits.output:
-                    break
-            elif _receive(task, data):
-                break
 
 
 def _receive(task: Task[Key], data: bytes) -> bool:
@@ -378,9 +374,10 @@ class Workers(Generic[Key]):
     def open(self) -> Iterator[Workers[Key]]:
         """Start what the workers need, and leave no process and no file behind."""
         self._root = scratch_root()
-        _end_old_server()
+        if _source != source_digest():
+            _end_server()
         self._mark = _server_mark()
-        with adopting(), _server_awake():
+        with adopting(), repeating(_wake_server, _TICK):
             try:
                 yield self
             finally:
@@ -403,7 +400,12 @@ class Workers(Generic[Key]):
             limits: what it may take.
         """
         context, walls = get_context("forkserver"), self._walls(limits)
-        scratch = self._scratch()
+        # Without a sandbox a job may have removed the one above.
+        try:
+            scratch = tempfile.mkdtemp(dir=self._root)
+        except FileNotFoundError:
+            self._root.mkdir(mode=0o700, parents=True)
+            scratch = tempfile.mkdtemp(dir=self._root)
         answer, send = context.Pipe(duplex=False)
         output, printed = context.Pipe(duplex=False)
         arguments = (function, argument, send, printed, limits, scratch, walls)
@@ -430,14 +432,6 @@ class Workers(Generic[Key]):
         if parts not in self._around:
             self._around[parts] = walls_around(*parts)
         return self._around[parts]
-
-    def _scratch(self) -> str:
-        """Make a folder for a task; without a sandbox a job may have removed the one above."""
-        try:
-            return tempfile.mkdtemp(dir=self._root)
-        except FileNotFoundError:
-            self._root.mkdir(mode=0o700, parents=True)
-            return tempfile.mkdtemp(dir=self._root)
 
     def wait(self, beside: Sequence[Any] = ()) -> list[tuple[Key, Ending]]:
         """Wait until some task has ended, and return those that have; none after a short while.
@@ -528,25 +522,19 @@ _mark = ""
 _source = ""  # what the server has loaded
 
 
-def _end_old_server() -> None:
-    """End the server where the source that it has loaded has changed since."""
-    if _source != source_digest():
-        _end_server()
-
-
 def _end_server() -> None:
     if alive(_server()):
         forkserver._forkserver._stop()  # type: ignore[attr-defined]
 
 
 @contextmanager
-def _server_awake() -> Iterator[None]:
-    """Let the server go on whenever a job stops it, even while a start waits for its answer."""
+def repeating(action: Callable[[], object], seconds: float) -> Iterator[None]:
+    """Call a function every so many seconds, in another thread, while the block runs."""
     done = threading.Event()
 
     def watch() -> None:
-        while not done.wait(_TICK):
-            _wake_server()
+        while not done.wait(seconds):
+            action()
 
     watcher = threading.Thread(target=watch, daemon=True)
     watcher.start()
@@ -555,6 +543,14 @@ def _server_awake() -> Iterator[None]:
     finally:
         done.set()
         watcher.join()
+
+
+def _wake_server() -> None:
+    """Let the server go on where a job has stopped it; a start may be waiting for its answer."""
+    server = _server()
+    with suppress(psutil.Error, ProcessLookupError):
+        if server is not None and psutil.Process(server).status() == psutil.STATUS_STOPPED:
+            os.kill(server, signal.SIGCONT)
 
 
 _hiding = threading.Lock()
@@ -575,13 +571,6 @@ def no_script() -> Iterator[None]:
             script = _hidden.pop()
             if not _hidden:
                 sys.modules["__main__"] = script
-
-
-def _wake_server() -> None:
-    server = _server()
-    with suppress(psutil.Error, ProcessLookupError):
-        if server is not None and psutil.Process(server).status() == psutil.STATUS_STOPPED:
-            os.kill(server, signal.SIGCONT)
 
 
 def _server() -> int | None:

@@ -13,7 +13,6 @@ from femubench.core.score.counting import block_shares, counted_blocks
 from femubench.core.score.ranking import OFFSET_PERCENT, geometric_mean, score_of
 from femubench.core.score.repeatability import environment_differences
 from femubench.core.score.statistics import Evidence, ScoreTable, evidence_of, structures_of
-from femubench.core.typing import FloatArray
 
 Metric = Literal["unseen", "used", "higher", "modified", "seconds", "failures"]
 METRICS: tuple[Metric, ...] = get_args(Metric)
@@ -218,12 +217,17 @@ def compare_runs(
     old = _by_job(before.started_from(nominal), names)
     new = _by_job(after.started_from(nominal), {b: b for b in names.values()})
     shared = [job for job in old if job in new]
-    other = [job for job in shared if _moved(before, old[job], after, new[job])]
+    # One name may stand for two different cases.
+    digests = ((job, _digest(before, old[job]), _digest(after, new[job])) for job in shared)
+    other = [job for job, first, second in digests if first and second and first != second]
     shared = [job for job in shared if job not in set(other)]
     if not shared:
         expected = "one (case, strategy, seed) with the same case files"
         raise InputError("the two runs have no job in common", expected=expected)
-    references = _references(before, after, shared)
+    known = {**(after.meta.get("reference") or {}), **(before.meta.get("reference") or {})}
+    references = {
+        case: known[case] for case in dict.fromkeys(job.case for job in shared) if case in known
+    }
     structures = {**structures_of(after), **structures_of(before)}
     shares = block_shares(references, structures)
     pairs = [
@@ -231,6 +235,17 @@ def compare_runs(
         for j in shared
     ]
     rows = tuple(_rows(pairs))
+    excesses = (
+        Excess(row.strategy, row.scenario, t.metric, value, t.most)
+        for t in thresholds
+        for row in rows
+        if (value := row.values[t.metric]) is not None and value > t.most + _ROUNDING * abs(t.most)
+    )
+    told = (t.metric for t in thresholds if all(row.values[t.metric] is None for row in rows))
+    ran = list(dict.fromkeys(pair.strategy for pair in pairs))
+    columns = [[pair.before for pair in pairs if pair.strategy == name] for name in ran]
+    columns += [[pair.after for pair in pairs if pair.strategy == name] for name in ran]
+    table = ScoreTable.of(columns, references, structures)
     return Comparison(
         before=str(before.meta.get("run") or "A"),
         after=str(after.meta.get("run") or "B"),
@@ -238,32 +253,21 @@ def compare_runs(
         jobs=len(pairs),
         changes=_changes(pairs),
         rows=rows,
-        evidence=evidence_of(_ratios(pairs, references, structures)),
+        evidence=evidence_of({name: table.ratios(k, k + len(ran)) for k, name in enumerate(ran)}),
         only_before=tuple(job for job in old if job not in new),
         only_after=tuple(job for job in new if job not in old),
         other_cases=tuple(other),
         environment=tuple(environment_differences(_safe(before.meta), _safe(after.meta))),
         notes=tuple(dict.fromkeys((*_notes(before), *_notes(after)))),
         thresholds=tuple(thresholds),
-        excesses=tuple(_excesses(rows, thresholds)),
-        untested=_untested(rows, thresholds),
+        excesses=tuple(excesses),
+        untested=tuple(told),
     )
-
-
-def _untested(rows: Sequence[Row], thresholds: Iterable[Threshold]) -> tuple[str, ...]:
-    told = (t.metric for t in thresholds if all(row.values[t.metric] is None for row in rows))
-    return tuple(told)
 
 
 def _notes(run: Run) -> list[str]:
     told = run.meta.get("notes")
     return list(map(str, told)) if isinstance(told, (list, tuple)) else []
-
-
-def _references(before: Run, after: Run, jobs: Iterable[Job]) -> dict[str, Mapping[str, float]]:
-    """Return the nominal errors of the cases of jobs, as A has them where both do."""
-    known = {**(after.meta.get("reference") or {}), **(before.meta.get("reference") or {})}
-    return {case: known[case] for case in dict.fromkeys(job.case for job in jobs) if case in known}
 
 
 def _common_start(before: Run, after: Run) -> Nominal:
@@ -318,12 +322,6 @@ def _digest(run: Run, result: JobResult) -> str:
     return str(result.provenance.get("case") or listed.get("digest") or "")
 
 
-def _moved(before: Run, old: JobResult, after: Run, new: JobResult) -> bool:
-    """Tell whether one name stands for two different cases."""
-    first, second = _digest(before, old), _digest(after, new)
-    return bool(first and second and first != second)
-
-
 def _safe(meta: Mapping[str, Any]) -> dict[str, Any]:
     """Return the meta data with nothing in place of what a stranger wrote for a table."""
     return {
@@ -362,19 +360,6 @@ def _damage(result: JobResult) -> str:
     return ", ".join(f"{number} {what}" for what, number in counts.items() if number)
 
 
-def _ratios(
-    pairs: Sequence[_Pair],
-    references: Mapping[str, Mapping[str, float]],
-    structures: Mapping[str, str],
-) -> dict[str, FloatArray]:
-    """Return the ratios of the scores on all structures by strategy."""
-    names = list(dict.fromkeys(pair.strategy for pair in pairs))
-    columns = [[pair.before for pair in pairs if pair.strategy == name] for name in names]
-    columns += [[pair.after for pair in pairs if pair.strategy == name] for name in names]
-    table = ScoreTable.of(columns, references, structures)
-    return {name: table.ratios(k, k + len(names)) for k, name in enumerate(names)}
-
-
 def _rows(pairs: Iterable[_Pair]) -> Iterable[Row]:
     groups: dict[str, dict[str | None, list[_Pair]]] = {}
     for pair in pairs:
@@ -383,29 +368,17 @@ def _rows(pairs: Iterable[_Pair]) -> Iterable[Row]:
         group.setdefault(pair.before.case.partition("/")[0], []).append(pair)
     for strategy, scenarios in groups.items():
         for scenario, listed in scenarios.items():
-            yield Row(strategy, scenario, len(listed), _values(listed))
-
-
-def _values(pairs: Sequence[_Pair]) -> dict[str, float | None]:
-    ratios = [(pair.unseen, pair.weight) for pair in pairs if pair.weight > 0.0]
-    known = [(ratio, weight) for ratio, weight in ratios if ratio is not None]
-    values: dict[str, float | None] = {"unseen": None}
-    if known:
-        values["unseen"] = geometric_mean((r for r, _ in known), (w for _, w in known))
-    for block in BLOCKS:
-        errors = [pair.blocks[block] for pair in pairs if block in pair.blocks]
-        values[block] = geometric_mean(errors) if errors else None
-    timed = [pair for pair in pairs if pair.before.status == pair.after.status == "ok"]
-    total = sum(pair.before.seconds for pair in timed)
-    ratio = sum(pair.after.seconds for pair in timed) / total if total > 0.0 else math.inf
-    values["seconds"] = ratio if math.isfinite(ratio) else None
-    values["failures"] = float(sum(change.kind == "lost" for change in _changes(pairs)))
-    return values
-
-
-def _excesses(rows: Sequence[Row], thresholds: Iterable[Threshold]) -> Iterable[Excess]:
-    for item in thresholds:
-        for row in rows:
-            value = row.values[item.metric]
-            if value is not None and value > item.most + _ROUNDING * abs(item.most):
-                yield Excess(row.strategy, row.scenario, item.metric, value, item.most)
+            ratios = [(pair.unseen, pair.weight) for pair in listed if pair.weight > 0.0]
+            known = [(ratio, weight) for ratio, weight in ratios if ratio is not None]
+            values: dict[str, float | None] = {"unseen": None}
+            if known:
+                values["unseen"] = geometric_mean((r for r, _ in known), (w for _, w in known))
+            for block in BLOCKS:
+                errors = [pair.blocks[block] for pair in listed if block in pair.blocks]
+                values[block] = geometric_mean(errors) if errors else None
+            timed = [pair for pair in listed if pair.before.status == pair.after.status == "ok"]
+            total = sum(pair.before.seconds for pair in timed)
+            ratio = sum(pair.after.seconds for pair in timed) / total if total > 0.0 else math.inf
+            values["seconds"] = ratio if math.isfinite(ratio) else None
+            values["failures"] = float(sum(change.kind == "lost" for change in _changes(listed)))
+            yield Row(strategy, scenario, len(listed), values)

@@ -265,7 +265,16 @@ def _row(strategy: str, results: Sequence[JobResult], table: _Table) -> dict[str
         else _over_seeds(left, strategy, table.seed)
     )
     fine = [result for result in results if result.status == "ok"]
-    figures = _by_case(fine)
+    figures: dict[str, dict[str, list[float]]] = {
+        name: defaultdict(list) for name in (*BLOCKS, *_FIGURES)
+    }
+    for result in fine:
+        case = result.case
+        for name, block in result.blocks.items():
+            figures[name][case].append(block.rms_percent)
+        for name, value in zip(_FIGURES, _figures(result), strict=True):
+            if value is not None:
+                figures[name][case].append(value)
     lost = sum(result.rigid_modes_lost for result in fine)
     negative = sum(result.negative_eigenvalues or 0 for result in fine)
     return {
@@ -314,21 +323,6 @@ def _over_seeds(left: FloatArray, strategy: str, seed: int) -> tuple[float, floa
 
 _FIGURES = ("parameter_count", "evaluations", "seconds")
 _figures = attrgetter(*_FIGURES)
-
-
-def _by_case(results: Iterable[JobResult]) -> dict[str, dict[str, list[float]]]:
-    """Return errors by block and other figures, each by case, without what has no value."""
-    found: dict[str, dict[str, list[float]]] = {
-        name: defaultdict(list) for name in (*BLOCKS, *_FIGURES)
-    }
-    for result in results:
-        case = result.case
-        for name, block in result.blocks.items():
-            found[name][case].append(block.rms_percent)
-        for name, value in zip(_FIGURES, _figures(result), strict=True):
-            if value is not None:
-                found[name][case].append(value)
-    return found
 
 
 def _median(by_case: Mapping[str, Sequence[float]]) -> float:

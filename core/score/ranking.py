@@ -148,7 +148,18 @@ def scores_and_ranks(
     baseline: str | None = None,
 ) -> tuple[list[float], list[int]]:
     """Return the scores and ranks of results; arguments and order as for `rank_results`."""
-    scores = _scores(results, reference, baseline)
+    if reference is not None:
+        scores = _scores_against(results, reference)
+    else:
+        given = {
+            _group(item): {name: block.rms_percent for name, block in item.blocks.items()}
+            for item in results
+            if item.strategy == baseline
+        }
+        scores = [
+            score_of(item, given.get(_group(item), {})) if item.score is None else item.score
+            for item in results
+        ]
     groups: dict[tuple[str, int, Nominal], int] = {}
     group = [groups.setdefault(_group(result), len(groups)) for result in results]
     names = {name: n for n, name in enumerate(sorted({result.strategy for result in results}))}
@@ -174,25 +185,6 @@ def scores_and_ranks(
     ranks = np.empty(len(order), dtype=int)
     ranks[order] = 1 + starts[1] - starts[0]
     return scores, ranks.tolist()
-
-
-def _scores(
-    results: Sequence[JobResult],
-    reference: Mapping[str, Mapping[str, float]] | None,
-    baseline: str | None,
-) -> list[float]:
-    """Return the scores of results; arguments as for `rank_results`."""
-    if reference is not None:
-        return _scores_against(results, reference)
-    given = {
-        _group(item): {name: block.rms_percent for name, block in item.blocks.items()}
-        for item in results
-        if item.strategy == baseline
-    }
-    return [
-        score_of(item, given.get(_group(item), {})) if item.score is None else item.score
-        for item in results
-    ]
 
 
 def _scores_against(

@@ -24,9 +24,11 @@ def environment_differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> l
     Arguments:
         old, new: `Run.meta`.
     """
+    then, now = _environment(old), _environment(new)
     return [
-        f"{name}: {before} then, {after} now"
-        for name, before, after in _pairs(_environment(old), _environment(new))
+        f"{name}: {then.get(name, 'nothing')} then, {now.get(name, 'nothing')} now"
+        for name in dict.fromkeys((*then, *now))
+        if then.get(name) != now.get(name)
     ]
 
 
@@ -103,12 +105,6 @@ def _environment(meta: Mapping[str, Any]) -> dict[str, Any]:
         "git commit": meta.get("git_commit"),
         **{f"case {name}": str(item.get("digest"))[:12] for name, item in cases.items()},
     }
-
-
-def _pairs(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[tuple[str, object, object]]:
-    for name in dict.fromkeys((*old, *new)):
-        if old.get(name) != new.get(name):
-            yield name, old.get(name, "nothing"), new.get(name, "nothing")
 
 
 def _differences(old: JobResult, new: JobResult) -> Iterator[str]:

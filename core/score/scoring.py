@@ -246,7 +246,20 @@ def judge(
     negative = int(np.count_nonzero(modes.eigenvalues < -reference.zero))
     blocks, choices = _blocks(case, model, modes, spread)
     surplus = surplus_partners(choices, reference.choices)
-    kept = _kept_rigid_modes(case, model, modes, reference)
+    # Of the rigid-body motions that are kept the spaces are compared, not the modes: among several
+    # zero modes the eigenvectors are arbitrary.
+    still = modes.shapes[:, np.abs(modes.eigenvalues) <= reference.zero]
+    same = model.size == case.model.size
+    rigid = reference.rigid if same else rigid_modes_of(model)
+    mass = case.model.mass if same else model.mass
+    if still.shape[1] == 0 or rigid.shape[1] == 0:
+        kept = 0
+    else:
+        values, turn = la.eigh(still.T @ (mass @ still))
+        keep = values > 1e-12 * values[-1]
+        basis = still @ (turn[:, keep] / np.sqrt(values[keep]))
+        cosines = la.svdvals(rigid.T @ (mass @ basis))
+        kept = int(np.count_nonzero(np.square(cosines) > _SAME_MOTION))
     return Judgement(blocks, kept, negative, surplus.count, surplus.reason)
 
 
@@ -338,21 +351,3 @@ def _block(pairs: tuple[PairedMode, ...], shaped: Sequence[bool]) -> Block:
     likeness = [pair.mac or 0.0 for pair, has in zip(pairs, shaped, strict=True) if has]
     mean_mac = float(np.mean(likeness)) if likeness else None
     return Block(100.0 * float(np.sqrt(np.mean(np.square(errors)))), mean_mac, pairs)
-
-
-def _kept_rigid_modes(case: Case, model: Model, modes: Modes, reference: Reference) -> int:
-    """Count the directions that zero modes and nominal rigid-body motions have in common.
-
-    Spaces are compared, not modes: among several zero modes the eigenvectors are arbitrary.
-    """
-    still = modes.shapes[:, np.abs(modes.eigenvalues) <= reference.zero]
-    same = model.size == case.model.size
-    rigid = reference.rigid if same else rigid_modes_of(model)
-    mass = case.model.mass if same else model.mass
-    if still.shape[1] == 0 or rigid.shape[1] == 0:
-        return 0
-    values, turn = la.eigh(still.T @ (mass @ still))
-    keep = values > 1e-12 * values[-1]
-    basis = still @ (turn[:, keep] / np.sqrt(values[keep]))
-    cosines = la.svdvals(rigid.T @ (mass @ basis))
-    return int(np.count_nonzero(np.square(cosines) > _SAME_MOTION))

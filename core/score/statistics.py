@@ -287,36 +287,33 @@ def tell_apart(run: Run, order: Sequence[str]) -> Groups:
         return Groups((), (), (), note)
     raw = {pair: _test(values) for pair, values in logs.items()}
     found = [1.0 if p is None else p for p in _corrected(list(raw.values()))]
-    sets, whole = _groups(
-        len(order), [pair for pair, p in zip(places, found, strict=True) if p < LEVEL]
-    )
-    note = _NOTE + _out_of_reach(most, [p is not None for p in raw.values()], len(order) - 1)
-    if not whole:
+    # Every pair that does not differ is in one of the sets; with too many of them only those of
+    # strategies that follow one another in the ranking are shown.
+    apart, others = [0] * len(order), len(order) - 1
+    for (i, j), p in zip(places, found, strict=True):
+        if p < LEVEL:
+            apart[i] |= 1 << j
+            apart[j] |= 1 << i
+    cliques = _cliques(apart)
+    listed = _stretches(apart) if cliques is None else cliques
+    sets = sorted([place for place in range(len(order)) if one >> place & 1] for one in listed)
+    # Pairs with the first strategy come first.
+    tested, least = [p is not None for p in raw.values()], 2.0 ** (1 - most)
+    kinds = {"pairs": sum(tested), "comparisons with the first strategy": sum(tested[:others])}
+    named = [f"{count} {kind}" for kind, count in kinds.items() if least * count >= LEVEL]
+    note = _NOTE
+    if named:
+        note += (
+            f" With {most} structures the test gives no p below {least:.2g}, too much for "
+            f"{' and for '.join(named)}: none can be shown there, however large the difference."
+        )
+    if cliques is None:
         note += " Of many overlapping groups those of neighbours in the ranking are shown."
     return Groups(
         tuple(tuple(order[place] for place in tier) for tier in _tiers(len(order), raw)),
         tuple((order[i], order[j], p) for (i, j), p in zip(places, found, strict=True)),
         tuple(tuple(order[place] for place in members) for members in sets),
         note,
-    )
-
-
-def _out_of_reach(most: int, tested: Sequence[bool], others: int) -> str:
-    """Return which comparisons can show nothing because so few structures are there.
-
-    Arguments:
-        most: structures that differ in one comparison, at most.
-        tested: whether a pair is tested; those with the first strategy come first.
-        others: number of strategies but the first.
-    """
-    least = 2.0 ** (1 - most)
-    kinds = {"pairs": sum(tested), "comparisons with the first strategy": sum(tested[:others])}
-    named = [f"{count} {kind}" for kind, count in kinds.items() if least * count >= LEVEL]
-    if not named:
-        return ""
-    return (
-        f" With {most} structures the test gives no p below {least:.2g}, too much for "
-        f"{' and for '.join(named)}: none can be shown there, however large the difference."
     )
 
 
@@ -394,22 +391,6 @@ def _signed_rank(logs: FloatArray) -> tuple[float, bool]:
     return min(1.0, 2.0 * tail), up > total - up
 
 
-def _groups(count: int, different: Iterable[tuple[int, int]]) -> tuple[list[list[int]], bool]:
-    """Return the largest sets without a pair that differs, and whether these are all of them.
-
-    Every pair that does not differ is in one of the sets; with too many of them only those of
-    strategies that follow one another in the ranking are returned.
-    """
-    apart = [0] * count
-    for i, j in different:
-        apart[i] |= 1 << j
-        apart[j] |= 1 << i
-    sets = _cliques(apart)
-    listed = _stretches(apart) if sets is None else sets
-    members = ([place for place in range(count) if found >> place & 1] for found in listed)
-    return sorted(members), sets is not None
-
-
 def _cliques(apart: Sequence[int]) -> list[int] | None:
     """Return all largest sets by bits, splitting at each difference; None where they are many."""
     sets = [(1 << len(apart)) - 1]
@@ -421,20 +402,15 @@ def _cliques(apart: Sequence[int]) -> list[int] | None:
                 split += [found & ~bit, found & ~others]
             else:
                 split.append(found)
-        sets = _largest(split)
+        kept: list[int] = []
+        for best in sorted(set(split), key=lambda bits: -bits.bit_count()):
+            if not any(best & ~other == 0 for other in kept):
+                kept.append(best)
+        sets = kept
         # Between two steps there may be more sets than in the end, but not by much.
         if len(sets) > 4 * _MOST_GROUPS:
             return None
     return sets if len(sets) <= _MOST_GROUPS else None
-
-
-def _largest(sets: Sequence[int]) -> list[int]:
-    """Return the sets that lie in no other one."""
-    kept: list[int] = []
-    for found in sorted(set(sets), key=lambda bits: -bits.bit_count()):
-        if not any(found & ~other == 0 for other in kept):
-            kept.append(found)
-    return kept
 
 
 def _stretches(apart: Sequence[int]) -> list[int]:

@@ -56,7 +56,9 @@ class AttachedOscillator(FrameEffect):
         if model.structure is None:
             return ()
         frame = model.structure.frame
-        middles = [f"{m.name}@{_middle(m.elements):g}" for m in frame.members]
+        # The mesh node nearest to the middle of a member.
+        middle = {m.name: m.elements // 2 / m.elements or 0.5 for m in frame.members}
+        middles = [f"{name}@{station:g}" for name, station in middle.items()]
         return directed_places(model, [*frame.joint_index, *middles])
 
     def finer(self, model: Model, place: str) -> Sequence[str]:
@@ -108,8 +110,3 @@ class AttachedOscillator(FrameEffect):
             return np.column_stack([stiffness, mass, mass][: len(terms)])
 
         return Change(tuple(terms), factors, extra=1)
-
-
-def _middle(elements: int) -> float:
-    """Return the station of the mesh node nearest to the middle of a member."""
-    return (elements // 2) / elements if elements > 1 else 0.5

@@ -50,7 +50,11 @@ class BraceSpring(FrameEffect):
         if model.structure is None or model.structure.frame.plane == "out-of-plane":
             return ()
         frame = model.structure.frame
-        body = _bodies(frame)
+        body = dict(frame.joint_index)  # the number of the rigid body that links make of joints
+        for link in frame.links:
+            if len(link.motions) in (0, len(ACTIVE[frame.plane])):
+                taken = {body[name] for name in (link.leads, *link.follows)}
+                body = {name: min(taken) if own in taken else own for name, own in body.items()}
         joined = {frozenset(body[name] for name in member.ends) for member in frame.members}
         joined |= {frozenset([number]) for number in body.values()}
         joined |= _in_line(frame, body) if frame.links else set()
@@ -67,7 +71,14 @@ class BraceSpring(FrameEffect):
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return the stiffness along the line of the joints."""
         frame = model.frame_structure.frame
-        scale = once_for(model, "stiffness of a brace", lambda: _SHARE * _rigidity(frame))
+
+        def rigidity() -> float:  # of the members along themselves in the mean, N/m
+            each = [
+                m.material.E * m.section.A / member_length(frame, m.name) for m in frame.members
+            ]
+            return _SHARE * float(np.mean(each))
+
+        scale = once_for(model, "stiffness of a brace", rigidity)
         return (EffectParameter("stiffness", "N/m", scale, scaling="exponential", one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
@@ -80,22 +91,6 @@ class BraceSpring(FrameEffect):
         """Return the stiffness matrix of 1 N/m."""
         row = elongation_row(model, pair_of(model.frame_structure.frame, place))
         return proportional(Term("stiffness", RowOperator(row, np.eye(1))))
-
-
-def _rigidity(frame: Frame) -> float:
-    """Return the stiffness of the members along themselves in the mean in N/m."""
-    each = [m.material.E * m.section.A / member_length(frame, m.name) for m in frame.members]
-    return float(np.mean(each))
-
-
-def _bodies(frame: Frame) -> dict[str, int]:
-    """Return from every joint to the number of the rigid body that links make it part of."""
-    body = dict(frame.joint_index)
-    for link in frame.links:
-        if len(link.motions) in (0, len(ACTIVE[frame.plane])):
-            taken = {body[name] for name in (link.leads, *link.follows)}
-            body = {name: min(taken) if own in taken else own for name, own in body.items()}
-    return body
 
 
 def _in_line(frame: Frame, body: Mapping[str, int]) -> set[frozenset[int]]:

@@ -45,7 +45,15 @@ class GravityStiffness(FrameEffect):
         if model.structure is None or model.structure.frame.plane == "out-of-plane":
             return ()
         with suppress(ModelError):
-            return ("all",) if _MOST * _felt(model) > _LEAST else ()
+            unit = _unit(model)
+            modes = once_for(model, "modes under weight", lambda: solve_modes(model).elastic)
+            few = modes.take(np.arange(min(_MODES, len(modes))))
+            work = np.einsum("ij,ij->j", few.shapes, unit @ few.shapes)
+            scale = (
+                np.einsum("ij,ij->j", few.shapes, model.mass_times(few.shapes)) * few.eigenvalues
+            )
+            felt = float(np.abs(0.5 * work / scale).max(initial=0.0))
+            return ("all",) if _MOST * felt > _LEAST else ()
         return ()
 
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
@@ -64,16 +72,6 @@ class GravityStiffness(FrameEffect):
         """Return the geometric stiffness of the weight."""
         now = model.frame_structure.frame.gravity
         return proportional(sparse_term("stiffness", _unit(model)), neutral=now)
-
-
-def _felt(model: Model) -> float:
-    """Return by how much the weight changes one of the lowest elastic frequencies, relative."""
-    unit = _unit(model)
-    modes = once_for(model, "modes under weight", lambda: solve_modes(model).elastic)
-    few = modes.take(np.arange(min(_MODES, len(modes))))
-    work = np.einsum("ij,ij->j", few.shapes, unit @ few.shapes)
-    scale = np.einsum("ij,ij->j", few.shapes, model.mass_times(few.shapes)) * few.eigenvalues
-    return float(np.abs(0.5 * work / scale).max(initial=0.0))
 
 
 def _unit(model: Model) -> SparseArray:

@@ -27,7 +27,6 @@ from femubench.effect import (
     type_places,
 )
 from femubench.fem import (
-    BeamProperties,
     FloatArray,
     Frame,
     IntArray,
@@ -83,9 +82,15 @@ class JointOffset(FrameEffect):
         """Return the stiffness of the end elements by powers of their flexible length."""
         structure = model.frame_structure
         ends = ends_of(structure.frame, place)
-        rows, sides = _elements(structure, ends)
+        found: dict[int, list[float]] = {}
+        for end in ends:
+            element, side = structure.element_ends[end]
+            found.setdefault(element, [0.0, 0.0])[side] = 1.0
+        rows, sides = np.array(list(found), dtype=np.int64), np.array(list(found.values()))
         own = structure.properties.take(rows)
-        keys = np.column_stack([_flexible(own), sides.sum(axis=1), *_shear_ratios(own)])
+        bending = own.length - own.rigid_1 - own.rigid_2
+        shear = 12.0 * own.EIy * own.flex_z, 12.0 * own.EIz * own.flex_y
+        keys = np.column_stack([bending, sides.sum(axis=1), *shear])
         keys = np.array([[float(f"{v:.{_DIGITS}e}") for v in key] for key in keys])
         groups, group = np.unique(keys, axis=0, return_inverse=True)
         longest = _longest(structure, ends)
@@ -121,24 +126,6 @@ def _longest(structure: Structure, ends: Sequence[str]) -> float:
     return max(min(room), 1e-9)
 
 
-def _elements(structure: Structure, ends: Sequence[str]) -> tuple[IntArray, FloatArray]:
-    """Return the end elements, (k,), and which of their ends take part, 0 or 1, (k, 2)."""
-    found: dict[int, list[float]] = {}
-    for end in ends:
-        element, side = structure.element_ends[end]
-        found.setdefault(element, [0.0, 0.0])[side] = 1.0
-    return np.array(list(found), dtype=np.int64), np.array(list(found.values()))
-
-
-def _flexible(p: BeamProperties) -> FloatArray:
-    return p.length - p.rigid_1 - p.rigid_2
-
-
-def _shear_ratios(p: BeamProperties) -> tuple[FloatArray, FloatArray]:
-    """Return phi l^2 = 12 EI / (kappa G A) of both planes in m2, (k,) each."""
-    return 12.0 * p.EIy * p.flex_z, 12.0 * p.EIz * p.flex_y
-
-
 def _basis(key: FloatArray, lengths: FloatArray) -> FloatArray:
     """Return the functions of a that the stiffness of an element is made of, (g, 3 to 7).
 
@@ -166,25 +153,16 @@ def _kept_blocks(
     fresh = [i for i, name in enumerate(names) if name not in known]
     if fresh:
         p = model.frame_structure.properties.take(rows[fresh])
-        made = np.stack(_blocks(p, sides[fresh], key, longest), axis=1)
+        # The functions are all but dependent where the shear of both planes is alike: the
+        # smallest solution is the stable one.
+        nodes = chebyshev_nodes(0.0, longest, _SAMPLES)
+        many = p.take(np.tile(np.arange(len(p)), len(nodes)))
+        more = (nodes[:, None, None] * sides[fresh]).reshape(-1, 2)
+        rigid = {"rigid_1": many.rigid_1 + more[:, 0], "rigid_2": many.rigid_2 + more[:, 1]}
+        values = stiffness_matrices(replace(many, **rigid)).reshape(len(nodes), -1)
+        basis = _basis(key, nodes)
+        weight = basis.max(axis=1)[:, None]
+        fitted = np.linalg.lstsq(basis / weight, values / weight, rcond=1e-13)[0]
+        made = np.stack(list(fitted.reshape(-1, len(p), 12, 12)), axis=1)
         known.update((names[i], blocks) for i, blocks in zip(fresh, made, strict=True))
     return list(np.stack([known[name] for name in names], axis=1))
-
-
-def _blocks(
-    p: BeamProperties, sides: FloatArray, key: FloatArray, longest: float
-) -> list[FloatArray]:
-    """Return the matrices that belong to the functions of `_basis`, each (k, 12, 12).
-
-    The functions are all but dependent where the shear of both planes is alike: the smallest
-    solution is the stable one.
-    """
-    nodes = chebyshev_nodes(0.0, longest, _SAMPLES)
-    many = p.take(np.tile(np.arange(len(p)), len(nodes)))
-    more = (nodes[:, None, None] * sides).reshape(-1, 2)
-    rigid = {"rigid_1": many.rigid_1 + more[:, 0], "rigid_2": many.rigid_2 + more[:, 1]}
-    values = stiffness_matrices(replace(many, **rigid)).reshape(len(nodes), -1)
-    basis = _basis(key, nodes)
-    weight = basis.max(axis=1)[:, None]
-    fitted = np.linalg.lstsq(basis / weight, values / weight, rcond=1e-13)[0]
-    return list(fitted.reshape(-1, len(p), 12, 12))

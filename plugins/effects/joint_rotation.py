@@ -70,7 +70,9 @@ class JointRotation(FrameEffect):
     def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
         """Return the stiffnesses, with the members' own as scale, 4 EI/L and GJ/L, and the arm."""
         structure = model.frame_structure
-        scales = _scales(structure.frame, ends_of(structure.frame, place))
+        own, lateral, torsion = end_stiffness(structure.frame, ends_of(structure.frame, place))
+        names = ("stiffness", "bending", "bending ry")
+        scales = {**dict.fromkeys(names, own), "bending rz": lateral, "torsion": torsion}
         found = [
             EffectParameter(
                 name,
@@ -125,10 +127,3 @@ def _longest(structure: Structure, place: str) -> float:
     ends = ends_of(structure.frame, place)
     arms = [(end_arm(structure, end), end_room(structure, end)) for end in ends]
     return min((min(_LONGEST, room / arm) for arm, room in arms if arm > 0.0), default=0.0)
-
-
-def _scales(frame: Frame, ends: Sequence[str]) -> dict[str, float]:
-    """Return the members' own stiffness, averaged over ends, by the name of the spring's."""
-    own, lateral, torsion = end_stiffness(frame, ends)
-    names = ("stiffness", "bending", "bending ry")
-    return {**dict.fromkeys(names, own), "bending rz": lateral, "torsion": torsion}

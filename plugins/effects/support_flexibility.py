@@ -116,12 +116,8 @@ def _resistance(frame: Frame, word: str, direction: str) -> float:
     """Return the mean stiffness of whole members against a motion of a support."""
     kind, axis = divmod((*_TRANSLATIONS, *_ROTATIONS).index(direction), 3)
     members = members_at(frame, f"support:{word}")
-    return float(np.mean([_own(frame, m)[kind] @ _along(frame, m, axis) for m in members]))
-
-
-def _along(frame: Frame, member: Member, axis: int) -> FloatArray:
-    """Return the squared components of a global axis along a member's own, (3,)."""
-    return np.asarray(member_axes(frame, member)[0][:, axis] ** 2)
+    turns = [np.asarray(member_axes(frame, m)[0][:, axis] ** 2) for m in members]
+    return float(np.mean([_own(frame, m)[kind] @ t for m, t in zip(members, turns, strict=True)]))
 
 
 def _own(frame: Frame, member: Member) -> FloatArray:

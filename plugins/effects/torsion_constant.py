@@ -176,25 +176,20 @@ def estimated_torsion_constant(section: Section) -> tuple[float, str] | None:
         return None if own is None else (own.J, _RULES[section.shape])
     if a**2 > _SOLID * np.sqrt(iy * iz):
         return a**4 / (4.0 * np.pi**2 * (iy + iz)), "by Saint-Venant's estimate for a solid section"
-    b, h, wall = _thin_tube(a, iy, iz)
-    form = "square" if abs(iy / iz - 1.0) < _CLOSE else "rectangular"
-    return bredt(b, h, wall), f"by Bredt's formula for a {form} tube with the same area and inertia"
-
-
-def _thin_tube(a: float, iy: float, iz: float) -> tuple[float, float, float]:
-    """Return centre-line width, height and wall of a tube with these A, Iy and Iz, in m."""
-    if abs(iy / iz - 1.0) < _CLOSE:  # exact: I = A (c^2 + t^2) / 6, A = 4 c t
+    if abs(iy / iz - 1.0) < _CLOSE:
         half = 3.0 * iy / a
         c = float(np.sqrt(half + np.sqrt(max(half**2 - a**2 / 16.0, 0.0))))
-        return c, c, a / (4.0 * c)
+        b, h, wall, form = c, c, a / (4.0 * c), "square"
+    else:
 
-    def excess(r: float) -> float:
-        return float(r**2 * (3.0 + r) / (3.0 * r + 1.0) - iy / iz)
+        def excess(r: float) -> float:
+            return float(r**2 * (3.0 + r) / (3.0 * r + 1.0) - iy / iz)
 
-    # height over width
-    r = float(root_scalar(excess, bracket=(1e-6, 1e6), xtol=1e-12, rtol=1e-12).root)
-    b = float(np.sqrt(12.0 * iy / a * (1.0 + r) / (r**2 * (3.0 + r))))
-    return b, r * b, a / (2.0 * b * (1.0 + r))
+        # height over width
+        r = float(root_scalar(excess, bracket=(1e-6, 1e6), xtol=1e-12, rtol=1e-12).root)
+        b = float(np.sqrt(12.0 * iy / a * (1.0 + r) / (r**2 * (3.0 + r))))
+        h, wall, form = r * b, a / (2.0 * b * (1.0 + r)), "rectangular"
+    return bredt(b, h, wall), f"by Bredt's formula for a {form} tube with the same area and inertia"
 
 
 def is_round(section: Section) -> bool | None:

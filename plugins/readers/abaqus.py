@@ -47,7 +47,10 @@ class AbaqusReader:
 
     def read_pair(self, stiffness: Path, mass: Path) -> Model:
         """Return a model on the degrees of freedom that either has, without those held."""
-        first, second = _free(_table(stiffness)), _table(mass)
+        table = _table(stiffness)
+        rows, columns = _keys(table)
+        held = rows[(rows == columns) & (table[:, 4] >= _HELD)]
+        first, second = table[~(np.isin(rows, held) | np.isin(columns, held))], _table(mass)
         labels = _labels(first, second)
         along = directions([dof for _, dof in labels], stiffness)
         names = [node for node, _ in labels]
@@ -90,13 +93,6 @@ def _labels(*tables: np.ndarray) -> Labels:
     """Return node and dof of every row that some table has, in the order of the nodes."""
     found = np.unique(np.concatenate([key for table in tables for key in _keys(table)]))
     return [divmod(int(key), len(DIRECTIONS) + 1) for key in found]
-
-
-def _free(table: np.ndarray) -> np.ndarray:
-    """Return the entries of what a boundary condition does not hold."""
-    rows, columns = _keys(table)
-    held = rows[(rows == columns) & (table[:, 4] >= _HELD)]
-    return table[~(np.isin(rows, held) | np.isin(columns, held))]
 
 
 def _assembled(table: np.ndarray, labels: Labels) -> SparseArray:

@@ -59,7 +59,15 @@ def apart(function: Callable[[Path], dict[str, Any]], path: Path, expected: str)
             what = told if done.returncode == 1 and told else "cannot be read: it is broken"
             raise InputError(what, file=path, expected=expected)
         with np.load(result, allow_pickle=False) as archive:
-            return _joined({name: archive[name] for name in archive.files})
+            arrays = {name: archive[name] for name in archive.files}
+            found: dict[str, Any] = {}
+            for i, name in enumerate(arrays[_NAMES].tolist()):
+                if f"v{i}" in arrays:
+                    found[name] = arrays[f"v{i}"]
+                else:
+                    data, indices, indptr, shape = (arrays[f"v{i}.{part}"] for part in _PARTS)
+                    found[name] = sp.csc_array((data, indices, indptr), shape=tuple(shape.tolist()))
+            return found
 
 
 def in_child(module: str, function: str, path: str, result: str) -> None:
@@ -67,7 +75,24 @@ def in_child(module: str, function: str, path: str, result: str) -> None:
     called: Callable[[Path], dict[str, Any]] = getattr(import_module(module), function)
     try:
         with opened(Path(path), ""):
-            found = _split(called(Path(path)))
+            # Arrays of NPZ, those of sparse matrices by part, and the list of all names.
+            found = called(Path(path))
+            arrays: dict[str, Any] = {}
+            names: list[str] = []
+            for name, value in found.items():
+                key = f"v{len(names)}"
+                if sp.issparse(value):
+                    matrix = sp.csc_array(value)
+                    matrix.check_format(full_check=True)
+                    arrays |= {
+                        f"{key}.{part}": np.asarray(getattr(matrix, part)) for part in _PARTS
+                    }
+                elif isinstance(value, np.ndarray) and value.dtype.kind in "fiucbUS":
+                    arrays[key] = value
+                else:
+                    continue
+                names.append(name)
+            found = arrays | {_NAMES: np.array(names, dtype=str)}
     except InputError as error:
         sys.exit(" ".join(error.what.split()))
     np.savez(result, **found)
@@ -82,32 +107,3 @@ def limit_memory(path: Path) -> None:
     most = _MEMORY + _PER_BYTE * path.stat().st_size
     resource.setrlimit(resource.RLIMIT_DATA, (most, most))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-
-
-def _split(found: dict[str, Any]) -> dict[str, Any]:
-    """Return arrays under plain names: those of sparse matrices, and the list of all names."""
-    arrays: dict[str, Any] = {}
-    names: list[str] = []
-    for name, value in found.items():
-        key = f"v{len(names)}"
-        if sp.issparse(value):
-            matrix = sp.csc_array(value)
-            matrix.check_format(full_check=True)
-            arrays |= {f"{key}.{part}": np.asarray(getattr(matrix, part)) for part in _PARTS}
-        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiucbUS":
-            arrays[key] = value
-        else:
-            continue
-        names.append(name)
-    return arrays | {_NAMES: np.array(names, dtype=str)}
-
-
-def _joined(arrays: dict[str, Any]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for i, name in enumerate(arrays[_NAMES].tolist()):
-        if f"v{i}" in arrays:
-            found[name] = arrays[f"v{i}"]
-        else:
-            data, indices, indptr, shape = (arrays[f"v{i}.{part}"] for part in _PARTS)
-            found[name] = sp.csc_array((data, indices, indptr), shape=tuple(shape.tolist()))
-    return found

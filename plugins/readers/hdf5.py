@@ -72,7 +72,13 @@ def _found(group: Any, above: str, path: Path) -> Iterator[tuple[str, Any]]:  # 
             if value is not None:
                 yield name, value
         elif (form := _form(item)) is not None:
-            yield name, _sparse(item, form)
+            data, indices, indptr = (np.asarray(item[part][()]) for part in form)
+            columns = len(indptr) - 1
+            rows = int(item.attrs.get(_ROWS, columns))
+            parts = (data, indices.astype(np.int64), indptr.astype(np.int64))
+            matrix = sp.csc_array(parts, shape=(rows, columns))
+            matrix.check_format(full_check=True)
+            yield name, matrix
         elif name.count("/") < _DEEPEST:
             yield from _found(item, f"{name}/", path)
 
@@ -99,16 +105,6 @@ def _value(item: Any) -> Any:  # noqa: ANN401 - numbers or words
 def _form(group: Any) -> tuple[str, ...] | None:  # noqa: ANN401
     """Return the names of the three arrays where a group is a sparse matrix."""
     return next((form for form in _FORMS if all(part in group for part in form)), None)
-
-
-def _sparse(group: Any, form: tuple[str, ...]) -> Any:  # noqa: ANN401
-    data, indices, indptr = (np.asarray(group[part][()]) for part in form)
-    columns = len(indptr) - 1
-    rows = int(group.attrs.get(_ROWS, columns))
-    parts = (data, indices.astype(np.int64), indptr.astype(np.int64))
-    matrix = sp.csc_array(parts, shape=(rows, columns))
-    matrix.check_format(full_check=True)
-    return matrix
 
 
 def save_hdf5(path: Path, original: Path, new: Variables) -> None:

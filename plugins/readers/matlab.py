@@ -48,18 +48,14 @@ def is_hdf5(path: Path) -> bool:
 def found_in(path: Path) -> dict[str, Any]:
     """Return the variables by name; a crash is for the caller to stand."""
     limit_memory(path)
-    return {name: _plain(value) for name, value in _loaded(path).items()}
+    found = _loaded(path)
+    for name, value in found.items():
+        if getattr(value, "dtype", np.dtype(float)).kind == "O":
+            cells = (np.asarray(cell).reshape(-1)[:1] for cell in value.flat)
+            found[name] = np.array([str(cell[0]) if np.size(cell) else "" for cell in cells])
+    return found
 
 
 def _loaded(path: Path) -> dict[str, Any]:
     found = scipy.io.loadmat(path)
     return {name: value for name, value in found.items() if not name.startswith("__")}
-
-
-def _plain(value: Any) -> Any:  # noqa: ANN401 - whatever MATLAB holds
-    """Return cells of words as an array of words, all else as it is."""
-    if getattr(value, "dtype", np.dtype(float)).kind != "O":
-        return value
-    return np.array(
-        [str(np.asarray(cell).reshape(-1)[0]) if np.size(cell) else "" for cell in value.flat]
-    )

@@ -51,29 +51,6 @@ def read_modal(variables: Mapping[str, Any], path: Path, names: Mapping[str, str
     Raises:
         InputError: where frequencies are missing, or sizes do not fit.
     """
-    found = _found(variables, path, names)
-    hertz = _hertz(found, path)
-    m = len(hertz)
-    shapes = _table(found, "shapes", m, path)
-    n = 0 if shapes is None else len(shapes)
-    std = _table(found, "shape_std", m, path)
-    if std is not None and std.shape != (n, m):
-        raise _wrong("shape_std", f"{std.shape[0]} x {std.shape[1]}", f"{n} x {m} as shapes", path)
-    numbers = _column(found, "numbers", m, path)
-    damping = _column(found, "damping", m, path)
-    return Measurement(
-        sensors=_sensors(found, n, path),
-        numbers=tuple(range(1, m + 1) if numbers is None else (int(v) for v in numbers)),
-        frequencies=hertz,
-        frequency_std=_hertz_std(found, hertz, path),
-        damping=np.full(m, np.nan) if damping is None else damping,
-        shapes=np.zeros((0, m)) if shapes is None else real_modes(shapes, align_phase=True),
-        shape_std=np.full((n, m), np.nan) if std is None else np.abs(std),
-    )
-
-
-def _found(variables: Mapping[str, Any], path: Path, names: Mapping[str, str]) -> dict[str, Any]:
-    """Return what is there, by key of `NAMES`."""
     plain = {name.lower().replace("_", ""): name for name in variables}
     found: dict[str, Any] = {}
     for key, known in NAMES.items():
@@ -84,7 +61,38 @@ def _found(variables: Mapping[str, Any], path: Path, names: Mapping[str, str]) -
         name = wanted or next((plain[word] for word in known if word in plain), None)
         if name is not None:
             found[key] = variables[name]
-    return found
+    hertz = _column(found, "frequencies", None, path)
+    squared = _column(found, "eigenvalues", None, path)
+    if hertz is None:
+        if squared is None:
+            raise InputError("no frequencies", file=path, expected=EXPECTED)
+        hertz = np.sqrt(np.maximum(squared, 0.0)) / (2.0 * np.pi)
+    if not len(hertz) or not (hertz > 0.0).all():
+        raise _wrong("frequencies", "one is not positive", "numbers > 0", path)
+    m = len(hertz)
+    shapes = _table(found, "shapes", m, path)
+    n = 0 if shapes is None else len(shapes)
+    std = _table(found, "shape_std", m, path)
+    if std is not None and std.shape != (n, m):
+        raise _wrong("shape_std", f"{std.shape[0]} x {std.shape[1]}", f"{n} x {m} as shapes", path)
+    numbers = _column(found, "numbers", m, path)
+    damping = _column(found, "damping", m, path)
+    sensors, hertz_std = _sensors(found, n, path), _column(found, "frequency_std", m, path)
+    if hertz_std is None:
+        squared_std = _column(found, "eigenvalue_std", m, path)  # of (2 pi f)^2
+        if squared_std is None:
+            hertz_std = np.full(m, np.nan)
+        else:
+            hertz_std = np.abs(squared_std) / (8.0 * np.pi**2 * hertz)
+    return Measurement(
+        sensors=sensors,
+        numbers=tuple(range(1, m + 1) if numbers is None else (int(v) for v in numbers)),
+        frequencies=hertz,
+        frequency_std=np.abs(hertz_std),
+        damping=np.full(m, np.nan) if damping is None else damping,
+        shapes=np.zeros((0, m)) if shapes is None else real_modes(shapes, align_phase=True),
+        shape_std=np.full((n, m), np.nan) if std is None else np.abs(std),
+    )
 
 
 def _numbers(found: Mapping[str, Any], key: str, path: Path) -> NDArray[Any] | None:
@@ -122,28 +130,6 @@ def _table(found: Mapping[str, Any], key: str, count: int, path: Path) -> NDArra
 
 def _wrong(key: str, what: str, expected: str, path: Path) -> InputError:
     return InputError(f"{key}: {what}", file=path, expected=expected)
-
-
-def _hertz(found: Mapping[str, Any], path: Path) -> Array:
-    hertz = _column(found, "frequencies", None, path)
-    squared = _column(found, "eigenvalues", None, path)
-    if hertz is None:
-        if squared is None:
-            raise InputError("no frequencies", file=path, expected=EXPECTED)
-        hertz = np.sqrt(np.maximum(squared, 0.0)) / (2.0 * np.pi)
-    if not len(hertz) or not (hertz > 0.0).all():
-        raise _wrong("frequencies", "one is not positive", "numbers > 0", path)
-    return hertz
-
-
-def _hertz_std(found: Mapping[str, Any], hertz: Array, path: Path) -> Array:
-    std = _column(found, "frequency_std", len(hertz), path)
-    if std is not None:
-        return np.abs(std)
-    squared = _column(found, "eigenvalue_std", len(hertz), path)
-    if squared is not None:  # of (2 pi f)^2
-        return np.asarray(np.abs(squared) / (8.0 * np.pi**2 * hertz))
-    return np.full(len(hertz), np.nan)
 
 
 def _words(value: Any) -> list[str]:  # noqa: ANN401 - numbers or words

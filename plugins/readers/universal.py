@@ -102,7 +102,19 @@ class UniversalReader:
 def _sensors_and_modes(path: Path, datasets: Sequence[Dataset], other: set[int]) -> Measurement:
     # A dataset that is cut short may lack any column.
     with opened(path, "whole datasets"):
-        nodes, modes = _nodes(path, datasets), _modes(path, datasets)
+        nodes, factor = _nodes(path, datasets), _length_factor(path, datasets)
+        modes = [mode for d in _of(datasets, 55) for mode in _mode_55(path, d, factor)]
+        modes = modes or [mode for d in _of(datasets, 2414) for mode in _mode_2414(path, d, factor)]
+        if any(mode.number < 1 for mode in modes):
+            modes = [
+                _Mode(i + 1, mode.frequency, mode.damping, mode.shape)
+                for i, mode in enumerate(modes)
+            ]
+        for number, count in Counter(mode.number for mode in modes).items():
+            if count > 1:
+                twice = f"mode {number} is listed twice"
+                raise InputError(twice, file=path, key="mode number", expected="every mode once")
+        modes = [mode for mode in modes if mode.frequency > 0.0]
     if not nodes and not modes:
         expected = "datasets 15 or 2411 with nodes, 55 or 2414 with modes"
         what = "neither nodes nor modes"
@@ -228,22 +240,6 @@ def _nodes(path: Path, datasets: Sequence[Dataset]) -> dict[int, _Node]:
                 what = f"node {int(number)} lies at two places"
                 raise InputError(what, file=path, key=key, expected="one place")
     return nodes
-
-
-def _modes(path: Path, datasets: Sequence[Dataset]) -> list[_Mode]:
-    """Return the elastic modes; dataset 2414 counts where there is no dataset 55."""
-    factor = _length_factor(path, datasets)
-    modes = [mode for d in _of(datasets, 55) for mode in _mode_55(path, d, factor)]
-    modes = modes or [mode for d in _of(datasets, 2414) for mode in _mode_2414(path, d, factor)]
-    if any(mode.number < 1 for mode in modes):
-        modes = [
-            _Mode(i + 1, mode.frequency, mode.damping, mode.shape) for i, mode in enumerate(modes)
-        ]
-    for number, count in Counter(mode.number for mode in modes).items():
-        if count > 1:
-            what = f"mode {number} is listed twice"
-            raise InputError(what, file=path, key="mode number", expected="every mode once")
-    return [mode for mode in modes if mode.frequency > 0.0]
 
 
 def _mode_55(path: Path, dataset: Dataset, factor: float) -> Iterator[_Mode]:

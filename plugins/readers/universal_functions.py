@@ -48,11 +48,19 @@ def read_functions(path: Path, positions: Sensors | None) -> FrequencyResponses 
     Raises:
         InputError: when the file is broken, holds neither, or its functions do not belong together.
     """
-    datasets, factors = _datasets(path)
+    length = force = 1.0
+    datasets: list[Dataset] = []
+    for dataset in read_datasets(path, (58, 164))[0]:
+        if dataset["type"] == 164:
+            length, force = float(dataset["length"]), float(dataset["force"])
+        else:
+            datasets.append(dataset)
+    if not all(math.isfinite(factor) and factor > 0.0 for factor in (length, force)):
+        raise InputError("unclear units", file=path, key="dataset 164", expected="factors > 0")
     for kind in (_RESPONSE, _TIME):
         wanted = [dataset for dataset in datasets if dataset["func_type"] == kind]
         if wanted:
-            functions = [_function(path, dataset, *factors) for dataset in wanted]
+            functions = [_function(path, dataset, length, force) for dataset in wanted]
             known = (
                 {} if positions is None else dict(zip(positions.labels, positions.xyz, strict=True))
             )
@@ -60,20 +68,6 @@ def read_functions(path: Path, positions: Sensors | None) -> FrequencyResponses 
     found = ", ".join(sorted({f"type {dataset['func_type']}" for dataset in datasets}))
     what = f"no function that is of use, only {found}" if found else "no functions"
     raise InputError(what, file=path, expected=_EMPTY)
-
-
-def _datasets(path: Path) -> tuple[list[Dataset], tuple[float, float]]:
-    """Return the functions, and what lengths and forces must be divided by to be in m and N."""
-    length = force = 1.0
-    found: list[Dataset] = []
-    for dataset in read_datasets(path, (58, 164))[0]:
-        if dataset["type"] == 164:
-            length, force = float(dataset["length"]), float(dataset["force"])
-        else:
-            found.append(dataset)
-    if not all(math.isfinite(factor) and factor > 0.0 for factor in (length, force)):
-        raise InputError("unclear units", file=path, key="dataset 164", expected="factors > 0")
-    return found, (length, force)
 
 
 def _function(path: Path, dataset: Dataset, length: float, force: float) -> _Function:

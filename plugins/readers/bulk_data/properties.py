@@ -6,7 +6,7 @@ of z^2 (Iy here), K1 goes with shear along y and K2 with shear along z.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from femubench.fem import (
@@ -103,7 +103,18 @@ def bar_of(card: Card, materials: Mapping[int, Card]) -> Bar:
     if material is None:
         raise card.error(f"there is no MAT1 {number}", "the number of a MAT1", "MID")
     read = {"PBAR": _pbar, "PBARL": _pbarl, "PBEAM": _pbeam, "PROD": _prod}[card.name]
-    E, G, nu = _moduli(material)
+    E, G, nu = (material.real(i, key, 0.0) for i, key in ((2, "E"), (3, "G"), (4, "NU")))
+    if not material.text(2):
+        E = 2.0 * (1.0 + nu) * G
+    if not E > 0.0:
+        raise material.error(f"{E:g}", "a number > 0", "E")
+    if G < 0.0 or not -1.0 < nu <= 0.5:
+        raise material.error(f"G {G:g}, NU {nu:g}", "G >= 0 and NU > -1 and <= 0.5", "G")
+    if material.text(3) and not material.text(4) and G > 0.0:
+        own = E / (2.0 * G) - 1.0
+        nu = own if -1.0 < own <= 0.5 else 0.0
+    if not material.text(3) and material.text(4):
+        G = E / (2.0 * (1.0 + nu))
     of = read(card, nu)
     bar = Bar(E, G, nu, _at_least_0(material, 5, "RHO"), of, card, material)
     if bar.has_shear and not G > 0.0:
@@ -114,23 +125,6 @@ def bar_of(card: Card, materials: Mapping[int, Card]) -> Bar:
         expected = "G = E / 2(1 + NU) beside a shape"
         raise material.error("G does not belong to E and NU", expected, "G")
     return bar
-
-
-def _moduli(card: Card) -> tuple[float, float, float]:
-    """Return E, G and nu of a MAT1, of which one may be blank."""
-    E, G, nu = (card.real(i, key, 0.0) for i, key in ((2, "E"), (3, "G"), (4, "NU")))
-    if not card.text(2):
-        E = 2.0 * (1.0 + nu) * G
-    if not E > 0.0:
-        raise card.error(f"{E:g}", "a number > 0", "E")
-    if G < 0.0 or not -1.0 < nu <= 0.5:
-        raise card.error(f"G {G:g}, NU {nu:g}", "G >= 0 and NU > -1 and <= 0.5", "G")
-    if card.text(3) and not card.text(4) and G > 0.0:
-        own = E / (2.0 * G) - 1.0
-        nu = own if -1.0 < own <= 0.5 else 0.0
-    if not card.text(3) and card.text(4):
-        G = E / (2.0 * (1.0 + nu))
-    return E, G, nu
 
 
 def _at_least_0(card: Card, number: int, key: str) -> float:
@@ -172,14 +166,6 @@ def _pbarl(card: Card, nu: float) -> Constants:
         expected = f"{', '.join(SHAPES)}, or a PBAR with numbers"
         raise card.error(f"shape {kind[:20]!r}", expected, "TYPE")
     sizes = [_at_least_0(card, 9 + i, f"DIM{i + 1}") for i in range(SHAPES[kind])]
-    shape = _shape(card, kind, sizes)
-    K1, K2 = (1.0, 1.0) if shape.kappa is None else shape.kappa(nu)
-    nsm = card.real(9 + len(sizes), "NSM", 0.0)
-    return Constants(shape.A, shape.Iz, shape.Iy, shape.J, nsm, K1, K2, shape)
-
-
-def _shape(card: Card, kind: str, sizes: Sequence[float]) -> Section:
-    """Return the section of a shape; raises InputError for walls that leave or fill no space."""
     across, along, wall, other = (*sizes, *(0.0,) * 4)[:4]
     if kind == "BOX" and abs(wall - other) > _SAME * wall:
         raise card.error("walls that differ", "DIM3 = DIM4, or a PBAR with numbers", "DIM4")
@@ -188,8 +174,14 @@ def _shape(card: Card, kind: str, sizes: Sequence[float]) -> Section:
     if not (across > 0.0 and hollow and (kind != "BOX" or wall > 0.0)):
         raise card.error(f"sizes {', '.join(f'{d:g}' for d in sizes)}", "those of a bar", "DIM1")
     if round_one:
-        return round_tube(2.0 * across, across - along)
-    return rectangular_tube(along, across, wall) if wall else solid_rectangle(along, across)
+        shape = round_tube(2.0 * across, across - along)
+    elif wall:
+        shape = rectangular_tube(along, across, wall)
+    else:
+        shape = solid_rectangle(along, across)
+    K1, K2 = (1.0, 1.0) if shape.kappa is None else shape.kappa(nu)
+    nsm = card.real(9 + len(sizes), "NSM", 0.0)
+    return Constants(shape.A, shape.Iz, shape.Iy, shape.J, nsm, K1, K2, shape)
 
 
 def _pbeam(card: Card, nu: float) -> Constants:

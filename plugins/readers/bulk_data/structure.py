@@ -175,12 +175,19 @@ class Reading:
             if card.name not in _READ | IGNORED:
                 raise _unread(card)
             self.named.setdefault(card.name, []).append(card)
-        self.weight = self._weight()
+        weight = 1.0
+        for i, card in enumerate(c for c in self._cards("PARAM") if c.text(1) == "WTMASS"):
+            value = card.real(2, "WTMASS")
+            if not value > 0.0 or (i and value != weight):
+                raise card.error(f"{value:g}", "one number > 0", "WTMASS")
+            weight = value
+        self.weight = weight
         self.systems = systems_of(deck)
         self.grids = grids_of(deck)
         self.sorted = sorted(self.grids)
         self.listed = 0  # grids in lists so far
-        self.stiffnesses = self._pelas()
+        pairs = [(card, i) for card in self._cards("PELAS") for i in (1, 5) if card.text(i)]
+        self.stiffnesses = {card.id(i, "PID"): card.real(i + 1, "K") for card, i in pairs}
         materials = numbered(deck, "MAT1")
         properties = numbered(deck, *PROPERTIES).items()
         self.bars = {number: bar_of(card, materials) for number, card in properties}
@@ -199,7 +206,18 @@ class Reading:
         for card in elements.values():
             if card.name in actions:
                 actions[card.name](card)
-        self._rods([card for card in elements.values() if card.name not in actions])
+        cards = [card for card in elements.values() if card.name not in actions]
+        springs = (s for s in self.parts.springs if s.direction in DIRECTIONS[3:])
+        found = {spring.at.joint for spring in springs if spring.at.joint is not None}
+        turning = found | self._joined()
+        for card in cards:
+            number = card.id(2, "PID", card.id(1, "EID"))
+            bar = self._property(card, number, ("PROD",))
+            ends = tuple(self.grid(card, 3 + i, f"G{i + 1}") for i in range(2))
+            names = {grid.name for grid in ends}
+            if not names <= turning:  # the joint turns freely with the rod
+                bar = replace(bar, of=replace(bar.of, J=0.0))
+            self._rod(card, bar, ends, lumped=bool(names & turning))
         if not self.parts.members:
             what, expected = "there is no bar", "a frame of CBAR or CBEAM, or a truss of CROD"
             raise InputError(what, file=self.deck.file, expected=expected)
@@ -228,16 +246,6 @@ class Reading:
     def _cards(self, *names: str) -> Iterator[Card]:
         for name in names:
             yield from self.named.get(name, ())
-
-    def _weight(self) -> float:
-        """Return what all masses are multiplied by (PARAM,WTMASS)."""
-        weight = 1.0
-        for i, card in enumerate(c for c in self._cards("PARAM") if c.text(1) == "WTMASS"):
-            value = card.real(2, "WTMASS")
-            if not value > 0.0 or (i and value != weight):
-                raise card.error(f"{value:g}", "one number > 0", "WTMASS")
-            weight = value
-        return weight
 
     def grid(self, card: Card, number: int, key: str) -> Grid:
         """Return the grid that a field names, and make a joint of it; raises InputError."""
@@ -298,11 +306,29 @@ class Reading:
         if names[0] == names[1] or not np.linalg.norm(stop - start) > 0.0:
             raise card.error("the bar has no length", "two grids apart", "GB")
         x = (stop - start) / np.linalg.norm(stop - start)
-        v = self._orientation(card, usual, ends[0], flags[0])
+        first = ends[0]
+        source = card if usual is None or any(card.text(i) for i in (5, 6, 7)) else usual
+        if source.is_integer(5) and not source.text(6) and not source.text(7):
+            number = source.id(5, "G0")
+            if number not in self.grids:
+                raise card.error(f"there is no GRID {number}", "the number of a GRID", "G0")
+            v = np.asarray(self.grids[number].xyz - first.xyz)
+        else:
+            vector = np.array(source.vector(5, "X"))
+            if not vector.any():
+                raise card.error("no orientation vector", "X1, X2, X3 or G0", "X1")
+            v = np.asarray(vector if flags[0] == "B" else vector @ first.axes)
         up = np.cross(x, v)
         if not np.linalg.norm(up) > 1e-6 * np.linalg.norm(v):
             raise card.error("the orientation vector lies along the bar", "one across it", "X1")
-        self._pins(card, self._member(card, bar, (names[0], names[1]), up))
+        member = self._member(card, bar, (names[0], names[1]), up)
+        for number, key, joint in ((9, "PA", member.ends[0]), (10, "PB", member.ends[1])):
+            components = card.components(number, key)
+            if components:
+                released = {DIRECTIONS[int(digit) - 1]: 0.0 for digit in components}
+                self.parts.add("joint_springs", JointSpring(joint, member.name, released), card)
+        if card.name == "CBEAM" and any(card.real(i, "SA", 0.0) for i in (17, 18)):
+            raise card.error("warping", "no SA and SB", "SA")
 
     def _property(self, card: Card, number: int, kinds: tuple[str, ...]) -> Bar:
         bar = self.bars.get(number)
@@ -328,52 +354,11 @@ class Reading:
             self.parts.add("links", Link(grid.name, (name,)), card)
         return self.parts.offsets[key]
 
-    def _orientation(self, card: Card, usual: Card | None, first: Grid, system: str) -> FloatArray:
-        """Return a vector in the plane 1 of a bar, in basic axes."""
-        source = card if usual is None or any(card.text(i) for i in (5, 6, 7)) else usual
-        if source.is_integer(5) and not source.text(6) and not source.text(7):
-            number = source.id(5, "G0")
-            if number not in self.grids:
-                raise card.error(f"there is no GRID {number}", "the number of a GRID", "G0")
-            return np.asarray(self.grids[number].xyz - first.xyz)
-        vector = np.array(source.vector(5, "X"))
-        if not vector.any():
-            raise card.error("no orientation vector", "X1, X2, X3 or G0", "X1")
-        return np.asarray(vector if system == "B" else vector @ first.axes)
-
-    def _pins(self, card: Card, member: Member) -> None:
-        """Let the ends of a bar go where pin flags say so."""
-        for number, key, joint in ((9, "PA", member.ends[0]), (10, "PB", member.ends[1])):
-            components = card.components(number, key)
-            if components:
-                released = {DIRECTIONS[int(digit) - 1]: 0.0 for digit in components}
-                self.parts.add("joint_springs", JointSpring(joint, member.name, released), card)
-        if card.name == "CBEAM" and any(card.real(i, "SA", 0.0) for i in (17, 18)):
-            raise card.error("warping", "no SA and SB", "SA")
-
-    def _rods(self, cards: list[Card]) -> None:
-        """Add rods, when it is known which joints bars, links and springs can turn."""
-        turning = self._turning()
-        for card in cards:
-            number = card.id(2, "PID", card.id(1, "EID"))
-            bar = self._property(card, number, ("PROD",))
-            ends = tuple(self.grid(card, 3 + i, f"G{i + 1}") for i in range(2))
-            names = {grid.name for grid in ends}
-            if not names <= turning:  # the joint turns freely with the rod
-                bar = replace(bar, of=replace(bar.of, J=0.0))
-            self._rod(card, bar, ends, lumped=bool(names & turning))
-
     def _joined(self) -> set[str]:
         """Return the joints of bars and links, which take up rotations."""
         found = {name for link in self.parts.links for name in (link.leads, *link.follows)}
         bars = (m for m in self.parts.members if self.card_of[m.name].name != "CROD")
         return found | {name for member in bars for name in member.ends}
-
-    def _turning(self) -> set[str]:
-        """Return the joints whose rotations a bar, a link or a spring takes up."""
-        springs = (s for s in self.parts.springs if s.direction in DIRECTIONS[3:])
-        found = {spring.at.joint for spring in springs if spring.at.joint is not None}
-        return found | self._joined()
 
     def _rod(self, card: Card, bar: Bar, ends: tuple[Grid, ...], *, lumped: bool) -> None:
         """Add a member that does not bend; lumped: half of its mass at either end, else its own.
@@ -410,7 +395,10 @@ class Reading:
 
     def _spring(self, card: Card) -> None:
         direct = card.name == "CELAS2"
-        stiffness = card.real(2, "K") if direct else self._of_pelas(card)
+        number = 0 if direct else card.id(2, "PID", card.id(1, "EID"))
+        if not direct and number not in self.stiffnesses:
+            raise card.error(f"there is no PELAS {number}", "the number of a PELAS", "PID")
+        stiffness = card.real(2, "K") if direct else self.stiffnesses[number]
         if stiffness < 0.0:
             raise card.error(f"{stiffness:g}", "a stiffness >= 0", "K")
         ends = []
@@ -437,17 +425,6 @@ class Reading:
             expected = "to ground, or along the line between the two grids"
             raise card.error("a spring between two grids across their line", expected)
         self.parts.add("braces", Brace((first.name, second.name), stiffness), card)
-
-    def _pelas(self) -> dict[int, float]:
-        pairs = [(card, i) for card in self._cards("PELAS") for i in (1, 5) if card.text(i)]
-        return {card.id(i, "PID"): card.real(i + 1, "K") for card, i in pairs}
-
-    def _of_pelas(self, card: Card) -> float:
-        wanted = card.id(2, "PID", card.id(1, "EID"))
-        if wanted not in self.stiffnesses:
-            what = f"there is no PELAS {wanted}"
-            raise card.error(what, "the number of a PELAS", "PID")
-        return self.stiffnesses[wanted]
 
     def _list(self, card: Card, first: int, key: str) -> list[int]:
         """Return the grids of a list; raises InputError for more than any structure needs."""
@@ -537,22 +514,19 @@ class Reading:
             chosen = sets
         for card in cards:
             if card.id(1, "SID") in chosen:
-                yield from self._held_by(card)
-
-    def _held_by(self, card: Card) -> Iterator[tuple[Grid, str, Card]]:
-        if card.name == "SPC1":
-            components = card.components(2, "C")
-            numbers = self._list(card, 3, "G")
-            pairs = [(number, components) for number in numbers]
-        else:
-            rows = [i for i in (2, 5) if card.text(i)]
-            if any(card.real(i + 2, "D", 0.0) for i in rows):
-                raise card.error("a displacement that is not 0", "a grid that is held", "D")
-            pairs = [(card.id(i, "G"), card.components(i + 1, "C")) for i in rows]
-        for number, components in pairs:
-            if number not in self.grids:
-                raise card.error(f"there is no GRID {number}", "the number of a GRID", "G")
-            yield self.grids[number], components, card
+                if card.name == "SPC1":
+                    components = card.components(2, "C")
+                    numbers = self._list(card, 3, "G")
+                    pairs = [(number, components) for number in numbers]
+                else:
+                    rows = [i for i in (2, 5) if card.text(i)]
+                    if any(card.real(i + 2, "D", 0.0) for i in rows):
+                        raise card.error("a displacement that is not 0", "a grid that is held", "D")
+                    pairs = [(card.id(i, "G"), card.components(i + 1, "C")) for i in rows]
+                for number, components in pairs:
+                    if number not in self.grids:
+                        raise card.error(f"there is no GRID {number}", "the number of a GRID", "G")
+                    yield self.grids[number], components, card
 
     def _check_held(self) -> None:
         """Check that every joint is part of the structure; hold rotations that nothing resists."""
@@ -590,20 +564,22 @@ class Reading:
             found.append(f"{len(lumped)} CROD beside bars: {what}")
         if twisting:
             found.append("J of PROD is left out: a joint of rods alone takes up no twist")
-        if not self._consistent() and any(m.material.rho > 0.0 for m in self.parts.members):
+        cards = [card for card in self._cards("PARAM") if card.text(1) == "COUPMASS"]
+        if not any(
+            card.text(2) == "YES" or card.text(2).strip("+0") == "1" for card in cards
+        ) and any(m.material.rho > 0.0 for m in self.parts.members):
             found.append("masses are consistent; the file asks for lumped ones (COUPMASS)")
         return tuple(filter(None, found))
-
-    def _consistent(self) -> bool:
-        """Tell whether the file asks for consistent masses, which are not Nastran's default."""
-        cards = [card for card in self._cards("PARAM") if card.text(1) == "COUPMASS"]
-        return any(card.text(2) == "YES" or card.text(2).strip("+0") == "1" for card in cards)
 
     def _assembled(self) -> Frame:
         parts = self.parts
         if len(parts.members) > _MOST_MEMBERS or len(parts.joints) > _MOST_MEMBERS:
             what, expected = f"{len(parts.members)} bars", f"at most {_MOST_MEMBERS}"
             raise InputError(what, file=self.deck.file, expected=expected)
+        found: dict[str, list[str]] = {}
+        for kind in ("section", "material"):
+            for member in parts.members:
+                found.setdefault(f"{kind}:{getattr(member, kind).name}", []).append(member.name)
         return Frame(
             plane="3d",
             beam="timoshenko"
@@ -618,7 +594,7 @@ class Reading:
             links=tuple(parts.links),
             braces=tuple(parts.braces),
             factors=tuple(_factors(self.bar_of)),
-            families=_families(parts.members),
+            families=tuple(MemberSet(word, tuple(names)) for word, names in found.items()),
         )
 
     def _order(self, name: str) -> tuple[int, int]:
@@ -630,15 +606,6 @@ def _listed(sentence: str, counts: Counter[str], names: frozenset[str]) -> str:
     """Return a sentence that lists the cards of some names, empty where there are none."""
     there = ", ".join(f"{name} ({counts[name]})" for name in sorted(names & set(counts)))
     return sentence.format(there) if there else ""
-
-
-def _families(members: list[Member]) -> tuple[MemberSet, ...]:
-    """Return the members of every property and of every material."""
-    found: dict[str, list[str]] = {}
-    for kind in ("section", "material"):
-        for member in members:
-            found.setdefault(f"{kind}:{getattr(member, kind).name}", []).append(member.name)
-    return tuple(MemberSet(word, tuple(names)) for word, names in found.items())
 
 
 def _factors(bars: dict[str, Bar]) -> Iterator[Factor]:

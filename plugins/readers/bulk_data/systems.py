@@ -107,7 +107,18 @@ class Systems:
             if card is None or depth > _DEEPEST:
                 expected = "0 or the number of a CORD1 or CORD2, none within itself"
                 raise user.error(f"there is no coordinate system {number}", expected, key)
-            self._known[number] = _system(card, self._points(card, depth + 1))
+            # Origin, on z, in x-z.
+            origin, on_z, in_xz = self._points(card, depth + 1)
+            z, towards_x = on_z - origin, in_xz - origin
+            y = np.cross(z, towards_x)
+            sizes = np.linalg.norm(z), np.linalg.norm(towards_x), np.linalg.norm(y)
+            if not sizes[2] > 1e-9 * sizes[0] * sizes[1]:
+                expected = "a point on z, and one in x-z beside it"
+                raise card.error("the points lie on one line", expected)
+            z, y = z / sizes[0], y / sizes[2]
+            axes = np.array([np.cross(y, z), y, z])
+            kinds: dict[str, Kind] = {"R": "R", "C": "C", "S": "S"}
+            self._known[number] = System(origin, axes, kinds[card.name[-1]])
         return self._known[number]
 
     def place(self, grid: Card, depth: int = 0) -> FloatArray:
@@ -136,17 +147,3 @@ def _parted(card: Card) -> list[Card]:
         return [card]
     halves = card.fields[:4], card.fields[4:8]
     return [Card(card.name, half, card.file, card.first, card.last) for half in halves]
-
-
-def _system(card: Card, points: list[FloatArray]) -> System:
-    """Return the system of three points: origin, on z, in x-z."""
-    origin, on_z, in_xz = points
-    z, towards_x = on_z - origin, in_xz - origin
-    y = np.cross(z, towards_x)
-    sizes = np.linalg.norm(z), np.linalg.norm(towards_x), np.linalg.norm(y)
-    if not sizes[2] > 1e-9 * sizes[0] * sizes[1]:
-        raise card.error("the points lie on one line", "a point on z, and one in x-z beside it")
-    z, y = z / sizes[0], y / sizes[2]
-    axes = np.array([np.cross(y, z), y, z])
-    kinds: dict[str, Kind] = {"R": "R", "C": "C", "S": "S"}
-    return System(origin, axes, kinds[card.name[-1]])

@@ -17,7 +17,6 @@ from femubench import InputError, Model
 from femubench.fem import (
     BeamProperties,
     FloatArray,
-    Frame,
     GroundSpring,
     Place,
     PointMass,
@@ -66,7 +65,8 @@ def write_cards(model: Model, path: Path, original: Path) -> None:
     nominal = reading.model().frame_structure
     if model.structure is None or model.mass_change or model.stiffness_change:
         raise _refusal(path)
-    masses, springs = _added(model.structure.frame, nominal.frame)
+    masses = model.structure.frame.masses[len(nominal.frame.masses) :]
+    springs = model.structure.frame.springs[len(nominal.frame.springs) :]
     laden = nominal.rebuilt(nominal.frame.with_attachments(masses, springs))
     changed = _changed(model, laden, reading.bar_of, path)
     cards = _Cards(reading)
@@ -78,11 +78,6 @@ def write_cards(model: Model, path: Path, original: Path) -> None:
 def _refusal(path: Path) -> InputError:
     what = "the update changed more than cards can say"
     return InputError(what, file=path, expected=_EXPECTED)
-
-
-def _added(new: Frame, old: Frame) -> tuple[tuple[PointMass, ...], tuple[GroundSpring, ...]]:
-    """Return the masses and the springs to ground that a frame has besides those of the file."""
-    return new.masses[len(old.masses) :], new.springs[len(old.springs) :]
 
 
 def _changed(
@@ -104,9 +99,25 @@ def _changed(
             raise _refusal(path)
     found: dict[str, tuple[Numbers, Numbers]] = {}
     for i, (name, bar) in enumerate(bars.items()):
-        ratio = _ratios(nominal.properties, new, i)
-        found[name] = _numbers(bar, ratio)
-        if not _says(bar, *found[name], ratio):
+        # By what every property of the element has been multiplied, 1 where it is 0.
+        ratio = {}
+        for f in fields(BeamProperties):
+            before, after = (float(getattr(p, f.name)[i]) for p in (nominal.properties, new))
+            times = after / before if before else 1.0
+            ratio[f.name] = 1.0 if abs(times - 1.0) <= _SAME else times
+        # The cards leave open how a rigidity is parted between modulus and section: of the ways to
+        # say it the one that changes least is taken, the first of several. RHO follows from the
+        # torsional inertia RHO (I1 + I2), and NSM makes up the mass.
+        moduli = dict.fromkeys((1.0, *(ratio[key] for key in ("EA", "EIy", "EIz", "GJ"))))
+        ways = (_parted(bar, ratio, e) for e in moduli)
+        found[name] = min(ways, key=lambda way: len(way[0]) + len(way[1]))
+        of, rho = dict(found[name][0]), dict(found[name][1]).get("rho", bar.rho)
+        inertia = (
+            (ratio["rhoIy"], rho * of.get("I2", bar.of.I2), bar.rho * bar.of.I2),
+            (ratio["rhoIz"], rho * of.get("I1", bar.of.I1), bar.rho * bar.of.I1),
+        )
+        kept = (abs(r * old - now) <= _KEPT * abs(old) for r, now, old in inertia)
+        if bar.has_shear and not all(kept):
             what = f"bar {name!r} has a rotary inertia or a shear of its own"
             raise InputError(what, file=path, expected=_EXPECTED)
     return found
@@ -116,32 +127,6 @@ def _alike(one: SparseArray, other: SparseArray) -> bool:
     apart = (one - other).tocoo()
     size = np.sqrt(np.abs(one.diagonal()))
     return bool(np.all(np.abs(apart.data) <= _KEPT * size[apart.row] * size[apart.col]))
-
-
-def _ratios(old: BeamProperties, new: BeamProperties, i: int) -> dict[str, float]:
-    """Return by what every property of an element has been multiplied, 1 where it is 0."""
-    found = {}
-    for f in fields(BeamProperties):
-        before, after = float(getattr(old, f.name)[i]), float(getattr(new, f.name)[i])
-        ratio = after / before if before else 1.0
-        found[f.name] = 1.0 if abs(ratio - 1.0) <= _SAME else ratio
-    return found
-
-
-def _numbers(bar: Bar, ratio: Mapping[str, float]) -> tuple[Numbers, Numbers]:
-    """Return the changed numbers of the property and of the material of a bar.
-
-    The cards leave open how a rigidity is parted between modulus and section: of the ways to say
-    it the one that changes least is taken. RHO follows from the torsional inertia RHO (I1 + I2),
-    and NSM makes up the mass.
-    """
-    best: tuple[Numbers, Numbers] | None = None
-    for e in dict.fromkeys((1.0, *(ratio[name] for name in ("EA", "EIy", "EIz", "GJ")))):
-        found = _parted(bar, ratio, e)
-        if best is None or len(found[0]) + len(found[1]) < len(best[0]) + len(best[1]):
-            best = found
-    assert best is not None
-    return best
 
 
 def _parted(bar: Bar, ratio: Mapping[str, float], e: float) -> tuple[Numbers, Numbers]:
@@ -171,18 +156,6 @@ def _parted(bar: Bar, ratio: Mapping[str, float], e: float) -> tuple[Numbers, Nu
     moduli = (("E", e), ("G", e), ("rho", r))
     material = [(key, f * getattr(bar, key)) for key, f in moduli if abs(f - 1.0) > _SAME]
     return tuple(numbers), tuple(material)
-
-
-def _says(bar: Bar, section: Numbers, material: Numbers, ratio: Mapping[str, float]) -> bool:
-    """Tell whether new numbers have the rotary inertia and the shear that are wanted."""
-    if not bar.has_shear:
-        return True
-    of, rho = dict(section), dict(material).get("rho", bar.rho)
-    pairs = (
-        (ratio["rhoIy"], rho * of.get("I2", bar.of.I2), bar.rho * bar.of.I2),
-        (ratio["rhoIz"], rho * of.get("I1", bar.of.I1), bar.rho * bar.of.I1),
-    )
-    return all(abs(r * old - new) <= _KEPT * abs(old) for r, new, old in pairs)
 
 
 class _Cards:
@@ -221,7 +194,20 @@ class _Cards:
                 number = bar.card.text(1) if k == 0 else self._next("PID", bar.card)
                 new += self._card(bar.card, *_property(bar, dict(of), number, mid))
                 for name in names if k else ():
-                    self._point(self.reading.card_of[name], number)
+                    # The element names another property; the rest of its lines stays as it is.
+                    card = self.reading.card_of[name]
+                    first, *rest = self._old(card)
+                    text = first.decode("latin-1")
+                    body, mark, comment = text.partition("$")
+                    if "," in body:
+                        parts = body.split(",")
+                        parts[2] = number
+                        body = ",".join(parts)
+                    else:
+                        width = _WIDTH if "*" in body[:8] else 8
+                        body = body.expandtabs(8)
+                        body = f"{body[: 8 + width]}{number:<{width}}{body[8 + 2 * width :]}"
+                    self._put(card, [(body + mark + comment).encode("latin-1"), *rest])
             self._put(bar.card, new)
 
     def attach(
@@ -305,21 +291,6 @@ class _Cards:
             for head, row in zip(heads, rows, strict=False)
         ]
 
-    def _point(self, card: Card, number: str) -> None:
-        """Let an element name another property, and leave the rest of its lines alone."""
-        first, *rest = self._old(card)
-        text = first.decode("latin-1")
-        body, mark, comment = text.partition("$")
-        if "," in body:
-            parts = body.split(",")
-            parts[2] = number
-            body = ",".join(parts)
-        else:
-            width = _WIDTH if "*" in body[:8] else 8
-            body = body.expandtabs(8)
-            body = f"{body[: 8 + width]}{number:<{width}}{body[8 + 2 * width :]}"
-        self._put(card, [(body + mark + comment).encode("latin-1"), *rest])
-
 
 def _material_of(bar: Bar) -> str:
     return str(bar.material.id(1, "MID"))
@@ -391,14 +362,10 @@ def real(value: float) -> str:
         elif -4 <= n < 0:
             forms.append(f"{sign}.{'0' * (-n - 1)}{figures}")
         for form in forms:
-            error = abs(_value(form) - value)
+            error = abs(float(re.sub(r"(?<=[\d.])([+-]\d+)$", r"e\1", form)) - value)
             if len(form) <= _WIDTH and (error, len(form)) < (least, len(best)):
                 best, least = form, error
     return best
-
-
-def _value(text: str) -> float:
-    return float(re.sub(r"(?<=[\d.])([+-]\d+)$", r"e\1", text))
 
 
 def _write(deck: Deck, edits: _Changes, path: Path, original: Path) -> None:
