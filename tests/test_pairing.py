@@ -110,6 +110,21 @@ def test_shapes_alike_at_the_sensors_are_told_apart_by_frequency() -> None:
     assert pairing.index.tolist() == [1, 0]
 
 
+@pytest.mark.parametrize(("apart", "partner"), [(0.3, 0), (0.5, 1)])
+def test_one_point_of_mac_is_worth_four_of_the_logarithm_of_frequencies(
+    apart: float, partner: int
+) -> None:
+    """A MAC of 1 at exp(apart) times the frequency, against one of 0.9 at the frequency itself.
+
+    0.1 points of MAC are worth 0.4 of the logarithm: the exact shape wins at 0.3, not at 0.5.
+    """
+    other = np.sqrt(0.9) * SHAPES[:, 0] + np.sqrt(0.1) * SHAPES[:, 1]
+    predicted = np.array([100.0 * np.exp(apart), 100.0])
+    shapes = np.column_stack([SHAPES[:, 0], other])
+    pairing = pair_modes(np.array([100.0]), SHAPES[:, :1], predicted, shapes)
+    assert pairing.index.tolist() == [partner]
+
+
 def test_no_pair_below_the_least_mac_or_outside_the_window() -> None:
     half = SHAPES[:, :1] + 1.05 * SHAPES[:, 1:2]  # MAC 0.476 with the first shape
     lone = pair_modes(np.array([100.0]), half, np.array([100.0]), SHAPES[:, :1])
