@@ -74,6 +74,14 @@ def test_scale_factor_minimises_the_weighted_difference() -> None:
     assert best == pytest.approx(reference, rel=1e-12)
 
 
+def test_scale_factor_of_complex_shapes_is_that_of_least_squares() -> None:
+    rng = np.random.default_rng(4)
+    m, p = rng.standard_normal((2, 7)) + 1j * rng.standard_normal((2, 7))
+    reference = np.linalg.lstsq(p[:, None], m, rcond=None)[0][0]
+    assert modal_scale_factor(m, p)[0] == pytest.approx(reference, rel=1e-12)
+    assert modal_scale_factor(1j * p, p)[0] == pytest.approx(1j)
+
+
 def test_swapped_modes_are_found_by_shape() -> None:
     order = [0, 2, 1, 3, 5, 4]
     pairing = pair_modes(FREQUENCIES, noisy(SHAPES), FREQUENCIES, SHAPES[:, order])
@@ -163,6 +171,15 @@ def test_a_frequency_alone_never_moves_a_shape_to_a_worse_partner() -> None:
     pairing = pair_modes(
         np.array([100.0, 100.0]), shapes, predicted, np.column_stack([SHAPES[:, 0], poor])
     )
+    assert pairing.index.tolist() == [0, -1]
+
+
+def test_a_frequency_alone_takes_no_partner_from_a_shape_however_poor() -> None:
+    """One predicted mode: a shape with a MAC of 0.52 at twice its frequency, and its frequency."""
+    poor = np.sqrt(0.52) * SHAPES[:, 0] + np.sqrt(0.48) * SHAPES[:, 1]
+    shapes = np.column_stack([poor, np.full(12, np.nan)])
+    measured = np.array([190.0, 100.0])
+    pairing = pair_modes(measured, shapes, np.array([100.0]), SHAPES[:, :1])
     assert pairing.index.tolist() == [0, -1]
 
 

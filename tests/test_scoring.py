@@ -187,6 +187,36 @@ def test_zero_modes_that_are_no_rigid_motions_do_not_count(
     assert (judgement.rigid_body_modes, judgement.negative_eigenvalues) == (3, 0)
 
 
+@pytest.mark.parametrize(
+    ("share", "kept", "negative"), [(5e-7, 3, 0), (-5e-7, 3, 0), (2e-6, 2, 0), (-2e-6, 2, 1)]
+)
+def test_a_millionth_of_the_first_elastic_eigenvalue_is_zero(
+    case: Case, reference: Reference, share: float, kept: int, negative: int
+) -> None:
+    """M r c r' M gives the rigid motion r the eigenvalue c, and leaves all other modes alone."""
+    moved = np.asarray(case.model.mass @ reference.rigid[:, :1])
+    first = float(solve_modes(case.model).elastic.eigenvalues[0])
+    change = LowRank(moved, np.array([[share * first]]))
+    judgement = judge(case, replace(case.model, stiffness_change=change), reference)
+    assert (judgement.rigid_body_modes, judgement.negative_eigenvalues) == (kept, negative)
+
+
+def test_a_zero_mode_that_is_a_rigid_motion_by_half_is_none(
+    case: Case, reference: Reference
+) -> None:
+    """The mean of a rigid motion and of an elastic mode takes no force, their difference does."""
+    elastic = solve_modes(case.model).elastic
+    first, value = elastic.shapes[:, 0], float(elastic.eigenvalues[0])
+    apart = (reference.rigid[:, 0] - first) / np.sqrt(2.0)
+    stiffness = case.model.stiffness.toarray()
+    for shape, own in ((first, -value), (apart, value)):
+        moved = case.model.mass @ shape
+        stiffness += own * np.outer(moved, moved)
+    mixed = replace(case.model, stiffness=type(case.model.stiffness)(stiffness))
+    judgement = judge(case, mixed, reference)
+    assert (judgement.rigid_body_modes, judgement.negative_eigenvalues) == (2, 0)
+
+
 def test_a_large_model_offers_as_many_modes_as_a_small_one(
     case: Case, monkeypatch: pytest.MonkeyPatch
 ) -> None:
