@@ -50,7 +50,7 @@ core/modal/close_modes.py :: close_modes
     along.T @ measured => across @ along.T @ measured
     > closeness * abs(first) => > closeness * first
 core/modal/eigen.py :: eigen rigid_modes
-    1.0 / mu - s, shapes => 1.0 / mu, shapes
+    1.0 / mu - => 1.0 / mu - 0.0 *
     _ROUNDOFF = 32.0 => _ROUNDOFF = 0.0
 core/modal/expansion.py :: expansion
     full @ rotation.T), rotation => full @ rotation), rotation
@@ -63,12 +63,12 @@ core/fit/noise.py :: model_error
     log_weight - float(np.log => log_weight + float(np.log
     self.whiten(raw - self.mean) => self.whiten(raw)
 core/inference/model_error.py :: model_error
-    TRUST = 0.7 => TRUST = 1.0
+    scales=found.v, trust= => scales=found.v, trust=1.0**
     weight @ raw[known] => 0.0 * weight @ raw[known]
 core/inference/posterior.py :: diagnosis_search diagnosis_verdict
     + trust * self.fit.log_evidence => + self.fit.log_evidence
-    OVERLOOKED = 0.05 => OVERLOOKED = 0.5
-    _FACTOR = 0.6, 20.0 => _FACTOR = 0.6, 0.0001
+    self.missed * log( => 0.2 * self.missed * log(
+    min(gains) > log( => min(gains) > -9.0 + 0.0 * log(
     - 0.5 * self.chi2 => - self.chi2
 core/inference/prior.py :: diagnosis_search
     log(names) + log(part.hypothesis.places) => log(names)
