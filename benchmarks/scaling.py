@@ -162,9 +162,7 @@ def _fitted(joints: int, *, slopes: bool) -> Row:
     model = Model.of(lattice(joints, standing=True))
     structure, count = model.frame_structure, 10
     names = [member.name for member in structure.frame.members]
-    parameters = [
-        Property(name, "EI", tuple(f"{name}/{k}" for k in range(1, 4))) for name in names
-    ]
+    parameters = [Property(name, "EI", tuple(f"{name}/{k}" for k in range(1, 4))) for name in names]
     rng = np.random.default_rng(0)
 
     def solved(values: FloatArray) -> tuple[Model, Modes]:

@@ -15,6 +15,8 @@ from femubench.core.fem.frame import (
     GroundSpring,
     Joint,
     JointSpring,
+    Material,
+    Member,
     Place,
     PointMass,
     RigidEnd,
@@ -22,6 +24,7 @@ from femubench.core.fem.frame import (
 )
 from femubench.core.fem.model import Model
 from femubench.core.fem.parameters import Property
+from femubench.core.fem.sections import Section
 from femubench.core.fem.structure import Structure
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.typing import FloatArray
@@ -78,6 +81,56 @@ def test_an_attachment_between_nodes_splits_its_element(ladder: FrameBuilder) ->
 def test_a_support_between_nodes_splits_its_element(ladder: FrameBuilder) -> None:
     frame = replace(ladder(), supports=(Support(Place(member="EF", s=0.4), ("z",)),))
     assert Model.of(frame).size == 83
+
+
+@pytest.mark.parametrize("beam", ["euler-bernoulli", "timoshenko"])
+@pytest.mark.parametrize("s", [0.3, 0.4, 0.93])
+def test_what_is_put_on_a_model_gives_the_modes_of_the_frame_that_has_it(
+    ladder: FrameBuilder, beam: str, s: float
+) -> None:
+    """Against matrices that are assembled anew: both pieces of an element have their lengths."""
+    masses = PointMass(Place(member="EF", s=s), 0.3), PointMass(Place(member="BE", s=0.61), 0.2)
+    springs = (GroundSpring(Place(member="AB", s=s), "z", 1e5),)
+    base = ladder(beam)
+    whole = replace(base, masses=(*base.masses, *masses), springs=springs)
+    after = Model.of(base).attach(masses, springs)
+    assert after.size == Model.of(whole).size == Model.of(base).size + 9
+    found = solve_modes(after).elastic.natural_frequencies[:8]
+    np.testing.assert_allclose(found, elastic(whole), rtol=1e-9)
+
+
+def test_a_mass_between_nodes_gives_the_frequencies_of_a_beam_with_a_mass() -> None:
+    """A cantilever with a mass M at a: det of Euler-Bernoulli's waves in its two parts.
+
+    Source: each part has cos, sin, cosh, sinh of beta x; shear jumps by M omega^2 w at the mass.
+    """
+    length, at, mass, EI, rho_a = 1.0, 0.37, 0.8, 2.1e11 * 1.2e-8, 7850.0 * 4e-4
+    section = Section(A=4e-4, Iy=1.2e-8, Iz=1.2e-8, J=2e-8, Jp=2.4e-8)
+    joints = Joint("A", (0.0, 0.0, 0.0)), Joint("B", (length, 0.0, 0.0))
+    member = Member("AB", ("A", "B"), 20, section, Material(2.1e11, 0.3, 7850.0))
+    clamped = (Support(Place(joint="A"), ("x", "z", "ry")),)
+    frame = Frame("in-plane", "euler-bernoulli", joints, (member,), supports=clamped)
+    after = Model.of(frame).attach([PointMass(Place(member="AB", s=at), mass)], [])
+    hertz = solve_modes(after).natural_frequencies[:3]
+
+    def determinant(f: float) -> float:
+        omega = 2.0 * np.pi * f
+        beta = (rho_a * omega**2 / EI) ** 0.25
+
+        def waves(x: float) -> FloatArray:
+            c, s, ch, sh = np.cos(beta * x), np.sin(beta * x), np.cosh(beta * x), np.sinh(beta * x)
+            return np.array([[c, s, ch, sh], [-s, c, sh, ch], [-c, -s, ch, sh], [s, -c, sh, ch]])
+
+        jump = np.zeros((4, 4))
+        jump[3] = mass * omega**2 / (EI * beta**3) * waves(at)[0]
+        matrix = np.zeros((8, 8))
+        matrix[:2, :4] = waves(0.0)[:2]
+        matrix[2:6, :4], matrix[2:6, 4:] = waves(at) + jump, -waves(at)
+        matrix[6:, 4:] = waves(length)[2:]
+        return float(np.linalg.det(matrix))
+
+    for f in hertz:
+        assert determinant(0.9999 * f) * determinant(1.0001 * f) < 0.0
 
 
 @pytest.mark.parametrize("distance", [1e-8, 1e-6, 1e-5, 1e-4, 1e-3])

@@ -308,6 +308,25 @@ def test_the_covariance_is_what_repeated_tests_show() -> None:
     assert np.var(deviations) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / 40.0))
 
 
+@pytest.mark.parametrize("blur", [1.0, 30.0, 1e4])
+def test_the_covariance_is_the_curvature_of_the_cost_with_its_prior(blur: float) -> None:
+    """Against second differences; of what the data do not show, the prior's deviation is left."""
+    frame = structure_named("ladder").frame
+    model, (effect,) = Model.of(frame), effects_named("member-mass")
+    test = measured(model, frame, weighed=False)
+    test = replace(test, frequency_std=blur * test.frequency_std, shape_std=blur * test.shape_std)
+    problem = problem_of(model, test, (effect,))
+    part = part_at(problem, "member-mass", "front-left")
+    found = fit(problem, (part,), np.zeros(1))
+    assert found is not None
+    step = 0.02
+    low, mid, high = (state_at(problem, (part,), np.array([x])).cost for x in (-step, 0.0, step))
+    curvature = (low - 2.0 * mid + high) / (2.0 * step**2)
+    assert curvature >= 1.0
+    assert found.covariance[0, 0] == pytest.approx(1.0 / curvature, rel=1e-2)
+    assert (found.covariance[0, 0] > 0.99) == (blur > 1e3)
+
+
 # --- evidence ---------------------------------------------------------------------------------
 
 

@@ -20,7 +20,7 @@ from femubench.core.fem.frame import Place
 from femubench.core.fit.extended_model import agreed, extended, raw_residual
 from femubench.core.fit.modal_fit import fit, state_at
 from femubench.core.inference.examine import examine
-from femubench.core.inference.posterior import Posterior
+from femubench.core.inference.posterior import Explanation, Posterior
 from femubench.core.inference.prior import (
     PRIOR_BEYOND_TEXTBOOK,
     PRIOR_OF_COUNT,
@@ -31,7 +31,14 @@ from femubench.effect import EffectParameter, FrameEffect
 from femubench.fem import Frame, PointMass
 
 sys.path.insert(0, str(Path(__file__).parent))
-from diagnosis_problems import catalogue, effects_named, measured, part_at, problem_of
+from diagnosis_problems import (
+    catalogue,
+    coordinates,
+    effects_named,
+    measured,
+    part_at,
+    problem_of,
+)
 
 FRAME = structure_named("ladder").frame
 MODEL = Model.of(FRAME)
@@ -72,6 +79,45 @@ def test_textbook_sets_are_all_subsets_with_probabilities_that_sum_to_one() -> N
     assert bases[-1].x.tolist() == [1.0, 1.0]
     (alone,) = textbook_bases([part_at(problem, "density", "all")])
     assert (alone.names, alone.log_prior) == ((), 0.0)
+
+
+def test_a_noise_that_is_trusted_by_half_halves_what_the_data_say_and_leaves_the_prior() -> None:
+    (effect,) = effects_named("member-mass")
+    test = measured(effect.extend(MODEL, "rung-left", (0.05,)), FRAME)
+    problem = problem_of(MODEL, test, (effect,))
+    part = part_at(problem, "member-mass", "rung-left")
+    (base,), odds = textbook_bases([]), []
+    for trust in (0.0, 0.5, 1.0):
+        noisy = replace(problem, noise=replace(problem.noise, trust=trust))
+        fits = fit(noisy, (), NOTHING), fit(noisy, (part,), np.array([0.5]))
+        nothing, cause = (Explanation(base, found, 1) for found in fits if found is not None)
+        found = Posterior.of((nothing, cause)).names
+        odds.append(log(found[("member-mass",)] / found[()]))
+    priors = [log_prior(parts, 1, PRIOR_OF_COUNT) for parts in ((part,), ())]
+    assert odds[0] == pytest.approx(priors[0] - priors[1])
+    assert odds[1] == pytest.approx(0.5 * (odds[0] + odds[2]))
+    assert odds[2] > odds[0] + 4.0
+
+
+@pytest.mark.parametrize(("overlooked", "count"), [(None, 0), (3, 1), (6, 0)])
+def test_a_mode_that_a_cause_adds_and_the_test_missed_makes_the_cause_improbable(
+    overlooked: int | None, count: int
+) -> None:
+    """Fewer than one test in ten overlooks a mode among those that it finds, more than in 100."""
+    (effect,) = effects_named("attached-oscillator")
+    values = (0.02, 500.0)  # kg, Hz: the third mode of seven
+    test = measured(effect.extend(MODEL, "J1", values), FRAME)
+    test = test.select([n for n in test.numbers if n != overlooked])
+    problem = problem_of(MODEL, test, (effect,))
+    part = part_at(problem, "attached-oscillator", "J1")
+    found = fit(problem, (part,), coordinates(part, values))
+    assert found is not None
+    assert found.state.chi2 < 1e-6  # the oscillator explains all that was measured
+    cost = (
+        log_prior((part,), 1, PRIOR_OF_COUNT)
+        - Explanation(textbook_bases([])[0], found, 1).log_prior
+    )
+    assert count * log(10.0) <= cost <= count * log(100.0)
 
 
 @pytest.fixture(scope="module")

@@ -74,6 +74,17 @@ def cantilever() -> Frame:
     return Frame("in-plane", "euler-bernoulli", joints, members, supports=(support,))
 
 
+def tower() -> Frame:
+    """Return a mast on a cross of four clamped legs: its modes of bending come in equal pairs."""
+    feet = {"N": (0.0, 0.4), "S": (0.0, -0.4), "E": (0.4, 0.0), "W": (-0.4, 0.0)}
+    joints = [Joint(name, (0.0, 0.0, z)) for name, z in (("top", 1.0), ("mid", 0.5), ("base", 0.0))]
+    joints += [Joint(name, (x, y, 0.0)) for name, (x, y) in feet.items()]
+    ends = {"low": ("base", "mid"), "high": ("mid", "top"), **{n: (n, "base") for n in feet}}
+    members = tuple(Member(f"m-{name}", pair, 3, BAR, STEEL) for name, pair in ends.items())
+    supports = tuple(Support(Place(name), ("x", "y", "z", "rx", "ry", "rz")) for name in feet)
+    return Frame("3d", "euler-bernoulli", tuple(joints), members, supports=supports)
+
+
 def everywhere(model: Model) -> Sensors:
     """Return a sensor on every degree of freedom."""
     labels = tuple(f"{n}{d}" for n, d in zip(model.dofs.node, model.dofs.direction, strict=True))
@@ -215,6 +226,35 @@ def test_slopes_are_those_of_differences_and_few_shapes_give_the_same_frequencie
         1.0 - modes.natural_frequencies[:3] / measurement.frequencies, abs=1e-9
     )
     assert few.fit(log).residual[:3] == pytest.approx(fit.residual[:3], abs=2e-3)
+
+
+def test_a_model_that_loses_a_mode_fits_no_better_than_before() -> None:
+    """All members softer and softer: the frequency falls as the root, until nothing pairs."""
+    model = Model.of(cantilever())
+    first = exact(model, everywhere(model), 1)
+    bare = replace(first, shapes=np.full_like(first.shapes, np.nan))
+    parts = parameterise(model, "members")
+    space = modal_space(parts, bare, shape_weight=0.0)
+    fits = [space.fit(np.full(len(parts), 2.0 * np.log(r))) for r in (0.9, 0.8, 0.73, 0.7, 0.5)]
+    assert [fit.paired for fit in fits] == [1, 1, 1, 0, 0]
+    costs = [fit.cost for fit in fits]
+    assert costs[:3] == pytest.approx([0.1**2, 0.2**2, 0.27**2], rel=1e-6)
+    assert min(costs[3:]) > costs[2]
+
+
+def test_modes_of_one_frequency_turn_by_no_rounding() -> None:
+    """Stiffness that grows everywhere alike turns no shape; that of one leg finds its factor."""
+    model, measurement = planted(tower(), "m-N", 6)
+    hertz = solve_modes(model).natural_frequencies
+    assert hertz[[1, 3]] == pytest.approx(hertz[[0, 2]], rel=1e-9)
+    parts = parameterise(model, "members")
+    space = modal_space(parts, exact(model, everywhere(model), 4), shape_weight=1.0)
+    slope = space.fit(np.zeros(len(parts))).slope
+    assert slope[:4].sum(axis=1) == pytest.approx([-0.5] * 4)
+    assert slope[4:].sum(axis=1) == pytest.approx(np.zeros(len(slope) - 4), abs=1e-9)
+    found = factors_of(Eigensensitivity(), model, measurement)
+    assert found.pop("m-N") == pytest.approx(FACTOR, abs=1e-3)
+    assert list(found.values()) == pytest.approx([1.0] * len(found), abs=1e-3)
 
 
 def test_the_curvature_is_that_of_the_curve_and_its_corner_beats_other_weights() -> None:

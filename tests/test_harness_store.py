@@ -24,7 +24,7 @@ from femubench.core.run.store import Store
 from femubench.core.run.upkeep import faults_of, repair, unsealed
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.records import result_to_json
-from femubench.core.schema.results import Block, JobResult, Run
+from femubench.core.schema.results import Block, JobResult, Run, Status
 from femubench.core.score.ranking import rank_results
 
 MODES = (
@@ -100,6 +100,24 @@ def test_the_latest_run_is_the_default_and_others_go_by_id(tmp_path: Path) -> No
         store.load("2026")
     with pytest.raises(InputError, match="no run 'x'"):
         store.load("x")
+
+
+@pytest.mark.parametrize("status", ["timeout", "failed", "crashed", "diverged"])
+def test_a_later_failure_takes_no_result_away_and_a_later_result_counts(
+    tmp_path: Path, status: Status
+) -> None:
+    def job(run: str, seconds: float, status: Status) -> None:
+        store.begin({**META, "run": run})
+        store.append(run, replace(GOOD, key="k", seconds=seconds, status=status))
+
+    store = Store(tmp_path)
+    seen = []
+    for second, outcome in enumerate((status, status, "ok", status, "not-applicable", status)):
+        job(f"2026010{second + 1}T000000Z-000000", second, outcome)
+        seen.append((store.latest()["k"].status, store.by_key()["k"].seconds))
+    first, second, *rest = seen
+    assert (first, second) == ((status, 0.0), (status, 1.0))
+    assert rest == [("ok", 2.0), ("ok", 2.0), ("not-applicable", 4.0), ("not-applicable", 4.0)]
 
 
 def test_an_unfinished_run_is_loaded_as_far_as_it_went(tmp_path: Path) -> None:

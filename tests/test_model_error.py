@@ -24,6 +24,8 @@ from femubench.core.inference.model_error import (
     error_slopes,
     kind,
 )
+from femubench.core.inference.posterior import Explanation
+from femubench.core.inference.prior import Base
 from femubench.effect import member_length, total_mass
 from femubench.fem import FloatArray, Frame, PointMass
 
@@ -166,6 +168,29 @@ def test_scales_follow_the_size_of_the_error(
         assert 0.6 < np.square(whitened).mean() < 1.4
         seen.append(found.v[list(chosen)].sum())
     assert seen[0] < seen[1] < seen[2]
+
+
+def test_scales_that_are_fitted_make_less_sure_than_a_noise_that_is_known(
+    problem: Problem, slopes: dict[str, FloatArray]
+) -> None:
+    """The odds of a cause, whose prior is that of nothing at all, under one covariance."""
+    part = part_at(problem, "local-stiffness-loss", f"{MEMBER.name}/2")
+    rng = np.random.default_rng(8)
+    _, error = drawn(problem, slopes, rng, 0.5)
+    offset = error + rng.standard_normal(len(error))
+    offset -= state_at(problem, (part,), np.array([1.5])).raw
+    model = ModelError.of(slopes, slopes, error, WIDTHS, 0.02, 0.0)
+    present = replace(problem, offset=offset)
+    guess = model.noise(model.fitted(state_at(present, (), NOTHING)))
+    known = conditioned(model.covariance(guess.scales), model.residual, 0.0, beam=True)
+    np.testing.assert_allclose(known.factor, guess.factor)
+    odds = []
+    for noise in (guess, known):
+        fits = (fit(replace(present, noise=noise), p, np.ones(len(p))) for p in ((), (part,)))
+        nothing, cause = (Explanation(Base((), 0.0), found, 1) for found in fits if found)
+        odds.append((cause.log_weight - cause.log_prior) - (nothing.log_weight - nothing.log_prior))
+    assert odds[1] > 5.0
+    assert 0.5 * odds[1] < odds[0] < 0.9 * odds[1]
 
 
 def test_unseen_data_lie_within_what_is_foreseen(

@@ -74,6 +74,14 @@ def test_scale_factor_minimises_the_weighted_difference() -> None:
     assert best == pytest.approx(reference, rel=1e-12)
 
 
+def test_scale_factor_of_complex_shapes_is_that_of_least_squares() -> None:
+    rng = np.random.default_rng(4)
+    m, p = rng.standard_normal((2, 7)) + 1j * rng.standard_normal((2, 7))
+    reference = np.linalg.lstsq(p[:, None], m, rcond=None)[0][0]
+    assert modal_scale_factor(m, p)[0] == pytest.approx(reference, rel=1e-12)
+    assert modal_scale_factor(1j * p, p)[0] == pytest.approx(1j)
+
+
 def test_swapped_modes_are_found_by_shape() -> None:
     order = [0, 2, 1, 3, 5, 4]
     pairing = pair_modes(FREQUENCIES, noisy(SHAPES), FREQUENCIES, SHAPES[:, order])
@@ -108,6 +116,21 @@ def test_shapes_alike_at_the_sensors_are_told_apart_by_frequency() -> None:
     shapes = np.column_stack([SHAPES[:, 0], SHAPES[:, 0]])
     pairing = pair_modes(np.array([300.0, 210.0]), shapes, np.array([200.0, 310.0]), shapes)
     assert pairing.index.tolist() == [1, 0]
+
+
+@pytest.mark.parametrize(("apart", "partner"), [(0.3, 0), (0.5, 1)])
+def test_one_point_of_mac_is_worth_four_of_the_logarithm_of_frequencies(
+    apart: float, partner: int
+) -> None:
+    """A MAC of 1 at exp(apart) times the frequency, against one of 0.9 at the frequency itself.
+
+    0.1 points of MAC are worth 0.4 of the logarithm: the exact shape wins at 0.3, not at 0.5.
+    """
+    other = np.sqrt(0.9) * SHAPES[:, 0] + np.sqrt(0.1) * SHAPES[:, 1]
+    predicted = np.array([100.0 * np.exp(apart), 100.0])
+    shapes = np.column_stack([SHAPES[:, 0], other])
+    pairing = pair_modes(np.array([100.0]), SHAPES[:, :1], predicted, shapes)
+    assert pairing.index.tolist() == [partner]
 
 
 def test_no_pair_below_the_least_mac_or_outside_the_window() -> None:
@@ -148,6 +171,15 @@ def test_a_frequency_alone_never_moves_a_shape_to_a_worse_partner() -> None:
     pairing = pair_modes(
         np.array([100.0, 100.0]), shapes, predicted, np.column_stack([SHAPES[:, 0], poor])
     )
+    assert pairing.index.tolist() == [0, -1]
+
+
+def test_a_frequency_alone_takes_no_partner_from_a_shape_however_poor() -> None:
+    """One predicted mode: a shape with a MAC of 0.52 at twice its frequency, and its frequency."""
+    poor = np.sqrt(0.52) * SHAPES[:, 0] + np.sqrt(0.48) * SHAPES[:, 1]
+    shapes = np.column_stack([poor, np.full(12, np.nan)])
+    measured = np.array([190.0, 100.0])
+    pairing = pair_modes(measured, shapes, np.array([100.0]), SHAPES[:, :1])
     assert pairing.index.tolist() == [0, -1]
 
 

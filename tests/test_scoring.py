@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from femubench.core.case.case import Case
+from femubench.core.fem.frame import Support
 from femubench.core.fem.model import LowRank, Model
 from femubench.core.modal import eigen
 from femubench.core.modal.eigen import solve_modes
@@ -113,6 +114,37 @@ def test_a_mode_that_no_sensor_sees_has_no_shape_to_pair_by(case: Case) -> None:
     assert all(pair.mac is None or 0.0 <= pair.mac <= 1.0 for pair in pairs)
 
 
+def mast(stiffer: float, up: tuple[float, float, float]) -> Model:
+    """A mast along z, stiffer by that share about one of two axes."""
+    section = toys.Section(A=4e-4, Iy=1.2e-8 * (1.0 + stiffer), Iz=1.2e-8, J=2e-8, Jp=2.4e-8)
+    joints = toys.Joint("A", (0.0, 0.0, 0.0)), toys.Joint("B", (0.0, 0.0, 1.0))
+    steel = toys.Material(2.1e11, 0.3, 7850.0)
+    member = toys.Member("mast", ("A", "B"), 6, section, steel, up)
+    clamped = (Support(toys.Place(joint="A"), ("x", "y", "z", "rx", "ry", "rz")),)
+    return Model.of(toys.Frame("3d", "euler-bernoulli", joints, (member,), supports=clamped))
+
+
+@pytest.mark.parametrize(("split", "alike"), [(1e-4, True), (0.1, False)])
+def test_modes_closer_than_a_test_can_tell_are_judged_as_a_space(split: float, alike: bool) -> None:
+    """Frequencies known to 0.2 %: the planes of a round mast say nothing, those of an oval do."""
+    heights = np.tile([0.25, 0.5, 0.75, 1.0], 2)
+    xyz = np.column_stack([0.0 * heights, 0.0 * heights, heights])
+    at = toys.Sensors(tuple(f"s{i}" for i in range(8)), xyz, ("x",) * 4 + ("y",) * 4)
+    along, across = mast(split, (1.0, 0.0, 0.0)), mast(split, (1.0, 0.7, 0.0))
+    modes = solve_modes(along).take(np.arange(4))
+    hertz = modes.natural_frequencies
+    shapes = along.observe(at) @ modes.shapes
+    none = np.full(4, np.nan)
+    measured = toys.Measurement(
+        at, (1, 2, 3, 4), hertz, 2e-3 * hertz, none, shapes, np.full(shapes.shape, 0.01)
+    )
+    # Turned by 35 degrees, each shape has a share of 1 / (1 + 0.7^2) in the measured plane.
+    pairs = predict_block(across, measured, None)
+    wanted = 1.0 if alike else 1.0 / 1.49
+    assert [pair.mac for pair in pairs] == pytest.approx([wanted] * 4, abs=1e-6)
+    assert [pair.predicted_hz for pair in pairs] == pytest.approx(hertz.tolist(), rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("predicted", "error"), [(None, 1.0), (-99.0, 1.0), (0.0, 1.0), (97.0, 0.03), (150.0, 0.5)]
 )
@@ -153,6 +185,36 @@ def test_zero_modes_that_are_no_rigid_motions_do_not_count(
     loose = replace(case.model, stiffness=type(case.model.stiffness)(stiffness))
     judgement = judge(case, loose, reference)
     assert (judgement.rigid_body_modes, judgement.negative_eigenvalues) == (3, 0)
+
+
+@pytest.mark.parametrize(
+    ("share", "kept", "negative"), [(5e-7, 3, 0), (-5e-7, 3, 0), (2e-6, 2, 0), (-2e-6, 2, 1)]
+)
+def test_a_millionth_of_the_first_elastic_eigenvalue_is_zero(
+    case: Case, reference: Reference, share: float, kept: int, negative: int
+) -> None:
+    """M r c r' M gives the rigid motion r the eigenvalue c, and leaves all other modes alone."""
+    moved = np.asarray(case.model.mass @ reference.rigid[:, :1])
+    first = float(solve_modes(case.model).elastic.eigenvalues[0])
+    change = LowRank(moved, np.array([[share * first]]))
+    judgement = judge(case, replace(case.model, stiffness_change=change), reference)
+    assert (judgement.rigid_body_modes, judgement.negative_eigenvalues) == (kept, negative)
+
+
+def test_a_zero_mode_that_is_a_rigid_motion_by_half_is_none(
+    case: Case, reference: Reference
+) -> None:
+    """The mean of a rigid motion and of an elastic mode takes no force, their difference does."""
+    elastic = solve_modes(case.model).elastic
+    first, value = elastic.shapes[:, 0], float(elastic.eigenvalues[0])
+    apart = (reference.rigid[:, 0] - first) / np.sqrt(2.0)
+    stiffness = case.model.stiffness.toarray()
+    for shape, own in ((first, -value), (apart, value)):
+        moved = case.model.mass @ shape
+        stiffness += own * np.outer(moved, moved)
+    mixed = replace(case.model, stiffness=type(case.model.stiffness)(stiffness))
+    judgement = judge(case, mixed, reference)
+    assert (judgement.rigid_body_modes, judgement.negative_eigenvalues) == (2, 0)
 
 
 def test_a_large_model_offers_as_many_modes_as_a_small_one(

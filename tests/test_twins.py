@@ -350,6 +350,33 @@ def test_one_twin_may_be_chance_and_who_is_never_good_knows_nothing(run: Run) ->
     assert not with_scores(4.0, 20.0, 20.0)
 
 
+def test_a_job_that_was_stopped_says_nothing_of_what_a_strategy_knows(run: Run) -> None:
+    """A twin that took too long, on a machine with more to do: the other answers are compared."""
+    told = {f"one~{i}": "one" for i in (1, 2, 3)}
+    reference = {name: {"higher": 3.0} for name in told}
+    meta = {
+        "reference": {"one": {"higher": 3.0}},
+        "twins": {"of": told, "again": {}, "reference": reference},
+    }
+    answer = run.results[0].changed(
+        case="one",
+        seed=0,
+        strategy="s",
+        blocks={"higher": replace(run.results[0].blocks["higher"], rms_percent=0.5)},
+    )
+    for status in ("timeout", "crashed"):
+        stopped = [replace(answer, case=name, status=status, blocks={}) for name in told]
+        assert twin_skills(Run(meta, (answer,), tuple(stopped))) == {}
+        some = (*stopped[:2], replace(answer, case="one~3"))
+        found = twin_skills(Run(meta, (answer,), some))["s"]
+        assert found.skill == found.original_skill == pytest.approx(1.0 - 0.55 / 3.05)
+        assert not found.suspicious
+        over = replace(answer, status=status, blocks={})
+        assert twin_skills(Run(meta, (over,), some)) == {}
+    failed = [replace(answer, case=name, status="failed", blocks={}) for name in told]
+    assert twin_skills(Run(meta, (answer,), tuple(failed)))["s"].suspicious
+
+
 def test_who_answers_otherwise_every_time_is_found(run: Run) -> None:
     assert list(unsteady(run)) == ["chance"]
     assert "another model" in unsteady(run)["chance"]

@@ -172,6 +172,28 @@ def test_a_covariance_that_is_none_is_refused(covariance: FloatArray, says: str)
     assert says in str(caught.value)
 
 
+@pytest.mark.parametrize("lack", [1e-6, 1e-5])
+def test_a_covariance_that_is_symmetric_to_six_digits_alone_is_refused(lack: float) -> None:
+    """A wrong index is no rounding: that of a product of matrices is of 1e-15."""
+    covariance = np.array([[1.0, 0.5 + lack], [0.5, 1.0]])
+    with pytest.raises(StrategyFailure, match="not symmetric"):
+        Uncertainty.drawn(lambda q: CASE.model, np.zeros(2), covariance)
+
+
+def test_a_covariance_of_lower_rank_serves_in_spite_of_its_rounding() -> None:
+    """Forty parameters of three causes: eigenvalues of -1e-16 are zeros, and samples span three."""
+    causes = np.random.default_rng(2).standard_normal((40, 3))
+    covariance = causes @ np.diag([1.0, 0.3, 0.1]) @ causes.T
+    asymmetric = covariance * (1.0 + 1e-13 * np.triu(np.ones((40, 40)), 1))
+    for given in (covariance, asymmetric):
+        assert np.linalg.eigvalsh(given)[0] < 0.0
+        seen: list[FloatArray] = []
+        Uncertainty.drawn(lambda q, seen=seen: seen.append(q) or CASE.model, np.zeros(40), given)  # type: ignore[misc]
+        size = np.linalg.svdvals(np.array(seen))
+        assert np.count_nonzero(size > 1e-6 * size[0]) == 3
+        assert np.cov(np.transpose(seen), bias=True) == pytest.approx(covariance, abs=1e-9)
+
+
 class Stating(Strategy):
     """Hand back the nominal model with any uncertainty."""
 
