@@ -333,7 +333,7 @@ class Paper(Protocol):
 
 
 class EffectParameter(Protocol):
-    """One number of an effect, with its prior; `effect.EffectParameter` explains the members."""
+    """One number of an effect, with its prior; `effect.Parameter` explains the members."""
 
     @property
     def name(self) -> str:

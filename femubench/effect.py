@@ -2,7 +2,7 @@
 
 from femubench.core.change.change import Change, proportional
 from femubench.core.change.interpolation import barycentric, chebyshev_nodes
-from femubench.core.change.parameter import Parameter as EffectParameter
+from femubench.core.change.parameter import Parameter
 from femubench.core.change.terms import (
     ElementOperator,
     MatrixOperator,
@@ -82,7 +82,7 @@ __all__ = [
     "Change",
     "Corrected",
     "Effect",
-    "EffectParameter",
+    "Parameter",
     "ElementOperator",
     "Fault",
     "FrameEffect",

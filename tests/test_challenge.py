@@ -46,7 +46,7 @@ from femubench.core.library.cases import read_cases
 from femubench.core.library.challenge import any_hidden, challenge, score_challenge
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.plugin.loader import load_plugins
-from femubench.effect import EffectParameter, FrameEffect, Site, Size
+from femubench.effect import FrameEffect, Parameter, Site, Size
 from femubench.fem import Frame, PointMass
 from femubench.plugins.effects.local_stiffness_loss import LocalStiffnessLoss
 
@@ -62,8 +62,8 @@ class ToyMass(FrameEffect):
     def places(self, model: Model) -> Sequence[str]:
         return tuple(joint.name for joint in model.frame_structure.frame.joints)
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
-        return (EffectParameter("mass", "kg", 0.05, lower=0.0, one_sided=True),)
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
+        return (Parameter("mass", "kg", 0.05, lower=0.0, one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         return replace(frame, masses=(*frame.masses, PointMass(Place(joint=place), values[0])))
@@ -77,8 +77,8 @@ class ToyModulus(FrameEffect):
     def places(self, model: Model) -> Sequence[str]:
         return ("all",)
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
-        return (EffectParameter("change", "", 0.05, lower=-0.5, upper=0.5),)
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
+        return (Parameter("change", "", 0.05, lower=-0.5, upper=0.5),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         stiff = 1.0 + values[0]
@@ -93,8 +93,8 @@ class Absurd(ToyModulus):
 
     name: ClassVar[str] = "absurd"
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
-        return (EffectParameter("change", "", 5.0, lower=0.0, one_sided=True),)
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
+        return (Parameter("change", "", 5.0, lower=0.0, one_sided=True),)
 
 
 TOYS = {toy.name: toy for toy in (ToyMass(), ToyModulus())}

@@ -27,7 +27,7 @@ from femubench.core.inference.prior import (
     log_prior,
     textbook_bases,
 )
-from femubench.effect import EffectParameter, FrameEffect
+from femubench.effect import FrameEffect, Parameter
 from femubench.fem import Frame, PointMass
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -230,8 +230,8 @@ class Ballast(FrameEffect):
     def places(self, model: Model) -> Sequence[str]:
         return tuple(m.name for m in model.frame_structure.frame.members if "rung" in m.name)
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
-        return (EffectParameter("mass", "kg", 0.02, lower=0.0, one_sided=True),)
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
+        return (Parameter("mass", "kg", 0.02, lower=0.0, one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         ends = frame.members[frame.member_index[place]].ends
@@ -244,8 +244,8 @@ class Softening(Ballast):
 
     name: ClassVar[str] = "softening"
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
-        return (EffectParameter("depth", "", 0.2, lower=0.0, upper=0.8, one_sided=True),)
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
+        return (Parameter("depth", "", 0.2, lower=0.0, upper=0.8, one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         softer = 1.0 - values[0] ** 2

@@ -20,7 +20,7 @@ from femubench.core.change.terms import RowOperator, Term
 from femubench.core.effect.attachments import point_motion
 from femubench.core.fem.frame import Place
 from femubench.diagnosis import registered_effects
-from femubench.effect import EffectParameter
+from femubench.effect import Parameter
 
 CASES = Path(__file__).parent / "cases"
 
@@ -33,8 +33,8 @@ class Tether:
     def places(self, model: Model) -> Sequence[str]:
         return ("A", "A-F")
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
-        return (EffectParameter("stiffness", "N m/rad", 10.0),)
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
+        return (Parameter("stiffness", "N m/rad", 10.0),)
 
     def change(self, model: Model, place: str) -> Change:
         points = [point_motion(model, Place(joint=name))[[3]] for name in place.split("-")]

@@ -16,7 +16,7 @@ from femubench.core.case.writing import write_case
 from femubench.core.fem.model import Dofs
 from femubench.core.fem.model_parameters import matrix_slopes, with_values
 from femubench.core.run.jobs import missing_capability
-from femubench.effect import EffectParameter
+from femubench.effect import Parameter
 from femubench.fem import (
     Frame,
     GroundSpring,
@@ -299,7 +299,7 @@ def test_sets_of_nodes_face_one_by_one() -> None:
 
 
 def test_a_factor_never_reaches_zero() -> None:
-    parameter = EffectParameter("change of E", "", 2.0, scaling="factor")
+    parameter = Parameter("change of E", "", 2.0, scaling="factor")
     low, high = parameter.range
     assert parameter.value(low) > -1.0
     assert parameter.value(high) == pytest.approx(np.expm1(12.0))

@@ -28,7 +28,7 @@ from femubench.core.challenge.truth import (
     with_causes,
 )
 from femubench.core.challenge.visibility import unexplained
-from femubench.core.change.parameter import Parameter as EffectParameter
+from femubench.core.change.parameter import Parameter
 from femubench.core.effect.frame_effect import FrameEffect
 from femubench.core.effect.sizes import Site, Size
 from femubench.core.errors import FemubenchError, InputError, ModelError
@@ -228,7 +228,7 @@ class Candidates:
 
 def draw_values(
     sizes: Sequence[Size],
-    parameters: Sequence[EffectParameter],
+    parameters: Sequence[Parameter],
     site: Site,
     rng: np.random.Generator,
 ) -> tuple[float, ...]:
@@ -251,7 +251,7 @@ def draw_values(
     )
 
 
-def _from_prior(parameter: EffectParameter, rng: np.random.Generator) -> float:
+def _from_prior(parameter: Parameter, rng: np.random.Generator) -> float:
     x = float(rng.uniform(0.5, 2.0))
     if not parameter.one_sided and rng.random() < 0.5:
         x = -x

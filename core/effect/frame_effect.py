@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar
 
-from femubench.core.change.parameter import Parameter as EffectParameter
+from femubench.core.change.parameter import Parameter
 from femubench.core.effect.reading import Reading
 from femubench.core.effect.sizes import Size
 from femubench.core.errors import NotApplicable
@@ -49,7 +49,7 @@ class FrameEffect(Effect):
         """Return where the effect may sit in this model; nothing where it does not apply."""
 
     @abstractmethod
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return its parameters there."""
 
     @abstractmethod

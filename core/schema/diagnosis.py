@@ -17,7 +17,7 @@ class CauseParameter:
     Arguments:
         std: standard deviation; None where the value is a textbook one that was not fitted.
         textbook: whether the value was taken from the textbook.
-        wording: how a size is worded, as in `EffectParameter`.
+        wording: how a size is worded, as in `Parameter`.
     """
 
     name: str

@@ -9,8 +9,8 @@ from typing import ClassVar
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     FrameEffect,
+    Parameter,
     Site,
     Size,
     free_translations,
@@ -38,12 +38,12 @@ class AddedMass(FrameEffect):
         """Return the points, or nodes, that can move."""
         return [at for at in point_places(model) if free_translations(model, point_in(model, at))]
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the mass."""
         structure = model.structure
         points = point_places(model) if structure is None else structure.frame.joints
         scale = model.total_mass * min(max(1.0 / max(len(points), 1), _LEAST), _MOST)
-        return (EffectParameter("mass", "kg", scale, one_sided=True),)
+        return (Parameter("mass", "kg", scale, one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the mass."""

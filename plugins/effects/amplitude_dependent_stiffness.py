@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 from femubench import Model
-from femubench.effect import EffectParameter, FrameEffect
+from femubench.effect import FrameEffect, Parameter
 from femubench.fem import Frame
 
 
@@ -30,9 +30,9 @@ class AmplitudeDependentStiffness(FrameEffect):
         """Return nothing: a single level of excitation cannot show it."""
         return ()
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the relative loss of stiffness between the two levels."""
-        return (EffectParameter("softening", "", 0.02, lower=0.0, upper=0.5, one_sided=True),)
+        return (Parameter("softening", "", 0.02, lower=0.0, upper=0.5, one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame at the higher level: E of every member lowered."""

@@ -13,8 +13,8 @@ from femubench import Model
 from femubench.effect import (
     FREE,
     Change,
-    EffectParameter,
     FrameEffect,
+    Parameter,
     RowOperator,
     Site,
     Size,
@@ -69,15 +69,13 @@ class AttachedOscillator(FrameEffect):
         across = set(free_translations(model, at)) - {direction}
         return (f"{place}{FREE}",) if across else ()
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return its mass, and its frequency around the middle of the lowest elastic ones."""
         scale, least = (share * model.total_mass for share in (_SHARE, _LEAST))
         centre = float(np.exp(np.log(elastic_band(model)).mean()))
         return (
-            EffectParameter(
-                "mass", "kg", scale, scaling="exponential", one_sided=True, least=least
-            ),
-            EffectParameter("frequency", "Hz", 0.5 * centre, centre, 0.05 * centre, 5.0 * centre),
+            Parameter("mass", "kg", scale, scaling="exponential", one_sided=True, least=least),
+            Parameter("frequency", "Hz", 0.5 * centre, centre, 0.05 * centre, 5.0 * centre),
         )
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:

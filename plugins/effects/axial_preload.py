@@ -11,9 +11,9 @@ import numpy as np
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     ElementOperator,
     FrameEffect,
+    Parameter,
     Site,
     Size,
     Term,
@@ -56,11 +56,11 @@ class AxialPreload(FrameEffect):
         slender = set(sorted(members, key=lambda name: euler_load(frame, name))[:_MOST])
         return tuple(name for name in members if name in slender)
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the force; its scale is a share of the member's Euler load."""
         load = euler_load(model.frame_structure.frame, place)
         bound = _BOUND * load
-        return (EffectParameter("force", "N", _SCALE * load, lower=-bound, upper=bound),)
+        return (Parameter("force", "N", _SCALE * load, lower=-bound, upper=bound),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the lack of fit."""

@@ -9,9 +9,9 @@ from typing import ClassVar
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     ElementOperator,
     FrameEffect,
+    Parameter,
     Size,
     Term,
     elements_of,
@@ -36,9 +36,9 @@ class BendingTorsionCoupling(FrameEffect):
             return ()
         return [member.name for member in model.structure.frame.members if member.section.J > 0.0]
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return c of the energy 2 c sqrt(EI GJ) k t / 2; beyond 1 a section has no stiffness."""
-        return (EffectParameter("coefficient", "", 0.15, lower=-_BOUND, upper=_BOUND),)
+        return (Parameter("coefficient", "", 0.15, lower=-_BOUND, upper=_BOUND),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the coupling."""

@@ -14,8 +14,8 @@ from scipy.sparse.csgraph import connected_components
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     FrameEffect,
+    Parameter,
     RowOperator,
     Site,
     Size,
@@ -68,7 +68,7 @@ class BraceSpring(FrameEffect):
         ]
         return [f"{first}-{last}" for first, last in _nearest(frame, pairs)]
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the stiffness along the line of the joints."""
         frame = model.frame_structure.frame
 
@@ -79,7 +79,7 @@ class BraceSpring(FrameEffect):
             return _SHARE * float(np.mean(each))
 
         scale = once_for(model, "stiffness of a brace", rigidity)
-        return (EffectParameter("stiffness", "N/m", scale, scaling="exponential", one_sided=True),)
+        return (Parameter("stiffness", "N/m", scale, scaling="exponential", one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the brace."""

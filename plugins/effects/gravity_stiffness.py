@@ -12,8 +12,8 @@ import numpy as np
 from femubench import Model, solve_modes
 from femubench.effect import (
     Change,
-    EffectParameter,
     FrameEffect,
+    Parameter,
     Size,
     once_for,
     proportional,
@@ -56,10 +56,10 @@ class GravityStiffness(FrameEffect):
             return ("all",) if _MOST * felt > _LEAST else ()
         return ()
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the multiple of the weight."""
         now = model.frame_structure.frame.gravity
-        parameter = EffectParameter(
+        parameter = Parameter(
             "multiple of the weight", "", 1.0, now, 0.0, now + _MOST, one_sided=now == 0.0
         )
         return (parameter,)

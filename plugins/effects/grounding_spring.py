@@ -11,8 +11,8 @@ import numpy as np
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     FrameEffect,
+    Parameter,
     RowOperator,
     Site,
     Size,
@@ -43,10 +43,10 @@ class GroundingSpring(FrameEffect):
         """Return the points, or nodes, in each direction that they can move in."""
         return directed_places(model, point_places(model))
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the stiffness; at its scale the lowest frequency rises by about a percent."""
         scale = _SHARE * model.total_mass * (2.0 * np.pi * float(elastic_band(model)[0])) ** 2
-        return (EffectParameter("stiffness", "N/m", scale, scaling="exponential", one_sided=True),)
+        return (Parameter("stiffness", "N/m", scale, scaling="exponential", one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the spring."""

@@ -12,8 +12,8 @@ import scipy.sparse as sp
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     FrameEffect,
+    Parameter,
     RowOperator,
     Site,
     Size,
@@ -46,10 +46,10 @@ class InterfaceSpring(FrameEffect):
         """Return the pairs of nodes that share a place, and all of them together."""
         return interface_places(model, facing_nodes(model))
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the stiffness of each spring."""
         scale = _SHARE * model.total_mass * (2.0 * np.pi * float(elastic_band(model)[0])) ** 2
-        return (EffectParameter("stiffness", "N/m", scale, scaling="exponential", one_sided=True),)
+        return (Parameter("stiffness", "N/m", scale, scaling="exponential", one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the springs."""

@@ -11,8 +11,8 @@ from femubench import Model
 from femubench.effect import (
     APART,
     Change,
-    EffectParameter,
     FrameEffect,
+    Parameter,
     Size,
     end_stiffness,
     flexible_ends_change,
@@ -49,9 +49,9 @@ class JointFlexibility(FrameEffect):
         """Return the place with a factor for every type."""
         return () if place.endswith(APART) else (f"{place}{APART}",)
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the multiple of 4 EI/L and GJ/L, and the factors of the types as their ln."""
-        stiffness = EffectParameter(
+        stiffness = Parameter(
             "stiffness, multiple of the members' own",
             "",
             1.0,
@@ -62,7 +62,7 @@ class JointFlexibility(FrameEffect):
         )
         groups = _groups(model.frame_structure) if place.endswith(APART) else ()
         factors = (
-            EffectParameter(f"ln of {group.name} over all", "", _SPREAD, 0.0, -_WIDEST, _WIDEST)
+            Parameter(f"ln of {group.name} over all", "", _SPREAD, 0.0, -_WIDEST, _WIDEST)
             for group in groups
         )
         return (stiffness, *factors)

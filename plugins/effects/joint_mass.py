@@ -9,8 +9,8 @@ from typing import ClassVar
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     FrameEffect,
+    Parameter,
     Site,
     Size,
     joints_of,
@@ -34,10 +34,10 @@ class JointMass(FrameEffect):
         """Return the joint types that two joints at least are of."""
         return () if model.structure is None else type_places(model.structure.frame)
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the mass at each joint."""
         scale = _SHARE * model.total_mass / len(model.frame_structure.frame.joints)
-        return (EffectParameter("mass", "kg", scale, scaling="exponential", one_sided=True),)
+        return (Parameter("mass", "kg", scale, scaling="exponential", one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the masses."""

@@ -12,9 +12,9 @@ import numpy as np
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     ElementOperator,
     FrameEffect,
+    Parameter,
     Site,
     Size,
     Term,
@@ -59,13 +59,13 @@ class JointOffset(FrameEffect):
         frame = model.structure.frame
         return (*type_places(frame), *joints_with_members(frame), *end_places(frame))
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the length; the scale is half the depth of the crossing members."""
         structure = model.frame_structure
         ends = ends_of(structure.frame, place)
         scale = float(np.mean([_scale(model, end) for end in ends]))
         upper = _longest(structure, ends)
-        return (EffectParameter("length", "m", scale, lower=0.0, upper=upper, one_sided=True),)
+        return (Parameter("length", "m", scale, lower=0.0, upper=upper, one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with rigid ends, lengths added to those that are there."""

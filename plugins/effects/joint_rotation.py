@@ -11,8 +11,8 @@ from femubench import Model
 from femubench.effect import (
     APART,
     Change,
-    EffectParameter,
     FrameEffect,
+    Parameter,
     Site,
     Size,
     branch_places,
@@ -67,14 +67,14 @@ class JointRotation(FrameEffect):
         more = len(_parts(structure.frame, free)) > len(_parts(structure.frame, place))
         return (free,) if more or _longest(structure, place) > 1.0 else ()
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the stiffnesses, with the members' own as scale, 4 EI/L and GJ/L, and the arm."""
         structure = model.frame_structure
         own, lateral, torsion = end_stiffness(structure.frame, ends_of(structure.frame, place))
         names = ("stiffness", "bending", "bending ry")
         scales = {**dict.fromkeys(names, own), "bending rz": lateral, "torsion": torsion}
         found = [
-            EffectParameter(
+            Parameter(
                 name,
                 "N m/rad",
                 scales[name],
@@ -87,7 +87,7 @@ class JointRotation(FrameEffect):
         ]
         if place.endswith(APART) and (longest := _longest(structure, place)) > 1.0:
             # The textbook has half the depth of the crossing member.
-            found.append(EffectParameter(_ARM, "", 0.5, 1.0, 0.0, longest, textbook=1.0))
+            found.append(Parameter(_ARM, "", 0.5, 1.0, 0.0, longest, textbook=1.0))
         return tuple(found)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:

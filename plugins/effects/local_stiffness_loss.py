@@ -11,9 +11,9 @@ import numpy as np
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     ElementOperator,
     FrameEffect,
+    Parameter,
     Size,
     Term,
     element_labels,
@@ -23,7 +23,7 @@ from femubench.effect import (
 )
 from femubench.fem import Factor, Frame, stiffness_matrices
 
-_LOSS = EffectParameter("loss", "", 0.3, lower=0.0, upper=0.95, one_sided=True, wording="share")
+_LOSS = Parameter("loss", "", 0.3, lower=0.0, upper=0.95, one_sided=True, wording="share")
 
 
 class LocalStiffnessLoss(FrameEffect):
@@ -37,7 +37,7 @@ class LocalStiffnessLoss(FrameEffect):
         """Return every element."""
         return () if model.structure is None else element_labels(model.structure.frame)
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the fraction that is lost."""
         return (_LOSS,)
 

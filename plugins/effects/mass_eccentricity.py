@@ -11,9 +11,9 @@ import numpy as np
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     ElementOperator,
     FrameEffect,
+    Parameter,
     Site,
     Size,
     Term,
@@ -47,12 +47,12 @@ class MassEccentricity(FrameEffect):
         """Return the members."""
         return () if model.structure is None else tuple(model.structure.frame.member_index)
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the offset, whose scale is a share of the section's size that way."""
         frame = model.frame_structure.frame
         size = section_size(frame.members[frame.member_index[place]].section, axis_of(frame))
         bound = _BOUND * size
-        return (EffectParameter(axis_of(frame), "m", _SCALE * size, lower=-bound, upper=bound),)
+        return (Parameter(axis_of(frame), "m", _SCALE * size, lower=-bound, upper=bound),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with the offset."""

@@ -12,8 +12,8 @@ import scipy.sparse as sp
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     FrameEffect,
+    Parameter,
     RowOperator,
     Site,
     Size,
@@ -54,14 +54,14 @@ class MassOffset(FrameEffect):
         # Asked for with every likely added mass, and the same for all of them.
         return once_for(model, "points with an arm", lambda: _felt_points(model))
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the mass, and the arm, whose scale is the section's size that way."""
         frame = model.frame_structure.frame
         size = section_size(_member_at(frame, place).section, "y" if _flat(frame) else "z")
-        mass = EffectParameter(
+        mass = Parameter(
             "mass", "kg", _SHARE * model.total_mass, scaling="exponential", one_sided=True
         )
-        return mass, EffectParameter(
+        return mass, Parameter(
             "offset", "m", _SPREAD * size, lower=-_BOUND * size, upper=_BOUND * size
         )
 

@@ -12,11 +12,11 @@ import numpy as np
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     ElementOperator,
     FrameEffect,
     LookWarning,
     MatrixOperator,
+    Parameter,
     Seen,
     Size,
     Term,
@@ -58,15 +58,15 @@ class MaterialEffect(FrameEffect):
         structure = model.structure
         return ("all", *(() if structure is None else set_places(structure.frame, ("material",))))
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the relative change; of a group with a prior of its own, that of a factor."""
         name = f"change of {self.constant}"
         group = place.removeprefix(GROUP)
         own = group in model.group_priors or group in support_groups(model)
         if model.structure is None and place.startswith(GROUP) and own:
             std = group_prior_std(model, group)
-            return (EffectParameter(name, "", std, scaling="factor", wording="change"),)
-        return (EffectParameter(name, "", 0.1, lower=-0.9, wording="change"),)
+            return (Parameter(name, "", std, scaling="factor", wording="change"),)
+        return (Parameter(name, "", 0.1, lower=-0.9, wording="change"),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with another material in the members."""

@@ -11,10 +11,10 @@ import numpy as np
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     ElementOperator,
     FrameEffect,
     LookWarning,
+    Parameter,
     Seen,
     Size,
     Term,
@@ -37,13 +37,13 @@ class RotaryInertia(FrameEffect):
         """Return the whole frame."""
         return () if model.structure is None else ("all",)
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the multiple of rho I."""
         now = model.frame_structure.frame.rotary_share
         lacks = now == 0.0
         textbook = 1.0 if lacks else None
         name = "multiple of rho I"
-        return (EffectParameter(name, "", 1.0, now, 0.0, one_sided=lacks, textbook=textbook),)
+        return (Parameter(name, "", 1.0, now, 0.0, one_sided=lacks, textbook=textbook),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with that share of rotary inertia."""

@@ -11,10 +11,10 @@ import numpy as np
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     ElementOperator,
     FrameEffect,
     LookWarning,
+    Parameter,
     Seen,
     Size,
     Term,
@@ -53,14 +53,14 @@ class ShearDeformation(FrameEffect):
         """Return the whole frame."""
         return () if model.structure is None else _AT_ALL
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the multiple of 1/(kappa G A)."""
         frame = model.frame_structure.frame
         now = present_share(frame)
         lacks, known = now == 0.0, all(m.section.kappa is not None for m in frame.members)
         textbook = 1.0 if lacks and known else None
         name = "multiple of 1/(kappa G A)"
-        return (EffectParameter(name, "", 1.0, now, 0.0, one_sided=lacks, textbook=textbook),)
+        return (Parameter(name, "", 1.0, now, 0.0, one_sided=lacks, textbook=textbook),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame of Timoshenko beams; rotary inertia stays what it is."""

@@ -11,8 +11,8 @@ import numpy as np
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     FrameEffect,
+    Parameter,
     Site,
     Size,
     flexible_supports_change,
@@ -53,11 +53,11 @@ class SupportFlexibility(FrameEffect):
         frame = model.structure.frame
         return tuple(place for place in support_places(frame) if _parts(frame, place))
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the stiffnesses; the scale is that of what is held, or of the springs there."""
         frame = model.frame_structure.frame
         return tuple(
-            EffectParameter(
+            Parameter(
                 name,
                 unit,
                 scale,

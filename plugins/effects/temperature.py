@@ -11,9 +11,9 @@ import numpy as np
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     ElementOperator,
     FrameEffect,
+    Parameter,
     Reading,
     Size,
     Term,
@@ -52,10 +52,10 @@ class Temperature(FrameEffect):
         along = (f"all:{d}" for d, is_wide in zip(_AXES, wide, strict=True) if is_wide)
         return ("all", *along)
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the temperature above the one of the constants, and how much it changes."""
         names = ("difference", "from end to end")[: 1 if place == "all" else 2]
-        return [EffectParameter(n, "K", 10.0, lower=-100.0, upper=100.0) for n in names]
+        return [Parameter(n, "K", 10.0, lower=-100.0, upper=100.0) for n in names]
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with E of every material, or element, at its temperature."""

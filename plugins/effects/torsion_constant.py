@@ -12,10 +12,10 @@ from scipy.optimize import root_scalar
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     ElementOperator,
     FrameEffect,
     LookWarning,
+    Parameter,
     Seen,
     Size,
     Term,
@@ -57,14 +57,10 @@ class TorsionConstant(FrameEffect):
             return ()
         return ("all",) if any(m.section.J for m in model.structure.frame.members) else ()
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the relative change; its textbook value leads to the constant of the shape."""
         textbook = _to_own_constant(model.frame_structure.frame)
-        return (
-            EffectParameter(
-                "change of J", "", 0.2, lower=-0.9, textbook=textbook, wording="change"
-            ),
-        )
+        return (Parameter("change of J", "", 0.2, lower=-0.9, textbook=textbook, wording="change"),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         """Return the frame with other torsion constants."""

@@ -12,9 +12,9 @@ import numpy as np
 from femubench import Model
 from femubench.effect import (
     Change,
-    EffectParameter,
     ElementOperator,
     FrameEffect,
+    Parameter,
     Size,
     Term,
     barycentric,
@@ -77,11 +77,11 @@ class WallThickness(FrameEffect):
         tubes = {member.name for member in frame.members if _wall(member.section)}
         return tuple(word for word in words if tubes.issuperset(members_of(frame, word)))
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         """Return the relative change of the wall."""
         bound = _bound(model.frame_structure.frame, place)
         return (
-            EffectParameter(
+            Parameter(
                 "change of the wall", "", _SCALE, lower=-bound, upper=bound, wording="change"
             ),
         )

@@ -10,7 +10,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from femubench import Measurement, Model
-from femubench.effect import Corrected, EffectParameter, Suspect
+from femubench.effect import Corrected, Parameter, Suspect
 
 _ERROR = 0.05  # a priori, relative
 _LEAST = -0.5
@@ -24,9 +24,7 @@ class FrequencyOutlier:
 
     def suspects(self, model: Model, measurement: Measurement) -> Sequence[Suspect]:
         """Return every measured mode."""
-        error = EffectParameter(
-            "error of the frequency", "", _ERROR, lower=_LEAST, wording="change"
-        )
+        error = Parameter("error of the frequency", "", _ERROR, lower=_LEAST, wording="change")
         return [
             Suspect(
                 f"mode:{number}",

@@ -7,10 +7,10 @@ from functools import partial
 from typing import ClassVar, Literal
 
 from femubench import Measurement, Model
-from femubench.effect import Corrected, EffectParameter, Suspect
+from femubench.effect import Corrected, Parameter, Suspect
 from femubench.plugins.faults.readings import multiplied, read_sensors
 
-_GAIN = EffectParameter("gain", "", 1.0, neutral=1.0, lower=0.2, upper=5.0)
+_GAIN = Parameter("gain", "", 1.0, neutral=1.0, lower=0.2, upper=5.0)
 
 
 class SensorGain:

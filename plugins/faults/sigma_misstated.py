@@ -10,7 +10,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from femubench import Measurement, Model
-from femubench.effect import Corrected, EffectParameter, Suspect
+from femubench.effect import Corrected, Parameter, Suspect
 
 _FEWEST = 4
 _QUANTITIES = {"frequencies": "frequency_std", "shapes": "shape_std"}
@@ -24,7 +24,7 @@ class SigmaMisstated:
 
     def suspects(self, model: Model, measurement: Measurement) -> Sequence[Suspect]:
         """Return frequencies and shapes, where there are some."""
-        factor = EffectParameter("stated over true", "", 1.5, neutral=1.0, lower=0.2, upper=8.0)
+        factor = Parameter("stated over true", "", 1.5, neutral=1.0, lower=0.2, upper=8.0)
         counts = {
             "frequencies": len(measurement),
             "shapes": int(np.isfinite(measurement.shapes).sum()),

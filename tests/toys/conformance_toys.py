@@ -25,7 +25,7 @@ from femubench import (
     solve_modes,
 )
 from femubench.core.score.scoring import frequency_error, predict_block
-from femubench.effect import EffectParameter, FrameEffect, LookWarning, Reading, Seen, Site, Size
+from femubench.effect import FrameEffect, LookWarning, Parameter, Reading, Seen, Site, Size
 from femubench.fem import Frame, GroundSpring, LowRank, Place, SparseArray
 
 
@@ -328,8 +328,8 @@ class Spring(FrameEffect):
             return ()
         return tuple(joint.name for joint in model.structure.frame.joints if joint.name != "C")
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
-        return (EffectParameter("stiffness", "N/m", 1.0e3, lower=0.0, one_sided=True),)
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
+        return (Parameter("stiffness", "N/m", 1.0e3, lower=0.0, one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         spring = GroundSpring(Place(joint=place), "z", values[0] + self.start)
@@ -389,7 +389,7 @@ class Foreign(Worded):
 class InPercent(Worded):
     """Word N/m as a relative change."""
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
         return [replace(item, wording="change") for item in super().parameters(model, place)]
 
 

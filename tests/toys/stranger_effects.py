@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from femubench import Model, hookimpl
-from femubench.effect import EffectParameter, FrameEffect, LookWarning, Reading, Seen, Size
+from femubench.effect import FrameEffect, LookWarning, Parameter, Reading, Seen, Size
 from femubench.fem import Factor, Frame
 
 CAUTION = "A skin that peels off looks like a thinner one."
@@ -26,8 +26,8 @@ class Skin(FrameEffect):
     def places(self, model: Model) -> Sequence[str]:
         return () if model.structure is None else ("all",)
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
-        return (EffectParameter("change of EI", "", 0.1, lower=-0.9, wording="change"),)
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
+        return (Parameter("change of EI", "", 0.1, lower=-0.9, wording="change"),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         if not values[0]:
@@ -50,8 +50,8 @@ class Bare(FrameEffect):
     def places(self, model: Model) -> Sequence[str]:
         return ("all",) if model.structure is not None else ()
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
-        return (EffectParameter("water", "", 0.1, lower=0.0, upper=0.5, one_sided=True),)
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
+        return (Parameter("water", "", 0.1, lower=0.0, upper=0.5, one_sided=True),)
 
     def frame(self, frame: Frame, place: str, values: Sequence[float]) -> Frame:
         return replace(frame, factors=(*frame.factors, Factor("rhoA", ("all",), 1.0 + values[0])))
@@ -65,8 +65,8 @@ class Plain:
     def places(self, model: Model) -> Sequence[str]:
         return Skin().places(model)
 
-    def parameters(self, model: Model, place: str) -> Sequence[EffectParameter]:
-        return (EffectParameter("more", "", 0.1, lower=-0.9),)
+    def parameters(self, model: Model, place: str) -> Sequence[Parameter]:
+        return (Parameter("more", "", 0.1, lower=-0.9),)
 
     def extend(self, model: Model, place: str, values: Sequence[float]) -> Model:
         return Skin().extend(model, place, values)
