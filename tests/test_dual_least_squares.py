@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import femubench
+from femubench.core.fit.dual_least_squares import DualPosterior, dual_step
 from femubench.core.update import sensitivity_update as iteration
-from femubench.core.update.dual_least_squares import DualPosterior, dual_step
 from femubench.update import UpdateOptions, scale_parts, sensitivity_update
 
 RNG = np.random.default_rng(5)

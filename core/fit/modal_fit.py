@@ -13,12 +13,12 @@ from scipy.special import log_ndtr
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
-from femubench.core.fit.gauss_newton import bounded_step
+from femubench.core.fit.gauss_newton import Linearised
 from femubench.core.fit.modal_basis import Space, solve_pencil
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.projection import Projection
 from femubench.core.fit.residuals import Data
-from femubench.core.typing import BoolArray, FloatArray, IntArray
+from femubench.core.typing import FloatArray, IntArray
 
 _STEPS = 12
 _SETTLED = 2e-2  # of chi-square plus prior: a hundredth of a nat
@@ -124,6 +124,12 @@ class State:
         """Return d prediction / d x in units of the noise, (n_data, k)."""
         return self.problem.noise.whiten(self.slopes.T).T
 
+    @cached_property
+    def linearised(self) -> Linearised:
+        """Return the least-squares problem about the state."""
+        one = np.ones(len(self.x))
+        return Linearised(self.jacobian, self.residual, self.x, one, well_posed=True)
+
     def rows(self, forces: FloatArray, masses: FloatArray) -> FloatArray:
         """Return d prediction / d x in standard deviations from modal forces, (n_data, p).
 
@@ -214,9 +220,8 @@ class Fit:
     @cached_property
     def covariance(self) -> FloatArray:
         """Return the covariance of the coordinates, (k, k)."""
-        jacobian = self.state.jacobian
-        precision = jacobian.T @ jacobian + np.eye(jacobian.shape[1])
-        return np.asarray(la.inv(precision)) if len(precision) else precision
+        normal = self.state.linearised.normal
+        return np.asarray(la.inv(normal)) if len(normal) else normal
 
 
 def bounds_of(parts: Sequence[Projection]) -> tuple[FloatArray, FloatArray]:
@@ -251,8 +256,9 @@ def fit(
         return None
     damping = 0.0
     for _ in range(steps if len(start) else 0):
-        step = _step(point, low, high, damping)
-        promised = _promise(point, step)
+        step = point.linearised.step(low, high, _LONGEST, damping=damping)
+        step = np.clip(point.x + step, low, high) - point.x
+        promised = point.linearised.promise(step)
         if promised < _SETTLED or point.cost - 3.0 * promised > give_up:
             break
         trial = _tried(problem, parts, point, step, low, high)
@@ -282,26 +288,6 @@ def _tried(
         return None
 
 
-def _step(point: State, low: FloatArray, high: FloatArray, damping: float) -> FloatArray:
-    """Return (J'J + I + damping diag)^-1 (J'r - x) with bounds respected one by one."""
-    jacobian = point.jacobian
-    normal = jacobian.T @ jacobian + np.eye(len(point.x))
-    normal += damping * np.diag(normal.diagonal())
-    right = jacobian.T @ point.residual - point.x
-
-    def solve(free: BoolArray) -> FloatArray:
-        return np.asarray(la.solve(normal[np.ix_(free, free)], right[free], assume_a="pos"))
-
-    step = bounded_step(solve, point.x, low, high, _LONGEST)
-    return np.asarray(np.clip(point.x + step, low, high) - point.x)
-
-
-def _promise(point: State, step: FloatArray) -> float:
-    after = point.residual - point.jacobian @ step
-    rest = point.x + step
-    return point.cost - float(after @ after + rest @ rest)
-
-
 def log_evidence(point: State) -> float:
     """Return ln of the integral of likelihood times prior by Laplace's method.
 
@@ -310,7 +296,7 @@ def log_evidence(point: State) -> float:
     line is replaced by that over x >= 0 (Kass & Raftery 1995, section 4.1, with the boundary).
     """
     jacobian, x = point.jacobian, point.x
-    curvature = jacobian.T @ jacobian + np.eye(len(x))
+    curvature = point.linearised.normal
     gradient = x - jacobian.T @ point.residual
     result = -0.5 * point.cost + point.problem.noise.log_density
     if len(x) == 0:

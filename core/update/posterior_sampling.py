@@ -22,10 +22,10 @@ from femubench.core.change.parametric_model import ParametricModel
 from femubench.core.errors import ModelError, NotApplicable, StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
+from femubench.core.fit.dual_least_squares import MANY
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.neighbour_modes import followed_frequencies
 from femubench.core.typing import BoolArray, FloatArray
-from femubench.core.update.dual_least_squares import MANY
 from femubench.core.update.quadratic_fit import QuadraticFit, coefficients_of
 from femubench.core.update.residuals import Data
 from femubench.core.update.sensitivity_update import (

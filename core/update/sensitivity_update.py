@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -13,10 +13,10 @@ from femubench.core.change.parametric_model import ParametricModel
 from femubench.core.errors import Diverged, ModelError, NotApplicable, StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
-from femubench.core.fit.gauss_newton import bounded_step
+from femubench.core.fit.dual_least_squares import MANY, DualPosterior
+from femubench.core.fit.gauss_newton import Linearised
 from femubench.core.modal.measurement import Measurement
 from femubench.core.typing import BoolArray, FloatArray
-from femubench.core.update.dual_least_squares import MANY, DualPosterior, dual_step
 from femubench.core.update.residuals import Data, Prediction, Residual, common_rows, predict
 from femubench.core.update.strategy import ParameterEstimate, UpdateResult
 from femubench.core.update.uncertainty import Uncertainty, standard_normal
@@ -25,8 +25,6 @@ _SMALLEST_STEP = 1e-9
 _ROUNDING = 1e-10  # relative, of a modal quantity: some ten times what linear algebra leaves
 _NO_GAIN = 1e-6
 _PATIENCE = 3
-
-Solve = Callable[[BoolArray], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -97,46 +95,14 @@ class Iteration:
         mass = self.parametric.mass(q, model)
         return Point(q, predict(self.data, model, previous, mass=mass))
 
-    def system(self, point: Point) -> tuple[FloatArray, FloatArray]:
-        """Return sensitivities s by the coordinates and residual of the data with a partner."""
+    def linearised(self, point: Point) -> Linearised:
+        """Return the least-squares problem about a point, of the data that have a partner."""
         parametric, prediction = self.parametric, point.prediction
         known = np.isfinite(prediction.residual)
         slopes = parametric.slopes(point.q, prediction.model)
         masses = partial(parametric.mass_slopes, point.q, prediction.model)
-        sensitivities = prediction.jacobian(slopes, masses) * parametric.steps(point.q)
-        return sensitivities[known], prediction.residual[known]
-
-    def step(self, point: Point) -> FloatArray:
-        """Return dtheta / |theta| = (s's + beta I + P)^-1 (s'r - P q), limits respected."""
-        s, residual = self.system(point)
-        solve = self.dual if len(point.q) > MANY else self.primal
-        low, high = self.parametric.lower, self.parametric.upper
-        return bounded_step(solve(s, residual, point.q), point.q, low, high, self.options.max_step)
-
-    def primal(self, s: FloatArray, residual: FloatArray, q: FloatArray) -> Solve:
-        """Return what solves for the step in the space of the parameters."""
-        size, weight = len(q), np.sqrt(self.parametric.precision)
-        rows = np.vstack([s, np.sqrt(self.beta) * np.eye(size), np.diag(weight)])
-        right = np.concatenate([residual, np.zeros(size), -weight * q])
-
-        def solve(free: BoolArray) -> FloatArray:
-            return np.asarray(np.linalg.lstsq(rows[:, free], right, rcond=None)[0])
-
-        return solve
-
-    def dual(self, s: FloatArray, residual: FloatArray, q: FloatArray) -> Solve:
-        """Return what solves for the step in the space of the data."""
-        weight = self.beta + self.parametric.precision
-        if not (weight > 0.0).all():
-            raise NotApplicable(
-                f"{len(q)} parameters without damping or a prior, expected one of them"
-            )
-        rest = -self.parametric.precision * q / weight
-
-        def solve(free: BoolArray) -> FloatArray:
-            return dual_step(s[:, free], residual, weight[free], rest[free])
-
-        return solve
+        s = (prediction.jacobian(slopes, masses) * parametric.steps(point.q))[known]
+        return Linearised(s, prediction.residual[known], point.q, parametric.precision)
 
     def gain(self, before: Point, after: Point) -> float:
         """Return the share of the cost that a step took away."""
@@ -146,14 +112,6 @@ class Iteration:
         )
         cost = before.cost(rows, precision)
         return 1.0 - after.cost(rows, precision) / cost if cost > 0.0 else 0.0
-
-    def promise(self, point: Point, step: FloatArray) -> float:
-        """Return the share of the cost that a step would take away were the model linear."""
-        s, residual = self.system(point)
-        after = residual - s @ step
-        rest = self.parametric.precision @ np.square(point.q + step)
-        cost = point.cost(np.isfinite(point.prediction.residual), self.parametric.precision)
-        return float(1.0 - (after @ after + rest) / cost) if cost > 0.0 else 0.0
 
     def rounding(self, cost: float) -> float:
         """Return how much two costs near a given one may differ by rounding alone."""
@@ -191,10 +149,12 @@ class Iteration:
         self.record(0, point, 0.0)
         slow = 0
         for iteration in range(1, self.options.max_iterations + 1):
-            step = self.step(point)
+            problem = self.linearised(point)
+            low, high = self.parametric.lower, self.parametric.upper
+            step = problem.step(low, high, self.options.max_step, ridge=self.beta)
             following = self.advance(point, step)
             if following is None:
-                self.converged = self.promise(point, step) < _NO_GAIN
+                self.converged = problem.promise(step) < _NO_GAIN * problem.cost
                 break
             moved = float(np.abs(following.q - point.q).max())
             slow = slow + 1 if self.gain(point, following) < self.options.cost_tolerance else 0
@@ -234,11 +194,11 @@ class Iteration:
         """Return the posterior covariance of q, (p, p); None without statistics."""
         if not self.data.statistical:
             return None
-        s, _ = self.system(point)
+        normal = self.linearised(point).normal
         try:
-            return np.asarray(np.linalg.inv(s.T @ s + np.diag(self.parametric.precision)))
+            return np.asarray(np.linalg.inv(normal))
         except np.linalg.LinAlgError:
-            return np.full((s.shape[1], s.shape[1]), np.inf)
+            return np.full(normal.shape, np.inf)
 
     def known(self, point: Point) -> tuple[FloatArray | None, Uncertainty | None]:
         """Return the deviations of q, (p,), and models of the posterior, where there are any."""
@@ -261,7 +221,7 @@ class Iteration:
         precision = self.parametric.precision
         if not self.data.statistical or not (precision > 0.0).all():
             return None, None
-        posterior = DualPosterior.of(self.system(point)[0], precision)
+        posterior = DualPosterior.of(self.linearised(point).jacobian, precision)
         draws = posterior.draws(standard_normal(len(point.q)))
         return posterior.std, Uncertainty.of_draws(self.model_at, point.q + draws)
 
