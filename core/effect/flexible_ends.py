@@ -26,8 +26,8 @@ from femubench.core.change.terms import ElementOperator, RowOperator, Term
 from femubench.core.effect.attachments import once_for
 from femubench.core.effect.places import member_length
 from femubench.core.fem.beam import mass_matrices, stiffness_matrices
-from femubench.core.fem.frame import Frame, JointSpring
-from femubench.core.fem.joints import available_length, half_depth
+from femubench.core.fem.frame import Frame
+from femubench.core.fem.joints import available_length, half_depth, spring_ends
 from femubench.core.fem.links import rigid_arm
 from femubench.core.fem.model import Model
 from femubench.core.fem.sensors import DIRECTIONS
@@ -151,23 +151,8 @@ def softened_ends(
         {'ry': 10000.0}
     """
     structure = Structure.build(frame)
-    springs = {f"{s.member}@{s.joint}": s for s in frame.joint_springs}
-    for end, own in stiffness.items():
-        member, _, joint = end.rpartition("@")
-        fresh = JointSpring(joint, member, {}, arm * end_arm(structure, end))
-        spring = springs.get(end, fresh)
-        springs[end] = replace(spring, stiffness=_in_series(spring.stiffness, own))
-    return replace(frame, joint_springs=tuple(springs.values()))
-
-
-def _in_series(there: Mapping[str, float], new: Mapping[str, float]) -> dict[str, float]:
-    """Return stiffnesses in series by direction; what is rigid is left out."""
-    joined = dict(there)
-    for direction, value in new.items():
-        if np.isfinite(value):
-            other = joined.get(direction)
-            joined[direction] = value if other is None else value * other / (value + other)
-    return joined
+    arms = {end: arm * end_arm(structure, end) for end in stiffness}
+    return spring_ends(frame, stiffness, arms)
 
 
 def free_arm_change(

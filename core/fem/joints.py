@@ -309,15 +309,41 @@ def with_joint_springs(
         >>> len(update.with_joint_springs(structure, springs).frame.joint_springs)
         1
     """
-    springs = []
-    for end, values in stiffness.items():
-        member, _, joint = end.rpartition("@")
-        wanted = half_depth(structure.frame, end) if arm is None else arm
-        length = min(wanted, available_length(structure, end)) if arm is None else wanted
-        factor = arm_factor if length > 0.0 else None
-        springs.append(JointSpring(joint, member, values, length, factor))
     frame = structure.frame
-    return structure.rebuilt(replace(frame, joint_springs=frame.joint_springs + tuple(springs)))
+    arms = {
+        end: min(half_depth(frame, end), available_length(structure, end)) if arm is None else arm
+        for end in stiffness
+    }
+    return structure.rebuilt(spring_ends(frame, stiffness, arms, arm_factor))
+
+
+def spring_ends(
+    frame: Frame,
+    stiffness: Mapping[str, Mapping[str, float]],
+    arms: Mapping[str, float],
+    arm_factor: float | None = None,
+) -> Frame:
+    """Return the frame with springs at member ends, in series with those that are there.
+
+    Arguments:
+        frame: any frame.
+        stiffness: from ``member@joint`` to local directions to N/m or N m/rad; infinite ones are
+            rigid and leave the arm.
+        arms: length in m of the massless arm before a new spring, by end.
+        arm_factor: the arm's rigidities in those of the member; None for a rigid arm.
+    """
+    springs = {f"{s.member}@{s.joint}": s for s in frame.joint_springs}
+    for end, own in stiffness.items():
+        member, _, joint = end.rpartition("@")
+        fresh = JointSpring(joint, member, {}, arms[end], arm_factor if arms[end] > 0.0 else None)
+        spring = springs.get(end, fresh)
+        joined = dict(spring.stiffness)
+        for direction, value in own.items():
+            if np.isfinite(value):
+                there = joined.get(direction)
+                joined[direction] = value if there is None else value * there / (value + there)
+        springs[end] = replace(spring, stiffness=joined)
+    return replace(frame, joint_springs=tuple(springs.values()))
 
 
 def with_rigid_ends(structure: Structure, lengths: Mapping[str, tuple[float, float]]) -> Structure:
