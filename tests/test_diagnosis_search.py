@@ -21,12 +21,8 @@ from femubench.core.fit.extended_model import agreed, extended, raw_residual
 from femubench.core.fit.modal_fit import fit, state_at
 from femubench.core.inference.examine import examine
 from femubench.core.inference.posterior import Posterior
-from femubench.core.inference.prior import (
-    PRIOR_BEYOND_TEXTBOOK,
-    PRIOR_OF_COUNT,
-    log_prior,
-    textbook_bases,
-)
+from femubench.core.inference.prior import log_prior, textbook_bases
+from femubench.core.inference.settings import settings
 from femubench.effect import EffectParameter, FrameEffect
 from femubench.fem import Frame, PointMass
 
@@ -39,22 +35,24 @@ NOTHING = np.zeros(0)
 
 
 def test_priors_of_counts_are_probabilities_and_fewer_causes_are_likelier() -> None:
-    for counts in (PRIOR_OF_COUNT, PRIOR_BEYOND_TEXTBOOK):
+    for counts in (settings.prior_of_causes, settings.prior_of_further_causes):
         assert sum(counts) == pytest.approx(1.0)
         assert list(counts) == sorted(counts, reverse=True)
-    assert PRIOR_OF_COUNT[0] == 0.5
+    assert settings.prior_of_causes[0] == 0.5
 
 
 def test_the_prior_of_all_explanations_with_so_many_causes_sums_to_that_of_their_count() -> None:
     """Over names and places; two causes in either order are one explanation."""
     problem = problem_of(MODEL, measured(MODEL, FRAME), effects_named("density", "joint-mass"))
     parts, names = problem.space.projections, 2
-    single = sum(exp(log_prior((part,), names, PRIOR_OF_COUNT)) for part in parts)
-    assert single == pytest.approx(PRIOR_OF_COUNT[1])
-    double = sum(exp(log_prior(pair, names, PRIOR_OF_COUNT)) for pair in combinations(parts, 2))
+    single = sum(exp(log_prior((part,), names, settings.prior_of_causes)) for part in parts)
+    assert single == pytest.approx(settings.prior_of_causes[1])
+    double = sum(
+        exp(log_prior(pair, names, settings.prior_of_causes)) for pair in combinations(parts, 2)
+    )
     # All but the pairs of a hypothesis with itself.
-    assert 0.4 * PRIOR_OF_COUNT[2] < double < PRIOR_OF_COUNT[2]
-    assert log_prior((), names, PRIOR_OF_COUNT) == log(PRIOR_OF_COUNT[0])
+    assert 0.4 * settings.prior_of_causes[2] < double < settings.prior_of_causes[2]
+    assert log_prior((), names, settings.prior_of_causes) == log(settings.prior_of_causes[0])
     assert factorial(2) * comb(2, 2) == 2
 
 

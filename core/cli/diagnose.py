@@ -60,6 +60,11 @@ def _seconds(ctx: click.Context, param: click.Parameter, value: float | None) ->
     "--plugin", "others", multiple=True, metavar="NAME",
     help="Try the effects and faults of this plugin too, which is imported; may be repeated.",
 )  # fmt: skip
+@click.option(
+    "--set", "words", multiple=True, metavar="NAME=VALUE",
+    help="Move where a statement begins, such as sure_fault=0.95; a note says so, and "
+    "docs/settings.md has all names. May be repeated.",
+)  # fmt: skip
 @options.style("terminal", "markdown")
 @click.option(
     "--report", "report_file", type=options.OUTPUT, metavar="FILE",
@@ -79,6 +84,7 @@ def diagnose(
     budget: float | None,
     effects: str | None,
     others: tuple[str, ...],
+    words: tuple[str, ...],
     style: str,
     report_file: Path | None,
     quiet: bool,
@@ -93,6 +99,9 @@ def diagnose(
         _check_report(report_file)
     if output is not None:
         check_new(output)
+    from femubench.core.inference.settings import decisions_from
+
+    decisions = decisions_from(words)
     names = None if effects is None else [word.strip() for word in effects.split(",")]
     chosen("effect", names or (), plugins.effects)
     chosen("plugin", others, (plugin.plugin for plugin in plugins.loaded))
@@ -110,6 +119,7 @@ def diagnose(
             budget=budget,
             told=told,
             others=others,
+            decisions=decisions,
         )
     written = output if output is not None and has_model(found) else None
     fault = None if written is None else _fault(found, written)

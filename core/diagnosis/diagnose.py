@@ -40,9 +40,10 @@ from femubench.core.fit.static_response import LargeProblem
 from femubench.core.inference.effort import Effort, Kind, Number
 from femubench.core.inference.examine import Examination, examine
 from femubench.core.inference.fault_search import Depth, Inquiry, inquire
-from femubench.core.inference.model_error import WIDTHS
+from femubench.core.inference.model_error import class_widths
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.search import adequacy
+from femubench.core.inference.settings import changed_settings, settings, shown
 from femubench.core.look.localisation import locate
 from femubench.core.look.look import look
 from femubench.core.look.modes import Seen
@@ -53,11 +54,6 @@ from femubench.core.roles import Effect, Fault
 from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning
 from femubench.core.score.scoring import score_model
 from femubench.core.ties import in_order
-
-_MOST_ADVISED = 8  # explanations that advice parts from each other
-_CLASSES = 3  # of model error that are told
-# Pieces of work that mostly follow: explanations that are judged, searches for a mode left out.
-_JUDGED, _SINGLE = (2.0, 5.0), 2.0
 
 
 @dataclass(frozen=True)
@@ -141,14 +137,16 @@ def diagnose(
         with effort.piece("advice"):
             looks = _looks(case.model, mended, (*registered, *known))
             found = _concluded(mended, inquiry, proof, looks, begin)
-    return replace(found, notes=(*case.notes, *found.notes, *_cut_short(effort)))
+    return replace(found, notes=(*case.notes, *found.notes, *_cut_short(effort), *_changed()))
 
 
 def _expected(case: Case) -> dict[Kind, Number]:
     """Return what mostly follows the search: unseen data or, without any, used ones left out."""
     if case.held_out or case.modifications:
-        return {"unseen": _JUDGED, "advice": 1.0}
-    return {"single": _SINGLE * len(case.used), "advice": 1.0}
+        # The best guess is solved and judged, and where it fails its rivals are.
+        judged = 2.0, 2.0 + settings.largest_group / 2.0
+        return {"unseen": judged, "advice": 1.0}
+    return {"single": float(settings.candidates * len(case.used)), "advice": 1.0}
 
 
 def _looks(drawn: Model, case: Case, effects: Iterable[Effect]) -> tuple[LookWarning, ...]:
@@ -269,6 +267,12 @@ def _cut_short(effort: Effort) -> tuple[str, ...]:
     )
 
 
+def _changed() -> tuple[str, ...]:
+    """Return which numbers of the table have other values, if any have."""
+    words = [f"{name} = {shown(value)}" for name, value in changed_settings().items()]
+    return (f"Settings other than the standard ones: {', '.join(words)}.",) if words else ()
+
+
 def _group_causes(options: Iterable[Iterable[Cause]]) -> list[Cause]:
     """Return every effect of a group once, as in the most probable explanation that has it.
 
@@ -298,7 +302,7 @@ def _reason(decision: Decision) -> str:
 def _advice(examination: Examination, group: Sequence[Explanation]) -> tuple[Advice, ...]:
     """Return what parts the names of a group, and each name's places, from each other."""
     others = (e for found in group for e in elsewhere(examination.posterior, found))
-    told = [*group, *others][:_MOST_ADVISED]
+    told = [*group, *others][: settings.advised]
     if len(told) < 2:
         return ()
     problems = [examination.problem_of(e) for e in told]
@@ -352,8 +356,9 @@ def _error_notes(examination: Examination, leader: Explanation) -> tuple[str, ..
     ratios = [row for row in error_scales(examination, leader) if not row.unit]
     if not ratios:
         return ()
-    wide = {row.name: row.scale / WIDTHS.get(row.name, np.inf) for row in ratios}
-    largest = sorted(ratios, key=lambda row: -wide[row.name])[:_CLASSES]
+    widths = class_widths()
+    wide = {row.name: row.scale / widths.get(row.name, np.inf) for row in ratios}
+    largest = sorted(ratios, key=lambda row: -wide[row.name])[: settings.of_a_kind]
     told = ", ".join(f"{row.name} {100.0 * row.scale:.2g} %" for row in largest)
     return (
         f"What the drawing itself gets wrong, above all: {told} (standard deviations). That the "
