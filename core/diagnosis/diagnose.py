@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -38,8 +39,8 @@ from femubench.core.fem.model import Model
 from femubench.core.fit.extended_model import departure
 from femubench.core.fit.static_response import LargeProblem
 from femubench.core.inference.effort import Effort, Kind, Number
-from femubench.core.inference.examine import Examination, examine
-from femubench.core.inference.fault_search import Depth, Inquiry, inquire
+from femubench.core.inference.examine import Examination, Terms
+from femubench.core.inference.fault_search import Inquiry, inquire
 from femubench.core.inference.model_error import class_widths
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.search import adequacy
@@ -48,7 +49,6 @@ from femubench.core.look.localisation import locate
 from femubench.core.look.look import look
 from femubench.core.look.modes import Seen
 from femubench.core.look.readings import look_at_band
-from femubench.core.modal.measurement import Measurement
 from femubench.core.plugin.loader import registered_effects, registered_faults
 from femubench.core.roles import Effect, Fault
 from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning
@@ -76,6 +76,11 @@ class _Proof:
     gain_rms: Gain
     crossed: bool
     confirmed: bool
+
+    @cached_property
+    def adequate(self) -> float:
+        """Return the probability of what the leader leaves of the used data, were it noise."""
+        return adequacy(self.leader.fit.state, self.leader.unknowns)
 
     @property
     def log_bayes(self) -> float:
@@ -113,31 +118,20 @@ def diagnose(
     registered = registered_effects()
     known = registered if effects is None else tuple(effects)
     wrong = registered_faults() if faults is None else tuple(faults)
-
-    def search(model: Model, measurement: Measurement, depth: Depth) -> Examination:
-        return examine(
-            model,
-            measurement,
-            known,
-            tolerance=case.tolerance if tolerance is None else tolerance,
-            pairs=pairs and depth == "several",
-            reference=case.used_reference,
-            width=case.error_width,
-            beam=case.beam_share,
-            effort=effort,
-        )
-
-    before, width = case.used_reference, case.error_width or 1.0
+    scatter = case.tolerance if tolerance is None else tolerance
+    reference, width, beam = case.used_reference, case.error_width, case.beam_share
+    terms = Terms(known, scatter, pairs, reference, width, beam, effort)
     with effort.scope(_expected(case)):
-        inquiry = inquire(
-            case.model, used, wrong, search, reference=before, width=width, effort=effort
-        )
+        # Faults of data and input first, then the causes that are left without them.
+        inquiry = inquire(case.model, used, wrong, terms)
         mended = mended_case(case, inquiry.mended)
-        proof = _proof(mended, inquiry.examination, known, case, effort)
+        proof = _proof(mended, inquiry.examination, terms, case)
         with effort.piece("advice"):
             looks = _looks(case.model, mended, (*registered, *known))
-            found = _concluded(mended, inquiry, proof, looks, begin)
-    return replace(found, notes=(*case.notes, *found.notes, *_cut_short(effort), *_changed()))
+            posterior, leader = inquiry.examination.posterior, proof.leader
+            decision = decide(posterior, proof.adequate, leader, proof.log_bayes, proof.confirmed)
+            found = _written(mended, inquiry, decision, proof, looks, begin)
+    return replace(found, notes=(*case.notes, *found.notes, *_conditions(effort)))
 
 
 def _expected(case: Case) -> dict[Kind, Number]:
@@ -162,11 +156,10 @@ def _looks(drawn: Model, case: Case, effects: Iterable[Effect]) -> tuple[LookWar
 def _proof(
     case: Case,
     examination: Examination,
-    effects: Sequence[Effect],
+    terms: Terms,
     given: Case,
-    effort: Effort,
 ) -> _Proof:
-    best = examination.best
+    best, effort = examination.best, terms.effort
     with effort.piece("unseen"):
         model = extended_by(case.model, best)
         # This asks for the most modes: all that follows is given those.
@@ -181,7 +174,7 @@ def _proof(
             after = score_model(case, model)
             unseen = unseen_of(case, examination, best, model)
     else:
-        crossed = left_out(examination, effects, effort)
+        crossed = left_out(examination, terms)
         unseen = (crossed,)
         confirmed = crossed.confirms(len(best.parts))
     before = score_model(given, given.model)
@@ -190,21 +183,10 @@ def _proof(
     return _Proof(best, model, unseen, median, rms, crossed is not None, confirmed)
 
 
-def _concluded(
-    case: Case, inquiry: Inquiry, proof: _Proof, looks: tuple[LookWarning, ...], begin: float
-) -> Diagnosis:
-    leader = proof.leader
-    adequate = adequacy(leader.fit.state, leader.unknowns)
-    posterior = inquiry.examination.posterior
-    decision = decide(posterior, adequate, leader, proof.log_bayes, proof.confirmed)
-    return _written(case, inquiry, decision, adequate, proof, looks, begin)
-
-
 def _written(
     case: Case,
     inquiry: Inquiry,
     decision: Decision,
-    adequate: float,
     proof: _Proof,
     looks: tuple[LookWarning, ...],
     begin: float,
@@ -242,7 +224,7 @@ def _written(
         chi2=(before.chi2, after.chi2),
         scatter=scatter_rows(after),
         data_count=len(examination.problem.data),
-        adequacy_p=adequate,
+        adequacy_p=proof.adequate,
         nothing=decision.nothing,
         looks=looks,
         locations=(*evidence_rows(examination), *locate(case.model, used)),
@@ -258,19 +240,18 @@ def _written(
     )
 
 
-def _cut_short(effort: Effort) -> tuple[str, ...]:
-    if not effort.cut:
-        return ()
-    return (
-        f"The search for several causes was ended after its budget of {effort.budget:g} s: causes "
-        "that explain the data together may have been overlooked.",
-    )
-
-
-def _changed() -> tuple[str, ...]:
-    """Return which numbers of the table have other values, if any have."""
-    words = [f"{name} = {shown(value)}" for name, value in changed_settings().items()]
-    return (f"Settings other than the standard ones: {', '.join(words)}.",) if words else ()
+def _conditions(effort: Effort) -> tuple[str, ...]:
+    """Return under what conditions it was found that are not the usual ones."""
+    notes = []
+    if effort.cut:
+        notes.append(
+            f"The search for several causes was ended after its budget of {effort.budget:g} s: "
+            "causes that explain the data together may have been overlooked."
+        )
+    if changed := changed_settings():
+        words = ", ".join(f"{name} = {shown(value)}" for name, value in changed.items())
+        notes.append(f"Settings other than the standard ones: {words}.")
+    return tuple(notes)
 
 
 def _group_causes(options: Iterable[Iterable[Cause]]) -> list[Cause]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import log
@@ -19,12 +19,11 @@ from femubench.core.fit.modal_fit import Fit, Problem, bounds_of, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
 from femubench.core.inference.effort import Effort
-from femubench.core.inference.examine import Examination, examine
+from femubench.core.inference.examine import Examination, Terms
 from femubench.core.inference.posterior import Explanation, Key, Posterior
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import enough_modes, modes_of, once_for
 from femubench.core.modal.measurement import Measurement
-from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import Gain
 from femubench.core.schema.results import Block
 from femubench.core.score.scoring import frequency_error, many_modifications, modified_modes
@@ -253,17 +252,14 @@ def _relative_std(measurement: Measurement) -> FloatArray:
     return np.where(known, std, typical)
 
 
-def left_out(
-    examination: Examination, effects: Iterable[Effect], effort: Effort | None = None
-) -> Unseen:
+def left_out(examination: Examination, terms: Terms) -> Unseen:
     """Return the errors of every used mode, predicted from the others alone.
 
     The causes are chosen anew without the mode, so that it has no part in what predicts it.
 
     Arguments:
         examination: of all used modes.
-        effects: what may be missing.
-        effort: as in `examine`.
+        terms: of the examination.
     """
     data = examination.problem.data
     numbers = data.measurement.numbers
@@ -271,24 +267,14 @@ def left_out(
     noise = Noise.of(np.zeros((len(data), 0)), 0.0)
     several = len(examination.best.parts) > 1
     before, after, std = [], [], []
-    effort = effort or Effort()
+    effort = terms.effort
     for j, number in enumerate(numbers):
         left = len(numbers) - j - 1
         effort.expect_alike(left, several)
         kept = data.measurement.select([other for other in numbers if other != number])
         if len(kept) == 0:
             break
-        again = examine(
-            examination.model,
-            kept,
-            effects,
-            tolerance=examination.tolerance,
-            pairs=several,
-            reference=examination.reference,
-            width=examination.width,
-            beam=examination.beam,
-            effort=effort,
-        )
+        again = replace(terms, pairs=several).examine(examination.model, kept)
         found, problem = again.best.fit, again.problem_of(again.best)
         point = state_at(replace(problem, data=data, noise=noise), found.parts, found.state.x)
         slope = data.by_mode(point.jacobian)[j]

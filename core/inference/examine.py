@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import log
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from femubench.core.case.case import BEAM_SHARE
 from femubench.core.change.hypothesis import Hypothesis, by_themselves, hypotheses_of
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.model import Model
@@ -51,7 +52,7 @@ class Examination:
         found: the atlas of every textbook set that was searched.
         modes: of the model, in the coordinates of the problem.
         error: what a beam model gets wrong, where that was asked.
-        reference, width, beam: as in `examine`.
+        reference: as in `examine`.
     """
 
     model: Model
@@ -63,8 +64,6 @@ class Examination:
     modes: Modes
     error: ModelError | None = None
     reference: Measurement | None = None
-    width: float = 0.0
-    beam: float = 1.0
 
     @cached_property
     def nominal(self) -> State:
@@ -165,6 +164,39 @@ class Examination:
         return replace(explanation.fit.state.problem, offset=0.0)
 
 
+@dataclass(frozen=True)
+class Terms:
+    """On what terms explanations are weighed, whatever model and data are examined.
+
+    Arguments:
+        effects, tolerance, pairs, reference, width, beam, effort: as in `examine`.
+    """
+
+    effects: tuple[Effect, ...]
+    tolerance: float
+    pairs: bool = True
+    reference: Measurement | None = None
+    width: float = 0.0
+    beam: float = BEAM_SHARE
+    effort: Effort = field(default_factory=Effort)
+
+    def single(self) -> Terms:
+        """Return the same without a search for several causes."""
+        return replace(self, pairs=False)
+
+    def examine(self, model: Model, measurement: Measurement) -> Examination:
+        """Weigh every explanation of what a model gets wrong; see `examine`."""
+        return examine(
+            *(model, measurement, self.effects),
+            tolerance=self.tolerance,
+            pairs=self.pairs,
+            reference=self.reference,
+            width=self.width,
+            beam=self.beam,
+            effort=self.effort,
+        )
+
+
 def examine(
     model: Model,
     measurement: Measurement,
@@ -174,7 +206,7 @@ def examine(
     pairs: bool = True,
     reference: Measurement | None = None,
     width: float = 0.0,
-    beam: float = 0.5,
+    beam: float = BEAM_SHARE,
     effort: Effort | None = None,
 ) -> Examination:
     """Weigh every explanation of what a model gets wrong.
@@ -221,7 +253,7 @@ def examine(
     basis.forget()
     return Examination(
         *(model, own, slopes, tolerance, posterior, tuple(atlas), basis.modes),
-        *(error, reference, width, beam),
+        *(error, reference),
     )
 
 

@@ -13,12 +13,11 @@ discounted.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import exp, log
-from typing import Literal
 
 import numpy as np
 import scipy.linalg as la
@@ -35,7 +34,7 @@ from femubench.core.fit.residuals import Data
 from femubench.core.fit.static_response import Basis, placed
 from femubench.core.inference.charge import Charge, Mended, charges_of
 from femubench.core.inference.effort import Effort
-from femubench.core.inference.examine import Examination, before_of, model_error_of, posed
+from femubench.core.inference.examine import Examination, Terms, before_of, model_error_of, posed
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import DENSE_LIMIT
@@ -44,9 +43,7 @@ from femubench.core.roles import EffectParameter, Fault
 from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray
 
-Depth = Literal["one", "several"]
 Weighed = list[tuple[Charge, float]]
-Examine = Callable[[Model, Measurement, Depth], Examination]
 
 
 @dataclass(frozen=True)
@@ -69,11 +66,7 @@ def inquire(
     model: Model,
     measurement: Measurement,
     faults: Iterable[Fault],
-    examine: Examine,
-    *,
-    reference: Measurement | None = None,
-    width: float = 1.0,
-    effort: Effort | None = None,
+    terms: Terms,
 ) -> Inquiry:
     """Weigh explanations of data by physical causes, and by faults beside them.
 
@@ -81,26 +74,24 @@ def inquire(
         model: the nominal model.
         measurement: the used modes and nothing else.
         faults: what may be wrong with either.
-        examine: from model, data and how many causes are sought to their examination.
-        reference: modes of the structure as it was, where they are known.
-        width: factor on the widths of the model error beside which faults are sought.
-        effort: counts the pieces.
+        terms: of every examination. Beside a pure beam model, without any model error, all would
+            look like faults: these are sought with an ordinary one.
 
     Raises:
         NotApplicable: when a used frequency has no standard deviation.
         ModelError: when the model has no modes.
     """
-    effort = effort or Effort()
+    effort = terms.effort
     # What was typed in is wrong in both states, and so no part of what differs.
-    known = tuple(f for f in faults if reference is None or f.side == "data")
+    known = tuple(f for f in faults if terms.reference is None or f.side == "data")
     mended: list[Mended] = []
     model, measurement = _possible(model, measurement, known, mended)
     if not known:
-        return Inquiry(examine(model, measurement, "several"))
-    now = _Drawn(model, measurement, reference, width)
+        return Inquiry(terms.examine(model, measurement))
+    now = _Drawn(model, measurement, terms.reference, terms.width or 1.0)
     ranked = _weighed(now, known, effort)
     while len(mended) < settings.faults_mended:
-        found = _definite(now, ranked, examine)
+        found = _definite(now, ranked, terms)
         if found is None:
             break
         mended.append(found)
@@ -108,13 +99,13 @@ def inquire(
         ranked = _weighed(now, known, effort)
     reweighing = [charge for charge, _ in ranked if charge.reweighs]
     with effort.scope({"single": (0.0, float(settings.candidates * bool(reweighing)))}):
-        seen = examine(now.model, now.measurement, "several")
+        seen = terms.examine(now.model, now.measurement)
     # Other deviations would excuse whatever is wrong: they are the last resort.
-    other = _reweighed(now, reweighing, seen, examine)
+    other = _reweighed(now, reweighing, seen, terms)
     if other is None:
         return Inquiry(seen, tuple(mended))
     if other.charge.loosens < 1.0:
-        return Inquiry(examine(*other.charge.mended, "several"), (*mended, other))
+        return Inquiry(terms.examine(*other.charge.mended), (*mended, other))
     surely = replace(other.charge, x=other.charge.x - 2.0 * other.charge.std)
     clearly = surely.loosens > settings.wrong_factor
     return Inquiry(seen, tuple(mended), (other,) if clearly else ())
@@ -125,17 +116,18 @@ def _sure_odds() -> float:
     return log(settings.sure_fault / (1.0 - settings.sure_fault))
 
 
-def _definite(now: _Drawn, ranked: Weighed, examine: Examine) -> Mended | None:
+def _definite(now: _Drawn, ranked: Weighed, terms: Terms) -> Mended | None:
     """Return the most probable fault, but for deviations; None where no fault is as probable."""
     pairs = [(c, g) for c, g in ranked if not c.reweighs and now.mostly(c)]
     if max((gain for _, gain in pairs), default=-np.inf) < _sure_odds():
         return None
-    seen = examine(now.model, now.measurement, "one")
+    single = terms.single()
+    seen = single.examine(now.model, now.measurement)
     without = _with_causes(seen, now.log_density, now.measurement)
     sound = seen.adequacy > settings.adequate_p and len(seen.best.parts) < 2
     least = without - now.log_density - (0.0 if sound else settings.fault_lag)
     tried = [(c, gain) for c, gain in pairs if gain > least][: settings.candidates]
-    densities = [_density(now, *pair, examine(*pair[0].mended, "one")) for pair in tried]
+    densities = [_density(now, *pair, single.examine(*pair[0].mended)) for pair in tried]
     if not tried:
         return None
     best = int(np.argmax(densities))
@@ -147,7 +139,7 @@ def _definite(now: _Drawn, ranked: Weighed, examine: Examine) -> Mended | None:
 
 
 def _reweighed(
-    now: _Drawn, charges: Sequence[Charge], seen: Examination, examine: Examine
+    now: _Drawn, charges: Sequence[Charge], seen: Examination, terms: Terms
 ) -> Mended | None:
     """Return other deviations, if those are more probable than the stated ones."""
     plain, caused = now.log_density, log_density(seen, now.measurement)
@@ -163,7 +155,7 @@ def _reweighed(
         return None
     # Wrong deviations lead to wrong causes, and these to wrong deviations: to and fro.
     for _ in range(settings.few_steps if charge.loosens < 1.0 else 0):
-        mended = examine(*charge.mended, "one")
+        mended = terms.single().examine(*charge.mended)
         density = log_density(mended, now.measurement) + now.prior(charge)
         charge = now.beside(mended.best).estimated(charge)
         if not _inside(charge):

@@ -91,7 +91,7 @@ def scatter_slopes(problem: Problem, modes: Modes) -> FloatArray:
     shapes = rigid_first(modes).shapes
     # Close modes are turned to the measured ones, and their forces with them.
     turned = nominal.vectors[:, nominal.partner]
-    top = int(np.flatnonzero(np.abs(turned).max(axis=1) > settings.negligible)[-1]) + 1
+    top = int(np.flatnonzero(np.abs(turned).max(axis=1) > settings.negligible**2)[-1]) + 1
     element = structure.properties
     own = element.rhoA * (element.length - element.rigid_mass_1 - element.rigid_mass_2)
     found = np.zeros((len(problem.data), 2, len(element)))
@@ -391,14 +391,15 @@ class ModelError:
             value = 0.5 * float(alpha @ y + log_det + v @ v)
             return value, v + 0.5 * self._slopes(v, inverse - np.outer(alpha, alpha))
 
-        widest = settings.widest_coordinate
+        ends = np.log(settings.error_scale_range) - np.log(settings.error_scale_median)
+        low, high = ends / settings.error_scale_spread
         many, few = settings.scale_steps
         found = minimize(
             cost,
             first,
             jac=True,
             method="L-BFGS-B",
-            bounds=[(-widest, widest)] * len(first),
+            bounds=[(low, high)] * len(first),
             options={"maxiter": many if near is None else few, "ftol": settings.scale_settled},
         )
         v = np.asarray(found.x)

@@ -237,7 +237,7 @@ def _followed(
     seen = np.broadcast_to((rows @ near).T[..., None], (len(grid), m, len(rows), 1))
     inner = added.T @ dynamic @ added
     # Blunted, since at a resonance first order has no end.
-    blunt = settings.large_blunt * np.abs(added.T @ stiff @ added).max(axis=(1, 2))
+    blunt = settings.approximation * np.abs(added.T @ stiff @ added).max(axis=(1, 2))
     blunt = blunt[:, None, None, None]
     follow = np.linalg.solve(
         inner @ inner + np.square(blunt) * np.eye(part.extra),

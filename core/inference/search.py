@@ -219,7 +219,7 @@ class Search:
             return []
         lowest = min(s.cost for s in screened)
         explained = start.state.chi2 - lowest
-        limit = lowest + 2.0 * settings.near + settings.interpolation_share * max(explained, 0.0)
+        limit = lowest + 2.0 * settings.near + settings.approximation * max(explained, 0.0)
         near = in_order(
             (s for s in screened if s.cost <= limit),
             lambda s: np.log(s.projection.hypothesis.places) - s.log_evidence,

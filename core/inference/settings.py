@@ -107,6 +107,9 @@ class Settings:
     error_scale_spread: float = _prior(
         1.0, "of the logarithm", "the scale of a class is known within a factor of three or so"
     )
+    error_scale_range: tuple[float, float] = _prior(
+        (0.01, 10.0), "of the width", "smaller is nothing, larger is no beam"
+    )
     own_error_of_change: float = _prior(
         0.3, "of the change", "an effect at a place is an idealisation: width of its own error"
     )
@@ -283,8 +286,8 @@ class Settings:
     near: float = _cost(
         8.0, "nats", "behind the best, within which a first estimate may have ranked wrongly"
     )
-    interpolation_share: float = _cost(
-        0.05, "of the explained chi-square", "which interpolation on the atlas may miss besides"
+    approximation: float = _cost(
+        0.05, "of what it explains", "which interpolation may miss, or first order near a resonance"
     )
     shortlist: int = _cost(40, "hypotheses", "fitted exactly, or weighed as partners, at most")
     given_up: float = _cost(
@@ -336,9 +339,6 @@ class Settings:
         (0.12, 0.5, 1.3, 2.6), "prior deviations", "at which each of them is tried"
     )
     large_slack: float = _cost(0.1, "of the prior", "a ranking by first order must not mind sizes")
-    large_blunt: float = _cost(
-        0.05, "of an eigenvalue", "a resonance that is closer is no matter of first order"
-    )
     work_of_pieces: tuple[float, ...] = _cost(
         (0.35, 0.018, 1.0, 0.45, 1.0, 0.4, 0.35, 0.3),
         "searches for single causes",
