@@ -99,17 +99,16 @@ def diagnose(
         _check_report(report_file)
     if output is not None:
         check_new(output)
-    from femubench.core.inference.settings import decisions_from
-
-    decisions = decisions_from(words)
     names = None if effects is None else [word.strip() for word in effects.split(",")]
     chosen("effect", names or (), plugins.effects)
     chosen("plugin", others, (plugin.plugin for plugin in plugins.loaded))
     read = one_case(case, plugins)
     from femubench.core.diagnosis.serial import diagnosis_to_json
+    from femubench.core.inference.settings import decisions_from
     from femubench.core.library.diagnose import diagnosis_of, has_model
     from femubench.core.library.report import rendering
 
+    decisions = decisions_from(words)
     with progress(read.name, quiet=quiet) as told:
         found = diagnosis_of(
             *(read, names, plugins),
