@@ -108,7 +108,6 @@ def diagnose(
     from femubench.core.library.diagnose import diagnosis_of, has_model
     from femubench.core.library.report import rendering
 
-    decisions = decisions_from(words)
     with progress(read.name, quiet=quiet) as told:
         found = diagnosis_of(
             *(read, names, plugins),
@@ -118,7 +117,7 @@ def diagnose(
             budget=budget,
             told=told,
             others=others,
-            decisions=decisions,
+            decisions=decisions_from(words),
         )
     written = output if output is not None and has_model(found) else None
     fault = None if written is None else _fault(found, written)
