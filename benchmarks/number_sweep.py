@@ -59,7 +59,7 @@ def answer(task: Task, values: Mapping[str, Value]) -> Record:
 
     with threadpool_limits(1), overridden(values):
         found = run_task(task, diagnose)
-    said = ("verdict", "named", "named_places", "right", "place_right", "probability", "seconds")
+    said = ("verdict", "named", "named_places", "right", "place_right", "probability")
     return {name: found.get(name) for name in said}
 
 
@@ -111,14 +111,17 @@ def changes(lines: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
         key = line["group"], line["number"]
         if not line["numbers"] or key not in plain:
             continue
-        row = found.setdefault(tuple(line["numbers"]), {"cases": set(), "changed": {}})
-        row["cases"].add(key)
+        row = found.setdefault(tuple(line["numbers"]), {"down": set(), "up": set(), "changed": {}})
+        way = "up" if line["up"] else "down"
+        row[way].add(key)
         said = ("verdict", "named", "named_places")
         if any(line[name] != plain[key][name] for name in said):
-            way = "up" if line["up"] else "down"
             words = f"{way}: {_verdict(plain[key])} -> {_verdict(line)}"
             row["changed"].setdefault(key, []).append(words)
-    return [{"numbers": names, **row} for names, row in found.items()]
+    return [
+        {"numbers": names, "cases": row["down"] & row["up"], "changed": row["changed"]}
+        for names, row in found.items()
+    ]
 
 
 def _verdict(line: Mapping[str, Any]) -> str:
