@@ -14,13 +14,13 @@ from numpy.testing import assert_allclose
 from scipy.special import logsumexp
 
 from femubench import Model, solve_modes
-from femubench.core.advise import point_attachments as advice_points
 from femubench.core.advise.advice import aligned
 from femubench.core.advise.point_attachments import antiresonances, loaded_frequencies
 from femubench.core.advise.prediction import Outlook, Points, Predicted, distance
 from femubench.core.case.nodes import MatrixGeometry
 from femubench.core.fem.model import Dofs
 from femubench.core.fit.modal_fit import Fit, fit, state_at
+from femubench.core.inference.settings import overridden
 from femubench.effect import point_in, translation_rows
 from femubench.fem import FloatArray, Frame, Place, PointMass, Support
 from femubench.plugins.effects.added_mass import AddedMass
@@ -95,10 +95,8 @@ class TestPredictions:
             low = exact > problem.space.zero
             assert len(found) >= int((~near & low & (exact < 0.99 * top)).sum())
 
-    def test_spread_is_the_change_within_a_deviation(
-        self, ladder: FrameBuilder, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(advice_points, "_SPARE", 1000)  # all modes: the rule alone is at stake
+    @overridden({"spare_modes": 1000})  # all modes: the rule alone is at stake
+    def test_spread_is_the_change_within_a_deviation(self, ladder: FrameBuilder) -> None:
         frame = ladder(polar=False)
         frame = replace(frame, supports=tuple(Support(Place(joint=j), ("z",)) for j in "ADF"))
         model = Model.of(frame)

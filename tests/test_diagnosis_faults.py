@@ -17,7 +17,7 @@ from femubench.core.challenge.score import candidates
 from femubench.core.diagnosis.diagnose import diagnose
 from femubench.core.diagnosis.serial import diagnosis_to_json
 from femubench.core.inference.charge import charges_of
-from femubench.core.inference.examine import examine
+from femubench.core.inference.examine import Terms, examine
 from femubench.core.inference.fault_search import _Drawn, inquire, log_density
 from femubench.core.plugin.loader import load_plugins, registered_faults
 from femubench.effect import Suspect
@@ -309,14 +309,11 @@ def test_a_fault_without_a_side_is_refused() -> None:
 
 def test_without_faults_the_examination_is_the_plain_one() -> None:
     case = clean("ladder", 1)
-    asked: list[str] = []
-
-    def look(model: Model, measurement: Measurement, depth: str) -> Any:
-        asked.append(depth)
-        return examine(model, measurement, FEW, tolerance=0.005, pairs=False)
-
-    assert inquire(case.model, case.used_measurement(), (), look).mended == ()
-    assert asked == ["several"]
+    used, terms = case.used_measurement(), Terms(tuple(FEW), 0.005, pairs=False)
+    found = inquire(case.model, used, (), terms)
+    assert found.mended == ()
+    plain = examine(case.model, used, FEW, tolerance=0.005, pairs=False)
+    assert found.examination.posterior.names == plain.posterior.names
 
 
 def test_the_json_says_the_side_and_a_group_keeps_its_faults() -> None:

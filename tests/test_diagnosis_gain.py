@@ -23,7 +23,7 @@ from femubench.core.diagnosis.proof import (
 )
 from femubench.core.fit.mesh_error import refined
 from femubench.core.fit.modal_fit import Fit, state_at
-from femubench.core.inference.examine import examine, posed
+from femubench.core.inference.examine import Terms, examine, posed
 from femubench.core.schema.diagnosis import Cause, Gain
 from femubench.core.schema.paired_modes import PairedMode
 from femubench.core.schema.results import Block
@@ -273,7 +273,7 @@ def test_a_mode_left_out_has_no_part_in_what_predicts_it() -> None:
     effects = effects_named(*NAMES)
     seen = examine(MODEL, replace(test, frequencies=wrong), effects, tolerance=0.0)
     assert seen.best.parts
-    crossed = left_out(seen, effects)
+    crossed = left_out(seen, Terms(tuple(effects), tolerance=0.0))
     assert crossed.after[3] == pytest.approx(crossed.before[3], rel=1e-6)
     assert crossed.before[3] == pytest.approx(0.03, rel=0.05)
 

@@ -21,12 +21,8 @@ from femubench.core.fit.extended_model import agreed, extended, raw_residual
 from femubench.core.fit.modal_fit import fit, state_at
 from femubench.core.inference.examine import examine
 from femubench.core.inference.posterior import Explanation, Posterior
-from femubench.core.inference.prior import (
-    PRIOR_BEYOND_TEXTBOOK,
-    PRIOR_OF_COUNT,
-    log_prior,
-    textbook_bases,
-)
+from femubench.core.inference.prior import log_prior, textbook_bases
+from femubench.core.inference.settings import settings
 from femubench.effect import FrameEffect, Parameter
 from femubench.fem import Frame, PointMass
 
@@ -46,22 +42,24 @@ NOTHING = np.zeros(0)
 
 
 def test_priors_of_counts_are_probabilities_and_fewer_causes_are_likelier() -> None:
-    for counts in (PRIOR_OF_COUNT, PRIOR_BEYOND_TEXTBOOK):
+    for counts in (settings.prior_of_causes, settings.prior_of_further_causes):
         assert sum(counts) == pytest.approx(1.0)
         assert list(counts) == sorted(counts, reverse=True)
-    assert PRIOR_OF_COUNT[0] == 0.5
+    assert settings.prior_of_causes[0] == 0.5
 
 
 def test_the_prior_of_all_explanations_with_so_many_causes_sums_to_that_of_their_count() -> None:
     """Over names and places; two causes in either order are one explanation."""
     problem = problem_of(MODEL, measured(MODEL, FRAME), effects_named("density", "joint-mass"))
     parts, names = problem.space.projections, 2
-    single = sum(exp(log_prior((part,), names, PRIOR_OF_COUNT)) for part in parts)
-    assert single == pytest.approx(PRIOR_OF_COUNT[1])
-    double = sum(exp(log_prior(pair, names, PRIOR_OF_COUNT)) for pair in combinations(parts, 2))
+    single = sum(exp(log_prior((part,), names, settings.prior_of_causes)) for part in parts)
+    assert single == pytest.approx(settings.prior_of_causes[1])
+    double = sum(
+        exp(log_prior(pair, names, settings.prior_of_causes)) for pair in combinations(parts, 2)
+    )
     # All but the pairs of a hypothesis with itself.
-    assert 0.4 * PRIOR_OF_COUNT[2] < double < PRIOR_OF_COUNT[2]
-    assert log_prior((), names, PRIOR_OF_COUNT) == log(PRIOR_OF_COUNT[0])
+    assert 0.4 * settings.prior_of_causes[2] < double < settings.prior_of_causes[2]
+    assert log_prior((), names, settings.prior_of_causes) == log(settings.prior_of_causes[0])
     assert factorial(2) * comb(2, 2) == 2
 
 
@@ -93,7 +91,7 @@ def test_a_noise_that_is_trusted_by_half_halves_what_the_data_say_and_leaves_the
         nothing, cause = (Explanation(base, found, 1) for found in fits if found is not None)
         found = Posterior.of((nothing, cause)).names
         odds.append(log(found[("member-mass",)] / found[()]))
-    priors = [log_prior(parts, 1, PRIOR_OF_COUNT) for parts in ((part,), ())]
+    priors = [log_prior(parts, 1, settings.prior_of_causes) for parts in ((part,), ())]
     assert odds[0] == pytest.approx(priors[0] - priors[1])
     assert odds[1] == pytest.approx(0.5 * (odds[0] + odds[2]))
     assert odds[2] > odds[0] + 4.0
@@ -114,7 +112,7 @@ def test_a_mode_that_a_cause_adds_and_the_test_missed_makes_the_cause_improbable
     assert found is not None
     assert found.state.chi2 < 1e-6  # the oscillator explains all that was measured
     cost = (
-        log_prior((part,), 1, PRIOR_OF_COUNT)
+        log_prior((part,), 1, settings.prior_of_causes)
         - Explanation(textbook_bases([])[0], found, 1).log_prior
     )
     assert count * log(10.0) <= cost <= count * log(100.0)

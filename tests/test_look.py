@@ -205,7 +205,7 @@ def test_large_models_are_not_solved_anew(
 ) -> None:
     model = Model.of(ladder(elements=elements))
     exact = look(model, measured(model))
-    for module in ("look.modes", "inference.mesh_error"):
+    for module in ("look.modes", "fit.mesh_error"):
         monkeypatch.setattr(f"femubench.core.{module}.SOLVED_LIMIT", 0)
     quick = look(model, measured(model))
     for effect, accuracy in (

@@ -18,8 +18,8 @@ from femubench.core.fit.modal_fit import Problem, State, fit, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.static_response import Basis
 from femubench.core.inference.model_error import (
-    WIDTHS,
     ModelError,
+    class_widths,
     conditioned,
     error_slopes,
     kind,
@@ -36,6 +36,7 @@ FRAME = structure_named("portal").frame
 MODEL = Model.of(FRAME)
 TEST = measured(MODEL, FRAME)
 NOTHING = np.zeros(0)
+WIDTHS = class_widths()
 MEMBER = FRAME.members[0]
 JOINT = MEMBER.ends[1]
 LENGTH = member_length(FRAME, MEMBER.name)

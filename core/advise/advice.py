@@ -18,16 +18,11 @@ from femubench.core.advise.prediction import Outlook, Points, Predicted, distanc
 from femubench.core.fem.model import Model
 from femubench.core.fit.modal_fit import Fit, Problem
 from femubench.core.fit.residuals import Data
+from femubench.core.inference.settings import settings
 from femubench.core.schema.diagnosis import Advice
 from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray
 
-# Relative standard deviations that a careful test reaches.
-_SCALES, _ANTIRESONANCE, _SHAPE, _DIAL = 0.002, 0.005, 0.015, 0.01
-_KNOWN_MASS = 0.02  # of the structure
-_MORE_MODES = 2
-_BAND = 0.25  # of the lowest used frequency: antiresonances may lie below the first resonance
-_ALIKE = (0.8, 1.25)  # two explanations mean the same antiresonance
 _LEVEL = "measure at twice the excitation level: a stiffness that falls with the amplitude"
 
 
@@ -91,13 +86,13 @@ class Group:
 def _weighing(group: Group) -> Iterator[Option]:
     if group.data.mass is None and group.views[0].state.mass > 0.0:
         predicted = [view.mass() for view in group.views]
-        relative = np.hypot(_SCALES, group.tolerance / np.sqrt(group.elements))
+        relative = np.hypot(settings.reachable_mass_std, group.tolerance / np.sqrt(group.elements))
         yield group.option("mass", "weigh the structure", predicted, relative * predicted[0].values)
 
 
 def _more_modes(group: Group) -> Iterator[Option]:
     first = group.views[0]
-    modes = first.further(_MORE_MODES)
+    modes = first.further(settings.least_modes)
     if len(modes):
         wanted = first.frequencies(modes)
         others = [_matched(wanted.values, view) for view in group.views[1:]]
@@ -122,7 +117,7 @@ def _matched(wanted: FloatArray, view: Outlook) -> Predicted | None:
 def _masses(group: Group) -> Iterator[Option]:
     if not group.points.labels or group.weight <= 0.0:
         return
-    size = float(f"{_KNOWN_MASS * group.weight:.1e}")
+    size = float(f"{settings.test_mass * group.weight:.1e}")
     tables = [loaded_frequencies(view, group.points, size) for view in group.views]
     for label, *predicted in zip(group.points.labels, *tables, strict=True):
         text = f"attach {_kilograms(size)} kg at {label} and measure again"
@@ -135,13 +130,15 @@ def _antiresonances(group: Group) -> Iterator[Option]:
         return
     used = group.data.measurement.frequencies
     tables = [antiresonances(view) for view in group.views]
-    relative = np.hypot(_ANTIRESONANCE, group.hertz)
+    relative = np.hypot(settings.reachable_antiresonance_std, group.hertz)
+    least = settings.antiresonance_band * used.min()
+    alike = 1.0 / settings.same_antiresonance, settings.same_antiresonance
     for sensor, first, *others in zip(group.points.sensors, *tables, strict=True):
-        band = (first.values >= _BAND * used.min()) & (first.values <= used.max())
+        band = (first.values >= least) & (first.values <= used.max())
         found = []
         for i in np.flatnonzero(band)[:2]:
             own = first.take([int(i)])
-            rivals = [nearest(float(own.values[0]), other, _ALIKE) for other in others]
+            rivals = [nearest(float(own.values[0]), other, alike) for other in others]
             where = f"near {_hertz(own.values[0])} Hz of the point receptance"
             text = f"measure the antiresonance {where} at {sensor}"
             found.append(group.option("zero", text, [own, *rivals], relative * own.values))
@@ -156,7 +153,7 @@ def _shapes(group: Group) -> Iterator[Option]:
     shapes = pairs[0][0]
     if len(shapes) < 2:
         return
-    std = np.hypot(_SHAPE, group.tolerance) * np.abs(shapes).max(axis=0)
+    std = np.hypot(settings.reachable_shape_std, group.tolerance) * np.abs(shapes).max(axis=0)
     own, *others = [aligned(shapes, *pair) for pair in pairs]
     yield group.option(
         "shapes",
@@ -202,7 +199,8 @@ def _deflection(group: Group) -> Iterator[Option]:
     best = int(predicted[0].values.argmax())
     text = f"measure the static deflection under a known load at {points.sensors[best]}"
     softest = [p.take([best]) for p in predicted]
-    yield group.option("deflection", text, softest, _DIAL * softest[0].values)
+    std = settings.reachable_deflection_std * softest[0].values
+    yield group.option("deflection", text, softest, std)
 
 
 def second_level(group: Group) -> Option | None:
@@ -248,10 +246,6 @@ def options_for(group: Group) -> list[Option]:
     return [option for kind in _KINDS for option in kind(group)]
 
 
-_WORTH, _CLEAR = 1.0, 9.0
-_MOST, _OF_A_KIND = 8, 3
-
-
 def advise(
     model: Model, problems: Sequence[Problem], fits: Sequence[Fit], *, tolerance: float
 ) -> tuple[Advice, ...]:
@@ -295,24 +289,26 @@ def _ranked(
     rows = [(option, *_told(option, labels)) for option in options]
     # Clearly all comes before very clearly some.
     rows = in_order(rows, lambda row: -row[2])
-    rows.sort(key=lambda row: min(row[0].distances) < _CLEAR)
+    clear = settings.visible_deviations**2
+    rows.sort(key=lambda row: min(row[0].distances) < clear)
     seen: dict[str, int] = {}
     chosen: list[Advice] = []
     for option, text, size in rows:
         seen[option.kind] = seen.get(option.kind, 0) + 1
-        if (size >= _WORTH and seen[option.kind] <= _OF_A_KIND) or not chosen:
+        worth = size >= settings.worth_measuring
+        if (worth and seen[option.kind] <= settings.of_a_kind) or not chosen:
             chosen.append(Advice(text, size))
     beside: list[Advice] = []
-    if level is not None and min(level.distances) >= _WORTH:
+    if level is not None and min(level.distances) >= settings.worth_measuring:
         beside.append(Advice(level.text, min(level.distances)))
-    kept = [*chosen[: _MOST - len(beside)], *beside]
+    kept = [*chosen[: settings.advised - len(beside)], *beside]
     return tuple(in_order(kept, lambda advice: -advice.separation))
 
 
 def _told(option: Option, labels: Sequence[str]) -> tuple[str, float]:
     """Return the text of an option and its separation from those that it tells from the first."""
     pairs = list(zip(labels[1:], option.distances, strict=True))
-    told = [(label, d) for label, d in pairs if d >= _WORTH]
+    told = [(label, d) for label, d in pairs if d >= settings.worth_measuring]
     if not told or len(told) == len(pairs):
         return option.text, min(option.distances)
     # Explanations that differ in textbook effects alone have one name.

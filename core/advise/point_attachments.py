@@ -15,18 +15,14 @@ from femubench.core.effect.attachments import free_translations, point_in
 from femubench.core.effect.places import point_places
 from femubench.core.fem.model import Model
 from femubench.core.fit.modal_fit import signed_hz
+from femubench.core.inference.settings import settings
 from femubench.core.typing import FloatArray
-
-_MOST = 48
-_SPARE = 8
-# A resonance closer than this hides an antiresonance.
-_HIDDEN = 0.01
 
 
 def points_of(model: Model) -> Points:
     """Return joints and the middles of members, at most 48 spread over the model."""
     chosen = _chosen(model)
-    chosen = chosen[:: -(-len(chosen) // _MOST)] if chosen else chosen
+    chosen = chosen[:: -(-len(chosen) // settings.points)] if chosen else chosen
     pairs = [(label, free_translations(model, point_in(model, label))) for label in chosen]
     moving = [(label, free) for label, free in pairs if free]
     return Points(tuple(label for label, _ in moving), tuple(free for _, free in moving))
@@ -66,7 +62,7 @@ def _ritz(values: FloatArray, rows: FloatArray, low: int) -> FloatArray:
 
 def _low(outlook: Outlook) -> int:
     state = outlook.state
-    return min(len(state.eigenvalues), int(state.partner.max()) + 1 + _SPARE)
+    return min(len(state.eigenvalues), int(state.partner.max()) + 1 + settings.spare_modes)
 
 
 def loaded_frequencies(outlook: Outlook, points: Points, mass: float) -> list[Predicted]:
@@ -113,7 +109,7 @@ def antiresonances(outlook: Outlook) -> list[Predicted]:
     frequencies, spread = outlook.hertz(eigenvalues[:, :kept], basis @ vectors[:, :, :kept])
     poles, zero = signed_hz(values), outlook.zero
     gap = np.abs(frequencies[..., None] - poles).min(axis=-1)
-    shown = (frequencies > zero) & (gap > _HIDDEN * frequencies)
+    shown = (frequencies > zero) & (gap > settings.hidden_by_resonance * frequencies)
     return [Predicted(f[i], s[i]) for f, s, i in zip(frequencies, spread, shown, strict=True)]
 
 

@@ -17,11 +17,9 @@ from femubench.core.fem.model import Model
 from femubench.core.fit.modal_basis import nominal_space
 from femubench.core.fit.modal_fit import Fit, Problem, State, signed_hz, state_at
 from femubench.core.fit.static_response import LargeProblem
+from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import solve_modes
 from femubench.core.typing import FloatArray, IntArray, SparseArray
-
-_CLOSE = 1e-3  # of an eigenvalue: closer modes turn into each other at the least change
-_STEP = 1e-4
 
 
 @dataclass(frozen=True)
@@ -180,7 +178,7 @@ class Outlook:
         """Return the measured modes at the points and their spread, (s, m) and (s, m, p)."""
         values, partner = self.state.eigenvalues, self.state.partner
         gap = values[partner] - values[:, None]
-        least = _CLOSE * np.abs(values[partner])
+        least = settings.close_modes * np.abs(values[partner])
         gap = np.where(np.abs(gap) < least, np.copysign(least, gap), gap)
         gap[partner, np.arange(len(partner))] = np.inf
         force = self.stiffness_spread[:, :, partner]
@@ -200,10 +198,10 @@ class Outlook:
             for i, parameter in enumerate(hypothesis.parameters, start=columns.start):
                 own = getattr(hypothesis.effect, "reading", None) == reading
                 if own and parameter.name == reading.parameter:
-                    ends = self.state.x[i] + _STEP * np.array([-1.0, 1.0])
+                    ends = self.state.x[i] + settings.slope_step * np.array([-1.0, 1.0])
                     low, high = parameter.value(ends)
                     value += float(parameter.value(self.state.x[i])) - parameter.neutral
-                    slope[i] = (high - low) / (2.0 * _STEP)
+                    slope[i] = (high - low) / (2.0 * settings.slope_step)
         return Predicted(np.array([value]), slope[None] @ self.root)
 
     def without(self, columns: slice) -> State:

@@ -60,6 +60,11 @@ def _seconds(ctx: click.Context, param: click.Parameter, value: float | None) ->
     "--plugin", "others", multiple=True, metavar="NAME",
     help="Try the effects and faults of this plugin too, which is imported; may be repeated.",
 )  # fmt: skip
+@click.option(
+    "--set", "words", multiple=True, metavar="NAME=VALUE",
+    help="Move where a statement begins, such as sure_fault=0.95; a note says so, and "
+    "docs/settings.md has all names. May be repeated.",
+)  # fmt: skip
 @options.style("terminal", "markdown")
 @click.option(
     "--report", "report_file", type=options.OUTPUT, metavar="FILE",
@@ -79,6 +84,7 @@ def diagnose(
     budget: float | None,
     effects: str | None,
     others: tuple[str, ...],
+    words: tuple[str, ...],
     style: str,
     report_file: Path | None,
     quiet: bool,
@@ -98,6 +104,7 @@ def diagnose(
     chosen("plugin", others, (plugin.plugin for plugin in plugins.loaded))
     read = one_case(case, plugins)
     from femubench.core.diagnosis.serial import diagnosis_to_json
+    from femubench.core.inference.settings import decisions_from
     from femubench.core.library.diagnose import diagnosis_of, has_model
     from femubench.core.library.report import rendering
 
@@ -110,6 +117,7 @@ def diagnose(
             budget=budget,
             told=told,
             others=others,
+            decisions=decisions_from(words),
         )
     written = output if output is not None and has_model(found) else None
     fault = None if written is None else _fault(found, written)

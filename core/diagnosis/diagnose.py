@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -38,26 +39,21 @@ from femubench.core.fem.model import Model
 from femubench.core.fit.extended_model import departure
 from femubench.core.fit.static_response import LargeProblem
 from femubench.core.inference.effort import Effort, Kind, Number
-from femubench.core.inference.examine import Examination, examine
-from femubench.core.inference.fault_search import Depth, Inquiry, inquire
-from femubench.core.inference.model_error import WIDTHS
+from femubench.core.inference.examine import Examination, Terms
+from femubench.core.inference.fault_search import Inquiry, inquire
+from femubench.core.inference.model_error import class_widths
 from femubench.core.inference.posterior import Explanation
 from femubench.core.inference.search import adequacy
+from femubench.core.inference.settings import changed_settings, settings, shown
 from femubench.core.look.localisation import locate
 from femubench.core.look.look import look
 from femubench.core.look.modes import Seen
 from femubench.core.look.readings import look_at_band
-from femubench.core.modal.measurement import Measurement
 from femubench.core.plugin.loader import registered_effects, registered_faults
 from femubench.core.roles import Effect, Fault
 from femubench.core.schema.diagnosis import Advice, Cause, Gain, LookWarning
 from femubench.core.score.scoring import score_model
 from femubench.core.ties import in_order
-
-_MOST_ADVISED = 8  # explanations that advice parts from each other
-_CLASSES = 3  # of model error that are told
-# Pieces of work that mostly follow: explanations that are judged, searches for a mode left out.
-_JUDGED, _SINGLE = (2.0, 5.0), 2.0
 
 
 @dataclass(frozen=True)
@@ -80,6 +76,11 @@ class _Proof:
     gain_rms: Gain
     crossed: bool
     confirmed: bool
+
+    @cached_property
+    def adequate(self) -> float:
+        """Return the probability of what the leader leaves of the used data, were it noise."""
+        return adequacy(self.leader.fit.state, self.leader.unknowns)
 
     @property
     def log_bayes(self) -> float:
@@ -117,38 +118,29 @@ def diagnose(
     registered = registered_effects()
     known = registered if effects is None else tuple(effects)
     wrong = registered_faults() if faults is None else tuple(faults)
-
-    def search(model: Model, measurement: Measurement, depth: Depth) -> Examination:
-        return examine(
-            model,
-            measurement,
-            known,
-            tolerance=case.tolerance if tolerance is None else tolerance,
-            pairs=pairs and depth == "several",
-            reference=case.used_reference,
-            width=case.error_width,
-            beam=case.beam_share,
-            effort=effort,
-        )
-
-    before, width = case.used_reference, case.error_width or 1.0
+    scatter = case.tolerance if tolerance is None else tolerance
+    reference, width, beam = case.used_reference, case.error_width, case.beam_share
+    terms = Terms(known, scatter, pairs, reference, width, beam, effort)
     with effort.scope(_expected(case)):
-        inquiry = inquire(
-            case.model, used, wrong, search, reference=before, width=width, effort=effort
-        )
+        # Faults of data and input first, then the causes that are left without them.
+        inquiry = inquire(case.model, used, wrong, terms)
         mended = mended_case(case, inquiry.mended)
-        proof = _proof(mended, inquiry.examination, known, case, effort)
+        proof = _proof(mended, inquiry.examination, terms, case)
         with effort.piece("advice"):
             looks = _looks(case.model, mended, (*registered, *known))
-            found = _concluded(mended, inquiry, proof, looks, begin)
-    return replace(found, notes=(*case.notes, *found.notes, *_cut_short(effort)))
+            posterior, leader = inquiry.examination.posterior, proof.leader
+            decision = decide(posterior, proof.adequate, leader, proof.log_bayes, proof.confirmed)
+            found = _written(mended, inquiry, decision, proof, looks, begin)
+    return replace(found, notes=(*case.notes, *found.notes, *_conditions(effort)))
 
 
 def _expected(case: Case) -> dict[Kind, Number]:
     """Return what mostly follows the search: unseen data or, without any, used ones left out."""
     if case.held_out or case.modifications:
-        return {"unseen": _JUDGED, "advice": 1.0}
-    return {"single": _SINGLE * len(case.used), "advice": 1.0}
+        # The best guess is solved and judged, and where it fails its rivals are.
+        judged = 2.0, 2.0 + settings.largest_group / 2.0
+        return {"unseen": judged, "advice": 1.0}
+    return {"single": float(settings.candidates * len(case.used)), "advice": 1.0}
 
 
 def _looks(drawn: Model, case: Case, effects: Iterable[Effect]) -> tuple[LookWarning, ...]:
@@ -164,11 +156,10 @@ def _looks(drawn: Model, case: Case, effects: Iterable[Effect]) -> tuple[LookWar
 def _proof(
     case: Case,
     examination: Examination,
-    effects: Sequence[Effect],
+    terms: Terms,
     given: Case,
-    effort: Effort,
 ) -> _Proof:
-    best = examination.best
+    best, effort = examination.best, terms.effort
     with effort.piece("unseen"):
         model = extended_by(case.model, best)
         # This asks for the most modes: all that follows is given those.
@@ -183,7 +174,7 @@ def _proof(
             after = score_model(case, model)
             unseen = unseen_of(case, examination, best, model)
     else:
-        crossed = left_out(examination, effects, effort)
+        crossed = left_out(examination, terms)
         unseen = (crossed,)
         confirmed = crossed.confirms(len(best.parts))
     before = score_model(given, given.model)
@@ -192,21 +183,10 @@ def _proof(
     return _Proof(best, model, unseen, median, rms, crossed is not None, confirmed)
 
 
-def _concluded(
-    case: Case, inquiry: Inquiry, proof: _Proof, looks: tuple[LookWarning, ...], begin: float
-) -> Diagnosis:
-    leader = proof.leader
-    adequate = adequacy(leader.fit.state, leader.unknowns)
-    posterior = inquiry.examination.posterior
-    decision = decide(posterior, adequate, leader, proof.log_bayes, proof.confirmed)
-    return _written(case, inquiry, decision, adequate, proof, looks, begin)
-
-
 def _written(
     case: Case,
     inquiry: Inquiry,
     decision: Decision,
-    adequate: float,
     proof: _Proof,
     looks: tuple[LookWarning, ...],
     begin: float,
@@ -244,7 +224,7 @@ def _written(
         chi2=(before.chi2, after.chi2),
         scatter=scatter_rows(after),
         data_count=len(examination.problem.data),
-        adequacy_p=adequate,
+        adequacy_p=proof.adequate,
         nothing=decision.nothing,
         looks=looks,
         locations=(*evidence_rows(examination), *locate(case.model, used)),
@@ -260,13 +240,18 @@ def _written(
     )
 
 
-def _cut_short(effort: Effort) -> tuple[str, ...]:
-    if not effort.cut:
-        return ()
-    return (
-        f"The search for several causes was ended after its budget of {effort.budget:g} s: causes "
-        "that explain the data together may have been overlooked.",
-    )
+def _conditions(effort: Effort) -> tuple[str, ...]:
+    """Return under what conditions it was found that are not the usual ones."""
+    notes = []
+    if effort.cut:
+        notes.append(
+            f"The search for several causes was ended after its budget of {effort.budget:g} s: "
+            "causes that explain the data together may have been overlooked."
+        )
+    if changed := changed_settings():
+        words = ", ".join(f"{name} = {shown(value)}" for name, value in changed.items())
+        notes.append(f"Settings other than the standard ones: {words}.")
+    return tuple(notes)
 
 
 def _group_causes(options: Iterable[Iterable[Cause]]) -> list[Cause]:
@@ -298,7 +283,7 @@ def _reason(decision: Decision) -> str:
 def _advice(examination: Examination, group: Sequence[Explanation]) -> tuple[Advice, ...]:
     """Return what parts the names of a group, and each name's places, from each other."""
     others = (e for found in group for e in elsewhere(examination.posterior, found))
-    told = [*group, *others][:_MOST_ADVISED]
+    told = [*group, *others][: settings.advised]
     if len(told) < 2:
         return ()
     problems = [examination.problem_of(e) for e in told]
@@ -352,8 +337,9 @@ def _error_notes(examination: Examination, leader: Explanation) -> tuple[str, ..
     ratios = [row for row in error_scales(examination, leader) if not row.unit]
     if not ratios:
         return ()
-    wide = {row.name: row.scale / WIDTHS.get(row.name, np.inf) for row in ratios}
-    largest = sorted(ratios, key=lambda row: -wide[row.name])[:_CLASSES]
+    widths = class_widths()
+    wide = {row.name: row.scale / widths.get(row.name, np.inf) for row in ratios}
+    largest = sorted(ratios, key=lambda row: -wide[row.name])[: settings.of_a_kind]
     told = ", ".join(f"{row.name} {100.0 * row.scale:.2g} %" for row in largest)
     return (
         f"What the drawing itself gets wrong, above all: {told} (standard deviations). That the "

@@ -10,9 +10,8 @@ import numpy as np
 from femubench.core.case.case import Case
 from femubench.core.diagnosis.words import listed, percent
 from femubench.core.inference.charge import Charge, Mended
+from femubench.core.inference.settings import settings
 from femubench.core.schema.diagnosis import Cause, CauseParameter
-
-_STEP = 1e-4
 
 
 def mended_case(case: Case, mended: Iterable[Mended]) -> Case:
@@ -47,8 +46,9 @@ def _parameters(charge: Charge) -> list[CauseParameter]:
     p = charge.suspect.parameter
     if p is None:
         return known
-    low, value, high = (float(p.value(np.array(charge.x + step))) for step in (-_STEP, 0.0, _STEP))
-    std = charge.std * abs(high - low) / (2.0 * _STEP)
+    h = settings.slope_step
+    low, value, high = (float(p.value(np.array(charge.x + step))) for step in (-h, 0.0, h))
+    std = charge.std * abs(high - low) / (2.0 * h)
     return [*known, CauseParameter(p.name, value, std, p.unit, wording=p.wording)]
 
 

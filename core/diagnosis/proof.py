@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import log
@@ -19,11 +19,11 @@ from femubench.core.fit.modal_fit import Fit, Problem, bounds_of, state_at
 from femubench.core.fit.noise import Noise
 from femubench.core.fit.residuals import Data
 from femubench.core.inference.effort import Effort
-from femubench.core.inference.examine import Examination, examine
+from femubench.core.inference.examine import Examination, Terms
 from femubench.core.inference.posterior import Explanation, Key, Posterior
+from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import enough_modes, modes_of, once_for
 from femubench.core.modal.measurement import Measurement
-from femubench.core.roles import Effect
 from femubench.core.schema.diagnosis import Gain
 from femubench.core.schema.results import Block
 from femubench.core.score.scoring import frequency_error, many_modifications, modified_modes
@@ -31,28 +31,15 @@ from femubench.core.typing import BoolArray, FloatArray
 
 Blocks = Mapping[str, Block]
 
-# Below this many deviations unseen data cannot tell one model from another.
-_CLEARLY = 3.0
-_SEES = 0.5  # deviations by which a mode must change to say anything of a cause
-_IDEAL = 0.05
-_INADEQUATE, _GOOD = 2e-3, 0.05
-_FEW = 2
-_DECISIVE = 5.0  # odds of 150 to 1
-# By what factor errors must fall at least, in the mean of their logarithms, where they stay more
-# than noise: no real structure is a beam. Physics from the textbook need not be all that is
-# missing; a fitted cause must carry further.
-_HALVED, _FOURFOLD = 2.0, 4.0
-# What a beam model gets wrong of an unseen frequency: nothing as often as not, else log-normal.
-_MODEL_ERROR, _SPREAD = 0.003, 1.5
-# A mode farther off than any model error and than five times what is usual was not measured, or
-# is not that mode.
-_GROSS, _UNUSUAL = 0.05, 5.0
-
 
 def _log_likelihood(errors: FloatArray, std: FloatArray) -> float:
-    """Return ln of the probability of errors, integrated over the size of a model error."""
-    z = np.linspace(-3.0, 3.0, 25)
-    sizes = _MODEL_ERROR * np.exp(_SPREAD * z)
+    """Return ln of the probability of errors, integrated over the size of a model error.
+
+    A beam model gets nothing wrong of a frequency as often as not, else a log-normal share.
+    """
+    widest = settings.widest_coordinate
+    z = np.linspace(-widest, widest, 2 * settings.grid_points - 1)
+    sizes = settings.unseen_error_median * np.exp(settings.unseen_error_spread * z)
     weights = np.exp(-0.5 * np.square(z))
     sizes, weights = np.append(sizes, 0.0), np.append(0.5 * weights / weights.sum(), 0.5)
     variance = np.square(std) + np.square(sizes)[:, None]
@@ -80,8 +67,8 @@ class Unseen:
     def sound(self) -> Unseen:
         """Return the same without gross misses, which no cause explains and none can answer for."""
         miss = np.minimum(np.abs(self.before), np.abs(self.after))
-        usual = max(1.5 * float(np.median(miss)) if len(miss) else 0.0, _GROSS / _UNUSUAL)
-        return self._of(miss <= _UNUSUAL * usual)
+        typical, unusual = float(np.median(miss)) if len(miss) else 0.0, settings.unusual_error
+        return self._of(miss <= unusual * max(1.5 * typical, settings.gross_error / unusual))
 
     def _of(self, rows: BoolArray) -> Unseen:
         plain = None if self.plain_std is None else self.plain_std[rows]
@@ -91,7 +78,8 @@ class Unseen:
     def seeing(self) -> Unseen:
         """Return those of the sound ones that the causes change."""
         sound = self.sound
-        return sound._of(np.abs(sound.before - sound.after) > _SEES * sound.std)
+        least = settings.telling_deviations * sound.std
+        return sound._of(np.abs(sound.before - sound.after) > least)
 
     @property
     def size(self) -> float:
@@ -101,7 +89,7 @@ class Unseen:
     @property
     def visible(self) -> bool:
         """Tell whether the causes change unseen modes by more than noise."""
-        return self.sound.size > _CLEARLY
+        return self.sound.size > settings.visible_deviations
 
     @property
     def log_bayes(self) -> float:
@@ -112,7 +100,7 @@ class Unseen:
         Source: Kass & Raftery (1995), JASA 90, 773-795.
         """
         seeing = self.seeing
-        after = np.hypot(seeing.std, _IDEAL * (seeing.before - seeing.after))
+        after = np.hypot(seeing.std, settings.idealisation_error * (seeing.before - seeing.after))
         plain = seeing.std if seeing.plain_std is None else seeing.plain_std
         return _log_likelihood(seeing.after, after) - _log_likelihood(seeing.before, plain)
 
@@ -123,7 +111,8 @@ class Unseen:
         A cause is an idealisation: of what it changes, one part in twenty is its own error.
         """
         sound = self.sound
-        rest = sound.after / np.hypot(sound.std, _IDEAL * (sound.before - sound.after))
+        own = settings.idealisation_error * (sound.before - sound.after)
+        rest = sound.after / np.hypot(sound.std, own)
         return float(chdtrc(len(rest), rest @ rest)) if len(rest) else 1.0
 
     def confirms(self, fitted: int) -> bool:
@@ -138,12 +127,15 @@ class Unseen:
         if not self.visible:
             return True
         log_bayes = self.log_bayes
-        if log_bayes < -_DECISIVE or self.plain_std is not None:
-            return log_bayes >= -_DECISIVE
-        if fitted > _FEW:
-            return self.probability > _GOOD
-        enough = len(self.seeing.before) * log(_FOURFOLD if fitted else _HALVED)
-        return self.probability > _INADEQUATE or log_bayes > enough
+        if log_bayes < -settings.decisive or self.plain_std is not None:
+            return log_bayes >= -settings.decisive
+        if fitted > settings.few_values:
+            return self.probability > settings.adequate_p
+        # No real structure is a beam, and physics from the textbook need not be all that is
+        # missing: errors that stay more than noise must fall by a factor, in the mean of their
+        # logarithms. A fitted cause must carry further.
+        enough = len(self.seeing.before) * (1 + bool(fitted)) * log(settings.error_ratio)
+        return self.probability > settings.unseen_noise_p or log_bayes > enough
 
 
 def held_out(
@@ -260,17 +252,14 @@ def _relative_std(measurement: Measurement) -> FloatArray:
     return np.where(known, std, typical)
 
 
-def left_out(
-    examination: Examination, effects: Iterable[Effect], effort: Effort | None = None
-) -> Unseen:
+def left_out(examination: Examination, terms: Terms) -> Unseen:
     """Return the errors of every used mode, predicted from the others alone.
 
     The causes are chosen anew without the mode, so that it has no part in what predicts it.
 
     Arguments:
         examination: of all used modes.
-        effects: what may be missing.
-        effort: as in `examine`.
+        terms: of the examination.
     """
     data = examination.problem.data
     numbers = data.measurement.numbers
@@ -278,25 +267,14 @@ def left_out(
     noise = Noise.of(np.zeros((len(data), 0)), 0.0)
     several = len(examination.best.parts) > 1
     before, after, std = [], [], []
-    effort = effort or Effort()
+    effort = terms.effort
     for j, number in enumerate(numbers):
         left = len(numbers) - j - 1
-        effort.expect("single", _SINGLE * left)
-        effort.expect("together", _TOGETHER * left * several)
+        effort.expect_alike(left, several)
         kept = data.measurement.select([other for other in numbers if other != number])
         if len(kept) == 0:
             break
-        again = examine(
-            examination.model,
-            kept,
-            effects,
-            tolerance=examination.tolerance,
-            pairs=several,
-            reference=examination.reference,
-            width=examination.width,
-            beam=examination.beam,
-            effort=effort,
-        )
+        again = replace(terms, pairs=several).examine(examination.model, kept)
         found, problem = again.best.fit, again.problem_of(again.best)
         point = state_at(replace(problem, data=data, noise=noise), found.parts, found.state.x)
         slope = data.by_mode(point.jacobian)[j]
@@ -346,11 +324,6 @@ def gain_of(before: Blocks, after: Blocks, crossed: Unseen | None) -> Gain:
     if crossed is not None and len(crossed.before):
         cross = tuple(100.0 * float(np.median(np.abs(e))) for e in (crossed.before, crossed.after))
     return Gain(used, pair("higher"), pair("modified"), cross)  # type: ignore[arg-type]
-
-
-_TIED, _PLACES = 0.1, 6
-# Pieces of work that an examination mostly takes.
-_SINGLE, _TOGETHER = 2.0, 4.0
 
 
 def extended_by(model: Model, explanation: Explanation, x: FloatArray | None = None) -> Model:
@@ -476,7 +449,7 @@ def borne_out(
         with effort.piece("unseen"):
             stands, log_bayes = _judged(case, examination, posterior.best(key))
         gain = log_bayes - first[1] + log(posterior.names[key] / posterior.names[name])
-        if stands and gain > (_DECISIVE if first[0] else 0.0):
+        if stands and gain > (settings.decisive if first[0] else 0.0):
             rivals.append((gain, posterior.best(key)))
     if rivals:
         return max(rivals, key=lambda pair: pair[0])[1]
@@ -504,4 +477,4 @@ def _judged(case: Case, examination: Examination, found: Explanation) -> tuple[b
 def _other_places(posterior: Posterior, key: Key) -> list[Explanation]:
     """Return the explanations of a name at other places that are not much less likely."""
     (_, most), *rest = posterior.members(key)
-    return [e for e, p in rest if p >= _TIED * most][:_PLACES]
+    return [e for e, p in rest if p >= settings.tied_place_share * most][: settings.largest_group]

@@ -10,6 +10,7 @@ from femubench.core.case.case import Case
 from femubench.core.display import Shown
 from femubench.core.fem.model import Model
 from femubench.core.inference.examine import Examination
+from femubench.core.inference.settings import settings
 from femubench.core.schema.diagnosis import (
     Advice,
     Cause,
@@ -101,7 +102,7 @@ class Diagnosis(Shown):
             *(("cause", f"{c.effect} at {c.place}, p = {c.probability:.2f}") for c in self.causes),
             *(
                 ("rival", f"{r.effect} at {r.place}, p = {r.probability:.2f}")
-                for r in self.rivals[: max(0, 3 - len(self.causes))]
+                for r in self.rivals[: max(0, settings.of_a_kind - len(self.causes))]
             ),
         ]
         for name, pair in asdict(self.gain_rms or self.gain).items():

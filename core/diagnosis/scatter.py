@@ -9,12 +9,10 @@ import numpy as np
 from scipy.special import chdtr, chdtrc
 
 from femubench.core.fit.modal_fit import State
+from femubench.core.inference.settings import settings
 from femubench.core.schema.diagnosis import Scatter
 
 Kind = Literal["all", "frequencies", "shapes"]
-
-_FAR = 1e-3  # by chance in one of a thousand diagnoses
-_LEAST = 1e-9  # of chi-square, for simulated data without scatter
 
 
 def scatter_of(state: State, kind: Kind = "all") -> Scatter | None:
@@ -36,7 +34,7 @@ def scatter_of(state: State, kind: Kind = "all") -> Scatter | None:
     if dof < 1:
         return None
     more = chdtrc(dof if kind == "all" else free, chi2)
-    factor = float(np.sqrt(dof / max(chi2, _LEAST)))
+    factor = float(np.sqrt(dof / max(chi2, settings.negligible**2)))
     return Scatter(kind, chi2, dof, float(chdtr(dof, chi2)), float(more), factor)
 
 
@@ -48,7 +46,7 @@ def overstatement(state: State, kind: Kind = "all") -> float:
         kind: of the data.
     """
     found = scatter_of(state, kind)
-    return 1.0 if found is None or found.less_p >= _FAR else found.factor
+    return 1.0 if found is None or found.less_p >= settings.noise_p else found.factor
 
 
 def scatter_rows(state: State) -> tuple[Scatter, ...]:
@@ -67,7 +65,7 @@ def scatter_rows(state: State) -> tuple[Scatter, ...]:
 
 
 def _warning(row: Scatter) -> str:
-    if min(row.less_p, row.more_p) >= _FAR:
+    if min(row.less_p, row.more_p) >= settings.noise_p:
         return ""
     of = "all data together" if row.kind == "all" else f"the {row.kind}"
     few = row.less_p < row.more_p

@@ -10,9 +10,8 @@ from scipy.spatial import cKDTree
 
 from femubench.core.drawing.places import PlacedWireframe, placed_wireframe
 from femubench.core.fem.model import Model
+from femubench.core.inference.settings import settings
 from femubench.core.typing import FloatArray, SparseArray
-
-_SAME = 1e-6  # of the structure's size, and of the largest entry of a matrix
 
 
 def symmetries(model: Model) -> tuple[FloatArray, ...]:
@@ -71,17 +70,17 @@ def _leaves(model: Model, turn: FloatArray) -> bool:
     turned = np.hstack([motions[:, :3] @ turn.T, np.linalg.det(turn) * motions[:, 3:] @ turn.T])
     known, wanted = (np.hstack([x, np.abs(m)]) for x, m in ((at, motions), (at @ turn.T, turned)))
     gap, image = cKDTree(known).query(wanted)
-    if (gap > _SAME).any() or len(np.unique(image)) < len(dofs):
+    if (gap > settings.negligible).any() or len(np.unique(image)) < len(dofs):
         return False
     sign = np.einsum("ij,ij->i", turned, motions[image])
-    if (np.abs(np.abs(sign) - 1.0) > _SAME).any():
+    if (np.abs(np.abs(sign) - 1.0) > settings.negligible).any():
         return False
     return all(_unmoved(matrix, image, sign) for matrix in (model.stiffness, model.mass))
 
 
 def _unmoved(matrix: SparseArray, image: FloatArray, sign: FloatArray) -> bool:
     moved = matrix.tocsr()[image][:, image].multiply(sign[:, None]).multiply(sign[None])
-    return bool(abs(moved - matrix).max() <= _SAME * abs(matrix).max())
+    return bool(abs(moved - matrix).max() <= settings.negligible * abs(matrix).max())
 
 
 def _extent(wireframe: PlacedWireframe, word: str) -> FloatArray:
@@ -101,4 +100,4 @@ def _same(one: FloatArray, other: FloatArray, size: float) -> bool:
     gaps = (other, other[:, ::-1])
     gap = np.min([np.abs(one[:, None] - o[None]).max(axis=(2, 3)) for o in gaps], axis=0)
     # Coordinates of drawings are rounded to nine decimals.
-    return bool((gap.min(axis=1) <= _SAME * size + 1e-8).all())
+    return bool((gap.min(axis=1) <= settings.negligible * size + 1e-8).all())

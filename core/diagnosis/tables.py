@@ -14,6 +14,7 @@ from femubench.core.fit.modal_fit import State
 from femubench.core.inference.examine import Examination
 from femubench.core.inference.posterior import Explanation, Posterior, fits_better
 from femubench.core.inference.search import Found
+from femubench.core.inference.settings import settings
 from femubench.core.roles import EffectParameter
 from femubench.core.schema.diagnosis import (
     Cause,
@@ -27,11 +28,6 @@ from femubench.core.schema.diagnosis import (
 )
 from femubench.core.ties import alike, by_probability
 from femubench.core.typing import FloatArray
-
-TOO_SMALL = 12.0  # of chi-square: an effect below is too small to see
-_LISTED = 12
-_STEP = 1e-4
-_COUNTS = 1e-6  # probability from which an explanation counts
 
 
 def error_scales(examination: Examination, explanation: Explanation) -> tuple[ErrorScale, ...]:
@@ -128,7 +124,7 @@ def spread_over(posterior: Posterior, leader: Explanation) -> FloatArray:
         here = leader.fit.state.x[start : start + width]
         total, weight = np.zeros(width), 0.0
         for e, p in zip(posterior.explanations, posterior.probabilities, strict=True):
-            own = _coordinates(e, part.hypothesis) if p > _COUNTS else None
+            own = _coordinates(e, part.hypothesis) if p > settings.negligible else None
             if own is not None:
                 total += p * (own[1] + np.square(own[0] - here))
                 weight += p
@@ -224,9 +220,10 @@ def _summary(effect: object) -> str:
 
 def _slope(parameter: EffectParameter, x: float) -> float:
     """Return |d value / d x|."""
-    low, high = max(x - _STEP, parameter.range[0]), min(x + _STEP, parameter.range[1])
+    step = settings.slope_step
+    low, high = max(x - step, parameter.range[0]), min(x + step, parameter.range[1])
     ends = [float(parameter.value(np.array(v))) for v in (low, high)]
-    return abs(ends[1] - ends[0]) / max(high - low, 1e-12)
+    return abs(ends[1] - ends[0]) / max(high - low, settings.negligible**2)
 
 
 def rivals_of(
@@ -252,7 +249,8 @@ def rivals_of(
     own = (" + ".join(best.searched), best.place) if best is not None else ("", "")
     ranked = [label for label in by_probability(totals) if label != own]
     inside = [(" + ".join(e.searched), e.place) for e in group]
-    ranked = [*ranked[:_LISTED], *(label for label in ranked[_LISTED:] if label in inside)]
+    most = settings.leading
+    ranked = [*ranked[:most], *(label for label in ranked[most:] if label in inside)]
     return tuple(
         Rival(
             *label,
@@ -293,7 +291,7 @@ def smallest_visible(found: Found) -> tuple[SmallestVisible, ...]:
     best: dict[str, SmallestVisible] = {}
     for item in found.screened:
         h = item.projection.hypothesis
-        effect = np.linalg.norm(item.residuals - base, axis=1) / np.sqrt(TOO_SMALL)
+        effect = np.linalg.norm(item.residuals - base, axis=1) / np.sqrt(settings.too_small)
         x = _visible(item.grid[:, 0], effect)
         if x is None:
             continue
@@ -317,9 +315,9 @@ def _visible(x: FloatArray, effect: FloatArray) -> float | None:
     for i in order:
         size, height = float(abs(x[i])), float(effect[i])
         if height >= 1.0:
-            share = (1.0 - seen) / max(height - seen, 1e-12)
+            share = (1.0 - seen) / max(height - seen, settings.negligible**2)
             found = last + share * (size - last)
-            return float(np.copysign(max(found, 1e-6), x[i]))
+            return float(np.copysign(max(found, settings.negligible), x[i]))
         if height > seen:
             last, seen = size, height
     return None
@@ -338,5 +336,5 @@ def evidence_rows(examination: Examination) -> tuple[LocationRow, ...]:
     return tuple(
         LocationRow("evidence", place, totals[place] / top)
         for place in ranked
-        if top > 0.0 and totals[place] > 1e-4 * top
+        if top > 0.0 and totals[place] > settings.minor * top
     )

@@ -12,28 +12,14 @@ from scipy.special import expit
 from femubench.core.diagnosis.scatter import overstatement
 from femubench.core.effect.places import bare_place
 from femubench.core.inference.posterior import (
-    LIKELY_NOTHING,
     Explanation,
     Key,
     Posterior,
     fits_better,
 )
+from femubench.core.inference.settings import settings
 from femubench.core.schema.diagnosis import Verdict
 from femubench.core.ties import alike, by_probability
-
-# Rivals at least this probable, or nearly parallel and not yet excluded, stay in the group.
-_RIVAL, _PARALLEL_RIVAL = 0.05, 0.005
-_PARALLEL = 10.0  # degrees
-_SURE = 0.98
-# A name as probable as this, its like counted, whose common part is behind so much of what is
-# explained, is named, whatever little cannot be told apart beside it.
-_COMMON, _MOST = 0.92, 0.8
-_NOISE = 1e-3
-_LARGEST_GROUP = 6
-# A rival this near in ln likelihood, with hardly more or fewer values fitted, is excluded by its
-# prior alone: 6 of chi-square.
-_AS_WELL, _MORE_VALUES = 3.0, 2
-_CREDIBLE = 0.95
 
 
 @dataclass(frozen=True)
@@ -82,13 +68,13 @@ def decide(
         confirmed: whether unseen data bear it out.
     """
     nothing = posterior.names.get((), 0.0)
-    if nothing >= LIKELY_NOTHING:
-        held = 1.0 if adequate > _NOISE else most_believed(adequate)
-        verdict: Verdict = "none" if adequate > _NOISE else "unknown"
+    if nothing >= settings.nothing_missing:
+        held = 1.0 if adequate > settings.noise_p else most_believed(adequate)
+        verdict: Verdict = "none" if adequate > settings.noise_p else "unknown"
         return Decision(verdict, (), nothing * held, (), held)
     group, angles = inseparable(posterior, leader)
     held = 1.0
-    if adequate <= _NOISE:
+    if adequate <= settings.noise_p:
         verdict, held = "unknown", most_believed(adequate)
         nothing *= held
     elif not confirmed:
@@ -126,12 +112,12 @@ def mostly_common(posterior: Posterior, group: Sequence[Key]) -> bool:
     share = sum(
         p for key, p in posterior.names.items() if _says_as_much(posterior, best, group[0], key)
     )
-    if share < _COMMON:
+    if share < settings.common_share:
         return False
     nothing = next(e for e in posterior.explanations if not e.parts and not e.base.parts)
     core = [e.chi2 for e in posterior.explanations if set(posterior.key(e)) == common]
     explained = nothing.chi2 - min(core, default=np.inf)
-    return bool(explained >= _MOST * (nothing.chi2 - best.chi2))
+    return bool(explained >= settings.explained_share * (nothing.chi2 - best.chi2))
 
 
 def _says_as_much(posterior: Posterior, best: Explanation, first: Key, key: Key) -> bool:
@@ -139,9 +125,9 @@ def _says_as_much(posterior: Posterior, best: Explanation, first: Key, key: Key)
     if set(first) <= set(key):
         return True
     swapped = len(key) == len(first) and len(set(first) - set(key)) == 1
-    if not swapped or posterior.names[key] < _PARALLEL_RIVAL:
+    if not swapped or posterior.names[key] < settings.parallel_rival_share:
         return False
-    return angle_between(best, posterior.best(key)) < _PARALLEL
+    return angle_between(best, posterior.best(key)) < settings.parallel_angle
 
 
 def inseparable(
@@ -161,12 +147,13 @@ def inseparable(
     best = posterior.best(ranked[0])
     group, angles, covered = [ranked[0]], [0.0], names[ranked[0]] / something
     for key in ranked[1:]:
-        if len(group) == _LARGEST_GROUP:
+        if len(group) == settings.largest_group:
             break
         share = names[key] / something
         angle = angle_between(best, posterior.best(key))
-        likely = share >= _PARALLEL_RIVAL
-        likely = likely and (share >= _RIVAL or angle < _PARALLEL or covered < _SURE)
+        near = angle < settings.parallel_angle or covered < settings.covered_share
+        least = settings.parallel_rival_share if near else settings.rival_share
+        likely = share >= least
         if likely or fits_as_well(posterior, best, key):
             group.append(key)
             angles.append(angle)
@@ -186,9 +173,10 @@ def fits_as_well(posterior: Posterior, best: Explanation, key: Key) -> bool:
     """
     if set(posterior.key(best)) <= set(key):
         return False
-    limit = _AS_WELL / overstatement(best.fit.state) ** 2
+    limit = settings.as_well / overstatement(best.fit.state) ** 2
+    few = settings.few_values
     return any(
-        fits_better(best, other) <= limit and abs(best.unknowns - other.unknowns) <= _MORE_VALUES
+        fits_better(best, other) <= limit and abs(best.unknowns - other.unknowns) <= few
         for other, _ in posterior.members(key)
     )
 
@@ -233,7 +221,7 @@ def credible(shares: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
     found: list[tuple[str, float]] = []
     covered = 0.0
     for place, share in shares.items():
-        if covered >= _CREDIBLE and not alike(share, found[-1][1]):
+        if covered >= settings.nearly_all and not alike(share, found[-1][1]):
             break
         found.append((place, share))
         covered += share

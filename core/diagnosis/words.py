@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from femubench.core.diagnosis.verdict import Decision
 from femubench.core.schema.diagnosis import Cause, Gain
 
-_NUMBERS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight"}
+_NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight")
 
 _LACKS, _NOTHING = "The model lacks", "nothing that the model lacks"
 _DIFFERS = "What differs from the reference is"
@@ -39,7 +39,8 @@ def where(cause: Cause) -> str:
 
 def _mirrors(cause: Cause) -> str:
     count = len(cause.mirrors) + 1
-    return f"one of {_NUMBERS.get(count, str(count))} mirror places" if count > 1 else ""
+    number = _NUMBERS[count] if count < len(_NUMBERS) else str(count)
+    return f"one of {number} mirror places" if count > 1 else ""
 
 
 def listed(names: Iterable[str], last: str = "and") -> str:

@@ -11,12 +11,10 @@ import numpy as np
 
 from femubench.core.effect.suspect import Corrected, Suspect
 from femubench.core.fem.model import Model
+from femubench.core.inference.settings import settings
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Fault
 
-# That data or input are wrong somewhere, before any datum is seen: over kinds, then suspects.
-PRIOR_OF_FAULT = 0.1
-_STEP = 1e-4  # of a coordinate, for a slope
 _VALUES = ("frequencies", "shapes")
 
 
@@ -86,11 +84,12 @@ class Charge:
         """
         if not self.single:
             return self.corrected(self.x)
-        (_, less), (_, more) = self.corrected(-_STEP), self.corrected(_STEP)
+        step = settings.slope_step
+        (_, less), (_, more) = self.corrected(-step), self.corrected(step)
         wide = {
             std: np.hypot(
                 getattr(self.measurement, std),
-                np.nan_to_num(getattr(more, name) - getattr(less, name)) / (2.0 * _STEP),
+                np.nan_to_num(getattr(more, name) - getattr(less, name)) / (2.0 * step),
             )
             for name, std in (("frequencies", "frequency_std"), ("shapes", "shape_std"))
         }
@@ -109,7 +108,7 @@ def charges_of(model: Model, measurement: Measurement, faults: Iterable[Fault]) 
     """Return every suspect with its prior."""
     kinds = [(fault, fault.suspects(model, measurement)) for fault in faults]
     kinds = [(fault, suspects) for fault, suspects in kinds if suspects]
-    each = log(PRIOR_OF_FAULT / (1.0 - PRIOR_OF_FAULT) / max(len(kinds), 1))
+    each = log(settings.prior_fault / (1.0 - settings.prior_fault) / max(len(kinds), 1))
     return [
         Charge(fault, suspect, model, measurement, each - log(len(suspects)))
         for fault, suspects in kinds

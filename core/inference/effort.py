@@ -7,24 +7,41 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Literal
 
+from femubench.core.inference.settings import settings
 from femubench.core.pace import Advance, Pace, Told
 
 Kind = Literal["faults", "typed", "single", "together", "more", "values", "unseen", "advice"]
 # So many pieces; or so many where what was found leaves no more than noise, and where not.
 Number = float | tuple[float, float]
 
-# What a piece of each kind takes, medians of the cases that come along (benchmarks/time_left.py),
-# and what is shown of it.
-_KINDS: dict[Kind, tuple[float, str]] = {
-    "faults": (0.35, "faults of the data"),
-    "typed": (0.018, "faults of the input"),
-    "single": (1.0, "single causes"),
-    "together": (0.45, "causes together"),
-    "more": (1.0, "more causes together"),
-    "values": (0.4, "a value each direction"),
-    "unseen": (0.35, "unseen data"),
-    "advice": (0.3, "what to measure next"),
+# What is shown of each kind of piece; what they take is `settings.work_of_pieces`, in this order.
+_KINDS: dict[Kind, str] = {
+    "faults": "faults of the data",
+    "typed": "faults of the input",
+    "single": "single causes",
+    "together": "causes together",
+    "more": "more causes together",
+    "values": "a value each direction",
+    "unseen": "unseen data",
+    "advice": "what to measure next",
 }
+
+
+def of_a_search(bases: int, several: bool) -> dict[Kind, Number]:
+    """Return the pieces that one search mostly takes.
+
+    Arguments:
+        bases: textbook sets that there are; causes are sought on the best of them.
+        several: whether more than one cause is sought.
+    """
+    tried, exchanged = settings.candidates, 2  # either cause of a pair
+    pairs = several * (settings.seeds + exchanged)
+    return {
+        "single": (min(bases, tried), min(bases, tried + 1)),
+        "together": (several * exchanged, pairs),
+        "more": (0, several * (settings.most_causes - 2)),
+        "values": several * settings.candidates,
+    }
 
 
 class Effort:
@@ -44,7 +61,7 @@ class Effort:
     ) -> None:
         self.budget, self._told, self._clock = budget, told, clock
         self._begin, self.cut = clock(), False
-        self._pace = Pace({kind: weight for kind, (weight, _) in _KINDS.items()})
+        self._pace = Pace(dict(zip(_KINDS, settings.work_of_pieces, strict=True)))
         self._done = 0
         self._piece: tuple[Kind, float] | None = None
         self._ahead: list[dict[Kind, Number]] = []
@@ -66,9 +83,9 @@ class Effort:
 
     def expect_alike(self, searches: int, several: bool) -> None:
         """Expect as many searches more, of several causes or of single ones."""
-        self.expect("single", (2.0 * searches, 3.0 * searches))
-        self.expect("together", (2.0 * searches * several, 8.0 * searches * several))
-        self.expect("more", (0.0, 2.0 * searches * several))
+        each = of_a_search(settings.candidates + 1, several)
+        for kind in ("single", "together", "more"):
+            self.expect(kind, _times(searches, each[kind]))
 
     def explained(self, adequate: bool) -> None:
         """Say whether what was found leaves no more than noise, which decides on what follows."""
@@ -104,7 +121,7 @@ class Effort:
         known = self._adequate is not None
         left = here + sum(n * self._pace.of(name) for name, n in numbers.items())
         total = self._done + current + round(sum(numbers.values()))
-        what = f"{_KINDS[kind][1]}{step}"
+        what = f"{_KINDS[kind]}{step}"
         self._told(Advance(self._done, total, what, left if known else None, here))
 
     def _number(self, number: Number) -> float:
@@ -117,6 +134,12 @@ class Effort:
         spent = self.budget is not None and self._clock() - self._begin >= self.budget
         self.cut = self.cut or spent
         return spent
+
+
+def _times(factor: int, number: Number) -> Number:
+    if isinstance(number, tuple):
+        return factor * number[0], factor * number[1]
+    return factor * number
 
 
 def _less(number: Number) -> Number:

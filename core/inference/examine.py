@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import log
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from femubench.core.case.case import BEAM_SHARE
 from femubench.core.change.hypothesis import Hypothesis, by_themselves, hypotheses_of
 from femubench.core.errors import NotApplicable
 from femubench.core.fem.model import Model
@@ -20,29 +21,22 @@ from femubench.core.fit.residuals import Data
 from femubench.core.fit.static_response import Basis, placed
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.model_error import (
-    CHANGE,
-    UNSHARED,
-    WIDTHS,
     Fitted,
     ModelError,
+    class_widths,
     conditioned,
     error_slopes,
     rows_of,
     scatter_slopes,
 )
-from femubench.core.inference.posterior import LIKELY_NOTHING, Explanation, Posterior, by_weight
+from femubench.core.inference.posterior import Explanation, Posterior, by_weight
 from femubench.core.inference.screening import with_shortlist
 from femubench.core.inference.search import Found, Search, adequacy
+from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import Modes, zero_tolerance
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import Effect
 from femubench.core.typing import FloatArray
-
-_ROUNDS, _STEPS, _SINGLES = 2, 3, 8
-# Explanations that are given scales of their own: so many at most, and so much behind in ln weight.
-_REFINED, _NEAR = 12, 8.0
-_WORTH = 1.0  # ln, by which other scales must suit the leading explanation better
-_HOPELESS = 30.0  # ln, behind which a beam model is not pursued
 
 
 @dataclass(frozen=True)
@@ -58,7 +52,7 @@ class Examination:
         found: the atlas of every textbook set that was searched.
         modes: of the model, in the coordinates of the problem.
         error: what a beam model gets wrong, where that was asked.
-        reference, width, beam: as in `examine`.
+        reference: as in `examine`.
     """
 
     model: Model
@@ -70,8 +64,6 @@ class Examination:
     modes: Modes
     error: ModelError | None = None
     reference: Measurement | None = None
-    width: float = 0.0
-    beam: float = 1.0
 
     @cached_property
     def nominal(self) -> State:
@@ -82,7 +74,7 @@ class Examination:
     def best(self) -> Explanation:
         """Return the best explanation: nothing where that is as likely as not, else a name's."""
         names = self.posterior.names
-        if names.get((), 0.0) >= LIKELY_NOTHING:
+        if names.get((), 0.0) >= settings.nothing_missing:
             return self.posterior.best(())
         return self.posterior.best(next(key for key in names if key))
 
@@ -118,7 +110,7 @@ class Examination:
         That a cause fits every datum well does not tell: all data may be moved by one factor.
         """
         own = self.own_share(state)
-        return max(own, CHANGE) if own > 0.0 else 0.0
+        return max(own, settings.own_error_of_change) if own > 0.0 else 0.0
 
     def foreseen(
         self,
@@ -172,6 +164,39 @@ class Examination:
         return replace(explanation.fit.state.problem, offset=0.0)
 
 
+@dataclass(frozen=True)
+class Terms:
+    """On what terms explanations are weighed, whatever model and data are examined.
+
+    Arguments:
+        effects, tolerance, pairs, reference, width, beam, effort: as in `examine`.
+    """
+
+    effects: tuple[Effect, ...]
+    tolerance: float
+    pairs: bool = True
+    reference: Measurement | None = None
+    width: float = 0.0
+    beam: float = BEAM_SHARE
+    effort: Effort = field(default_factory=Effort)
+
+    def single(self) -> Terms:
+        """Return the same without a search for several causes."""
+        return replace(self, pairs=False)
+
+    def examine(self, model: Model, measurement: Measurement) -> Examination:
+        """Weigh every explanation of what a model gets wrong; see `examine`."""
+        return examine(
+            *(model, measurement, self.effects),
+            tolerance=self.tolerance,
+            pairs=self.pairs,
+            reference=self.reference,
+            width=self.width,
+            beam=self.beam,
+            effort=self.effort,
+        )
+
+
 def examine(
     model: Model,
     measurement: Measurement,
@@ -181,7 +206,7 @@ def examine(
     pairs: bool = True,
     reference: Measurement | None = None,
     width: float = 0.0,
-    beam: float = 0.5,
+    beam: float = BEAM_SHARE,
     effort: Effort | None = None,
 ) -> Examination:
     """Weigh every explanation of what a model gets wrong.
@@ -221,14 +246,14 @@ def examine(
                 explanations = searched(problem, error, known, pairs, effort)
         own = replace(problem, noise=beam_noise(basis, slopes, before, tolerance, log(beam)))
         slopes = slopes[: len(measurement)].copy()  # those of shapes fill the memory
-        floor = max((e.log_weight for e in explanations), default=-np.inf) - _HOPELESS
+        floor = max((e.log_weight for e in explanations), default=-np.inf) - settings.hopeless
         more, atlas = Search(own, known, pairs=pairs, floor=floor, effort=effort).run()
     posterior = Posterior.of([*explanations, *more])
     basis.solver.forget()
     basis.forget()
     return Examination(
         *(model, own, slopes, tolerance, posterior, tuple(atlas), basis.modes),
-        *(error, reference, width, beam),
+        *(error, reference),
     )
 
 
@@ -277,24 +302,25 @@ def searched(
 
     scales = error.fitted(nothing)
     explanations: list[Explanation] = []
-    effort.expect_alike(_ROUNDS, pairs)
+    effort.expect_alike(settings.scale_rounds, pairs)
     if len(error.residual):
         # Scales that do without a cause see none: those of the structure as it was do.
         earlier = error.before()
-        single = by_weight(e for e in sought(earlier, False) if e.parts)[:_SINGLES]
+        single = by_weight(e for e in sought(earlier, False) if e.parts)[: settings.partners]
         explanations += [with_scales(error, e, scales, nothing) for e in single]
-    for left in reversed(range(_ROUNDS)):
+    for left in reversed(range(settings.scale_rounds)):
         effort.expect_alike(left, pairs)
         explanations += sought(scales, pairs)
         best = by_weight(explanations)[0].fit.state
         before, scales = scales, error.fitted(best, scales)
-        if error.log_density(best, scales.v) - error.log_density(best, before.v) < _WORTH:
+        gain = error.log_density(best, scales.v) - error.log_density(best, before.v)
+        if gain < settings.worth_scales:
             break
     ranked = list({_causes(e): e for e in reversed(by_weight(explanations))}.values())[::-1]
-    close = [i for i, e in enumerate(ranked) if e.log_weight > ranked[0].log_weight - _NEAR]
+    close = [i for i, e in enumerate(ranked) if e.log_weight > ranked[0].log_weight - settings.near]
     # One cause and its own error may do what otherwise takes a second one.
     few = [i for i, e in enumerate(ranked) if len(e.parts) < 2]
-    near = {*close[:_REFINED], *few[:_REFINED]}
+    near = {*close[: settings.leading], *few[: settings.leading]}
     return [
         with_scales(error, e, scales, nothing) if i in near else e for i, e in enumerate(ranked)
     ]
@@ -319,7 +345,7 @@ def with_scales(
     problem = replace(state.problem, noise=error.noise(error.fitted(state, near)))
     found: Fit | None
     if state.parts:
-        found = fit(problem, state.parts, state.x, steps=_STEPS)
+        found = fit(problem, state.parts, state.x, steps=settings.few_steps)
     else:
         # A textbook set without causes is a state of its own, which no fit of nothing leads to.
         there = replace(state, problem=problem)
@@ -335,8 +361,9 @@ def model_error_of(
     present = error_slopes(problem, structure, basis.modes)
     reference = None if before is None else error_slopes(before.problem, structure, basis.modes)
     residual = np.zeros(0) if before is None else before.raw
-    widths = {name: width * value for name, value in WIDTHS.items()}
-    return ModelError.of(present, reference, residual, widths, UNSHARED, log_prior)
+    widths = {name: width * value for name, value in class_widths().items()}
+    unshared = settings.width_between_states
+    return ModelError.of(present, reference, residual, widths, unshared, log_prior)
 
 
 def beam_noise(
@@ -371,7 +398,7 @@ def posed(
         raise NotApplicable("there is no used mode")
     if basis is None:
         basis = Basis.of(model, measurement)
-    bias = mesh_bias(model, 2 * len(measurement) + 8)
+    bias = mesh_bias(model, 2 * len(measurement) + settings.spare_modes)
     still = basis.modes.rigid | (basis.modes.eigenvalues <= zero_tolerance(basis.modes))
     data = Data(measurement, np.zeros(0) if bias is None else bias, int(still.sum()))
     plain = placed(basis, data, Noise(np.eye(len(data))), tuple(hypotheses))

@@ -13,12 +13,11 @@ discounted.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import exp, log
-from typing import Literal
 
 import numpy as np
 import scipy.linalg as la
@@ -35,32 +34,16 @@ from femubench.core.fit.residuals import Data
 from femubench.core.fit.static_response import Basis, placed
 from femubench.core.inference.charge import Charge, Mended, charges_of
 from femubench.core.inference.effort import Effort
-from femubench.core.inference.examine import Examination, before_of, model_error_of, posed
+from femubench.core.inference.examine import Examination, Terms, before_of, model_error_of, posed
 from femubench.core.inference.posterior import Explanation
+from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import DENSE_LIMIT
 from femubench.core.modal.measurement import Measurement
 from femubench.core.roles import EffectParameter, Fault
 from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray
 
-_SURE = 0.9  # probability from which a fault is mended
-_ODDS = log(_SURE / (1.0 - _SURE))
-_MOST, _TRIED = 3, 2  # faults that are mended, and tried beside causes each time
-# Of each kind so many suspects are tried at scales of their own, if they promise so many nats.
-_OF_A_KIND, _PROMISING = 3, -3.0
-_CLEARLY = 20.0  # nats by which a fault may lag behind causes, and still be tried with them
-_SOLVED = 20  # suspects of what was typed in that are solved of a large model
-_ROUNDS = 3
-_AGAIN = 2.0  # searches for single causes that deviations mostly take
-_TWICE = 2.0  # by which deviations must be stated too large to be told
-_LITTLE = 0.3  # share of the squared misfit that is left, where a fault is most of it
-_FIT, _GROSS = 0.05, 0.05
-_AT_ONCE = 256  # data that are weighed at once
-_GRID, _FAR, _EDGE, _CURVED = 13, 3.0, 0.02, 0.02
-
-Depth = Literal["one", "several"]
 Weighed = list[tuple[Charge, float]]
-Examine = Callable[[Model, Measurement, Depth], Examination]
 
 
 @dataclass(frozen=True)
@@ -83,11 +66,7 @@ def inquire(
     model: Model,
     measurement: Measurement,
     faults: Iterable[Fault],
-    examine: Examine,
-    *,
-    reference: Measurement | None = None,
-    width: float = 1.0,
-    effort: Effort | None = None,
+    terms: Terms,
 ) -> Inquiry:
     """Weigh explanations of data by physical causes, and by faults beside them.
 
@@ -95,63 +74,72 @@ def inquire(
         model: the nominal model.
         measurement: the used modes and nothing else.
         faults: what may be wrong with either.
-        examine: from model, data and how many causes are sought to their examination.
-        reference: modes of the structure as it was, where they are known.
-        width: factor on the widths of the model error beside which faults are sought.
-        effort: counts the pieces.
+        terms: of every examination. Beside a pure beam model, without any model error, all would
+            look like faults: these are sought with an ordinary one.
 
     Raises:
         NotApplicable: when a used frequency has no standard deviation.
         ModelError: when the model has no modes.
     """
-    effort = effort or Effort()
+    effort = terms.effort
     # What was typed in is wrong in both states, and so no part of what differs.
-    known = tuple(f for f in faults if reference is None or f.side == "data")
+    known = tuple(f for f in faults if terms.reference is None or f.side == "data")
     mended: list[Mended] = []
     model, measurement = _possible(model, measurement, known, mended)
     if not known:
-        return Inquiry(examine(model, measurement, "several"))
-    now = _Drawn(model, measurement, reference, width)
+        return Inquiry(terms.examine(model, measurement))
+    now = _Drawn(model, measurement, terms.reference, terms.width or 1.0)
     ranked = _weighed(now, known, effort)
-    while len(mended) < _MOST and (found := _definite(now, ranked, examine)) is not None:
+    while len(mended) < settings.faults_mended:
+        found = _definite(now, ranked, terms)
+        if found is None:
+            break
         mended.append(found)
         now = now.mended(found.charge)
         ranked = _weighed(now, known, effort)
     reweighing = [charge for charge, _ in ranked if charge.reweighs]
-    with effort.scope({"single": (0.0, _AGAIN if reweighing else 0.0)}):
-        seen = examine(now.model, now.measurement, "several")
+    with effort.scope({"single": (0.0, float(settings.candidates * bool(reweighing)))}):
+        seen = terms.examine(now.model, now.measurement)
     # Other deviations would excuse whatever is wrong: they are the last resort.
-    other = _reweighed(now, reweighing, seen, examine)
+    other = _reweighed(now, reweighing, seen, terms)
     if other is None:
         return Inquiry(seen, tuple(mended))
     if other.charge.loosens < 1.0:
-        return Inquiry(examine(*other.charge.mended, "several"), (*mended, other))
-    clearly = replace(other.charge, x=other.charge.x - 2.0 * other.charge.std).loosens > _TWICE
+        return Inquiry(terms.examine(*other.charge.mended), (*mended, other))
+    surely = replace(other.charge, x=other.charge.x - 2.0 * other.charge.std)
+    clearly = surely.loosens > settings.wrong_factor
     return Inquiry(seen, tuple(mended), (other,) if clearly else ())
 
 
-def _definite(now: _Drawn, ranked: Weighed, examine: Examine) -> Mended | None:
+def _sure_odds() -> float:
+    """Return ln of the odds from which a fault is mended."""
+    return log(settings.sure_fault / (1.0 - settings.sure_fault))
+
+
+def _definite(now: _Drawn, ranked: Weighed, terms: Terms) -> Mended | None:
     """Return the most probable fault, but for deviations; None where no fault is as probable."""
     pairs = [(c, g) for c, g in ranked if not c.reweighs and now.mostly(c)]
-    if max((gain for _, gain in pairs), default=-np.inf) < _ODDS:
+    if max((gain for _, gain in pairs), default=-np.inf) < _sure_odds():
         return None
-    seen = examine(now.model, now.measurement, "one")
+    single = terms.single()
+    seen = single.examine(now.model, now.measurement)
     without = _with_causes(seen, now.log_density, now.measurement)
-    sound = seen.adequacy > _FIT and len(seen.best.parts) < 2
-    least = without - now.log_density - (0.0 if sound else _CLEARLY)
-    tried = [(c, gain) for c, gain in pairs if gain > least][:_TRIED]
-    densities = [_density(now, *pair, examine(*pair[0].mended, "one")) for pair in tried]
+    sound = seen.adequacy > settings.adequate_p and len(seen.best.parts) < 2
+    least = without - now.log_density - (0.0 if sound else settings.fault_lag)
+    tried = [(c, gain) for c, gain in pairs if gain > least][: settings.candidates]
+    densities = [_density(now, *pair, single.examine(*pair[0].mended)) for pair in tried]
     if not tried:
         return None
     best = int(np.argmax(densities))
     rest = [now.log_density + gain for _, gain in pairs[len(tried) :]]
     probability = exp(densities[best] - float(logsumexp([without, *densities, *rest])))
     found = now.refined(tried[best][0])
-    return Mended(found, probability) if probability > _SURE and _inside(found) else None
+    sure = probability > settings.sure_fault and _inside(found)
+    return Mended(found, probability) if sure else None
 
 
 def _reweighed(
-    now: _Drawn, charges: Sequence[Charge], seen: Examination, examine: Examine
+    now: _Drawn, charges: Sequence[Charge], seen: Examination, terms: Terms
 ) -> Mended | None:
     """Return other deviations, if those are more probable than the stated ones."""
     plain, caused = now.log_density, log_density(seen, now.measurement)
@@ -161,19 +149,19 @@ def _reweighed(
     again = (best.screened(charge) for charge in charges)
     found += [(charge, caused + gain) for charge, gain in again]
     charge, density = max(found, key=lambda pair: pair[1], default=(None, -np.inf))
-    if charge is None or density < without - _CLEARLY:
+    if charge is None or density < without - settings.fault_lag:
         return None
-    if charge.loosens < 1.0 and seen.adequacy > _FIT:
+    if charge.loosens < 1.0 and seen.adequacy > settings.adequate_p:
         return None
     # Wrong deviations lead to wrong causes, and these to wrong deviations: to and fro.
-    for _ in range(_ROUNDS if charge.loosens < 1.0 else 0):
-        mended = examine(*charge.mended, "one")
+    for _ in range(settings.few_steps if charge.loosens < 1.0 else 0):
+        mended = terms.single().examine(*charge.mended)
         density = log_density(mended, now.measurement) + now.prior(charge)
         charge = now.beside(mended.best).estimated(charge)
         if not _inside(charge):
             return None
     odds = density - without
-    return Mended(charge, 1.0 / (1.0 + exp(-min(odds, 700.0)))) if odds > _ODDS else None
+    return Mended(charge, 1.0 / (1.0 + exp(-min(odds, 700.0)))) if odds > _sure_odds() else None
 
 
 def _density(now: _Drawn, charge: Charge, gain: float, mended: Examination) -> float:
@@ -262,7 +250,7 @@ class _Drawn:
         Arguments:
             gain: at the present scales.
         """
-        if gain <= _PROMISING:
+        if gain <= -settings.as_well:
             return charge, -np.inf
         found = charge if charge.single else self.refined(charge)
         return found, self.gain(found) if _inside(found) else -np.inf
@@ -287,7 +275,7 @@ class _Drawn:
         """Return ln of the prior of a fault at its coordinate, times the width of the posterior."""
         if charge.suspect.parameter is None or charge.single:
             return charge.log_prior
-        return charge.log_prior - 0.5 * charge.x**2 + log(max(charge.std, 1e-6))
+        return charge.log_prior - 0.5 * charge.x**2 + log(max(charge.std, settings.negligible))
 
     def mostly(self, charge: Charge) -> bool:
         """Tell whether a fault is most of what the drawing gets wrong, where it need be.
@@ -297,8 +285,8 @@ class _Drawn:
         leaves little to be wrong.
         """
         if charge.fault.side == "input":
-            after = self.mended(charge).state
-            return float(after.raw @ after.raw) < _LITTLE * float(self.state.raw @ self.state.raw)
+            before, after = self.state.raw, self.mended(charge).state.raw
+            return float(after @ after) < settings.fault_remainder * float(before @ before)
         if not charge.single:
             return True
         wide = self.mended(charge).measurement
@@ -307,7 +295,7 @@ class _Drawn:
         rows = self.state.problem.data.by_mode(raw)[: len(m)]
         error = np.square(rows * m.frequency_std / m.frequencies)
         own = wide.frequency_std != m.frequency_std
-        return not own.any() or bool(error[~own].sum() < _LITTLE * error.sum())
+        return not own.any() or bool(error[~own].sum() < settings.fault_remainder * error.sum())
 
     def likelier(self, others: Iterable[Measurement]) -> FloatArray:
         """Return by how many nats other data are likelier, each at the scales of these, (k,)."""
@@ -352,8 +340,8 @@ class _Drawn:
         """Return every fault as `screened` does; those without a parameter many at once."""
         fixed = [c for c in charges if c.suspect.parameter is None or c.single]
         gains: dict[Charge, float] = {}
-        for first in range(0, len(fixed), _AT_ONCE):
-            some = fixed[first : first + _AT_ONCE]
+        for first in range(0, len(fixed), settings.block):
+            some = fixed[first : first + settings.block]
             with suppress(FemubenchError, la.LinAlgError):
                 gains.update(zip(some, self.likelier(c.mended[1] for c in some), strict=True))
         return [
@@ -372,21 +360,22 @@ class _Drawn:
         def cost(x: float) -> float:
             return float(costs(np.array([x]))[0])
 
-        grid = np.linspace(*_between(charge.suspect.parameter), _GRID)
+        grid = np.linspace(*_between(charge.suspect.parameter), settings.grid_points)
         nearest = int(np.argmin(costs(grid)))
-        between = grid[max(nearest - 1, 0)], grid[min(nearest + 1, _GRID - 1)]
+        between = grid[max(nearest - 1, 0)], grid[min(nearest + 1, settings.grid_points - 1)]
         found = minimize_scalar(cost, bounds=between, method="bounded", options={"xatol": 1e-3})
         x = float(found.x)
-        bend = cost(x + _CURVED) + cost(x - _CURVED) - 2.0 * float(found.fun)
-        return replace(charge, x=x, std=max(bend / _CURVED**2, 1.0) ** -0.5)
+        step = settings.coordinate_margin
+        bend = cost(x + step) + cost(x - step) - 2.0 * float(found.fun)
+        return replace(charge, x=x, std=max(bend / step**2, 1.0) ** -0.5)
 
     def worth_solving(self, charges: Sequence[Charge]) -> Sequence[Charge]:
         """Return the faults of what was typed in that are tried: none where no error is gross."""
         problem, count = self.state.problem, len(self.measurement)
         error = problem.data.by_mode(self.state.raw)[:count] * self.measurement.frequency_std
-        if not (np.abs(error / self.measurement.frequencies) > _GROSS).any():
+        if not (np.abs(error / self.measurement.frequencies) > settings.gross_error).any():
             return []
-        return charges[: _SOLVED if self.model.size > DENSE_LIMIT else len(charges)]
+        return charges[: settings.typed_solved if self.model.size > DENSE_LIMIT else len(charges)]
 
     def typed(self, charge: Charge) -> Weighed:
         """Return a fault of what was typed in with what it gains at the present scales."""
@@ -400,8 +389,8 @@ class _Drawn:
 
 def _between(parameter: EffectParameter) -> tuple[float, float]:
     """Return the coordinates between which a parameter is sought."""
-    low, high = parameter.range
-    return max(low, -_FAR), min(high, _FAR)
+    (low, high), widest = parameter.range, settings.widest_coordinate
+    return max(low, -widest), min(high, widest)
 
 
 def _inside(charge: Charge) -> bool:
@@ -409,7 +398,7 @@ def _inside(charge: Charge) -> bool:
     if charge.suspect.parameter is None:
         return True
     low, high = _between(charge.suspect.parameter)
-    return low + _EDGE < charge.x < high - _EDGE
+    return low + settings.coordinate_margin < charge.x < high - settings.coordinate_margin
 
 
 def _weighed(now: _Drawn, faults: Sequence[Fault], effort: Effort) -> Weighed:
@@ -432,7 +421,7 @@ def _likeliest(now: _Drawn, promises: Weighed) -> Weighed:
     kinds: dict[str, Weighed] = {}
     for charge, gain in in_order(promises, lambda pair: -pair[1]):
         kinds.setdefault(charge.fault.name, []).append((charge, gain))
-    few = [pair for kind in kinds.values() for pair in kind[:_OF_A_KIND]]
+    few = [pair for kind in kinds.values() for pair in kind[: settings.of_a_kind]]
     exact = [now.exactly(charge, gain) for charge, gain in few]
     kept = [(c, gain) for c, gain in exact if c.reweighs or np.isfinite(gain)]
     return in_order(kept, lambda pair: -pair[1])
@@ -442,14 +431,14 @@ def _possible(
     model: Model, measurement: Measurement, faults: Sequence[Fault], mended: list[Mended]
 ) -> tuple[Model, Measurement]:
     """Return model and data without what cannot be; `mended` is filled."""
-    while len(mended) < _MOST:
+    while len(mended) < settings.faults_mended:
         blatant = [c for c in charges_of(model, measurement, faults) if c.suspect.blatant]
         if not blatant:
             break
         costs = [_half_chi2(charge, model, measurement) for charge in blatant]
         best = int(np.argmin(costs))
         gain = _half_chi2(None, model, measurement) - costs[best]
-        if not gain > _CLEARLY:
+        if not gain > settings.fault_lag:
             break
         others = float(logsumexp(np.array(costs)[best] - np.array(costs)))
         mended.append(Mended(blatant[best], exp(-others) / (1.0 + exp(-gain))))

@@ -16,6 +16,7 @@ from femubench.core.fit.modal_basis import Space
 from femubench.core.fit.modal_fit import Problem, State, signed_hz
 from femubench.core.fit.noise import marginal
 from femubench.core.fit.projection import Projection
+from femubench.core.inference.settings import settings
 from femubench.core.ties import in_order, least
 from femubench.core.typing import FloatArray
 
@@ -105,7 +106,7 @@ def _in_cells(grid: FloatArray, residuals: FloatArray) -> tuple[FloatArray, floa
     right = (turned @ here[..., None])[..., 0] + size * corner
     # In units of its own columns: two that act alike, and far beyond the prior, are none to digits.
     unit = np.sqrt(np.diagonal(normal, axis1=2, axis2=3))
-    normal = normal / unit[..., :, None] / unit[..., None, :] + _ALIKE * np.eye(2)
+    normal = normal / unit[..., :, None] / unit[..., None, :] + settings.negligible**2 * np.eye(2)
     solution = np.linalg.solve(normal, (right / unit)[..., None])[..., 0]
     share = np.clip(-solution / unit, 0.0, 1.0)
     x = corner + share * size
@@ -134,7 +135,7 @@ def _on_chords(
     a = np.square(chord).sum(axis=2) + np.square(width)
     b = np.einsum("hgi,hgi->hg", chord, rows[:, :-1]) + width * x[:, :-1]
     # On a long way modes change places: its ends are known, and nothing between.
-    t = np.where(width > _LONG, -2.0 * b > a, np.clip(-b / a, 0.0, 1.0))
+    t = np.where(width > settings.long_step, -2.0 * b > a, np.clip(-b / a, 0.0, 1.0))
     cost = np.square(rows[:, :-1]).sum(axis=2) + np.square(x[:, :-1]) + 2 * b * t + a * t**2
     best = np.arange(len(x)), least(cost)
     place = x[best] + t[best] * width[best]
@@ -149,15 +150,6 @@ def _spread(residuals: FloatArray, grid: FloatArray) -> float:
     span = np.ptp(grid, axis=0)
     steep = np.linalg.norm(residuals - residuals.mean(axis=0), axis=1).max()
     return float(np.log(1.0 + np.square(steep / np.maximum(span, 1e-9))).sum())
-
-
-_RESPONSES, _FEW = 6, 3
-_MINOR = 1e-4  # of the largest squared response: what is left out moves the modes by its square
-_KEPT, _TRACKED = 5, 3  # modes beyond the last partner: in the basis, and with their response
-_LIKELY = 40  # that are looked at beside causes
-_FAR = 1e18
-_ALIKE = 1e-12
-_LONG = 1.5  # prior deviations between neighbours on a grid, above which nothing is interpolated
 
 
 def screen(
@@ -215,7 +207,7 @@ def likely(
     promising = in_order(
         (row for row in rows if state.chi2 - row.cost > least), lambda row: row.cost
     )
-    return [row.projection for row in promising[:_LIKELY]]
+    return [row.projection for row in promising[: settings.shortlist]]
 
 
 def _residuals(problem: Problem, projections: Sequence[Projection], top: int) -> FloatArray:
@@ -227,7 +219,8 @@ def _residuals(problem: Problem, projections: Sequence[Projection], top: int) ->
         top: number of modes up to the last one that has a measured partner.
     """
     space = problem.space
-    low, tracked = min(len(space), top + _KEPT), min(len(space), top + _TRACKED)
+    low = min(len(space), top + settings.modes_kept)
+    tracked = min(len(space), top + settings.modes_tracked)
     counts = [len(p.hypothesis.grid) for p in projections]
     first = np.concatenate([[0], np.cumsum(counts)])
     hertz = np.zeros((first[-1], low))
@@ -237,7 +230,8 @@ def _residuals(problem: Problem, projections: Sequence[Projection], top: int) ->
     for i, p in enumerate(projections):
         kinds.setdefault((p.extra, bool(p.is_mass.any()), bool(few[i])), []).append(i)
     for (_, _, small), members in kinds.items():
-        kept = min(_FEW if small else _RESPONSES, responses.shape[2])
+        most = settings.responses // 2 if small else settings.responses
+        kept = min(most, responses.shape[2])
         chosen = responses[members][:, :, responses.shape[2] - kept :]
         rows = np.concatenate([np.arange(first[i], first[i + 1]) for i in members])
         own = [projections[i] for i in members]
@@ -269,9 +263,9 @@ def residuals_at(
     for target, core in ((stiffness, projection.core(factors, mass=False)), (mass, heavy)):
         if core is not None:
             target += rows.T @ (core @ rows)
-    count = min(size, space.rigid + 2 * len(problem.data.measurement) + 8)
+    count = min(size, space.rigid + 2 * len(problem.data.measurement) + settings.spare_modes)
     values, vectors = _solve(stiffness, None if heavy is None else mass, count)
-    kept = values[:, 0] < _FAR / 2.0
+    kept = values[:, 0] < settings.far / 2.0
     seen = space.padded_readings(size) @ vectors[kept]
     weight = space.mass + factors[kept] @ projection.weights
     return grid[kept], _compared(problem, signed_hz(values[kept]), seen, weight)
@@ -320,12 +314,13 @@ def _responses(
     for i, projection in enumerate(projections):
         response[i] = _forces(projection, low, n, tracked, values)
     response /= values[:tracked] - values[low:, None]
-    kept = min(_RESPONSES, n - low, tracked)
+    kept = min(settings.responses, n - low, tracked)
     gram = np.swapaxes(response, 1, 2) @ response
     size, turn = np.linalg.eigh(gram)
-    few = np.ones(len(projections), dtype=bool)
-    if kept > _FEW:
-        few = size[:, -_FEW - 1] <= _MINOR * size[:, -1]
+    few, half = np.ones(len(projections), dtype=bool), settings.responses // 2
+    if kept > half:
+        # What is left out moves the modes by its square.
+        few = size[:, -half - 1] <= settings.minor * size[:, -1]
     size, turn = size[:, tracked - kept :], turn[:, :, tracked - kept :]
     visible = size > 1e-10 * np.maximum(size[:, -1:], 1e-30)
     scale = np.where(visible, 1.0 / np.sqrt(np.where(visible, size, 1.0)), 0.0)
@@ -392,7 +387,7 @@ def _unloaded(space: Space, responses: FloatArray, low: int, extra: int) -> Floa
     plain[:, start:, start:] = high
     own = plain[:, range(start, size), range(start, size)]
     idle = ~responses.any(axis=1)
-    plain[:, range(start, size), range(start, size)] = np.where(idle, _FAR, own)
+    plain[:, range(start, size), range(start, size)] = np.where(idle, settings.far, own)
     return plain
 
 
@@ -411,7 +406,7 @@ def _solve(
     except np.linalg.LinAlgError:
         bad = np.linalg.eigvalsh(mass)[:, 0] <= 0.0
         mass, stiffness = mass.copy(), stiffness.copy()
-        mass[bad], stiffness[bad] = np.eye(mass.shape[1]), _FAR * np.eye(mass.shape[1])
+        mass[bad], stiffness[bad] = np.eye(mass.shape[1]), settings.far * np.eye(mass.shape[1])
         lower = np.linalg.cholesky(mass)
     # One inverse costs less than three solutions with as many right-hand sides.
     inverse = np.linalg.inv(lower)

@@ -25,35 +25,25 @@ from femubench.core.fem.structure import Structure
 from femubench.core.fit.modal_basis import Space, rigid_first, scatter_terms
 from femubench.core.fit.modal_fit import Problem, State, state_at
 from femubench.core.fit.noise import Noise
+from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import Modes
 from femubench.core.typing import BoolArray, FloatArray, IntArray
 
-# Widths w of the classes: relative changes, and compliances in those of the member's own end.
-WIDTHS: Mapping[str, float] = {
-    "element stiffness": 0.02,
-    "element mass": 0.01,
-    "stiffness of everything": 0.03,
-    "density of everything": 0.03,
-    "flexibility of joint types": 0.15,
-    "flexibility of joints": 0.05,
-    "mass of joints": 0.02,
-    "general": 0.02,
-    "sensor gains": 0.01,
-    "shapes": 1.0,
-}
-CHANGE = 0.3  # of what an explanation moves: width of its own error
-# Power of the evidence beside model error, which is no more than a model of what is not known.
-# Source: Grünwald (2012), the safe Bayesian; Miller & Dunson (2019), coarsened posteriors.
-TRUST = 0.7
-UNSHARED = 0.02  # of the scale, median: what the states do not share
-_MEDIAN, _SPREAD = 0.3, 1.0  # of u, log-normal
-_LEAST, _MOST = 0.01, 10.0  # of u
-_UNKNOWN = 1e8  # variance of what is not looked at
-_STEPS, _FEW_STEPS, _SETTLED = 40, 10, 1e-5
-_GENERAL = 20  # elastic modes that a general change couples
-_AT_ONCE = 512  # elements whose scatter is looked at
-_TURNED = 1e-9  # below which a mode has no part in another
-_ENDS = (slice(3, 6), slice(9, 12))  # rotations among the local displacements of an element
+
+def class_widths() -> dict[str, float]:
+    """Return the width w of every class, compliances in those of the member's own end."""
+    return {
+        "element stiffness": settings.width_element_stiffness,
+        "element mass": settings.width_element_mass,
+        "stiffness of everything": settings.width_everything,
+        "density of everything": settings.width_everything,
+        "flexibility of joint types": settings.width_joint_types,
+        "flexibility of joints": settings.width_joints,
+        "mass of joints": settings.width_joint_masses,
+        "general": settings.width_general,
+        "sensor gains": settings.width_sensor_gains,
+        "shapes": settings.width_shapes,
+    }
 
 
 def error_slopes(
@@ -101,12 +91,13 @@ def scatter_slopes(problem: Problem, modes: Modes) -> FloatArray:
     shapes = rigid_first(modes).shapes
     # Close modes are turned to the measured ones, and their forces with them.
     turned = nominal.vectors[:, nominal.partner]
-    top = int(np.flatnonzero(np.abs(turned).max(axis=1) > _TURNED)[-1]) + 1
+    top = int(np.flatnonzero(np.abs(turned).max(axis=1) > settings.negligible**2)[-1]) + 1
     element = structure.properties
     own = element.rhoA * (element.length - element.rigid_mass_1 - element.rigid_mass_2)
     found = np.zeros((len(problem.data), 2, len(element)))
     # Some elements at once: with those of a large model the forces would fill the memory.
-    for rows in np.split(np.arange(len(element)), range(_AT_ONCE, len(element), _AT_ONCE)):
+    most = settings.block
+    for rows in np.split(np.arange(len(element)), range(most, len(element), most)):
         forces = scatter_terms(structure, shapes, space.eigenvalues[:top], rows)
         near = np.einsum("piN,im->mNp", forces, turned[:top])
         masses = np.concatenate([np.zeros(len(rows)), own[rows]])
@@ -126,7 +117,7 @@ def _everything(nominal: State, sign: float, mass: float) -> FloatArray:
 def _general(nominal: State) -> FloatArray:
     """Return the slopes of random symmetric changes sqrt(lambda_a lambda_b) g_ab, (n_data, p)."""
     space, near = nominal.problem.space, nominal.vectors[:, nominal.partner]
-    modes = np.arange(space.rigid, min(space.rigid + _GENERAL, len(space)))
+    modes = np.arange(space.rigid, min(space.rigid + settings.general_modes, len(space)))
     one, other = (modes[index] for index in np.triu_indices(len(modes)))
     size = np.sqrt(np.maximum(space.eigenvalues[one] * space.eigenvalues[other], 0.0))
     column = np.arange(len(one))
@@ -223,7 +214,9 @@ def _end_moments(
         length = float(structure.properties.length[own].sum())
         s, m = member.section, member.material
         stiff = (m.G * s.J / length, 4.0 * m.E * s.Iy / length, 4.0 * m.E * s.Iz / length)
-        for element, rotations, joint in zip((own[0], own[-1]), _ENDS, member.ends, strict=True):
+        # Rotations among the local displacements of an element.
+        ends = slice(3, 6), slice(9, 12)
+        for element, rotations, joint in zip((own[0], own[-1]), ends, member.ends, strict=True):
             for d in active:
                 if stiff[d] > 0.0 and np.isfinite(stiff[d]):
                     for rows, matrix in zip(moments, matrices, strict=True):
@@ -320,10 +313,11 @@ class ModelError:
 
     def _variances(self, v: FloatArray) -> tuple[FloatArray, float]:
         """Return tau^2 of the classes, and the unshared share, of standard normal v."""
-        u = _MEDIAN * np.exp(_SPREAD * v)
-        tau = np.square(self.widths * u[: len(self.names)])
-        shared = (self.unshared * u[len(self.names)] / _MEDIAN) ** 2 if len(self.residual) else 0.0
-        return tau, shared
+        u, last = _scale(v), len(self.names)
+        tau = np.square(self.widths * u[:last])
+        if not len(self.residual):
+            return tau, 0.0
+        return tau, (self.unshared * u[last] / settings.error_scale_median) ** 2
 
     def _own(self, v: FloatArray) -> FloatArray:
         """Return the variances of an explanation's own error, (r + n,)."""
@@ -364,7 +358,7 @@ class ModelError:
             found = np.append(found, unshared * float(tau @ within))
         if len(self.change):
             found = np.append(found, float(self._own(v) @ weight.diagonal()))
-        return np.asarray(2.0 * _SPREAD * found)
+        return np.asarray(2.0 * settings.error_scale_spread * found)
 
     def fitted(self, state: State, near: Fitted | None = None) -> Fitted:
         """Return the most probable scales where the causes of a state may still move.
@@ -382,7 +376,7 @@ class ModelError:
     def before(self) -> Fitted:
         """Return the scales that the reference alone asks for, whatever the present data say."""
         r, n = len(self.residual), self.present.shape[1]
-        unknown = np.diag(np.concatenate([np.zeros(r), np.full(n, _UNKNOWN)]))
+        unknown = np.diag(np.concatenate([np.zeros(r), np.full(n, settings.unknown_variance)]))
         y = np.concatenate([self.residual, np.zeros(n)])
         return self._fitted(y, unknown, np.zeros(self._count), None)
 
@@ -397,20 +391,22 @@ class ModelError:
             value = 0.5 * float(alpha @ y + log_det + v @ v)
             return value, v + 0.5 * self._slopes(v, inverse - np.outer(alpha, alpha))
 
-        low, high = (np.log(u / _MEDIAN) / _SPREAD for u in (_LEAST, _MOST))
+        ends = np.log(settings.error_scale_range) - np.log(settings.error_scale_median)
+        low, high = ends / settings.error_scale_spread
+        many, few = settings.scale_steps
         found = minimize(
             cost,
             first,
             jac=True,
             method="L-BFGS-B",
             bounds=[(low, high)] * len(first),
-            options={"maxiter": _STEPS if near is None else _FEW_STEPS, "ftol": _SETTLED},
+            options={"maxiter": many if near is None else few, "ftol": settings.scale_settled},
         )
         v = np.asarray(found.x)
         inverse, _ = _inverse(self.covariance(v) + free)
         if near is not None:
-            own = self._own(v)
-            known = 0.5 * (2.0 * _SPREAD) ** 2 * float(own @ np.square(inverse) @ own)
+            own = 2.0 * settings.error_scale_spread * self._own(v)
+            known = 0.5 * float(own @ np.square(inverse) @ own)
             return Fitted(v, near.log_volume - 0.5 * float(np.log1p(known)))
         fisher = np.eye(len(v)) + self._fisher(v, inverse)
         return Fitted(v, -0.5 * float(np.linalg.slogdet(fisher)[1]))
@@ -428,7 +424,7 @@ class ModelError:
             turned[-1] = inverse @ (unshared * tau @ apart).reshape(inverse.shape)
         flat = turned.reshape(len(turned), -1)
         found = np.array([flat @ own.T.ravel() for own in turned])
-        return 0.5 * (2.0 * _SPREAD) ** 2 * found
+        return 0.5 * (2.0 * settings.error_scale_spread) ** 2 * found
 
     def log_density(self, state: State, v: FloatArray) -> float:
         """Return ln of the density of all data, linear in the causes, and of scales."""
@@ -446,7 +442,7 @@ class ModelError:
 
     def own_share(self, v: FloatArray) -> float:
         """Return which share of what an explanation changes is its own error."""
-        return float(CHANGE * _MEDIAN * np.exp(_SPREAD * v[-1])) if len(v) > self._count else 0.0
+        return float(settings.own_error_of_change * _scale(v[-1])) if len(v) > self._count else 0.0
 
     def scales(self, v: FloatArray) -> list[tuple[str, float, str]]:
         """Return name, standard deviation and unit of every class, at definite scales."""
@@ -495,7 +491,13 @@ class ModelError:
         total = self.covariance(found.v)
         weight = found.log_volume - 0.5 * float(found.v @ found.v) + self.log_prior
         noise = conditioned(total, self.residual, weight, beam=False)
-        return replace(noise, scales=found.v, trust=TRUST)
+        # Source: Grünwald (2012), the safe Bayesian; Miller & Dunson (2019), coarsened posteriors.
+        return replace(noise, scales=found.v, trust=settings.trust_in_model_error)
+
+
+def _scale(v: FloatArray) -> FloatArray:
+    """Return the scale u of standard normal v, log-normal."""
+    return np.asarray(settings.error_scale_median * np.exp(settings.error_scale_spread * v))
 
 
 def conditioned(total: FloatArray, known: FloatArray, weight: float, *, beam: bool) -> Noise:

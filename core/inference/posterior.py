@@ -12,15 +12,10 @@ from scipy.special import logsumexp
 
 from femubench.core.fit.modal_fit import Fit, State, state_at
 from femubench.core.fit.projection import Projection
-from femubench.core.inference.prior import PRIOR_BEYOND_TEXTBOOK, PRIOR_OF_COUNT, Base, log_prior
+from femubench.core.inference.prior import Base, log_prior
+from femubench.core.inference.settings import settings
 from femubench.core.ties import by_probability, in_order
 
-# From this probability on the verdict is that nothing is missing.
-LIKELY_NOTHING = 0.5
-# A textbook effect is part of a name only where it is likely, and the data made it so.
-_EARNED, _FACTOR = 0.6, 20.0
-_SURELY_MORE = 0.95
-_OVERLOOKED = 0.05  # probability that a test does not find a mode among those that it finds
 Key = tuple[str, ...]
 
 
@@ -77,8 +72,10 @@ class Explanation:
     @cached_property
     def log_prior(self) -> float:
         """Return ln of the prior, and of what is improbable whatever the readings are."""
-        counts = PRIOR_BEYOND_TEXTBOOK if self.base.parts else PRIOR_OF_COUNT
-        prior = log_prior(self.parts, self.names, counts) + self.missed * log(_OVERLOOKED)
+        further = settings.prior_of_further_causes
+        counts = further if self.base.parts else settings.prior_of_causes
+        missed = self.missed * log(settings.prior_missed_mode)
+        prior = log_prior(self.parts, self.names, counts) + missed
         return self.base.log_prior + prior
 
     @property
@@ -158,7 +155,7 @@ class Posterior:
 
     def _likely(self, name: str) -> bool:
         pairs = zip(self.explanations, self.probabilities, strict=True)
-        return sum(p for e, p in pairs if name in e.effects) >= _EARNED
+        return sum(p for e, p in pairs if name in e.effects) >= settings.earned_probability
 
     def _missed(self, names: frozenset[str]) -> bool:
         """Tell whether the best explanation with textbook effects is much better than without.
@@ -179,7 +176,7 @@ class Posterior:
         if without is None:
             return True
         gains = best.fit.log_evidence - without.fit.log_evidence, fits_better(best, without)
-        return min(gains) > log(_FACTOR)
+        return min(gains) > log(settings.earned_factor)
 
     def _first(self, effects: frozenset[str], searched: Key) -> Explanation | None:
         """Return the best explanation with these effects in all and these of them fitted."""
@@ -214,7 +211,7 @@ class Posterior:
         if not first.tells_more:
             return first
         more = sum(p for e, p in members if e.tells_more)
-        if more >= _SURELY_MORE * sum(p for _, p in members):
+        if more >= settings.nearly_all * sum(p for _, p in members):
             return first
         return next((e for e, _ in members if not e.tells_more), first)
 

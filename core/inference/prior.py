@@ -10,14 +10,7 @@ from math import factorial, log
 import numpy as np
 
 from femubench.core.fit.projection import Projection
-
-# How many causes a model lacks besides textbook physics, before any datum is seen.
-PRIOR_OF_COUNT = (0.5, 0.4, 0.08, 0.015, 0.005)
-# The same where the textbook already mends something.
-PRIOR_BEYOND_TEXTBOOK = (0.6, 0.3, 0.08, 0.015, 0.005)
-# Physics that every beam has need not earn its place: a model that lacks it most likely lacks all
-# of it. Some textbook effects without the others share the rest.
-_AS_DRAWN, _ALL_TEXTBOOK = 0.1, 0.8
+from femubench.core.inference.settings import settings
 
 
 @dataclass(frozen=True)
@@ -50,8 +43,9 @@ def textbook_bases(projections: Iterable[Projection]) -> list[Base]:
     if not known:
         return [Base((), 0.0)]
     some = max(2 ** len(known) - 2, 1)
-    shares = {0: _AS_DRAWN, len(known): _ALL_TEXTBOOK}
-    rest = (1.0 - _AS_DRAWN - _ALL_TEXTBOOK) / some
+    # Physics that every beam has need not earn its place: a model lacks all of it, most likely.
+    drawn, whole = settings.prior_as_drawn, settings.prior_whole_textbook
+    shares, rest = {0: drawn, len(known): whole}, (1.0 - drawn - whole) / some
     return [
         Base(parts, log(shares.get(count, rest)))
         for count in range(len(known) + 1)
@@ -76,4 +70,5 @@ def log_prior(parts: Sequence[Projection], names: int, counts: Sequence[float]) 
 
 def selection_cost(names: int, places: float) -> float:
     """Return by how much chi-square must fall for one more cause to be worth its prior."""
-    return 2.0 * (log(names) + log(max(places, 1.0)) + log(PRIOR_OF_COUNT[1] / PRIOR_OF_COUNT[2]))
+    _, one, two, *_ = settings.prior_of_causes
+    return 2.0 * (log(names) + log(max(places, 1.0)) + log(one / two))

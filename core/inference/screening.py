@@ -18,15 +18,9 @@ from femubench.core.fit.projection import Projection, Projector
 from femubench.core.fit.static_response import LargeProblem
 from femubench.core.inference.effort import Effort
 from femubench.core.inference.grid_search import Screened, residuals_at, screen
+from femubench.core.inference.settings import settings
 from femubench.core.ties import in_order, least
 from femubench.core.typing import FloatArray
-
-_MOST, _OF_A_NAME, _PARTNERS = 240, 12, 60
-_CHUNK = 512  # forces that are held at once
-_SIZES = (0.12, 0.5, 1.3, 2.6)  # at which each is tried
-_STEPS = 3
-_SLACK = 0.1  # share of the prior that counts: a ranking by first order must not mind sizes
-_BLUNT = 0.05  # a resonance closer than this share of an eigenvalue is no matter of first order
 
 
 @dataclass(frozen=True)
@@ -53,7 +47,7 @@ def with_shortlist(problem: Problem) -> Problem:
         return problem
     projector = problem.common.projector
     ranked = _ranked(projector, state_at(problem, (), np.zeros(0)), problem.hypotheses)
-    chosen = _chosen(ranked, _MOST, _OF_A_NAME)
+    chosen = _chosen(ranked, settings.large_shortlist, settings.leading)
     space = replace(problem.space, projections=tuple(projector(h) for h in chosen))
     return replace(problem, space=space)
 
@@ -82,12 +76,12 @@ def _tried(own: Problem, projection: Projection) -> Screened | None:
         projection: the hypothesis in those that it shares.
     """
     parts = own.space.projections
-    grid, raw = residuals_at(own, parts[0], magnitudes(projection.hypothesis, _SIZES))
+    grid, raw = residuals_at(own, parts[0], magnitudes(projection.hypothesis, settings.large_sizes))
     if not len(grid):
         return None
     residuals = own.noise.residual(raw + own.offset)
     best = least(np.square(residuals).sum(axis=1) + np.square(grid).sum(axis=1))
-    found = fit(own, parts, grid[best], steps=_STEPS)
+    found = fit(own, parts, grid[best], steps=settings.few_steps)
     assert found is not None
     state = found.state
     return Screened(projection, grid, residuals, state.x, state.cost, found.log_evidence)
@@ -113,7 +107,7 @@ def beside(problem: Problem, seed: Fit) -> Problem:
     problem.common.forget()  # one of two as large arrays at a time
     ranked = _ranked(Projector(problem.model, found.vectors), there, free)
     known = {id(p.hypothesis): p for p in problem.space.projections}
-    chosen = _chosen(ranked, _PARTNERS, 3)
+    chosen = _chosen(ranked, settings.large_shortlist // 4, settings.of_a_kind)
     parts = [known.get(id(h)) or problem.common.projector(h) for h in chosen]
     partners = tuple(map(found.projected, parts))
     rebased = replace(space, projections=partners).rebased(space.projections, state.x)
@@ -156,7 +150,7 @@ def _ranked(projector: Projector, state: State, hypotheses: Sequence[Hypothesis]
         pulls = _pulls(projector, hypothesis, near, values, weighed)
         waiting.append((hypothesis, pulls))
         many += len(pulls.masses)
-        if many >= _CHUNK or hypothesis is hypotheses[-1]:
+        if many >= settings.block or hypothesis is hypotheses[-1]:
             found += _gains(state, waiting)
             waiting, many = [], 0
     return found
@@ -176,7 +170,7 @@ def _gains(state: State, some: Sequence[tuple[Hypothesis, _Pulls]]) -> Iterator[
         moves = pulls.shares @ each[first:last]
         size, prior = np.square(moves).sum(axis=1), np.square(pulls.grid).sum(axis=1)
         along = np.maximum(moves @ residual, 0.0)
-        gain = np.square(along) / (size + _SLACK * prior + 1e-30)
+        gain = np.square(along) / (size + settings.large_slack * prior + 1e-30)
         visible = np.sqrt(size / (prior + 1e-30))
         yield Ranked(hypothesis, float(gain.max()), float(visible.max()))
 
@@ -243,7 +237,8 @@ def _followed(
     seen = np.broadcast_to((rows @ near).T[..., None], (len(grid), m, len(rows), 1))
     inner = added.T @ dynamic @ added
     # Blunted, since at a resonance first order has no end.
-    blunt = _BLUNT * np.abs(added.T @ stiff @ added).max(axis=(1, 2))[:, None, None, None]
+    blunt = settings.approximation * np.abs(added.T @ stiff @ added).max(axis=(1, 2))
+    blunt = blunt[:, None, None, None]
     follow = np.linalg.solve(
         inner @ inner + np.square(blunt) * np.eye(part.extra),
         inner @ (added.T @ dynamic @ seen),

@@ -20,11 +20,12 @@ from femubench.core.fit.extended_model import agreed, extended
 from femubench.core.fit.modal_fit import Fit, Problem, State, fit, log_evidence, state_at
 from femubench.core.fit.projection import Projection
 from femubench.core.fit.static_response import Basis, LargeProblem, enriched, placed
-from femubench.core.inference.effort import Effort
+from femubench.core.inference.effort import Effort, of_a_search
 from femubench.core.inference.grid_search import Screened, likely, screen
 from femubench.core.inference.posterior import Explanation, by_weight
 from femubench.core.inference.prior import Base, selection_cost, textbook_bases
 from femubench.core.inference.screening import beside, screened, with_shortlist
+from femubench.core.inference.settings import settings
 from femubench.core.roles import Effect
 from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray
@@ -57,20 +58,6 @@ def adequacy(state: State, unknowns: int) -> float:
 def _tail(residual: FloatArray, unknowns: int) -> float:
     dof = max(len(residual) - unknowns, 1)
     return float(chdtrc(dof, residual @ residual)) if len(residual) else 1.0
-
-
-_GROUNDS = 2  # the model as drawn and a textbook set, on which causes are mostly sought
-_REFINED = 40  # hypotheses that are fitted exactly at most
-_OF_A_NAME = 2  # hypotheses of every effect that are fitted where the atlas explains nothing
-_NEAR = 16.0  # of the cost, below which the interpolation may have ranked wrongly
-_CURVED = 0.05  # share of the explained chi-square that the interpolation may miss
-_LOST = 20.0  # behind the best by so much, a fit is not brought to its end
-_SINGLES_FOR_PAIRS, _PARTNERS = 6, 8
-_SWAPPED, _MORE = 2, 2  # how often partners are mostly sought after those of the first causes
-_PROMISE = 0.3  # of the chi-square that a partner must explain, were effects to add up
-_MOST_CAUSES = 4
-_ADEQUATE = 0.05
-_SPLIT = 4  # single causes that are tried with more values at their places
 
 
 @dataclass(frozen=True)
@@ -126,14 +113,7 @@ class Search:
         """Return all explanations and the atlas of every base that was searched."""
         bases = textbook_bases(self.problem.space.projections)
         several = self.pairs and bool(self.names)
-        with self.effort.scope(
-            {
-                "single": (min(len(bases), _GROUNDS), min(len(bases), _GROUNDS + 1)),
-                "together": (several * 2, several * (_SINGLES_FOR_PAIRS + _SWAPPED)),
-                "more": (0, several * _MORE),
-                "values": several * 2,
-            }
-        ):
+        with self.effort.scope(of_a_search(len(bases), several)):
             return self._run(bases)
 
     def _run(self, bases: Sequence[Base]) -> tuple[list[Explanation], list[Found]]:
@@ -152,7 +132,7 @@ class Search:
             explanations += self.combined(found)
             self.effort.expect("together", 0)
             self.effort.expect("more", 0)
-            for best in by_weight(explanations)[:2]:
+            for best in by_weight(explanations)[: settings.candidates]:
                 with self.effort.piece("values"):
                     explanations += self.split(best)
         if isinstance(self.problem, LargeProblem):
@@ -192,15 +172,15 @@ class Search:
 
     def promising(self, bare: Sequence[Explanation], plain: Found) -> list[Base]:
         """Return the textbook sets that come nearer to the data than the model as drawn."""
-        nothing = plain.explanations[0].chi2
+        least = plain.explanations[0].chi2 - 2.0 * settings.as_well
         ranked = in_order(bare, lambda e: e.chi2 - 2.0 * e.base.log_prior)
-        better = [e.base for e in ranked if e.chi2 < nothing - 6.0]
-        return better[: 1 if self.adequate(plain.best) else 2]
+        better = [e.base for e in ranked if e.chi2 < least]
+        return better[: 1 if self.adequate(plain.best) else settings.candidates]
 
     def adequate(self, explanation: Explanation) -> bool:
         """Tell whether an explanation leaves no more than noise."""
         state = explanation.fit.state
-        return adequacy(state, len(state.x)) > _ADEQUATE
+        return adequacy(state, len(state.x)) > settings.adequate_p
 
     def on(self, base: Base) -> Found:
         """Return nothing and every single cause on top of a textbook set."""
@@ -217,10 +197,9 @@ class Search:
         ranked = by_weight(explanations[1:])
         # What tells more may carry most of it: the best of what it refines count wherever they are.
         refined = {getattr(effect, "refines", None) for effect in self.effects}
-        own = [e for e in ranked[_SPLIT:] if refined.intersection(e.searched)]
-        explanations += [
-            e for single in (*ranked[:_SPLIT], *own[:_SPLIT]) for e in self.split(single)
-        ]
+        own = [e for e in ranked[settings.finer_singles :] if refined.intersection(e.searched)]
+        most = settings.finer_singles
+        explanations += [e for one in (*ranked[:most], *own[:most]) for e in self.split(one)]
         return Found(base, problem, tuple(explanations), tuple(atlas))
 
     def grounded(self, base: Base) -> Problem:
@@ -240,22 +219,22 @@ class Search:
             return []
         lowest = min(s.cost for s in screened)
         explained = start.state.chi2 - lowest
-        limit = lowest + _NEAR + _CURVED * max(explained, 0.0)
+        limit = lowest + 2.0 * settings.near + settings.approximation * max(explained, 0.0)
         near = in_order(
             (s for s in screened if s.cost <= limit),
             lambda s: np.log(s.projection.hypothesis.places) - s.log_evidence,
-        )[:_REFINED]
+        )[: settings.shortlist]
         known = {id(item) for item in near}
         chances = [item for item in _first_of_a_name(screened) if id(item) not in known]
         # Where large changes exchange modes the atlas may err by any amount.
-        if chdtrc(len(start.state.residual), lowest) > _ADEQUATE:
+        if chdtrc(len(start.state.residual), lowest) > settings.adequate_p:
             chances = []
         fits: list[Fit] = []
         best = start.state.cost
         for number, item in enumerate((*near, *chances)):
             self.effort.step(number, len(near) + len(chances))
             own, parts = enriched(problem, (item.projection,))
-            give_up = best + _LOST if id(item) in known else np.inf
+            give_up = best + settings.given_up if id(item) in known else np.inf
             result = fit(own, parts, item.x, give_up=give_up)
             if result is not None:
                 fits.append(result)
@@ -268,8 +247,8 @@ class Search:
         singles = by_weight(e for item in found for e in item.explanations if e.parts)
         places = {self.at(e.parts[0].hypothesis): e for e in reversed(singles)}
         enough = self.enough(found)
-        seeds = by_weight(places.values())[: 1 if enough else _SINGLES_FOR_PAIRS]
-        self.effort.expect("together", len(seeds) + (not enough) * _SWAPPED)
+        seeds = by_weight(places.values())[: 1 if enough else settings.seeds]
+        self.effort.expect("together", len(seeds) + 2 * (not enough))
         result: list[Explanation] = []
         tried: set[tuple[object, ...]] = set()
         for seed in seeds:
@@ -277,14 +256,14 @@ class Search:
             self.effort.explained(enough or (bool(result) and self.adequate(_best(result))))
         if not result:
             return result
-        self.effort.expect("together", _SWAPPED)
         best = _best(result)
+        self.effort.expect("together", len(best.parts))
         result += self.swapped(by_base[best.base.names], best, tried)
         self.effort.expect("together", 0)
         while True:
             best = _best(result)
             self.effort.explained(enough or self.adequate(best))
-            if len(best.parts) >= _MOST_CAUSES or self.adequate(best):
+            if len(best.parts) >= settings.most_causes or self.adequate(best):
                 return result
             result += self.grown(by_base[best.base.names], best, tried)
             if _best(result) is best:
@@ -312,7 +291,7 @@ class Search:
     ) -> list[Explanation]:
         problem, state = found.problem, seed.fit.state
         floor = 0.5 * selection_cost(self.names, self.places)
-        above = beside(worthwhile(found, seed, _PROMISE * floor), seed.fit)
+        above = beside(worthwhile(found, seed, settings.promise_share * floor), seed.fit)
         start = fit(above, (), np.zeros(0))
         assert start is not None
         originals = {id(p.hypothesis): p for p in problem.space.projections}
@@ -321,7 +300,7 @@ class Search:
         free = [p for p in above.space.projections if id(p.hypothesis) not in taken]
         ranked = in_order(screen(above, start.state, free, state.jacobian), lambda s: s.cost)
         result = []
-        for item in ranked[:_PARTNERS]:
+        for item in ranked[: settings.partners]:
             if start.state.chi2 - item.cost < floor or self.effort.stops():
                 break
             partner = originals.get(id(item.projection.hypothesis), item.projection)
@@ -371,7 +350,7 @@ def _first_of_a_name(screened: Sequence[Screened]) -> list[Screened]:
     found: dict[str, list[Screened]] = {}
     for item in in_order(screened, lambda s: s.cost):
         found.setdefault(item.projection.hypothesis.name, []).append(item)
-    return [item for own in found.values() for item in own[:_OF_A_NAME]]
+    return [item for own in found.values() for item in own[: settings.candidates]]
 
 
 def _fit_from_grid(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -17,6 +17,7 @@ from femubench.core.diagnosis.serial import diagnosis_to_json
 from femubench.core.errors import InputError, NotApplicable
 from femubench.core.files import check_new, make_folder
 from femubench.core.inference.effort import Effort
+from femubench.core.inference.settings import Value, overridden
 from femubench.core.library.cases import CaseLike, listed, one_case, usable_plugins, way_of
 from femubench.core.pace import Told
 from femubench.core.plugin.loader import Plugins, registered_faults
@@ -89,11 +90,12 @@ def diagnosis_of(
     budget: float | None = None,
     told: Told | None = None,
     others: Sequence[str] = (),
+    decisions: Mapping[str, Value] | None = None,
 ) -> Diagnosis:
     """Return the diagnosis; see `diagnose`.
 
     `told` is called with how far it is, and how long the rest takes; `others` are the plugins of
-    strangers that are asked for.
+    strangers that are asked for; `decisions` are settings with other values than the standard ones.
     """
     if budget is not None and not budget >= 0.0:
         raise InputError(f"budget = {budget!r}", expected="seconds >= 0")
@@ -103,7 +105,7 @@ def diagnosis_of(
         read = replace(read, tolerance=tolerance)
     try:
         # Many small matrices: threads would only wait for each other.
-        with threadpool_limits(1):
+        with threadpool_limits(1), overridden(decisions or {}):
             effort = Effort(budget, told)
             wrong = (registered_faults(*others) if others else None) if faults else ()
             return search(read, effects=wanted, faults=wrong, pairs=pairs, effort=effort)

@@ -6,11 +6,10 @@ import numpy as np
 import scipy.linalg as la
 
 from femubench.core.effect.attachments import elastic_band
+from femubench.core.inference.settings import settings
 from femubench.core.look.modes import Seen
 from femubench.core.modal.rigid import rigid_body_vectors
 from femubench.core.schema.diagnosis import LookWarning
-
-_SOFT = 0.5  # of the first elastic frequency: the softer half still changes it by some per cent
 
 
 def look_at_freedom(seen: Seen) -> list[LookWarning]:
@@ -22,7 +21,7 @@ def look_at_freedom(seen: Seen) -> list[LookWarning]:
     energy, inertia = rigid.T @ model.stiffness_times(rigid), rigid.T @ model.mass_times(rigid)
     highest = float(la.eigh(energy, inertia, eigvals_only=True)[-1])
     carried, first = np.sqrt(max(highest, 0.0)) / (2.0 * np.pi), float(elastic_band(model)[0])
-    if carried <= _SOFT * first:
+    if carried <= settings.soft_suspension * first:
         return []
     what = (
         f"The structure is said to hang free, yet the model is held: as a rigid body it moves at "

@@ -15,6 +15,7 @@ from femubench.core.fem.beam import stiffness_matrices
 from femubench.core.fem.group_factors import group_places
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
+from femubench.core.inference.settings import settings
 from femubench.core.look.shape_expansion import Comparison, Expansion, expand
 from femubench.core.modal.correlation import modal_scale_factor
 from femubench.core.modal.measurement import Measurement
@@ -23,11 +24,6 @@ from femubench.core.ties import in_order
 from femubench.core.typing import FloatArray, IntArray, SparseArray
 
 Values = Mapping[str, float]
-# Strain energies below this share of the mean count as that much: a quiet element has no say.
-_QUIET_ENERGY = 1.0
-_QUIET_WORK = 0.05
-_LEAST_SHIFTS = 2
-_NO_SHIFT = 1e-6  # relative
 
 
 @dataclass(frozen=True)
@@ -88,7 +84,7 @@ def energy_error(elements: Elements, expansion: Expansion) -> list[Values]:
     found: list[Values] = []
     for names, gather in (elements.members, elements.labels):
         top, base = gather @ error, gather @ energy
-        found.append(_named(names, top / (base + _QUIET_ENERGY * _mean(base))))
+        found.append(_named(names, top / (base + _mean(base))))
     springs = _springs(elements.structure, shapes, gaps)
     return [*found, springs] if springs else found
 
@@ -104,7 +100,7 @@ def _springs(structure: Structure, shapes: FloatArray, gaps: FloatArray) -> Valu
         gather @ (structure.springs * np.square(structure.spring_rows @ x).sum(axis=1))
         for x in (gaps, shapes)
     )
-    return _named(names, error / (energy + _QUIET_ENERGY * _mean(energy)))
+    return _named(names, error / (energy + _mean(energy)))
 
 
 def force_residual(
@@ -127,7 +123,7 @@ def force_residual(
     found: list[Values] = []
     for names, gather in (elements.members, elements.labels):
         explained, base = np.abs(gather @ work), gather @ energy
-        floor = np.maximum(base, _QUIET_WORK * _mean(base))
+        floor = np.maximum(base, settings.quiet_share * _mean(base))
         root = np.sqrt(np.where(floor > 0.0, floor, 1.0))
         found.append(_named(names, explained / root))
     frame = elements.structure.frame
@@ -154,7 +150,7 @@ def group_energy(comparison: Comparison, expansion: Expansion) -> list[Values]:
     energy = np.array([np.einsum("nm,nm->", shapes, k @ shapes) for k in parts])
     if not names:
         return []
-    return [_named(names, error / (energy + _QUIET_ENERGY * _mean(energy)))]
+    return [_named(names, error / (energy + _mean(energy)))]
 
 
 def _at_nodes(comparison: Comparison, gaps: FloatArray) -> FloatArray:
@@ -198,7 +194,7 @@ def mdlac(elements: Elements, comparison: Comparison) -> list[Values]:
     """
     shifts = comparison.shifts
     paired = np.flatnonzero(np.isfinite(shifts))
-    if len(paired) < _LEAST_SHIFTS or np.abs(shifts[paired]).max() < _NO_SHIFT:
+    if len(paired) < settings.least_modes or np.abs(shifts[paired]).max() < settings.negligible:
         return []
     index = comparison.pairing.index[paired]
     shapes = comparison.modes.shapes[:, index]
@@ -227,10 +223,6 @@ def _named(names: tuple[str, ...], values: FloatArray) -> Values:
 def _mean(values: FloatArray) -> float:
     mean = float(values.mean()) if len(values) else 0.0
     return mean if mean > 0.0 else 1.0
-
-
-# Below this an indicator is made of rounding errors, and says nothing; energies go by the square.
-_NOTHING = {"force-residual": 1e-6, "energy-error": 1e-12, "ecomac": 1e-6, "mdlac": 0.0}
 
 
 def locate(model: Model, measurement: Measurement) -> tuple[LocationRow, ...]:
@@ -267,10 +259,17 @@ def locate(model: Model, measurement: Measurement) -> tuple[LocationRow, ...]:
     return tuple(row for name, kinds in found.items() for row in _rows(name, kinds))
 
 
+def _nothing(indicator: str) -> float:
+    """Return below what an indicator is made of rounding errors, and says nothing."""
+    if indicator == "mdlac":
+        return 0.0
+    return settings.negligible ** (2 if indicator == "energy-error" else 1)
+
+
 def _rows(indicator: str, kinds: Iterable[Values]) -> list[LocationRow]:
     rows = []
     for values in kinds:
         largest = max(values.values(), default=0.0)
-        if largest > _NOTHING[indicator]:
+        if largest > _nothing(indicator):
             rows += [LocationRow(indicator, place, v / largest) for place, v in values.items()]
     return in_order(rows, lambda row: -row.value)

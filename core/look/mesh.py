@@ -6,12 +6,9 @@ import numpy as np
 
 from femubench.core.fem.structure import Structure
 from femubench.core.fit.mesh_error import mesh_bias
+from femubench.core.inference.settings import settings
 from femubench.core.look.modes import Seen, percent
 from femubench.core.schema.diagnosis import LookWarning
-
-_NOTABLE = 0.001
-_NOTABLE_DEVIATIONS = 0.5
-_UNEQUAL = 20.0  # ratio of the lengths of neighbours
 
 
 def look_at_mesh(seen: Seen) -> list[LookWarning]:
@@ -20,7 +17,7 @@ def look_at_mesh(seen: Seen) -> list[LookWarning]:
     changes = mesh_bias(seen.model, seen.count, seen.modes)
     if changes is None or len(changes) == 0:
         return found
-    if seen.exceeds(changes, _NOTABLE, _NOTABLE_DEVIATIONS):
+    if seen.exceeds(changes, settings.notable_mesh, settings.telling_deviations):
         worst = int(np.abs(changes).argmax())
         what = (
             f"The mesh is coarse: with every element cut in two, mode {worst + 1} changes by "
@@ -41,7 +38,7 @@ def _unequal(structure: Structure) -> list[LookWarning]:
     np.maximum.at(longest, nodes, length[element])
     ratio = np.where(longest > 0.0, longest / shortest, 0.0)
     worst = int(ratio.argmax())
-    if ratio[worst] <= _UNEQUAL:
+    if ratio[worst] <= settings.unequal_elements:
         return []
     at_node = element[nodes == worst]
     short, long = at_node[length[at_node].argmin()], at_node[length[at_node].argmax()]

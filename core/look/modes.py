@@ -11,6 +11,7 @@ import scipy.linalg as la
 from femubench.core.errors import ModelError
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.model import Model
+from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import Modes
 from femubench.core.modal.frequency_changes import (
     SOLVED_LIMIT,
@@ -23,9 +24,6 @@ from femubench.core.modal.pairing import Pairing, pair_measured
 from femubench.core.schema.diagnosis import LookWarning
 from femubench.core.typing import FloatArray
 
-_MOST_MODES = 40
-_MARGIN = 4  # modes beyond those wanted, so that a pair may cross the end of the list
-_NOTABLE, _NOTABLE_DEVIATIONS = 0.005, 2.0
 Changes = tuple[tuple[int, float], ...]
 
 
@@ -44,8 +42,9 @@ class Seen:
     @cached_property
     def modes(self) -> Modes:
         """Return the elastic modes, those of zero frequency left out, a margin included."""
-        wanted = min(2 * len(self.measurement) + 8, _MOST_MODES)
-        return elastic_modes(self.model, wanted + _MARGIN)
+        # Half as many spare ones again, so that a pair may cross the end of the list.
+        spare = settings.spare_modes + settings.spare_modes // 2
+        return elastic_modes(self.model, 2 * len(self.measurement) + spare)
 
     @cached_property
     def readings(self) -> FloatArray:
@@ -103,7 +102,8 @@ class Seen:
             what: begin of the sentence, which goes on with the largest change.
             changes: relative changes of the frequencies with the effect; None where not known.
         """
-        if changes is None or not self.exceeds(changes, _NOTABLE, _NOTABLE_DEVIATIONS):
+        least, deviations = settings.notable_physics, settings.notable_deviations
+        if changes is None or not self.exceeds(changes, least, deviations):
             return []
         worst = int(np.abs(changes).argmax())
         said = f"{what}: it changes mode {worst + 1} by {100.0 * changes[worst]:+.2g} %."

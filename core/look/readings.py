@@ -4,29 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from femubench.core.inference.settings import settings
 from femubench.core.look.modes import Seen
 from femubench.core.modal.pairing import LEAST_SENSORS, pair_modes
 from femubench.core.schema.diagnosis import LookWarning
 from femubench.core.typing import FloatArray, IntArray
-
-_DEVIATIONS = (1e-5, 0.2)  # relative, of a frequency
-_SAME_PLACE = 1e-6  # m
-_GAIN = (0.5, 2.0)
-_SURE = 6.0  # standard deviations by which a reading must stand out to judge a gain
-_ALIKE = 0.97  # cosine between readings and expectations over the modes
-_ALONE = 10.0  # times the misfit of an ordinary sensor; what a model lacks gave up to 6
-_LEAST_MODES = 2
-_LEAST_NOISE = 1e-4  # of the largest component
-_WELL_PAIRED = 0.9  # MAC
-_MOST_TRIED = 100
-_BORDER = 0.05  # of the frequency: so near to the end of a band a mode may lie outside
 
 
 def look_at_deviations(seen: Seen) -> list[LookWarning]:
     """Return standard deviations of frequencies that no test has."""
     m = seen.measurement
     relative = m.frequency_std / m.frequencies
-    odd = ~((relative >= _DEVIATIONS[0]) & (relative <= _DEVIATIONS[1]))
+    low, high = settings.usual_std
+    odd = ~((relative >= low) & (relative <= high))
     if not odd.any():
         return []
     modes = ", ".join(str(m.numbers[k]) for k in np.flatnonzero(odd))
@@ -53,7 +43,7 @@ def _twins(seen: Seen) -> list[LookWarning]:
     if len(sensors) < 2:
         return []
     axes = sensors.axes
-    near = np.abs(sensors.xyz[:, None] - sensors.xyz[None]).max(axis=2) <= _SAME_PLACE
+    near = np.abs(sensors.xyz[:, None] - sensors.xyz[None]).max(axis=2) <= settings.negligible
     along = np.abs(np.einsum("ik,jk->ij", axes, axes)) > 0.5
     first, second = np.nonzero(np.triu(near & along, 1))
     return [
@@ -76,7 +66,7 @@ def _outliers(seen: Seen) -> list[LookWarning]:
     m = seen.measurement
     index = _partners(seen)
     columns = np.flatnonzero(index >= 0)
-    if len(columns) < _LEAST_MODES:
+    if len(columns) < settings.least_modes:
         return []
     rows = np.flatnonzero(np.isfinite(m.shapes[:, columns]).all(axis=1))
     found = []
@@ -103,10 +93,10 @@ def _partners(seen: Seen) -> IntArray:
     """
     best = seen.pairing
     likeness = np.nan_to_num(best.mac, nan=0.0)
-    if len(likeness) == 0 or likeness.min() >= _WELL_PAIRED:
+    if len(likeness) == 0 or likeness.min() >= settings.well_paired:
         return best.index
     m, predicted = seen.measurement, seen.modes.natural_frequencies
-    for row in range(min(len(m.sensors), _MOST_TRIED)):
+    for row in range(min(len(m.sensors), settings.block)):
         rest = np.arange(len(m.sensors)) != row
         pairing = pair_modes(m.frequencies, m.shapes[rest], predicted, seen.readings[rest])
         if np.nansum(pairing.mac) > np.nansum(best.mac):
@@ -133,16 +123,17 @@ def _worst(
     measured = seen.measurement.shapes[np.ix_(rows, columns)]
     expected = _left_out(seen.readings[np.ix_(rows, partners)], measured)
     noise = np.nan_to_num(seen.measurement.shape_std[np.ix_(rows, columns)], nan=0.0)
-    noise = np.maximum(noise, _LEAST_NOISE * np.abs(measured).max(axis=0))
+    noise = np.maximum(noise, settings.minor * np.abs(measured).max(axis=0))
     inner = np.einsum("sm,sm->s", measured, expected)
     norm = np.einsum("sm,sm->s", expected, expected)
     size = np.einsum("sm,sm->s", measured, measured)
     gain = inner / np.maximum(norm, 1e-300)
-    alike = np.abs(inner) > _ALIKE * np.sqrt(norm * size)
-    clear = (np.abs(expected) > _SURE * noise).sum(axis=1) >= _LEAST_MODES
+    alike = np.abs(inner) > settings.alike_readings * np.sqrt(norm * size)
+    clear = (np.abs(expected) > settings.clear_reading * noise).sum(axis=1) >= settings.least_modes
     misfit = np.square((measured - expected) / noise).sum(axis=1)
-    alone = misfit > _ALONE * np.median(misfit)
-    odd = clear & alike & alone & ((gain < _GAIN[0]) | (gain > _GAIN[1]))
+    alone = misfit > settings.lone_misfit * np.median(misfit)
+    factor = settings.wrong_factor
+    odd = clear & alike & alone & ((gain < 1.0 / factor) | (gain > factor))
     if not odd.any():
         return None
     worst = int(np.where(odd, misfit, -1.0).argmax())
@@ -158,7 +149,7 @@ def _left_out(basis: FloatArray, measured: FloatArray) -> FloatArray:
     left = left[:, singular > 1e-8 * singular.max(initial=0.0)]
     own = np.square(left).sum(axis=1)[:, None]
     fitted = left @ (left.T @ measured)
-    alone = own > 1.0 - 1e-6  # nobody else sees what it sees
+    alone = own > 1.0 - settings.negligible  # nobody else sees what it sees
     return np.where(alone, measured, (fitted - own * measured) / np.where(alone, 1.0, 1.0 - own))
 
 
@@ -168,7 +159,9 @@ def look_at_band(seen: Seen, band: tuple[float, float]) -> list[LookWarning]:
     Arguments:
         band: in Hz; the measurement holds every mode of the structure inside.
     """
-    low, high = band[0] * (1.0 + _BORDER), band[1] * (1.0 - _BORDER)
+    # So near to the end of a band a mode may lie outside.
+    border = settings.gross_error
+    low, high = band[0] * (1.0 + border), band[1] * (1.0 - border)
     frequencies = seen.modes.natural_frequencies
     inside = np.flatnonzero((frequencies > low) & (frequencies < high))
     m = seen.measurement.frequencies

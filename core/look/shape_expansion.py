@@ -10,17 +10,13 @@ import scipy.linalg as la
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import Model
 from femubench.core.fit.mesh_error import mesh_bias
+from femubench.core.inference.settings import settings
 from femubench.core.modal.eigen import Modes
 from femubench.core.modal.frequency_changes import elastic_modes
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.pairing import LEAST_SENSORS, Pairing, pair_measured
 from femubench.core.modal.sparse_eigen import ShiftedModel
 from femubench.core.typing import FloatArray
-
-_COLUMNS = 16  # that are solved for at once
-_DEFAULT_STD = 0.02  # of the largest component, where a shape has no deviation
-_NEAR = 1e-7  # relative distance to an eigenvalue below which K - lambda M is as good as singular
-_WEIGHTS = (1e-6, 1e18)  # of the readings against the model, times the largest sensitivity
 
 
 @dataclass(frozen=True)
@@ -50,7 +46,7 @@ class Comparison:
         Raises:
             ModelError: when the model has no modes.
         """
-        modes = elastic_modes(model, 2 * len(measurement) + 8)
+        modes = elastic_modes(model, 2 * len(measurement) + settings.spare_modes)
         readings = np.asarray(model.observe(measurement.sensors) @ modes.shapes)
         pairing = pair_measured(measurement, modes, readings)
         bias = np.zeros(len(modes))
@@ -111,7 +107,7 @@ def expand(comparison: Comparison) -> Expansion:
         reading = m.shapes[known, j]
         size = float(np.abs(reading).max())
         std = m.shape_std[known, j]
-        std = np.where(np.isfinite(std) & (std > 0.0), std, _DEFAULT_STD * size)
+        std = np.where(np.isfinite(std) & (std > 0.0), std, settings.default_shape_std * size)
         sensors = np.asarray(rows[np.flatnonzero(known)].toarray()) / std[:, None]
         if size > 0.0:
             columns.append(_expanded(comparison, sensors, reading / std, float(eigenvalue)))
@@ -149,7 +145,9 @@ def _expanded(
 def _off_resonance(modes: Modes, eigenvalue: float) -> float:
     """Return the eigenvalue, moved off one of the model that it hits."""
     near = np.abs(modes.eigenvalues / eigenvalue - 1.0).min(initial=1.0)
-    return eigenvalue * (1.0 + _NEAR) if near < 0.5 * _NEAR else eigenvalue
+    # As near as that, K - lambda M is as good as singular.
+    step = settings.negligible
+    return eigenvalue * (1.0 + step) if near < 0.5 * step else eigenvalue
 
 
 class _Solver:
@@ -162,8 +160,9 @@ class _Solver:
     def __call__(self, right: FloatArray) -> FloatArray:
         answer = np.empty(right.shape)
         # A few columns at once: of a large model each array is as large as the factors.
-        for first in range(0, right.shape[1], _COLUMNS):
-            own = slice(first, first + _COLUMNS)
+        most = settings.block // 32
+        for first in range(0, right.shape[1], most):
+            own = slice(first, first + most)
             near = self.shifted.solve(right[:, own])
             left = right[:, own] - self.model.stiffness_times(near)
             left += self.eigenvalue * self.model.mass_times(near)
@@ -181,7 +180,7 @@ def _discrepancy(values: FloatArray, parts: FloatArray) -> float:
     largest = float(values.max(initial=0.0))
     if largest == 0.0:
         raise ModelError("no sensor sees any motion that the model can make")
-    low, high = (np.log(w / largest) for w in _WEIGHTS)
+    low, high = (np.log(w / largest) for w in (settings.negligible, settings.far))
     expected = max(len(parts) - 1.0, 1.0)
     for _ in range(60):
         middle = 0.5 * (low + high)

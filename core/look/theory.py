@@ -8,17 +8,10 @@ from femubench.core.fem.beam import stiffness_matrices
 from femubench.core.fem.frame import Frame, Material, Member
 from femubench.core.fem.joints import whole_members
 from femubench.core.fem.sections import Section
+from femubench.core.inference.settings import settings
 from femubench.core.look.modes import Seen
 from femubench.core.schema.diagnosis import LookWarning
 from femubench.core.typing import FloatArray
-
-_STUBBY = 8.0  # length over height
-_BENDS = 0.05  # of the energy of some mode, in the bending of one member along one axis
-_ACROSS = ([2, 4, 8, 10], [1, 5, 7, 11])  # local dofs of bending along z and along y
-# E / rho in m2/s2: metals 2.3e7 to 2.8e7, magnesium to beryllium alloys 2e7 to 2e8, plastics 2e6.
-_STIFF_PER_MASS = (1e6, 4e8)
-_POISSON = (0.0, 0.5)
-_SHEAR_COEFFICIENT = (0.2, 1.0)
 
 
 def look_at_slenderness(seen: Seen) -> list[LookWarning]:
@@ -35,15 +28,15 @@ def look_at_slenderness(seen: Seen) -> list[LookWarning]:
     whole = whole_members(frame)
     for pieces in whole:
         rows = [frame.member_index[name] for name in pieces]
-        bends = share[rows].sum(axis=0).max(axis=1) > _BENDS
+        bends = share[rows].sum(axis=0).max(axis=1) > settings.quiet_share
         height = _sizes(frame.members[rows[0]].section)[bends].max(initial=0.0)
-        if length[rows].sum() < _STUBBY * height:
+        if length[rows].sum() < settings.stubby * height:
             least = min(least, length[rows].sum() / height)
             short.append(pieces)
     if not short:
         return []
     what = (
-        f"{len(short)} of {len(whole)} members are shorter than {_STUBBY:g} times their "
+        f"{len(short)} of {len(whole)} members are shorter than {settings.stubby:g} times their "
         f"height, down to {least:.2g}: beams describe them roughly, and what happens "
         "in their joints counts."
     )
@@ -62,7 +55,8 @@ def _bending(seen: Seen) -> FloatArray:
     local = (structure.gather @ modes.shapes).reshape(-1, 12, len(modes))
     stiffness, member = stiffness_matrices(structure.properties), structure.mesh.member
     share = np.zeros((len(structure.frame.members), 2, len(modes)))
-    for k, slots in enumerate(_ACROSS):
+    across = [2, 4, 8, 10], [1, 5, 7, 11]  # local dofs of bending along z and along y
+    for k, slots in enumerate(across):
         own = local[:, slots]
         energy = np.einsum("eim,eim->em", own, stiffness[:, slots][:, :, slots] @ own)
         np.add.at(share[:, k], member, energy / modes.eigenvalues)
@@ -83,13 +77,14 @@ def look_at_materials(seen: Seen) -> list[LookWarning]:
     for material in dict.fromkeys(m.material for m in frame.members):
         where = _members_of(frame, material)
         ratio = material.E / material.rho
-        if not _STIFF_PER_MASS[0] <= ratio <= _STIFF_PER_MASS[1]:
+        low, high = settings.stiffness_per_mass
+        if not low <= ratio <= high:
             what = (
                 f"E / rho = {ratio:.3g} m2/s2 is that of no structural material (metals have "
                 "about 2.5e7): a wrong unit of E or of the density?"
             )
             found.append(LookWarning(what, where, ""))
-        if not _POISSON[0] <= material.nu < _POISSON[1]:
+        if not 0.0 <= material.nu < 0.5:
             what = f"Poisson's ratio {material.nu:g} is not between 0 and 0.5."
             found.append(LookWarning(what, where, ""))
     return found + _shear_coefficients(frame)
@@ -98,10 +93,10 @@ def look_at_materials(seen: Seen) -> list[LookWarning]:
 def _shear_coefficients(frame: Frame) -> list[LookWarning]:
     found = []
     for member in frame.members:
-        values = _kappa(member)
-        if values and not all(_SHEAR_COEFFICIENT[0] <= k <= _SHEAR_COEFFICIENT[1] for k in values):
+        values, (low, high) = _kappa(member), settings.shear_coefficient
+        if values and not all(low <= k <= high for k in values):
             said = " and ".join(f"{k:.3g}" for k in dict.fromkeys(values))
-            what = f"The shear coefficient {said} is not between 0.2 and 1."
+            what = f"The shear coefficient {said} is not between {low:g} and {high:g}."
             found.append(LookWarning(what, member.name, ""))
     return found
 

@@ -1,0 +1,472 @@
+"""The numbers that a diagnosis rests on: each with its unit, its kind and why it is what it is.
+
+A `prior` is what is believed before any datum is seen, a `cost` is how much work is spent (and
+what counts as rounding), a `decision` is where a statement begins. Code reads them by attribute:
+`settings.sure_fault`. In a block `with overridden({"sure_fault": 0.95}):` some have other values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field, fields, replace
+from difflib import SequenceMatcher
+from math import inf
+from typing import Literal, TypeVar, cast
+
+from femubench.core.errors import InputError
+
+Kind = Literal["prior", "cost", "decision"]
+Value = float | tuple[float, ...]
+T = TypeVar("T", float, int, tuple[float, ...], tuple[float, float], tuple[int, int])
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One number of the table.
+
+    Arguments:
+        value: a number, or several that belong together.
+        unit: what it counts or is a share of.
+        kind: prior, cost or decision.
+        why: one line.
+    """
+
+    value: Value
+    unit: str
+    kind: Kind
+    why: str
+
+
+def _entry(value: T, unit: str, kind: Kind, why: str) -> T:
+    return field(default=value, metadata={"unit": unit, "kind": kind, "why": why})
+
+
+def _prior(value: T, unit: str, why: str) -> T:
+    return _entry(value, unit, "prior", why)
+
+
+def _cost(value: T, unit: str, why: str) -> T:
+    return _entry(value, unit, "cost", why)
+
+
+def _decision(value: T, unit: str, why: str) -> T:
+    return _entry(value, unit, "decision", why)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """All numbers, each with the value that it has unless a block says otherwise."""
+
+    # What is believed before any datum is seen: causes and faults.
+    prior_fault: float = _prior(
+        0.1, "probability", "data or input are wrong somewhere, over kinds, then suspects"
+    )
+    prior_of_causes: tuple[float, ...] = _prior(
+        (0.5, 0.4, 0.08, 0.015, 0.005), "probability", "a model lacks 0, 1, 2, 3, 4 or more causes"
+    )
+    prior_of_further_causes: tuple[float, ...] = _prior(
+        (0.6, 0.3, 0.08, 0.015, 0.005), "probability", "the same on top of textbook physics"
+    )
+    prior_as_drawn: float = _prior(
+        0.1, "probability", "a model that could lack textbook physics lacks none of it"
+    )
+    prior_whole_textbook: float = _prior(
+        0.8, "probability", "it lacks all of it, since every beam has it; other sets share the rest"
+    )
+    prior_missed_mode: float = _prior(
+        0.05, "probability", "a test does not find a mode among those that it finds"
+    )
+    # What a beam model gets wrong of a real structure.
+    width_element_stiffness: float = _prior(
+        0.02, "relative", "sections and moduli scatter along a structure"
+    )
+    width_element_mass: float = _prior(0.01, "relative", "masses scatter less: they can be weighed")
+    width_everything: float = _prior(
+        0.03, "relative", "modulus and density of a delivery are off as a whole"
+    )
+    width_joint_types: float = _prior(
+        0.15, "of L/4EI", "joints of one make are all softer than their drawing"
+    )
+    width_joints: float = _prior(0.05, "of L/4EI", "each joint differs from its like")
+    width_joint_masses: float = _prior(0.02, "of the structure", "welds, bolts and brackets")
+    width_general: float = _prior(
+        0.02, "relative", "random changes between modes, for what no other class is"
+    )
+    width_sensor_gains: float = _prior(0.01, "relative", "sensors are calibrated to a per cent")
+    width_shapes: float = _prior(
+        1.0, "deviations", "stated deviations of shapes are right only within their own size"
+    )
+    width_between_states: float = _prior(
+        0.02, "of the scale", "a structure and its reference hardly differ in their model error"
+    )
+    error_scale_median: float = _prior(
+        0.3, "of the width", "most structures are nearer to beams than a class is wide"
+    )
+    error_scale_spread: float = _prior(
+        1.0, "of the logarithm", "the scale of a class is known within a factor of three or so"
+    )
+    error_scale_range: tuple[float, float] = _prior(
+        (0.01, 10.0), "of the width", "smaller is nothing, larger is no beam"
+    )
+    own_error_of_change: float = _prior(
+        0.3, "of the change", "an effect at a place is an idealisation: width of its own error"
+    )
+    trust_in_model_error: float = _prior(
+        0.7, "power of the evidence", "model error is no more than a model of what is not known"
+    )
+    idealisation_error: float = _prior(
+        0.05, "of the change", "the same where unseen data judge a cause"
+    )
+    unseen_error_median: float = _prior(
+        0.003, "of a frequency", "what a beam model gets wrong of an unseen mode, where anything"
+    )
+    unseen_error_spread: float = _prior(
+        1.5, "of the logarithm", "the size of that error is hardly known"
+    )
+    widest_coordinate: float = _prior(
+        3.0, "prior deviations", "beyond this a parameter or a size is not believed"
+    )
+    default_shape_std: float = _prior(
+        0.02, "of the largest component", "of a shape that states no deviation"
+    )
+    reachable_mass_std: float = _prior(0.002, "relative", "scales of a careful test")
+    reachable_antiresonance_std: float = _prior(
+        0.005, "relative", "antiresonances shift with where the hammer hits"
+    )
+    reachable_shape_std: float = _prior(
+        0.015, "of the largest component", "accelerometers of a careful test"
+    )
+    reachable_deflection_std: float = _prior(0.01, "relative", "dial gauges of a careful test")
+
+    # Where a verdict begins.
+    nothing_missing: float = _decision(
+        0.5, "probability", "from here on the verdict is that nothing is missing"
+    )
+    earned_probability: float = _decision(
+        0.6, "probability", "from which a textbook effect may be part of a name"
+    )
+    earned_factor: float = _decision(
+        20.0, "Bayes factor", "which the data must add: strong evidence (Kass & Raftery 1995)"
+    )
+    nearly_all: float = _decision(
+        0.95, "probability", "covered by the places that are told; more than that leaves no doubt"
+    )
+    adequate_p: float = _decision(
+        0.05, "probability", "what is left, were it noise: above it nothing more is sought"
+    )
+    noise_p: float = _decision(
+        1e-3, "probability", "what is left, were it noise: below it no known effect explains it"
+    )
+    rival_share: float = _decision(0.05, "probability", "from which a rival stays in the group")
+    parallel_rival_share: float = _decision(
+        0.005, "probability", "the same of one that acts alike: its size made the difference"
+    )
+    parallel_angle: float = _decision(
+        10.0, "degrees", "below which two explanations act on the data alike"
+    )
+    covered_share: float = _decision(
+        0.98, "probability", "until a group covers this, less probable rivals stay in it"
+    )
+    common_share: float = _decision(
+        0.92, "probability", "of a name and its like, from which it is named whatever goes with it"
+    )
+    explained_share: float = _decision(
+        0.8, "of chi-square", "which the common part of such a group must explain"
+    )
+    largest_group: int = _decision(
+        6, "explanations", "more names or places than this help nobody to decide"
+    )
+    as_well: float = _decision(3.0, "nats", "within which two fits are as good: 6 of chi-square")
+    few_values: int = _decision(
+        2, "values", "by which two fits may differ, and causes that do not bend to any data"
+    )
+    too_small: float = _decision(
+        12.0, "of chi-square", "an effect that changes it by less is too small to see"
+    )
+    # Where unseen data confirm.
+    visible_deviations: float = _decision(
+        3.0, "deviations", "by which two predictions must differ to be told apart"
+    )
+    telling_deviations: float = _decision(
+        0.5, "deviations", "by which a single mode must change to say anything"
+    )
+    unseen_noise_p: float = _decision(
+        2e-3, "probability", "of errors on unseen data, were they noise: above it they confirm"
+    )
+    decisive: float = _decision(
+        5.0, "nats", "odds of 150 to 1, from which unseen data outweigh used ones"
+    )
+    error_ratio: float = _decision(
+        2.0, "factor", "by which textbook physics must lower errors; its square for a fitted cause"
+    )
+    gross_error: float = _decision(
+        0.05, "of a frequency", "more than any model error: the drawing, or the pairing, is wrong"
+    )
+    unusual_error: float = _decision(
+        5.0, "times the usual error", "a mode farther off was not measured, or is not that mode"
+    )
+    tied_place_share: float = _decision(
+        0.1, "of the probability", "of the best place, from which unseen data judge another one"
+    )
+    # Where a fault begins.
+    sure_fault: float = _decision(0.9, "probability", "from which data or input are mended")
+    fault_lag: float = _decision(
+        20.0, "nats", "by which a fault and causes may differ, and both be tried"
+    )
+    fault_remainder: float = _decision(
+        0.3, "of the squared misfit", "which may be left where a fault is most of what is wrong"
+    )
+    wrong_factor: float = _decision(
+        2.0, "factor", "by which a gain or stated deviations must be off to be called wrong"
+    )
+    # Where a plain look warns.
+    notable_mesh: float = _decision(
+        0.001, "of a frequency", "change by a finer mesh that is worth a warning"
+    )
+    notable_physics: float = _decision(
+        0.005, "of a frequency", "change by physics that a model leaves out that is worth one"
+    )
+    notable_deviations: float = _decision(2.0, "deviations", "the same beside the measurement")
+    unequal_elements: float = _decision(
+        20.0, "ratio of lengths", "of neighbours, above which a mesh is ill made"
+    )
+    soft_suspension: float = _decision(
+        0.5, "of the first elastic frequency", "above which rigid motions are held, not free"
+    )
+    usual_std: tuple[float, float] = _decision(
+        (1e-5, 0.2),
+        "of a frequency",
+        "deviations that tests have, from the best to the worst",
+    )
+    clear_reading: float = _decision(
+        6.0, "deviations", "by which a reading must stand out to judge a gain"
+    )
+    alike_readings: float = _decision(
+        0.97, "cosine", "of readings and expectations over the modes, from which a gain is one"
+    )
+    lone_misfit: float = _decision(
+        10.0, "times an ordinary sensor's", "what a model lacks gave up to 6"
+    )
+    least_modes: int = _decision(2, "modes", "fewer have no pattern that says anything")
+    well_paired: float = _decision(0.9, "MAC", "from which no wrong sensor can have spoilt a pair")
+    stubby: float = _decision(8.0, "length over height", "below which a member is hardly a beam")
+    quiet_share: float = _decision(
+        0.05, "of the energy", "below which a member has no say, or counts as that much"
+    )
+    stiffness_per_mass: tuple[float, float] = _decision(
+        (1e6, 4e8), "m2/s2", "E / rho of plastics and of beryllium alloys, with room"
+    )
+    shear_coefficient: tuple[float, float] = _decision(
+        (0.2, 1.0), "", "of thin-walled to solid sections"
+    )
+    # What is worth measuring.
+    worth_measuring: float = _decision(
+        1.0, "squared deviations", "from which a measurement separates two explanations"
+    )
+    test_mass: float = _decision(
+        0.02, "of the structure", "a known mass that is at hand and changes a mode visibly"
+    )
+    antiresonance_band: float = _decision(
+        0.25, "of the lowest used frequency", "antiresonances may lie below the first resonance"
+    )
+    same_antiresonance: float = _decision(
+        1.25, "ratio of frequencies", "within which two explanations mean the same one"
+    )
+    hidden_by_resonance: float = _decision(
+        0.01, "of a frequency", "a resonance closer than this hides an antiresonance"
+    )
+
+    # How much work is spent: the search.
+    candidates: int = _cost(2, "candidates", "followed where the best alone might be wrong")
+    of_a_kind: int = _cost(
+        3, "of a kind", "suspects, partners, measurements or classes that are tried or shown"
+    )
+    near: float = _cost(
+        8.0, "nats", "behind the best, within which a first estimate may have ranked wrongly"
+    )
+    approximation: float = _cost(
+        0.05, "of what it explains", "which interpolation may miss, or first order near a resonance"
+    )
+    shortlist: int = _cost(40, "hypotheses", "fitted exactly, or weighed as partners, at most")
+    given_up: float = _cost(
+        20.0, "of the cost", "so far behind the best a fit is not brought to its end"
+    )
+    hopeless: float = _cost(30.0, "nats", "behind which a pure beam model is not pursued")
+    seeds: int = _cost(6, "causes", "about which pairs are sought where no single one suffices")
+    partners: int = _cost(8, "causes", "fitted beside a seed, or carried on from other scales")
+    promise_share: float = _cost(
+        0.3, "of the chi-square to earn", "which a partner must promise, were effects to add up"
+    )
+    most_causes: int = _cost(4, "causes", "in one explanation: few data tell more apart")
+    finer_singles: int = _cost(4, "causes", "tried with more values at their places")
+    leading: int = _cost(
+        12, "explanations", "given scales of their own and listed; places of a name kept"
+    )
+    scale_rounds: int = _cost(2, "rounds", "of causes and scales of model error in turn")
+    worth_scales: float = _cost(
+        1.0, "nats", "by which other scales must suit the leader better for another round"
+    )
+    few_steps: int = _cost(3, "steps", "of an iteration that begins near its end")
+    scale_steps: tuple[int, int] = _cost(
+        (40, 10), "steps", "for the scales of model error, from anywhere and from nearby"
+    )
+    scale_settled: float = _cost(1e-5, "relative", "change of the cost at which these steps end")
+    general_modes: int = _cost(20, "elastic modes", "that random changes couple")
+    faults_mended: int = _cost(3, "faults", "more are no matter of mending")
+    typed_solved: int = _cost(20, "suspects", "of the input that are solved of a large model")
+    grid_points: int = _cost(13, "points", "on which the parameter of a fault is sought first")
+    coordinate_margin: float = _cost(
+        0.02, "prior deviations", "step of a curvature, and what is off a bound"
+    )
+    advised: int = _cost(8, "rows", "of advice, and explanations that it parts")
+    points: int = _cost(48, "points", "of a structure where a test is thought through")
+    # The atlas, and large models.
+    responses: int = _cost(
+        6, "vectors", "responses of the higher modes to a hypothesis; half where those suffice"
+    )
+    modes_kept: int = _cost(5, "modes", "beyond the last partner, in the basis of the atlas")
+    modes_tracked: int = _cost(3, "modes", "beyond the last partner, with their response")
+    spare_modes: int = _cost(8, "modes", "beyond twice the measured ones that are solved for")
+    long_step: float = _cost(
+        1.5, "prior deviations", "between neighbours on a grid, above which modes change places"
+    )
+    large_shortlist: int = _cost(
+        240, "hypotheses", "of a large model in its coordinates; a quarter beside a seed"
+    )
+    large_sizes: tuple[float, ...] = _cost(
+        (0.12, 0.5, 1.3, 2.6), "prior deviations", "at which each of them is tried"
+    )
+    large_slack: float = _cost(0.1, "of the prior", "a ranking by first order must not mind sizes")
+    work_of_pieces: tuple[float, ...] = _cost(
+        (0.35, 0.018, 1.0, 0.45, 1.0, 0.4, 0.35, 0.3),
+        "searches for single causes",
+        "medians of the cases that come along (benchmarks/time_left.py)",
+    )
+    # Memory and rounding.
+    block: int = _cost(512, "rows", "worked on at once, so that arrays fit the memory")
+    slope_step: float = _cost(1e-4, "of a coordinate", "for a slope by central differences")
+    close_modes: float = _cost(
+        1e-3, "of an eigenvalue", "closer modes turn into each other at the least change"
+    )
+    minor: float = _cost(1e-4, "of the largest", "below this a response, row or noise is rounding")
+    negligible: float = _cost(
+        1e-6, "share, or m", "below this nothing differs; its square for energies"
+    )
+    far: float = _cost(1e18, "ratio", "as good as infinite, and its square still a number")
+    unknown_variance: float = _cost(1e8, "variance", "of a datum that is not looked at")
+
+
+_CURRENT: ContextVar[Settings] = ContextVar("settings", default=Settings())  # noqa: B039
+
+
+class _Reader:
+    """Gives the numbers of the block that asks."""
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(_CURRENT.get(), name)
+
+
+settings = cast(Settings, _Reader())
+
+
+def settings_table() -> dict[str, Setting]:
+    """Return every number by its name, in the order of the table, as it is in this block."""
+    now = _CURRENT.get()
+    return {f.name: Setting(getattr(now, f.name), **f.metadata) for f in fields(now)}
+
+
+@contextmanager
+def overridden(values: Mapping[str, Value]) -> Iterator[None]:
+    """Give some numbers other values inside a block, and nowhere else.
+
+    Arguments:
+        values: by name.
+
+    Raises:
+        InputError: for a name that is not in the table, or a value of another type.
+    """
+    table = settings_table()
+    for name, value in values.items():
+        _check_known(name, table)
+        _check_value(name, value, table[name])
+    given = {
+        name: type(table[name].value)(value)  # type: ignore[arg-type] # of one type, as checked
+        for name, value in values.items()
+    }
+    token = _CURRENT.set(replace(_CURRENT.get(), **given))  # type: ignore[arg-type]
+    try:
+        yield
+    finally:
+        _CURRENT.reset(token)
+
+
+def changed_settings() -> dict[str, Value]:
+    """Return the numbers that have other values in this block than in the table."""
+    standard = Settings()
+    table = settings_table().items()
+    return {name: s.value for name, s in table if s.value != getattr(standard, name)}
+
+
+def shown(value: Value) -> str:
+    """Return a value as it is written in words and options."""
+    return ",".join(f"{x:g}" for x in (value if isinstance(value, tuple) else (value,)))
+
+
+def decisions_from(words: Iterable[str]) -> dict[str, Value]:
+    """Return numbers of the class `decision` from words such as ``sure_fault=0.95``.
+
+    Raises:
+        InputError: for an unknown name, one of another class, or a bad value.
+    """
+    table = settings_table()
+    known = {name: s for name, s in table.items() if s.kind == "decision"}
+    found: dict[str, Value] = {}
+    for word in words:
+        name, equals, text = (part.strip() for part in word.partition("="))
+        if not equals:
+            raise InputError(f"--set {word}", expected="name=value")
+        if name in table and name not in known:
+            what = f"--set {name}: a {table[name].kind} is not to be set"
+            raise InputError(what, expected=f"a decision, one of {_nearest(name, known)}")
+        _check_known(name, known)
+        old = known[name].value
+        try:
+            numbers = tuple(float(part) for part in text.split(","))
+        except ValueError:
+            numbers = ()
+        value: Value = numbers[0] if len(numbers) == 1 and not isinstance(old, tuple) else numbers
+        _check_value(name, value, known[name])
+        found[name] = int(cast(float, value)) if isinstance(old, int) else value
+    return found
+
+
+def _check_known(name: str, known: Mapping[str, Setting]) -> None:
+    if name not in known:
+        raise InputError(f"no setting {name!r}", expected=f"one of {_nearest(name, known)}")
+
+
+def _nearest(name: str, known: Iterable[str]) -> str:
+    """Return known names, those most like a name first: a message has an end."""
+    return ", ".join(sorted(known, key=lambda other: -SequenceMatcher(None, name, other).ratio()))
+
+
+def _check_value(name: str, value: Value, known: Setting) -> None:
+    """Make sure that a value is of the kind of the present one.
+
+    Raises:
+        InputError: otherwise.
+    """
+    several, whole = isinstance(known.value, tuple), isinstance(known.value, int)
+    count = len(known.value) if isinstance(known.value, tuple) else 1
+    numbers = value if isinstance(value, tuple) else (value,)
+    most = 1.0 if known.unit in ("probability", "cosine", "MAC") else inf
+    good = len(numbers) == count and isinstance(value, tuple) == several
+    good = good and all(0.0 < x < most for x in numbers)
+    if not good or (whole and numbers[0] != int(numbers[0])):
+        below = "" if most == inf else f" and < {most:g}"
+        kind = f"{count} numbers > 0, by comma" if several else f"a number > 0{below}"
+        kind = "a whole number >= 1" if whole else kind
+        given = shown(value) or "no number"
+        raise InputError(f"{name} = {given}", expected=f"{kind}, such as {shown(known.value)}")
