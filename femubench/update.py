@@ -16,6 +16,7 @@ from femubench.core.fem.joints import (
     with_joint_springs,
     with_rigid_ends,
 )
+from femubench.core.fit.discrepancy import Discrepancy
 from femubench.core.update.change_lists import (
     OWN,
     carried_by,
@@ -59,7 +60,7 @@ from femubench.core.update.modal_space import (
     parametric_result,
 )
 from femubench.core.update.parametric_strategy import ParametricStrategy
-from femubench.core.update.posterior_sampling import Discrepancy, sample_posterior
+from femubench.core.update.posterior_sampling import sample_posterior
 from femubench.core.update.promise import check_used_modes, force_scale
 from femubench.core.update.quasi import ITERATIONS, QuasiModes, quasi_measured_modes
 from femubench.core.update.sensitivity_strategy import SensitivityStrategy

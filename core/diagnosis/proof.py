@@ -13,6 +13,7 @@ from scipy.special import chdtrc, logsumexp
 from femubench.core.case.case import Case, Modification
 from femubench.core.diagnosis.verdict import inseparable
 from femubench.core.fem.model import Model
+from femubench.core.fit.discrepancy import Discrepancy
 from femubench.core.fit.extended_model import extended, raw_residual
 from femubench.core.fit.mesh_error import mesh_bias, mesh_corrections
 from femubench.core.fit.modal_fit import Fit, Problem, bounds_of, state_at
@@ -39,7 +40,8 @@ def _log_likelihood(errors: FloatArray, std: FloatArray) -> float:
     """
     widest = settings.widest_coordinate
     z = np.linspace(-widest, widest, 2 * settings.grid_points - 1)
-    sizes = settings.unseen_error_median * np.exp(settings.unseen_error_spread * z)
+    own = Discrepancy(settings.unseen_error_median, settings.unseen_error_spread)
+    sizes = own.std(z)
     weights = np.exp(-0.5 * np.square(z))
     sizes, weights = np.append(sizes, 0.0), np.append(0.5 * weights / weights.sum(), 0.5)
     variance = np.square(std) + np.square(sizes)[:, None]

@@ -22,6 +22,7 @@ from scipy.optimize import minimize
 from femubench.core.fem.beam import mass_matrices, stiffness_matrices
 from femubench.core.fem.frame import ACTIVE
 from femubench.core.fem.structure import Structure
+from femubench.core.fit.discrepancy import Discrepancy
 from femubench.core.fit.modal_basis import Space, rigid_first, scatter_terms
 from femubench.core.fit.modal_fit import Problem, State, state_at
 from femubench.core.fit.noise import Noise
@@ -497,7 +498,7 @@ class ModelError:
 
 def _scale(v: FloatArray) -> FloatArray:
     """Return the scale u of standard normal v, log-normal."""
-    return np.asarray(settings.error_scale_median * np.exp(settings.error_scale_spread * v))
+    return Discrepancy(settings.error_scale_median, settings.error_scale_spread).std(v)
 
 
 def conditioned(total: FloatArray, known: FloatArray, weight: float, *, beam: bool) -> Noise:

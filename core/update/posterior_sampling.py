@@ -22,6 +22,7 @@ from femubench.core.change.parametric_model import ParametricModel
 from femubench.core.errors import ModelError, NotApplicable, StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.fem.structure import Structure
+from femubench.core.fit.discrepancy import Discrepancy
 from femubench.core.fit.dual_least_squares import MANY
 from femubench.core.modal.measurement import Measurement
 from femubench.core.modal.neighbour_modes import followed_frequencies
@@ -48,23 +49,6 @@ _WALKERS, _FEWEST_WALKERS = 4, 96  # for each unknown, and in all: few take no l
 _BLOCK, _LONGEST = 500, 8000  # steps
 _LONG_ENOUGH = 25.0  # autocorrelation times
 _BURN_IN = 3.0  # autocorrelation times
-
-
-@dataclass(frozen=True)
-class Discrepancy:
-    """What is known beforehand of the relative standard deviation that a model has of its own.
-
-    Arguments:
-        median: of a log-normal prior.
-        spread: standard deviation of its logarithm.
-    """
-
-    median: float
-    spread: float
-
-    def std(self, v: FloatArray) -> FloatArray:
-        """Return the standard deviation at standard normal coordinates."""
-        return np.asarray(self.median * np.exp(self.spread * v))
 
 
 @dataclass(frozen=True)
