@@ -1,0 +1,145 @@
+"""Lists of changes: parts and effects as parameters of every strategy that fits some."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import femubench
+from femubench import InputError, NotApplicable
+from femubench.core.change.change import parameter_of
+from femubench.modal import eigenvalue_sensitivities
+from femubench.update import (
+    ParametricModel,
+    check_changes,
+    list_changes,
+    modal_space,
+    parameterise,
+    scale_property,
+    sensitivity_update,
+    set_property,
+)
+
+FRAME = femubench.cases["frame"]
+RNG = np.random.default_rng(4)
+WORDS = (
+    "sections+joint-rotation",
+    "members+density+joint-mass",
+    "joint-offset+torsion-constant",
+    "shear-deformation+rotary-inertia",
+    "local-stiffness-loss@rung-middle/2+added-mass@J1",
+    "joints",
+)
+FAMILY = (
+    *("global", "local", "spring", "offset", "bayesian", "bayesian-sampling", "sparse"),
+    *("eigensensitivity", "cma-es", "multi-start", "strain-energy", "cross-model"),
+)
+
+
+def inside(parametric: ParametricModel) -> np.ndarray:
+    """Return coordinates off all limits, a third of the way to what is likely."""
+    high = np.minimum(parametric.upper, 0.5)
+    return np.where(parametric.lower < -0.5, 0.1, 0.0) + 0.4 * high
+
+
+@pytest.mark.parametrize("case", ["frame", "hframe"])
+@pytest.mark.parametrize("words", WORDS)
+def test_slopes_of_a_list_are_those_of_differences(case: str, words: str) -> None:
+    model = femubench.cases[case].model
+    if case == "hframe":
+        words = words.replace("@rung-middle/2", "").replace("@J1", "")
+        words = words.replace("torsion-constant", "youngs-modulus")
+    parametric = ParametricModel(model, tuple(list_changes(model, words)))
+    x = inside(parametric)
+    at = parametric.at(x)
+    modes = femubench.solve_modes(at).elastic.take(np.arange(4))
+    slopes = eigenvalue_sensitivities(at, modes, parametric.slopes(x, at)) * parametric.steps(x)
+    step, masses = 1e-5, parametric.mass_slopes(x, at) * parametric.steps(x)
+    for k, unit in enumerate(np.eye(len(x))):
+        up, down = (parametric.at(x + sign * step * unit) for sign in (1.0, -1.0))
+        high, low = (femubench.solve_modes(m).elastic.eigenvalues[:4] for m in (up, down))
+        # Differences of eigenvalues are known to rounding of the largest one of the model.
+        scale = np.abs(slopes).max(axis=1) + 0.5 * modes.eigenvalues
+        np.testing.assert_array_less(
+            np.abs(slopes[:, k] - (high - low) / (2.0 * step)), 2e-5 * scale
+        )
+        weighed = [parametric.mass(x + s * step * unit, m) for s, m in ((1, up), (-1, down))]
+        assert masses[k] == pytest.approx((weighed[0] - weighed[1]) / (2.0 * step), abs=1e-6)
+
+
+@pytest.mark.parametrize("at_start", [True, False])
+def test_the_modal_space_has_the_frequencies_and_slopes_of_the_model(at_start: bool) -> None:
+    parametric = parameterise(FRAME.model, "sections+joint-rotation+joint-mass")
+    used, x = FRAME.used_measurement(), inside(parametric)
+    start = np.zeros(len(x)) if at_start else 0.5 * x
+    space = modal_space(parametric, used, shape_weight=0.1, at=start)
+    exact = femubench.solve_modes(parametric.at(x)).elastic.natural_frequencies[:6]
+    values, _ = space.eigenpairs(x)
+    hertz = np.sqrt(np.abs(values)) / (2.0 * np.pi)
+    assert hertz[hertz > 1.0][:6] == pytest.approx(exact, rel=1e-8)
+    ahead, behind = (
+        [space.fit(x + sign * 1e-5 * unit).residual for unit in np.eye(len(x))] for sign in (1, -1)
+    )
+    slope = (np.array(ahead) - np.array(behind)).T / 2e-5
+    assert space.fit(x).slope == pytest.approx(slope, abs=2e-6)
+
+
+def test_an_effect_sits_at_its_coarsest_places_or_at_the_one_that_is_named() -> None:
+    model = FRAME.model
+    names = [change.name for change in list_changes(model, "joint-rotation+density")]
+    assert names == ["joint-rotation L", "joint-rotation T", "density all"]
+    (alone,) = list_changes(model, "joint-rotation@J1")
+    assert alone.places == ("J1",)
+    free, held = (list_changes(model, "density", prior_std=std)[0] for std in (None, 0.1))
+    assert parameter_of(free.parameters[0]).std == np.inf
+    assert parameter_of(held.parameters[0]).std == 1.0
+
+
+def test_what_has_no_place_or_name_is_one_line() -> None:
+    check_changes("own")
+    with pytest.raises(InputError, match=r"there is no 'member' \(expected own, elements, "):
+        check_changes("sections+member")
+    with pytest.raises(NotApplicable, match="joint-rotation has no place in this model at 'X'"):
+        list_changes(FRAME.model, "joint-rotation@X")
+    matrices = replace(FRAME.model, structure=None)
+    with pytest.raises(NotApplicable, match="joint-rotation has no place in this model"):
+        list_changes(matrices, "joint-rotation")
+    with pytest.raises(NotApplicable, match=r"attached-oscillator.* adds degrees of freedom"):
+        parameterise(FRAME.model, "attached-oscillator@J1:z")
+    with pytest.raises(NotApplicable, match=r"is in E .* and in E "):
+        parameterise(FRAME.model, "members+sections")
+
+
+@pytest.mark.parametrize("name", FAMILY)
+def test_every_strategy_of_the_family_fits_effects_and_sections_together(name: str) -> None:
+    strategy = femubench.strategies[name](changes="joint-rotation+sections")
+    used = FRAME.used_measurement()
+    result = strategy.update(FRAME.model, used, np.random.default_rng(0))
+    expected = 2 if name == "strain-energy" else 5  # which fits what it names alone
+    assert len(result.parameters) >= expected
+    modes = femubench.solve_modes(result.model)
+    assert int(modes.rigid.sum()) == 3
+    assert modes.eigenvalues.min() > -1e-6 * modes.elastic.eigenvalues[0]
+    error = np.abs(modes.elastic.natural_frequencies[:3] / used.frequencies - 1.0).max()
+    if name not in ("cross-model", "strain-energy"):  # linear about rigid joints
+        assert error < 0.02
+
+
+def test_a_list_runs_on_the_board() -> None:
+    words = "bayesian:changes=joint-rotation+sections"
+    run = femubench.rank("frame", [words], nominal="drawn")
+    (result,) = (r for r in run.results if r.strategy.startswith("bayesian"))
+    assert result.status == "ok"
+
+
+def test_a_value_that_is_set_moves_in_its_unit_and_keeps_its_sign() -> None:
+    soft = set_property("k", "spring", ("a@B:ry",), 1e4, 1.0, 1e7, unit="N m/rad")
+    signed = set_property("a", "rigid", ("a@B",), -0.02, -0.1, 0.1, unit="m", signed=True)
+    assert soft.values(np.array([[np.log(2.0)]]))[0, 0] == pytest.approx(2e4)
+    assert signed.values(np.array([[2.0]]))[0, 0] == pytest.approx(0.02)
+    assert signed.bounds[0] == pytest.approx([-4.0])
+    factor = scale_property("E", "E", ("rung-middle/1",), prior_std=0.1)
+    result = sensitivity_update(FRAME.model, [factor], FRAME.used_measurement())
+    assert result.parameters[0].places == ("rung-middle/1",)
