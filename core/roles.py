@@ -310,21 +310,17 @@ class Paper(Protocol):
     """A paper whose printed tables are recomputed.
 
     A paper may offer more than is asked here: ``done``, hundredths of a second after which a re-run
-    had done each of its different updates, and all else, from which the time that is left is told.
-
-    Attributes:
-        name: the word after ``bench reproduce``.
-        cases: names of those that the re-run works with.
+    had done each of its different updates, and all else, from which the time that is left follows.
     """
 
     @property
     def name(self) -> str:
-        """Return a slug; a plain attribute will do."""
+        """Return the word after ``bench reproduce``; a plain attribute will do."""
         ...
 
     @property
     def cases(self) -> Sequence[str]:
-        """Return the names of cases; a plain attribute will do."""
+        """Return the names of cases that the re-run works with; a plain attribute will do."""
         ...
 
     def study(self, bench: Any) -> Any:  # noqa: ANN401 - see the module

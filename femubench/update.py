@@ -1,7 +1,6 @@
 """Steps that updating strategies share: unknowns, element families, joints, expansion, promises."""
 
-from femubench.core.change.change import Change, scale_property, set_property
-from femubench.core.change.parameter import Parameter
+from femubench.core.change.change import scale_property, set_property
 from femubench.core.change.parametric_model import ParametricModel
 from femubench.core.errors import SelfCheckFailed
 from femubench.core.fem.joints import (
@@ -85,8 +84,6 @@ __all__ = [
     "ParametricModel",
     "Symmetry",
     "Uncertainty",
-    "Change",
-    "Parameter",
     "SensitivityStrategy",
     "list_changes",
     "scale_property",

@@ -28,6 +28,7 @@ from femubench.core.fem.sections import constant_kappa
 from femubench.core.modal.eigen import counted_evaluations
 from femubench.core.modal.sensitivity import eigenvalue_sensitivities
 from femubench.core.update.residuals import Data, predict
+from femubench.effect import Change
 from femubench.fem import (
     Frame,
     GroundSpring,
@@ -48,7 +49,6 @@ from femubench.plugins.strategies.factors import Global, Local
 from femubench.plugins.strategies.offset import Offset
 from femubench.plugins.strategies.spring import Spring
 from femubench.update import (
-    Change,
     UpdateOptions,
     all_elements,
     carried_by,

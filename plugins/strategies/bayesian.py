@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from femubench import Measurement, Model
+from femubench.effect import Change
 from femubench.update import (
     OWN,
-    Change,
     SensitivityStrategy,
     UpdateOptions,
     all_elements,

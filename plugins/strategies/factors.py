@@ -7,8 +7,8 @@ from functools import partial
 from typing import ClassVar
 
 from femubench import Measurement, Model
+from femubench.effect import Change
 from femubench.update import (
-    Change,
     SensitivityStrategy,
     UpdateOptions,
     groups_within,

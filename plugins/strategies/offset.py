@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from femubench import Measurement, Model
+from femubench.effect import Change
 from femubench.fem import Structure
 from femubench.update import (
-    Change,
     JointGroup,
     SensitivityStrategy,
     available_length,

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from femubench import Measurement, Model, NotApplicable
+from femubench.effect import Change
 from femubench.fem import Structure
 from femubench.update import (
-    Change,
     JointGroup,
     SensitivityStrategy,
     all_elements,
