@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import femubench
-from femubench import InputError, NotApplicable
+from femubench import InputError, Model, NotApplicable
 from femubench.core.change.change import parameter_of
+from femubench.fem import Place, Support
 from femubench.modal import eigenvalue_sensitivities
 from femubench.update import (
     ParametricModel,
@@ -143,3 +144,63 @@ def test_a_value_that_is_set_moves_in_its_unit_and_keeps_its_sign() -> None:
     factor = scale_property("E", "E", ("rung-middle/1",), prior_std=0.1)
     result = sensitivity_update(FRAME.model, [factor], FRAME.used_measurement())
     assert result.parameters[0].places == ("rung-middle/1",)
+
+
+def test_a_list_that_contradicts_itself_is_refused() -> None:
+    for words, message in (
+        ("members+members", "'members' stands there twice"),
+        ("own+members", "'own' alone"),
+        ("members@rung-middle", "only effects have places"),
+    ):
+        with pytest.raises(InputError, match=message):
+            check_changes(words)
+    with pytest.raises(InputError, match=r"one of own, .* not 'members\+sections'"):
+        check_changes("members+sections", parts_alone=True)
+    with pytest.raises(NotApplicable, match=r"no plugin|nobody"):
+        list_changes(FRAME.model, "nobody/effect")
+    together = parameterise(FRAME.model, "joint-rotation+joint-flexibility")
+    with pytest.raises(NotApplicable, match="do not go together in this model"):
+        modal_space(together, FRAME.used_measurement(), shape_weight=0.0)
+    with pytest.raises(NotApplicable, match="do not go together in this model"):
+        sensitivity_update(FRAME.model, together.changes, FRAME.used_measurement())
+
+
+def test_a_point_without_a_mass_is_worse_than_any_model() -> None:
+    lighter = parameterise(FRAME.model, "member-mass+density")
+    space = modal_space(lighter, FRAME.used_measurement(), shape_weight=0.1)
+    low = space.fit(lighter.lower)
+    assert low.paired == 0
+    assert low.cost > 1e3 * space.fit(np.zeros(len(lighter))).cost
+    assert not low.slope.any()
+
+
+def test_masses_of_matrices_and_of_held_frames_have_the_terms_in_them() -> None:
+    held = replace(
+        FRAME.model.frame_structure.frame,
+        supports=(Support(Place(joint="J1"), ("z", "rx", "ry")),),
+    )
+    frame = ParametricModel(Model.of(held), tuple(list_changes(Model.of(held), "added-mass@J5")))
+    (kilograms,) = frame.values(np.array([0.5]))
+    at = frame.at(np.array([0.5]))
+    assert frame.mass(np.array([0.5]), at) == pytest.approx(
+        frame.model.total_mass + kilograms, rel=1e-12
+    )
+    half = replace(FRAME.model, structure=None, mass_groups={"half": 0.5 * FRAME.model.mass})
+    factor = scale_property("mass", "density", ("group:half",))
+    both = ParametricModel(half, (factor, *list_changes(half, "youngs-modulus")))
+    x = np.zeros(len(both))
+    x[0] = np.log(1.2)
+    assert both.mass(x, both.at(x)) == pytest.approx(1.1 * half.total_mass, rel=1e-9)
+    assert both.mass_slopes(x, both.at(x))[0] == pytest.approx(0.6 * half.total_mass, rel=1e-9)
+
+
+def test_data_of_the_start_leave_cross_model_where_it_starts() -> None:
+    parametric = parameterise(FRAME.model, "joint-rotation")
+    modes = femubench.solve_modes(parametric.start).elastic.take(np.arange(3))
+    used = FRAME.used_measurement()
+    shapes = np.asarray(parametric.start.observe(used.sensors) @ modes.shapes)
+    exact = replace(used, frequencies=modes.natural_frequencies, shapes=shapes)
+    strategy = femubench.strategies["cross-model"](changes="joint-rotation")
+    result = strategy.update(FRAME.model, exact, RNG)
+    found = femubench.solve_modes(result.model).elastic.natural_frequencies[:3]
+    assert found == pytest.approx(modes.natural_frequencies, rel=1e-3)

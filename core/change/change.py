@@ -80,6 +80,7 @@ class Change:
     def slopes(self, x: FloatArray) -> FloatArray:
         """Return d factors / d x at one point, (k, n_terms); one-sided where a bound is near."""
         low, high = self.bounds
+        x = np.clip(x, low, high)
         step = _SLOPE_STEP * np.eye(len(x))
         up, down = np.minimum(x + step, high), np.maximum(x - step, low)
         width = (up - down).diagonal()

@@ -11,7 +11,7 @@ import numpy as np
 from femubench.core.change.change import Change, parameter_of
 from femubench.core.change.parameter import Parameter
 from femubench.core.change.terms import Term, sparse_matrix, weigh_term
-from femubench.core.errors import NotApplicable
+from femubench.core.errors import ModelError, NotApplicable
 from femubench.core.fem.model import Model
 from femubench.core.fem.model_parameters import (
     MatrixSlopes,
@@ -21,6 +21,7 @@ from femubench.core.fem.model_parameters import (
     with_values,
 )
 from femubench.core.fem.parameters import Property
+from femubench.core.modal.eigen import solve_modes
 from femubench.core.typing import BoolArray, FloatArray, IntArray, SparseArray
 
 
@@ -45,8 +46,11 @@ class TermSlopes:
         """Return left_j' dK/dx right_j and the same for dM, two arrays (m, n_parameters)."""
         found = {name: np.zeros((left.shape[1], self.count)) for name in ("stiffness", "mass")}
         for term, own in zip(self.terms, self.factors.T, strict=True):
-            energy = np.einsum("nm,nm->m", left, term.operator.apply(right))
-            found[term.matrix] += np.outer(energy, own)
+            energy, used = (
+                np.einsum("nm,nm->m", left, term.operator.apply(right)),
+                np.flatnonzero(own),
+            )
+            found[term.matrix][:, used] += np.outer(energy, own[used])
         return found["stiffness"], found["mass"]
 
     def inner(self, left: FloatArray, right: FloatArray, matrix: str = "stiffness") -> FloatArray:
@@ -54,7 +58,9 @@ class TermSlopes:
         found = np.zeros((self.count, left.shape[1], right.shape[1]))
         for term, own in zip(self.terms, self.factors.T, strict=True):
             if term.matrix == matrix:
-                found += own[:, None, None] * (left.T @ term.operator.apply(right))
+                used = np.flatnonzero(own)
+                form = left.T @ term.operator.apply(right)
+                found[used] += own[used, None, None] * form
         return found
 
     def combined(self, vector: FloatArray, weights: FloatArray) -> FloatArray:
@@ -65,8 +71,9 @@ class TermSlopes:
         """Return (dK/dx - eigenvalue dM/dx) @ vector for every parameter, (n, n_parameters)."""
         result = np.zeros((len(vector), self.count))
         for term, own in zip(self.terms, self.factors.T, strict=True):
-            force = term.operator.apply(vector[:, None])[:, 0]
-            result += np.outer(force if term.matrix == "stiffness" else -eigenvalue * force, own)
+            used = np.flatnonzero(own)
+            factor = own[used] if term.matrix == "stiffness" else -eigenvalue * own[used]
+            result[:, used] += np.outer(term.operator.apply(vector[:, None])[:, 0], factor)
         return result
 
 
@@ -111,7 +118,9 @@ class JoinedSlopes:
 
 @dataclass(frozen=True)
 class ParametricModel:
-    """A model as a function of the coordinates x of its changes, 0 for the model as it is.
+    """A model as a function of the coordinates x of its changes.
+
+    It is as it is at x = 0, but for what an effect has at any size: the arms of joints that rotate.
 
     Changes of properties are made in the frame or the groups; what terms add is summed on top of
     them, on the dofs of the model.
@@ -250,9 +259,9 @@ class ParametricModel:
             x: coordinates, (p,).
             model: the model there.
         """
-        added = float(self.factors(x) @ self._weights) if self.terms else 0.0
-        known = model if model.structure is not None or not self.terms else self.model
-        return updated_mass(known) + added
+        # A frame weighs what its members weigh; matrices have the terms in them.
+        framed = self.terms and model.structure is not None
+        return updated_mass(model) + (float(self.factors(x) @ self._weights) if framed else 0.0)
 
     def mass_slopes(self, x: FloatArray, model: Model) -> FloatArray:
         """Return d mass / dx in kg, that of a factor about its present value, (p,)."""
@@ -285,6 +294,23 @@ class ParametricModel:
             bool(change.quantity) and not change.property.is_factor for change in self.owners
         ]
         return np.where(set_alone, self.growth(x), 1.0)
+
+    @cached_property
+    def start(self) -> Model:
+        """Return the model at x = 0, as near to there as the ranges allow.
+
+        Raises:
+            NotApplicable: when changes do not go together: their terms leave no model.
+        """
+        if not self.terms:
+            return self.model
+        model = self.at(np.clip(np.zeros(len(self)), self.lower, self.upper))
+        try:
+            solve_modes(model, 1)
+        except ModelError as error:
+            names = ", ".join(change.name for change in self.changes)
+            raise NotApplicable(f"{names} do not go together in this model: {error}") from None
+        return model
 
     @cached_property
     def start_slopes(self) -> MatrixSlopes:

@@ -11,7 +11,7 @@ import numpy as np
 from femubench.core.change.change import Change, scale_property
 from femubench.core.change.parametric_model import ParametricModel
 from femubench.core.change.tabulated import change_of
-from femubench.core.errors import InputError, NotApplicable
+from femubench.core.errors import InputError, NotApplicable, UnknownNameError
 from femubench.core.fem.frame import Frame
 from femubench.core.fem.group_factors import GROUP, Matrix, group_places
 from femubench.core.fem.joints import JointGroup, all_elements, elements_at, joint_groups
@@ -44,12 +44,20 @@ def check_changes(words: str, *, parts_alone: bool = False) -> None:
         >>> update.check_changes("members")
     """
     known = get_args(PartSet)
-    for word in words.split("+") if words != OWN else ():
+    if words == OWN:
+        return
+    if parts_alone and words not in known:
+        raise InputError(f"the changes are one of {OWN}, {', '.join(known)}, not {words!r}")
+    listed = words.split("+")
+    for word in listed:
+        if listed.count(word) > 1:
+            raise InputError(f"changes: {word!r} stands there twice", expected="each once")
         if word in known:
             continue
-        if parts_alone:
-            raise InputError(f"the changes are {OWN}, {', '.join(known)}, not {word!r}")
         effect = word.partition("@")[0]
+        if effect in (OWN, *known):
+            rule = "alone" if effect == OWN else "without @: only effects have places"
+            raise InputError(f"changes: {word!r}", expected=f"{effect!r} {rule}")
         # The code of others is imported where a strategy runs, not where its options are read.
         if "/" not in effect and all(found.name != effect for found in registered_effects()):
             raise InputError(
@@ -288,7 +296,8 @@ def list_changes(model: Model, words: str, *, prior_std: float | None = None) ->
         prior_std: of the logarithm of a factor; None for no prior on anything.
 
     Raises:
-        NotApplicable: when the model has no such parts, or no place for an effect.
+        NotApplicable: when the model has no such parts, two factors on the same one, or no place
+            for an effect.
 
     Examples:
         >>> names = [change.name for change in update.list_changes(model, "sections+density")]
@@ -302,13 +311,17 @@ def list_changes(model: Model, words: str, *, prior_std: float | None = None) ->
             continue
         name, _, place = word.partition("@")
         plugin, _, name = name.rpartition("/")
-        known = registered_effects(*([plugin] if plugin else []))
+        try:
+            known = registered_effects(*([plugin] if plugin else []))
+        except UnknownNameError as error:
+            raise NotApplicable(f"changes: {error}") from error
         effect = next((found for found in known if found.name == name), None)
         if effect is None:
             raise NotApplicable(f"changes: there is no effect {name!r}")
         placed = [change_of(effect, model, where) for where in _places(effect, model, place)]
         placed = [replace(c, name=f"{name} {c.places[0]}") for c in placed]
         found += placed if prior_std is not None else [c.without_prior() for c in placed]
+    _check_apart({change.name: change.places for change in found if change.quantity})
     return found
 
 
@@ -358,6 +371,4 @@ def parameterise(model: Model, words: str) -> ParametricModel:
     check_changes(words)
     if words == OWN:
         words = "members" if model.structure is not None else "groups"
-    changes = list_changes(model, words, prior_std=STRUCTURE_STD)
-    _check_apart({change.name: change.places for change in changes if change.quantity})
-    return ParametricModel(model, tuple(changes))
+    return ParametricModel(model, tuple(list_changes(model, words, prior_std=STRUCTURE_STD)))

@@ -11,7 +11,7 @@ import scipy.linalg as la
 from scipy.optimize import least_squares
 
 from femubench.core.change.parametric_model import ParametricModel
-from femubench.core.errors import StrategyFailure
+from femubench.core.errors import ModelError, StrategyFailure
 from femubench.core.fem.model import Model
 from femubench.core.modal.correlation import seen_modes
 from femubench.core.modal.eigen import (
@@ -32,6 +32,7 @@ from femubench.core.update.strategy import UpdateResult
 _SPARE = 10  # modes above the measured ones that may become their partners
 _LOST = 1.0 - 1.0 / WINDOW_WITHOUT_SHAPE  # what a mode without a partner counts as, relative
 _DEPENDENT = 1e-8
+_NO_MODEL = 10.0  # more than any residual of a model
 _LONGEST = 0.5  # step of ln theta
 _HALVINGS = 6
 _EVALUATIONS, _TOLERANCE = 30, 1e-6
@@ -111,7 +112,11 @@ class ModalSpace:
         return low, np.where(model.is_property, factor, model.upper)
 
     def eigenpairs(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return eigenvalues (r,) and vectors (r, r) at coordinates, (p,)."""
+        """Return eigenvalues (r,) and vectors (r, r) at coordinates, (p,).
+
+        Raises:
+            ModelError: when the mass is not positive definite there.
+        """
         count_evaluation()
         change = np.tensordot(np.expm1(x[self.parametric.is_property]), self.parts, axes=1)
         stiffness, mass = self.stiffness + change, None
@@ -121,7 +126,10 @@ class ModalSpace:
             if own.any():
                 mass = self.mass + np.tensordot(factors[own], self.terms[own], axes=1)
         driver = "evd" if mass is None else "gvd"
-        values, vectors = la.eigh(stiffness, mass, check_finite=False, driver=driver)
+        try:
+            values, vectors = la.eigh(stiffness, mass, check_finite=False, driver=driver)
+        except la.LinAlgError as error:
+            raise ModelError("the mass is not positive definite") from error
         return np.asarray(values), np.asarray(vectors)
 
     def forces(self, x: FloatArray, vector: FloatArray, value: float) -> FloatArray:
@@ -147,7 +155,10 @@ class ModalSpace:
         The residual of a shape is that of both shapes at unit length, the measured less its share
         along the model's: the sum of its squares is 1 - MAC, whose own slope vanishes at its best.
         """
-        eigenvalues, vectors = self.eigenpairs(x)
+        try:
+            eigenvalues, vectors = self.eigenpairs(x)
+        except ModelError:
+            return self._none(len(x) if slopes else 0)
         readings = self.readings @ vectors
         partner = self.partners(eigenvalues, readings)
         m, shapes = len(self.measurement), self._unit_shapes
@@ -177,6 +188,11 @@ class ModalSpace:
             np.vstack([slope, weight * shape_slope.reshape(shape_rows.size, size)]),
             int((partner >= 0).sum()),
         )
+
+    def _none(self, size: int) -> ModalFit:
+        """Return a fit that no model is as bad as, where changes together leave no mass."""
+        rows = len(self.measurement) + self._unit_shapes.size * bool(self._unit_shapes.any())
+        return ModalFit(np.full(rows, _NO_MODEL), np.zeros((rows, size)), 0)
 
     @cached_property
     def _known(self) -> BoolArray:
@@ -288,8 +304,8 @@ def modal_space(
         >>> space.fit(np.zeros(7)).paired
         3
     """
-    count = len(parametric)
-    x = np.zeros(count) if at is None else at
+    assert parametric.start is not None  # raises where changes do not go together
+    x = np.zeros(len(parametric)) if at is None else at
     model = parametric.model if not x.any() else parametric.at(x)
     modes = solve_modes(model, enough_modes(model, len(measurement)))
     observer = model.observe(measurement.sensors)

@@ -92,7 +92,9 @@ class Target:
             except ModelError:
                 continue
             if self.measurement.total_mass is not None:
-                row = np.append(row, model.total_mass)
+                own = self.iteration.parametric
+                mass = own.mass(q, model) if own.terms else model.total_mass
+                row = np.append(row, mass)
             if (row > 0.0).all():
                 rows.append(np.log(row))
                 kept.append(q)
@@ -309,7 +311,8 @@ def _started(target: Target, fit: QuadraticFit, root: FloatArray, rng: np.random
     near = rng.standard_normal((walkers, size))
     near[:, :-1] = target.point.q + near[:, :-1] @ root.T
     low, high = target.iteration.parametric.lower, target.iteration.parametric.upper
-    near[:, :-1] = np.clip(near[:, :-1], 0.99 * low, 0.99 * high)
+    # At a bound there is no density.
+    near[:, :-1] = np.clip(near[:, :-1], np.where(low < 0.0, 0.99 * low, 0.01 * high), 0.99 * high)
     density = target.log_density(fit)
     sampler = emcee.EnsembleSampler(walkers, size, density, vectorize=True, moves=StretchMove())
     sampler.random_state = np.random.RandomState(int(rng.integers(2**32))).get_state()

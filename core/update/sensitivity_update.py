@@ -141,7 +141,9 @@ class Iteration:
 
     def run(self) -> Point:
         """Return the optimum; raises StrategyFailure or Diverged where there is none."""
-        point = self.at(np.zeros(len(self.parametric)))
+        parametric = self.parametric
+        assert parametric.start is not None  # raises where changes do not go together
+        point = self.at(np.clip(np.zeros(len(parametric)), parametric.lower, parametric.upper))
         if not (point.prediction.partner >= 0).any():
             raise StrategyFailure("no mode of the model looks like any measured mode")
         data = self.data

@@ -68,6 +68,7 @@ class CrossModel(ParametricStrategy):
             StrategyFailure: when a measured mode has no partner in the model.
         """
         parts = parameterise(model, self.changes)
+        model = parts.start
         own = solve_modes(model).elastic
         own = own.take(np.arange(min(len(own), self.modes * len(measurement))))
         if self.expansion == "force":
@@ -104,7 +105,7 @@ def cross_equations(
     inertias = parts.inertias(own.shapes, shapes)
     if inertias is not None:
         energies = energies - eigenvalues * inertias
-    momentum = own.shapes.T @ parts.model.mass_times(shapes)
+    momentum = own.shapes.T @ parts.start.mass_times(shapes)
     right = (eigenvalues[None, :] - own.eigenvalues[:, None]) * momentum
     scale = 1.0 / np.sqrt(np.outer(own.eigenvalues, eigenvalues))
     return (energies * scale).reshape(len(parts), -1).T, (right * scale).ravel()

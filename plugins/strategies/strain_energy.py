@@ -75,9 +75,12 @@ class StrainEnergy(ParametricStrategy):
         order = np.argsort(-index, kind="stable")
         count = min(max(len(named), 1), len(measurement))
         chosen = parts.of([int(j) for j in order[:count]])
+        while len(chosen) > len(measurement) and count > 1:  # an effect may have several values
+            count -= 1
+            chosen = parts.of([int(j) for j in order[:count]])
         space = modal_space(chosen, measurement, shape_weight=self.shape_weight)
         log, cost = bounded_fit(space, np.zeros(len(chosen)), _LARGEST)
-        return parametric_result(chosen, log, cost=cost, named=float(count))
+        return parametric_result(chosen, log, cost=cost, named=float(len(chosen.changes)))
 
 
 def energy_change_index(before: FloatArray, after: FloatArray) -> FloatArray:
