@@ -22,7 +22,7 @@ from femubench.core.conformance.kit import (
     judged,
     prepare,
 )
-from femubench.core.conformance.problems import Problem
+from femubench.core.conformance.problems import UpdatingProblem
 from femubench.core.errors import InputError
 from femubench.core.plugin.loader import Plugins, shown
 from femubench.core.plugin.validation import KINDS, did_you_mean
@@ -65,7 +65,7 @@ def checks_of(role: Role) -> tuple[Check, ...]:
 
 
 def subjects(
-    name: str, plugins: Plugins, *, cases: Sequence[Problem] = (), seconds: float = SECONDS
+    name: str, plugins: Plugins, *, cases: Sequence[UpdatingProblem] = (), seconds: float = SECONDS
 ) -> list[Subject]:
     """Return every strategy, effect, reader and scenario of a name.
 
@@ -134,7 +134,7 @@ def _bench(
     role: Role,
     item: Any,  # noqa: ANN401 - any role
     plugins: Plugins,
-    cases: Sequence[Problem],
+    cases: Sequence[UpdatingProblem],
     seconds: float,
 ) -> Bench:
     if role == "strategy":

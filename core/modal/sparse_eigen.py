@@ -12,7 +12,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from femubench.core.errors import ModelError
 from femubench.core.fem.model import LowRank, Model
-from femubench.core.modal.factorisation import LU, Cholesky, DefiniteLU, Factor, cholmod_obstacle
+from femubench.core.modal.factorisation import LU, Cholesky, DefiniteLU, Symmetric, cholmod_obstacle
 from femubench.core.modal.generalised_mass import generalised_masses
 from femubench.core.modal.inertia import Change, negative_after, negative_by_pins, signs_hold
 from femubench.core.modal.rigid import rigid_modes_of
@@ -70,7 +70,7 @@ class ShiftedModel:
         )
 
     @cached_property
-    def _factor(self) -> Factor:
+    def _factor(self) -> Symmetric:
         # Above the lowest eigenvalue there is no Cholesky factorisation.
         if self.shift <= 0.0 and (cholesky := self._cholesky) and cholesky.factorise(self._matrix):
             return cholesky
