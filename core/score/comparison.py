@@ -147,7 +147,7 @@ _ROUNDING = 1e-9  # relative; two machines may differ by it
 
 
 @dataclass(frozen=True)
-class _Pair:
+class _JobPair:
     """One job in both runs; the errors of the nominal model and its shares stand for both."""
 
     strategy: str
@@ -231,7 +231,7 @@ def compare_runs(
     structures = {**structures_of(after), **structures_of(before)}
     shares = block_shares(references, structures)
     pairs = [
-        _Pair(j.strategy, old[j], new[j], references.get(j.case) or {}, shares.get(j.case))
+        _JobPair(j.strategy, old[j], new[j], references.get(j.case) or {}, shares.get(j.case))
         for j in shared
     ]
     rows = tuple(_rows(pairs))
@@ -335,7 +335,7 @@ def _state(result: JobResult) -> str:
     return "unphysical" if result.unphysical else result.status
 
 
-def _changes(pairs: Iterable[_Pair]) -> tuple[StatusChange, ...]:
+def _changes(pairs: Iterable[_JobPair]) -> tuple[StatusChange, ...]:
     found = []
     for pair in pairs:
         before, after = _state(pair.before), _state(pair.after)
@@ -360,8 +360,8 @@ def _damage(result: JobResult) -> str:
     return ", ".join(f"{number} {what}" for what, number in counts.items() if number)
 
 
-def _rows(pairs: Iterable[_Pair]) -> Iterable[RatioRow]:
-    groups: dict[str, dict[str | None, list[_Pair]]] = {}
+def _rows(pairs: Iterable[_JobPair]) -> Iterable[RatioRow]:
+    groups: dict[str, dict[str | None, list[_JobPair]]] = {}
     for pair in pairs:
         group = groups.setdefault(pair.strategy, {None: []})
         group[None].append(pair)

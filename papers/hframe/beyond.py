@@ -10,12 +10,12 @@ import numpy as np
 from femubench.fem import FloatArray
 from femubench.papers.hframe.meshes import frequencies
 from femubench.papers.hframe.physical import (
-    Physical,
+    TimoshenkoFit,
     in_plane,
     physical_model,
     shape_paired_errors,
 )
-from femubench.papers.hframe.rows import FREE_EI, ROWS, Row, at_printed, parameter_values, run
+from femubench.papers.hframe.rows import FREE_EI, ROWS, Update, at_printed, parameter_values, run
 from femubench.papers.hframe.updates import USED, follows, misprinted, unit_of
 from femubench.papers.printed import printed
 from femubench.reproduction import Bars, Extra, Workbench
@@ -42,7 +42,7 @@ class ModelComparison:
     errors: Mapping[str, FloatArray]
     probability: float
     causes: tuple[str, ...]
-    physical: Physical
+    physical: TimoshenkoFit
 
 
 def compare(bench: Workbench) -> ModelComparison:
@@ -135,7 +135,7 @@ def _converged(bench: Workbench) -> Extra:
     )
 
 
-def _history(bench: Workbench, row: Row) -> Extra:
+def _history(bench: Workbench, row: Update) -> Extra:
     words = row.converged or row.updated.words
     history = run(bench, words).history
     names = [name for name in history[0] if name not in ("iteration", "step")]
